@@ -1,0 +1,83 @@
+"""The errors and warnings that picchio raises on purpose.
+
+Every message is one line that names the file, the key, the value that is wrong and the
+valid choices, so that a user can mend the input without reading a traceback.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+_NOT_GIVEN = object()
+_MOST_CHOICES = 12
+
+
+class PicchioError(Exception):
+    """Root of every error that picchio raises on purpose."""
+
+
+class PicchioWarning(UserWarning):
+    """Something the user should know, that does not stop the work."""
+
+
+class InputError(PicchioError):
+    """Bad input: a file, a key, a value or an argument.
+
+    Args:
+        problem: what is wrong, without a full stop.
+        file: the file that holds it.
+        key: the dotted key, joint, frame or option that is wrong.
+        value: the value found there.
+        choices: what would have been valid; close matches come first.
+        hint: what to do.
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        file: str | Path | None = None,
+        key: str | None = None,
+        value: Any = _NOT_GIVEN,
+        choices: Iterable[str] | None = None,
+        hint: str | None = None,
+    ) -> None:
+        self.problem = problem
+        self.file = str(file) if file is not None else None
+        self.key = key
+        self.value = None if value is _NOT_GIVEN else value
+        self.choices = tuple(choices) if choices is not None else None
+        self.hint = hint
+        super().__init__(self._line(value))
+
+    def _line(self, value: Any) -> str:
+        place = [part for part in (self.file, self.key) if part]
+        line = (": ".join(place) + ": " if place else "") + self.problem
+        if value is not _NOT_GIVEN:
+            line += f", got {shorten(value)}"
+        if self.choices is not None:
+            line += "; " + describe_choices(value, self.choices)
+        if self.hint:
+            line += f"; {self.hint}"
+        return " ".join(line.split())
+
+
+def shorten(value: Any, width: int = 80) -> str:
+    """The value's repr, cut to `width` characters and to one line."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= width else text[: width - 3] + "..."
+
+
+def describe_choices(value: Any, choices: Iterable[str]) -> str:
+    """A sentence part that lists the valid choices, the likely one first."""
+    names = [str(choice) for choice in choices]
+    if not names:
+        return "there are none to choose from"
+    close = difflib.get_close_matches(str(value), names, n=1, cutoff=0.6)
+    shown = ", ".join(names[:_MOST_CHOICES])
+    more = f" and {len(names) - _MOST_CHOICES} more" if len(names) > _MOST_CHOICES else ""
+    meant = f"did you mean {close[0]!r}? " if close else ""
+    return f"{meant}valid: {shown}{more}"

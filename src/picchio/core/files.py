@@ -1,0 +1,85 @@
+"""Files that are either whole or not there, and their fingerprints."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+from picchio.core.errors import InputError
+
+
+@contextmanager
+def atomic_write(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
+    """Open a temporary file beside `path` and rename it over `path` when the block ends well.
+
+    Args:
+        path: where the file shall stand.
+        mode: "w" for UTF-8 text, "wb" for bytes.
+
+    Raises:
+        InputError: the folder does not exist or can't be written.
+    """
+    target = Path(path)
+    try:
+        handle, name = tempfile.mkstemp(
+            prefix=f".{target.name}.", suffix=".part", dir=target.parent
+        )
+    except OSError as error:
+        raise InputError(f"cannot write here: {error.strerror}", file=target) from None
+    temporary = Path(name)
+    try:
+        os.chmod(temporary, 0o666 & ~_umask())
+        with os.fdopen(handle, mode, encoding=None if "b" in mode else "utf-8") as stream:
+            yield stream
+        if target.is_dir():
+            raise InputError("cannot write a file over a folder", file=target)
+        os.replace(temporary, target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    # mkstemp makes files private; give the user's own default permissions back.
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def sha256(path: str | Path) -> str:
+    """SHA-256 of a file's bytes, as 64 hex digits."""
+    digest = hashlib.sha256()
+    with open(path, "rb") as stream:
+        for block in iter(lambda: stream.read(1 << 20), b""):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def read_text(path: str | Path, *, limit: int = 32 << 20) -> str:
+    """A UTF-8 text file's content.
+
+    Args:
+        path: the file.
+        limit: refuse files above this size, in bytes.
+
+    Raises:
+        InputError: missing, a folder, unreadable, too large, or not UTF-8.
+    """
+    source = Path(path)
+    try:
+        if source.is_dir():
+            raise InputError("is a folder, not a file", file=source)
+        if (size := source.stat().st_size) > limit:
+            raise InputError(f"is too large ({size} bytes; at most {limit})", file=source)
+        return source.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        raise InputError("no such file", file=source) from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"is not UTF-8 text (byte {error.start})", file=source) from None
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=source) from None

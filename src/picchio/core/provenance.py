@@ -1,0 +1,47 @@
+"""Where a result comes from: version, seed, hashes of the inputs."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterable
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from picchio.core.files import sha256
+
+_LIBRARIES = {"pin": "pinocchio", "numpy": "numpy", "scipy": "scipy"}
+
+
+def package_version() -> str:
+    """The installed version of picchio."""
+    try:
+        return version("picchio")
+    except PackageNotFoundError:  # run from a source tree that is not installed
+        return "0+unknown"
+
+
+def provenance(inputs: Iterable[str | Path] = (), *, seed: int | None = None) -> dict[str, Any]:
+    """The record that every output carries.
+
+    Args:
+        inputs: files that were read; each is named with its SHA-256.
+        seed: the random seed, where chance was used.
+
+    Returns:
+        `{"picchio", "python", "libraries", "seed", "inputs": [{"file", "sha256"}]}`.
+    """
+    libraries: dict[str, str | None] = {}
+    for distribution, name in _LIBRARIES.items():
+        try:
+            libraries[name] = version(distribution)
+        except PackageNotFoundError:
+            libraries[name] = None
+    files = sorted({Path(path).resolve() for path in inputs})
+    return {
+        "picchio": package_version(),
+        "python": platform.python_version(),
+        "libraries": libraries,
+        "seed": seed,
+        "inputs": [{"file": path.name, "sha256": sha256(path)} for path in files],
+    }

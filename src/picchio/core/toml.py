@@ -1,0 +1,151 @@
+"""TOML files: read with the standard library, checked by pydantic, errors in one line."""
+
+from __future__ import annotations
+
+import tomllib
+import types
+import typing
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from picchio.core.errors import InputError
+from picchio.core.files import read_text
+
+T = TypeVar("T", bound=BaseModel)
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """The content of a TOML file.
+
+    Raises:
+        InputError: missing, not UTF-8, or a syntax error (with its line).
+    """
+    text = read_text(path)
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"is not valid TOML: {error}", file=path) from None
+    except RecursionError:
+        raise InputError("is nested too deeply", file=path) from None
+
+
+def parse_toml(path: str | Path, model: type[T], *, format: str) -> T:
+    """Read a TOML file and validate it against a pydantic model.
+
+    Args:
+        path: the file.
+        model: what it must look like; a `format` key is taken off before.
+        format: the version that is understood, such as "picchio-task/1".
+
+    Raises:
+        InputError: syntax, missing or unknown format, misspelt keys, wrong values.
+    """
+    return validate(read_toml(path), model, format=format, file=path)
+
+
+def validate(
+    data: dict[str, Any], model: type[T], *, format: str, file: str | Path | None = None
+) -> T:
+    """Validate a dictionary as `parse_toml` does."""
+    content = dict(data)
+    found = content.pop("format", None)
+    if found is None:
+        raise InputError(
+            f'the key is missing; a file of this kind says format = "{format}"',
+            file=file,
+            key="format",
+        )
+    if found != format:
+        raise InputError("unknown format", file=file, key="format", value=found, choices=[format])
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        raise _as_input_error(error, model, file) from None
+    except RecursionError:
+        raise InputError("is nested too deeply", file=file) from None
+
+
+def _as_input_error(
+    error: ValidationError, model: type[BaseModel], file: str | Path | None
+) -> InputError:
+    """The most telling of pydantic's errors: a misspelt key explains a missing one."""
+    errors = error.errors(include_url=False, include_context=True)
+    errors.sort(key=lambda e: 0 if e["type"] == "extra_forbidden" else 1)
+    first = errors[0]
+    more = f"and {len(errors) - 1} more" if len(errors) > 1 else None
+    # Tagged unions put the tag's name into the path; it is no key of the file.
+    key = _dotted(first["loc"])
+    if first["type"] == "extra_forbidden":
+        return InputError(
+            "unknown key",
+            file=file,
+            key=_dotted(first["loc"][:-1]) or None,
+            value=str(first["loc"][-1]),
+            choices=_field_names(model, first["loc"][:-1]),
+            hint=more,
+        )
+    if first["type"] == "missing":
+        return InputError("the key is missing", file=file, key=key, hint=more)
+    inner = first.get("ctx", {}).get("error")
+    if isinstance(inner, InputError):
+        return InputError(str(inner), file=file, key=key, hint=more)
+    problem = first["msg"].removeprefix("Value error, ")
+    problem = problem[:1].lower() + problem[1:]
+    return InputError(problem, file=file, key=key, value=first["input"], hint=more)
+
+
+def _dotted(loc: tuple[int | str, ...]) -> str:
+    text = ""
+    for part in loc:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        else:
+            text += f".{part}" if text else part
+    return text
+
+
+def _field_names(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str]:
+    """The keys that the record at `loc` may have."""
+    here: list[Any] = [model]
+    for part in loc:
+        here = [step for kind in here for step in _step(kind, part)]
+    names: list[str] = []
+    for kind in here:
+        for name, field in _fields(kind).items():
+            names.append(field.alias or name)
+    return sorted(set(names))
+
+
+def _fields(kind: Any) -> dict[str, Any]:
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return dict(kind.model_fields)
+    return {}
+
+
+def _step(kind: Any, part: int | str) -> list[Any]:
+    """The types reached from `kind` by one key or index."""
+    fields = _fields(kind)
+    for name, field in fields.items():
+        if part in (name, field.alias):
+            return _flatten(field.annotation)
+    if not fields:
+        arguments = typing.get_args(kind)
+        if typing.get_origin(kind) in (list, tuple, set):
+            return _flatten(arguments[0])
+        if typing.get_origin(kind) in (dict,) or getattr(kind, "__name__", "") == "Mapping":
+            return _flatten(arguments[-1])
+        if "Mapping" in str(typing.get_origin(kind)):
+            return _flatten(arguments[-1])
+    # A union's tag in the path: stay where we are.
+    return [kind]
+
+
+def _flatten(kind: Any) -> list[Any]:
+    origin = typing.get_origin(kind)
+    if origin is typing.Annotated:
+        return _flatten(typing.get_args(kind)[0])
+    if origin in (typing.Union, types.UnionType):
+        return [leaf for arm in typing.get_args(kind) for leaf in _flatten(arm)]
+    return [kind]

@@ -1,0 +1,46 @@
+"""What all tests share: where measured data are, and that CI skips nothing for want of a tool."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+NO_DATA = "no measured data here: "
+_skipped: list[str] = []
+
+
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    """The checkout's root."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def measured_data() -> Path:
+    """The folder of measured data beside the checkout, or named by PICCHIO_DATA."""
+    folder = Path(os.environ.get("PICCHIO_DATA") or ROOT.parent / "shared" / "data")
+    if not folder.is_dir():
+        pytest.skip(f"{NO_DATA}{folder} is missing; set PICCHIO_DATA")
+    return folder
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    if report.skipped and not hasattr(report, "wasxfail"):
+        reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
+        if NO_DATA not in reason:
+            _skipped.append(f"{report.nodeid}: {reason}")
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    if os.environ.get("CI") and _skipped and exitstatus == 0:
+        session.exitstatus = 1
+
+
+def pytest_terminal_summary(terminalreporter) -> None:
+    if os.environ.get("CI") and _skipped:
+        terminalreporter.section("skipped in CI: a failure")
+        for line in _skipped:
+            terminalreporter.line(line)
