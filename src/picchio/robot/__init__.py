@@ -1,0 +1,17 @@
+"""Robots: URDF, annotation, sidecar, poses and inverse kinematics -> `FlexibleRobot`."""
+
+from picchio.robot.catalogue import RobotEntry, list_robots
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.joint import Joint, Shaft
+from picchio.robot.load import load_robot
+from picchio.robot.state import RobotState
+
+__all__ = [
+    "FlexibleRobot",
+    "Joint",
+    "RobotEntry",
+    "RobotState",
+    "Shaft",
+    "list_robots",
+    "load_robot",
+]

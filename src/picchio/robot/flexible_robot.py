@@ -1,0 +1,269 @@
+"""The robot as every later stage sees it: rigid dynamics at a pose, and springs in its joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from picchio.core.errors import InputError
+from picchio.robot.joint import Joint
+from picchio.robot.pose import check_pose
+from picchio.robot.rigid_model import RigidModel
+from picchio.robot.state import RobotState
+from picchio.robot.tool import Gun, Mounting, Tool
+from picchio.robot.urdf_tree import UrdfTree
+
+if TYPE_CHECKING:
+    from picchio.robot.inverse_kinematics import Solutions
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FlexibleRobot:
+    """A robot with flexible joints; immutable, picklable, safe to share between threads.
+
+    Made by `load_robot`. Poses are (nv,): one number a movable joint, rad or m, in the order
+    of `joint_names`; mimicking joints follow and have none.
+
+    Args:
+        name: what it is called.
+        source: the URDF file.
+        task_path: the robot's own example task, or None.
+        files: every file that was read.
+        tree: the URDF's links and joints.
+        tool: what the last frame carries.
+        gun: the percussive gun, or None.
+        mounting: how the robot stands.
+        flexible_joints: the n joints with a stiffness, in tangent order.
+        origin_of: where every value is from; read it as `origins`.
+        named_poses: poses by name, from the SRDF.
+        rigid: the rigid robot's dynamics.
+        tool_point: the link at whose origin the force acts.
+    """
+
+    name: str
+    source: Path
+    task_path: Path | None
+    files: tuple[Path, ...]
+    tree: UrdfTree
+    tool: Tool
+    gun: Gun | None
+    mounting: Mounting
+    flexible_joints: tuple[Joint, ...]
+    origin_of: dict[str, str]
+    named_poses: dict[str, tuple[float, ...]]
+    rigid: RigidModel
+    tool_point: str
+    lower: Array = field(init=False)
+    upper: Array = field(init=False)
+    stiffness: Array = field(init=False)
+    damping_ratio: Array = field(init=False)
+    flexible_index: NDArray[np.intp] = field(init=False)
+
+    def __post_init__(self) -> None:
+        names = self.rigid.joint_names
+        urdf = [self.tree.joints.get(name) for name in names]
+        unlimited = float("inf")
+        computed: dict[str, Any] = {
+            "lower": np.array([joint.lower if joint else -unlimited for joint in urdf]),
+            "upper": np.array([joint.upper if joint else unlimited for joint in urdf]),
+            "stiffness": np.array([joint.stiffness for joint in self.flexible_joints]),
+            "damping_ratio": np.array([joint.damping_ratio for joint in self.flexible_joints]),
+            "flexible_index": np.array(
+                [names.index(joint.name) for joint in self.flexible_joints], dtype=np.intp
+            ),
+        }
+        for key, value in computed.items():
+            value.setflags(write=False)
+            object.__setattr__(self, key, value)
+
+    def __repr__(self) -> str:
+        return (
+            f"FlexibleRobot({self.name!r}, joints={list(self.joint_names)}, "
+            f"flexible={list(self.flexible_names)}, tool_frame={self.tool_frame!r})"
+        )
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """All movable joints in tangent order, length nv."""
+        return self.rigid.joint_names
+
+    @property
+    def flexible_names(self) -> tuple[str, ...]:
+        """Names of the flexible joints, length n."""
+        return tuple(joint.name for joint in self.flexible_joints)
+
+    @property
+    def tool_frame(self) -> str:
+        """The frame that carries the tool."""
+        return self.tool.frame
+
+    @property
+    def origins(self) -> Mapping[str, str]:
+        """Where each value is from: "joint_1.stiffness" -> "flex.toml: Dumas 2011"."""
+        return MappingProxyType(self.origin_of)
+
+    def pose(self, values: str | Sequence[float] | Mapping[str, float] | ArrayLike) -> Array:
+        """A checked pose (nv,) from a list, from joint names (the rest at zero), or a name.
+
+        Raises:
+            InputError: wrong length, unknown joint or pose name, not a finite number.
+        """
+        return check_pose(values, self.joint_names, self.named_poses, self.joint_names_given)
+
+    @property
+    def joint_names_given(self) -> tuple[str, ...]:
+        """The joints that a list of numbers is about: all but the gun's recoil."""
+        return tuple(name for name in self.joint_names if name in self.tree.joints)
+
+    def limit_violations(self, pose: ArrayLike) -> list[str]:
+        """Names of the joints that stand beyond their limits at this pose."""
+        checked = self.pose(pose)
+        # Angles typed in are rounded: a limit of pi must accept 3.1416.
+        slack = 1e-4
+        beyond = (checked < self.lower - slack) | (checked > self.upper + slack)
+        return [name for name, out in zip(self.joint_names, beyond, strict=True) if out]
+
+    def state(self, pose: ArrayLike) -> RobotState:
+        """Mass matrix, Jacobian, stiffness, gravity and the tool's place at a pose.
+
+        Raises:
+            InputError: as `pose`.
+        """
+        full = self.pose(pose)
+        index = self.flexible_index
+        point = self.rigid.frame(self.tool_point)
+        jacobian = self.rigid.jacobian(full, point)[:3, index]
+        position, rotation = self.rigid.placement(full, point)
+        torque = self.gravity_torque(full)
+        return RobotState(
+            pose=full,
+            mass_matrix=self.rigid.mass_matrix(full)[np.ix_(index, index)],
+            jacobian=jacobian,
+            stiffness=self._stiffness_at(torque),
+            gravity_torque=torque,
+            tool_position=position,
+            tool_rotation=rotation,
+        )
+
+    def mass_and_jacobian(self, pose: Array) -> tuple[Array, Array]:
+        """Only M (n, n) and J (3, n), for maps of many poses; the pose is taken unchecked."""
+        index = self.flexible_index
+        mass = self.rigid.mass_matrix(pose)
+        jacobian = self.rigid.jacobian(pose, self.rigid.frame(self.tool_point))
+        return mass[index[:, None], index], jacobian[:3, index]
+
+    def gravity_torque(self, pose: ArrayLike) -> Array:
+        """Torque (n,) that the springs carry at rest, N m (N), balancers taken off."""
+        full = self.pose(pose)
+        torque = self.rigid.gravity_torque(full)[self.flexible_index]
+        return torque + self._balancing(full)[0]
+
+    def gravity_stiffness(self, pose: ArrayLike) -> Array:
+        """dg/dq (n, n) of the flexible joints, N m/rad, balancers included."""
+        full = self.pose(pose)
+        index = self.flexible_index
+        gradient = self.rigid.gravity_gradient(full)[np.ix_(index, index)]
+        return gradient + np.diag(self._balancing(full)[1])
+
+    def stiffness_at(self, pose: ArrayLike) -> Array:
+        """Stiffness (n,) at a pose: curves give their slope at the gravity torque there."""
+        return self._stiffness_at(self.gravity_torque(pose))
+
+    def _stiffness_at(self, torque: Array) -> Array:
+        stiffness = self.stiffness.copy()
+        for row, joint in enumerate(self.flexible_joints):
+            if joint.stiffness_curve is not None:
+                stiffness[row] = joint.stiffness_curve.tangent(torque[row])
+        return stiffness
+
+    def _balancing(self, full: Array) -> tuple[Array, Array]:
+        torque = np.zeros(len(self.flexible_joints))
+        stiffness = np.zeros(len(self.flexible_joints))
+        for row, (joint, column) in enumerate(
+            zip(self.flexible_joints, self.flexible_index, strict=True)
+        ):
+            if joint.balancer is not None:
+                axis = self.tree.joints[joint.name].axis
+                added = joint.balancer.torque_and_stiffness(axis, full[column])
+                torque[row], stiffness[row] = added
+        return torque, stiffness
+
+    def link_of(self, frame: str) -> str:
+        """The link whose frame this is: a link's name, or a joint's for the link it carries.
+
+        Raises:
+            InputError: no such frame.
+        """
+        if frame in self.tree.links:
+            return frame
+        if frame in self.tree.joints:
+            return self.tree.joints[frame].child
+        raise InputError("no such frame", key="frame", value=frame, choices=self.tree.links)
+
+    def frame_placement(self, pose: ArrayLike, frame: str) -> tuple[Array, Array]:
+        """World position (3,) in m and rotation (3, 3) of a frame.
+
+        Raises:
+            InputError: no such frame; as `pose`.
+        """
+        return self.rigid.placement(self.pose(pose), self.rigid.frame(self.link_of(frame)))
+
+    def frame_jacobian(self, pose: ArrayLike, frame: str) -> Array:
+        """Jacobian (6, n) of a frame's origin, world axes: linear [m], then angular [1].
+
+        Raises:
+            InputError: no such frame; as `pose`.
+        """
+        full = self.pose(pose)
+        return self.rigid.jacobian(full, self.rigid.frame(self.link_of(frame)))[
+            :, self.flexible_index
+        ]
+
+    def all_branches(
+        self, point: ArrayLike, *, axis: ArrayLike | None = None, seed: int = 0
+    ) -> list[Array]:
+        """Every branch of poses (nv,) found that puts the tool on a point.
+
+        See `picchio.robot.inverse_kinematics.solve`.
+        """
+        return list(self._solve(point, axis, seed).poses)
+
+    def inverse_kinematics(
+        self,
+        point: ArrayLike,
+        *,
+        axis: ArrayLike | None = None,
+        branch: str | Sequence[str] = "any",
+        seed: int = 0,
+    ) -> Array:
+        """A pose (nv,) that puts the tool on a point: of the asked branch the one least bent.
+
+        Args:
+            point: (3,) m, world.
+            axis: (3,) the way the tool shall point, world; None leaves it free, and so does an
+                arm of fewer than five joints, which cannot choose.
+            branch: "any", "elbow-up", "elbow-down", or words such as "joint_3+" (see
+                `picchio.robot.branch`).
+            seed: moves the starts of the search.
+
+        Raises:
+            InputError: out of reach (how far is said), or not on this branch.
+        """
+        from picchio.robot.branch import branch_words, choose_branch
+
+        words = branch_words(self, branch)  # a misspelt word need not wait for the search
+        return choose_branch(self, self.all_branches(point, axis=axis, seed=seed), words, point)
+
+    def _solve(self, point: ArrayLike, axis: ArrayLike | None, seed: int) -> Solutions:
+        # Compiled code takes a second to load: only when it is needed.
+        from picchio.robot.inverse_kinematics import solve
+
+        return solve(self, point, axis=axis, seed=seed)

@@ -1,0 +1,258 @@
+"""Compiled inverse kinematics: damped least squares with limits, over many starts and points.
+
+Levenberg-Marquardt on the distance to the point, and on the angle to the wanted axis where one
+is given. A joint that a step would push through its limit is held there for this step.
+Products of small matrices are written out: that compiles and runs several times faster than
+calls into BLAS.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from picchio.robot.small_matrices import cholesky_solve, cross, rotate, turn, turn_about
+
+
+@njit(cache=True)
+def forward(tables, q, residual, jacobian, target, axis, weight):  # type: ignore[no-untyped-def]
+    """Fill the residual (6,) and its Jacobian (6, k); the axis rows are zero if weight is zero.
+
+    Args:
+        tables: rotation, offset, joint axis, slides, follow, shift, tool axis of a `Chain`.
+        q: (k,) coordinates.
+        residual: (6,) out: position error in m, then weight x axis error.
+        jacobian: (6, k) out.
+        target: (3,) m.
+        axis: (3,) unit.
+        weight: m, a length that makes angles comparable to distances.
+    """
+    rotation, offset, axes, slides, follow, shift, tool_axis = tables
+    m, k = follow.shape
+    turned, other, spin = np.eye(3), np.empty((3, 3)), np.empty((3, 3))
+    place, arm, linear, angular = np.zeros(3), np.empty(3), np.empty(3), np.empty(3)
+    spins, origins = np.empty((m, 3)), np.empty((m, 3))
+    for i in range(m):
+        rotate(turned, offset[i], arm)
+        for r in range(3):
+            place[r] += arm[r]
+        turn(turned, rotation[i], other)
+        rotate(other, axes[i], spins[i])
+        position = shift[i]
+        for j in range(k):
+            position += follow[i, j] * q[j]
+        if slides[i]:
+            for r in range(3):
+                place[r] += spins[i, r] * position
+            turned[:] = other
+        else:
+            turn_about(axes[i], position, spin)
+            turn(other, spin, turned)
+        origins[i] = place
+    rotate(turned, offset[m], arm)
+    for r in range(3):
+        place[r] += arm[r]
+    pointing = np.empty(3)
+    rotate(rotation[m], tool_axis, arm)
+    rotate(turned, arm, pointing)
+    for r in range(3):
+        residual[r] = place[r] - target[r]
+        residual[r + 3] = weight * (pointing[r] - axis[r])
+    jacobian[:] = 0.0
+    for i in range(m):
+        if slides[i]:
+            linear[:] = spins[i]
+            angular[:] = 0.0
+        else:
+            for r in range(3):
+                arm[r] = place[r] - origins[i, r]
+            cross(spins[i], arm, linear)
+            cross(spins[i], pointing, angular)
+        for j in range(k):
+            if follow[i, j] != 0.0:
+                for r in range(3):
+                    jacobian[r, j] += follow[i, j] * linear[r]
+                    jacobian[r + 3, j] += follow[i, j] * weight * angular[r]
+
+
+@njit(cache=True)
+def normal_equations(jacobian, residual, normal, gradient):  # type: ignore[no-untyped-def]
+    """Fill J^T J (k, k) and J^T r (k,); return the largest diagonal entry, at least 1e-12."""
+    rows, k = jacobian.shape
+    largest = 1e-12
+    for i in range(k):
+        total = 0.0
+        for r in range(rows):
+            total += jacobian[r, i] * residual[r]
+        gradient[i] = total
+        for j in range(i + 1):
+            total = 0.0
+            for r in range(rows):
+                total += jacobian[r, i] * jacobian[r, j]
+            normal[i, j] = total
+            normal[j, i] = total
+        largest = max(largest, normal[i, i])
+    return largest
+
+
+@njit(cache=True)
+def square(vector):  # type: ignore[no-untyped-def]
+    """Sum of squares."""
+    total = 0.0
+    for value in vector:
+        total += value * value
+    return total
+
+
+@njit(cache=True)
+def descend(tables, q, lower, upper, target, axis, weight, steps):  # type: ignore[no-untyped-def]
+    """Move q (k,) in place to the nearest minimum; return the residual's norm in m."""
+    k = q.shape[0]
+    residual, trial_residual = np.empty(6), np.empty(6)
+    jacobian, trial_jacobian = np.empty((6, k)), np.empty((6, k))
+    normal, system = np.empty((k, k)), np.empty((k, k))
+    gradient, step, trial = np.empty(k), np.empty(k), np.empty(k)
+    forward(tables, q, residual, jacobian, target, axis, weight)
+    cost = square(residual)
+    damping = 1e-3
+    for _ in range(steps):
+        if cost < 1e-24:
+            break
+        largest = normal_equations(jacobian, residual, normal, gradient)
+        for j in range(k):
+            at_lower = q[j] <= lower[j] and gradient[j] > 0.0
+            at_upper = q[j] >= upper[j] and gradient[j] < 0.0
+            if at_lower or at_upper:
+                normal[j, :] = 0.0
+                normal[:, j] = 0.0
+                gradient[j] = 0.0
+                normal[j, j] = largest
+        if np.sqrt(square(gradient)) < 1e-14 * largest:
+            break
+        improved = False
+        trial_cost = cost
+        while damping < 1e8:
+            system[:] = normal
+            for j in range(k):
+                system[j, j] += damping * largest
+                step[j] = gradient[j]
+            cholesky_solve(system, step)
+            for j in range(k):
+                trial[j] = min(max(q[j] - step[j], lower[j]), upper[j])
+            forward(tables, trial, trial_residual, trial_jacobian, target, axis, weight)
+            trial_cost = square(trial_residual)
+            if trial_cost < cost:
+                improved = True
+                break
+            damping *= 10.0
+        if not improved:
+            break
+        stalled = cost - trial_cost < 1e-13 * cost and cost > 1e-16
+        q[:] = trial
+        residual[:] = trial_residual
+        jacobian[:] = trial_jacobian
+        cost = trial_cost
+        damping = max(damping * 0.1, 1e-15)
+        if stalled:
+            break
+    return np.sqrt(cost)
+
+
+@njit(cache=True)
+def along_self_motion(jacobian, wish, held, step):  # type: ignore[no-untyped-def]
+    """Project `wish` (k,) onto the motions that keep the tool still; `held` joints stand."""
+    rows, k = jacobian.shape
+    gram, load = np.zeros((rows, rows)), np.zeros(rows)
+    trace = 1e-12
+    for r in range(rows):
+        for c in range(r + 1):
+            for j in range(k):
+                if not held[j]:
+                    gram[r, c] += jacobian[r, j] * jacobian[c, j]
+            gram[c, r] = gram[r, c]
+        trace += gram[r, r]
+        for j in range(k):
+            if not held[j]:
+                load[r] += jacobian[r, j] * wish[j]
+    for r in range(rows):
+        gram[r, r] += 1e-12 * trace
+    cholesky_solve(gram, load)
+    for j in range(k):
+        step[j] = 0.0
+        if not held[j]:
+            step[j] = wish[j]
+            for r in range(rows):
+                step[j] -= jacobian[r, j] * load[r]
+
+
+@njit(cache=True)
+def relax(tables, q, centre, lower, upper, target, axis, weight, steps):  # type: ignore[no-untyped-def]
+    """Move q (k,) in place along its self-motion towards `centre`, the tool standing still."""
+    k = q.shape[0]
+    residual, jacobian = np.empty(6), np.empty((6, k))
+    wish, step, trial = np.empty(k), np.empty(k), np.empty(k)
+    held = np.zeros(k, dtype=np.bool_)
+    for _ in range(steps):
+        forward(tables, q, residual, jacobian, target, axis, weight)
+        for j in range(k):
+            wish[j] = centre[j] - q[j]
+        before = square(wish)
+        held[:] = False
+        for _again in range(k):
+            along_self_motion(jacobian, wish, held, step)
+            pushed = False
+            for j in range(k):
+                out = (q[j] <= lower[j] and step[j] < -1e-12) or (
+                    q[j] >= upper[j] and step[j] > 1e-12
+                )
+                if out and not held[j]:
+                    held[j] = True
+                    pushed = True
+            if not pushed:
+                break
+        length = np.sqrt(square(step))
+        if length < 1e-5:
+            break
+        share = min(0.5, 0.3 / length)
+        nearer = False
+        # The way curves: where a step ends no nearer, a shorter one does.
+        for _shorter in range(8):
+            for j in range(k):
+                trial[j] = min(max(q[j] + share * step[j], lower[j]), upper[j])
+            error = descend(tables, trial, lower, upper, target, axis, weight, 20)
+            nearer = error < 1e-8 and square(centre - trial) < before
+            if nearer:
+                break
+            share *= 0.4
+        if not nearer:
+            break
+        q[:] = trial
+
+
+@njit(cache=True)
+def solve_points(  # type: ignore[no-untyped-def]
+    tables, starts, centre, lower, upper, targets, axes, weight, redundant, found, errors
+):
+    """Every start at every point.
+
+    Args:
+        tables: see `forward`.
+        starts: (s, k) first guesses.
+        centre: (k,) where redundant arms rest.
+        lower: (k,) limits.
+        upper: (k,) limits.
+        targets: (p, 3) m.
+        axes: (p, 3) unit.
+        weight: m; zero leaves the axis free.
+        redundant: move solutions along their self-motion towards the centre.
+        found: (p, s, k) out: where each start ended.
+        errors: (p, s) out: what is left there, m.
+    """
+    for p in range(targets.shape[0]):
+        for s in range(starts.shape[0]):
+            q = starts[s].copy()
+            error = descend(tables, q, lower, upper, targets[p], axes[p], weight, 100)
+            if redundant and error < 1e-8:
+                relax(tables, q, centre, lower, upper, targets[p], axes[p], weight, 100)
+            found[p, s] = q
+            errors[p, s] = error

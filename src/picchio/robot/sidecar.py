@@ -1,0 +1,154 @@
+"""The sidecar `picchio-sidecar/1`: what a URDF does not say, value by value with its source.
+
+The same records validate the `picchio:` annotations of a URDF, so the two can say the same.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from picchio.core.model import Finite, NotNegative, Positive, StrictModel
+from picchio.core.toml import parse_toml
+
+FORMAT = "picchio-sidecar/1"
+Vector = tuple[Finite, Finite, Finite]
+Tensor = Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
+
+
+class ShaftEntry(StrictModel):
+    """A round shaft: m, m, Pa, and the name of its S-N curve."""
+
+    radius: Positive
+    length: Positive
+    shear_modulus: Positive
+    sn_curve: str | None = None
+
+
+class StiffnessCurveEntry(StrictModel):
+    """K1, K2, K3 [N m/rad] and T1, T2 [N m] of a strain-wave catalogue."""
+
+    k1: Positive
+    k2: Positive
+    k3: Positive
+    t1: Positive
+    t2: Positive
+
+    @model_validator(mode="after")
+    def _corners_ascend(self) -> Self:
+        if self.t2 <= self.t1:
+            raise ValueError(f"t2 must be above t1 = {self.t1:g}, it is {self.t2:g}")
+        return self
+
+
+class BalancerEntry(StrictModel):
+    """Points [m] in the joint's frame at zero, spring [N/m, m] and constant pull [N]."""
+
+    parent_point: Vector
+    child_point: Vector
+    stiffness: NotNegative = 0.0
+    free_length: NotNegative = 0.0
+    force: Finite = 0.0
+
+
+class JointEntry(StrictModel):
+    """One joint's drive."""
+
+    stiffness: Positive | None = None
+    stiffness_curve: StiffnessCurveEntry | None = None
+    damping_ratio: NotNegative | None = None
+    shaft: ShaftEntry | None = None
+    reducer: str | None = None
+    rotor_inertia: NotNegative | None = None
+    gear_ratio: Finite | None = None
+    balancer: BalancerEntry | None = None
+    source: str | None = None
+    estimated: bool = False
+
+    @model_validator(mode="after")
+    def _one_stiffness(self) -> Self:
+        if self.stiffness is not None and self.stiffness_curve is not None:
+            raise ValueError("give stiffness or stiffness_curve, not both")
+        if self.gear_ratio == 0:
+            raise ValueError("gear_ratio must not be zero")
+        return self
+
+
+class ToolEntry(StrictModel):
+    """The tool: m, kg, kg m^2, all in the tool frame."""
+
+    frame: str | None = None
+    xyz: Vector = (0.0, 0.0, 0.0)
+    axis: Vector = (0.0, 0.0, 1.0)
+    mass: NotNegative = 0.0
+    com: Vector = (0.0, 0.0, 0.0)
+    inertia: Tensor = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    source: str | None = None
+
+    @model_validator(mode="after")
+    def _axis_has_length(self) -> Self:
+        if not any(abs(part) > 1e-9 for part in self.axis):
+            raise ValueError("the axis has length zero")
+        xx, xy, xz, yy, yz, zz = self.inertia
+        principal = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if principal[0] < -1e-9 * max(abs(principal).max(), 1e-12):
+            raise ValueError("the inertia is not positive semidefinite")
+        if self.mass == 0 and any(self.inertia):
+            raise ValueError("an inertia needs a mass")
+        return self
+
+
+class GunEntry(StrictModel):
+    """The gun: kg, N/m, 1, N."""
+
+    mass: NotNegative
+    recoil_stiffness: Positive | None = None
+    damping_ratio: NotNegative = 0.0
+    feed_force: Finite = 0.0
+    source: str | None = None
+
+    @model_validator(mode="after")
+    def _recoiling_mass(self) -> Self:
+        if self.recoil_stiffness is not None and self.mass == 0:
+            raise ValueError("a recoil spring needs the gun's mass")
+        return self
+
+
+class BaseEntry(StrictModel):
+    """How the robot stands: m, rad, m/s^2."""
+
+    xyz: Vector = (0.0, 0.0, 0.0)
+    rpy: Vector = (0.0, 0.0, 0.0)
+    gravity: Vector = (0.0, 0.0, -9.81)
+    source: str | None = None
+
+
+class Sidecar(StrictModel):
+    """Everything a sidecar may say. `robot` names the arm it belongs to."""
+
+    robot: str | None = None
+    description: str | None = None
+    joint: dict[str, JointEntry] = Field(default_factory=dict)
+    tool: ToolEntry | None = None
+    gun: GunEntry | None = None
+    base: BaseEntry | None = None
+
+
+def read_sidecar(path: str | Path) -> Sidecar:
+    """Read and check a sidecar.
+
+    Raises:
+        InputError: no such file, bad TOML, a misspelt key, a value that cannot be.
+    """
+    return parse_toml(path, Sidecar, format=FORMAT)
+
+
+def given(entry: StrictModel | None) -> dict[str, Any]:
+    """The values that were actually written, not the defaults."""
+    if entry is None:
+        return {}
+    return {name: getattr(entry, name) for name in entry.model_fields_set
+            if getattr(entry, name) is not None}  # fmt: skip

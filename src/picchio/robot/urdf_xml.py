@@ -1,0 +1,93 @@
+"""The bytes of a URDF as an XML tree, read with every door closed.
+
+No document type declaration, hence no entities; no network; no huge trees. What goes wrong
+is said in one line. Everything that needs the XML itself (reading, annotating) starts here.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from lxml import etree
+
+from picchio.core.errors import InputError
+
+MOST_BYTES = 32 << 20
+NAMESPACE = "urn:picchio:1"
+
+_DOCTYPES = tuple(
+    text.encode(code) for text in ("<!DOCTYPE", "<!ENTITY") for code in ("ascii", "utf-16-le")
+)
+
+
+def read_urdf_bytes(path: Path) -> bytes:
+    """The file's bytes.
+
+    Raises:
+        InputError: missing, a folder, unreadable, or above 32 MiB.
+    """
+    try:
+        if path.is_dir():
+            raise InputError("is a folder, not a URDF file", file=path)
+        if not path.is_file():
+            raise InputError("no such file", file=path)
+        if (size := path.stat().st_size) > MOST_BYTES:
+            raise InputError(f"is too large ({size} bytes; at most {MOST_BYTES})", file=path)
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
+    except ValueError:  # a NUL in the path
+        raise InputError("is not a file name", value=str(path)) from None
+
+
+def parse_urdf(content: bytes, path: Path) -> etree._Element:
+    """The root element of a URDF.
+
+    Args:
+        content: the file's bytes.
+        path: named in errors.
+
+    Raises:
+        InputError: not XML, a document type declaration, an undeclared prefix, wrong encoding.
+    """
+    if not content.strip():
+        raise InputError("is empty", file=path)
+    if any(mark in content for mark in _DOCTYPES):
+        raise InputError(
+            "has a document type declaration or entities, which are not accepted", file=path
+        )
+    parser = etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, recover=False
+    )
+    try:
+        root = etree.fromstring(content, parser)
+    except etree.XMLSyntaxError as error:
+        raise InputError(_reason(error), file=path, hint=_hint(error)) from None
+    except (ValueError, LookupError) as error:
+        raise InputError(f"is not readable as XML: {error}", file=path) from None
+    if root.getroottree().docinfo.doctype:
+        raise InputError("has a document type declaration, which is not accepted", file=path)
+    return root
+
+
+def _reason(error: etree.XMLSyntaxError) -> str:
+    text = str(error.msg).replace(f"{error.filename}, ", "")
+    if "Namespace prefix" in text:
+        return f"uses an XML prefix that is not declared: {text}"
+    return f"is not valid XML: {text}"
+
+
+def _hint(error: etree.XMLSyntaxError) -> str | None:
+    if "Namespace prefix picchio" in str(error.msg):
+        return f'write <robot name="..." xmlns:picchio="{NAMESPACE}">'
+    return None
+
+
+def local_name(element: etree._Element) -> str:
+    """The tag without its namespace; "" for comments and processing instructions."""
+    return etree.QName(element).localname if isinstance(element.tag, str) else ""
+
+
+def children(element: etree._Element, name: str) -> list[etree._Element]:
+    """The direct children with this tag and no namespace."""
+    return [child for child in element if child.tag == name]
