@@ -1,0 +1,161 @@
+"""A force history in pieces: constants, ramps and sines, one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from picchio.core.arrays import ComplexArray, FloatArray, IndexArray
+from picchio.core.errors import InputError
+from picchio.core.phi import phi1, phi2
+
+
+@dataclass(frozen=True, eq=False)
+class PiecewiseForce:
+    """F(t) on [0, end), in m pieces that follow one another without a gap.
+
+    On piece i, with u = t - start[i],
+
+        F(t) = constant[i] + slope[i] u + Re(amplitude[i] exp(1j angular_frequency[i] u)).
+
+    A pulse is a constant, a half-sine blow a sine, a measured history a chain of ramps.
+    At a jump the force takes its value just after.
+
+    Attributes:
+        start: (m,) s, ascending, the first is 0.
+        end: s, where the last piece ends; infinite after a burst.
+        constant: (m,) N.
+        slope: (m,) N/s.
+        amplitude: (m,) complex, N.
+        angular_frequency: (m,) rad/s.
+    """
+
+    start: FloatArray
+    end: float
+    constant: FloatArray
+    slope: FloatArray
+    amplitude: ComplexArray
+    angular_frequency: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("start", "constant", "slope", "angular_frequency"):
+            object.__setattr__(self, name, _frozen(getattr(self, name), np.float64))
+        object.__setattr__(self, "amplitude", _frozen(self.amplitude, np.complex128))
+        shapes = {getattr(self, n).shape for n in _PER_PIECE}
+        if shapes != {self.start.shape} or self.start.ndim != 1 or not self.start.size:
+            raise InputError("the pieces of a force must be arrays of one common length")
+        if not all(np.isfinite(getattr(self, name)).all() for name in _PER_PIECE):
+            raise InputError("a force history holds a value that is not finite")
+        if self.start[0] != 0.0 or not (self.duration > 0.0).all():
+            raise InputError("the pieces of a force must start at 0 and follow one another")
+
+    @property
+    def duration(self) -> FloatArray:
+        """(m,) s, length of each piece; the last may be infinite."""
+        return np.diff(self.start, append=self.end)
+
+    def __call__(self, time: ArrayLike) -> FloatArray:
+        """The force (N) at times within [0, end); zero outside.
+
+        Args:
+            time: any shape, s.
+        """
+        t = np.asarray(time, dtype=float)
+        index = np.clip(np.searchsorted(self.start, t, side="right") - 1, 0, None)
+        value = self.in_piece(index, t - self.start[index])
+        return np.where((t >= 0.0) & (t < self.end), value, 0.0)
+
+    def in_piece(self, index: ArrayLike, u: ArrayLike) -> FloatArray:
+        """The force (N) of piece `index` at `u` seconds after that piece's start."""
+        i = np.asarray(index)
+        u = np.asarray(u, dtype=float)
+        wave = self.amplitude[i] * np.exp(1j * self.angular_frequency[i] * u)
+        return self.constant[i] + self.slope[i] * u + wave.real
+
+    def convolve(self, pole: ComplexArray, index: IndexArray, u: FloatArray) -> ComplexArray:
+        """The integral of exp(pole (u - v)) F(v) dv over v from 0 to u, within a piece.
+
+        It solves z' = pole z + F from z = 0: the exact answer of a first-order system.
+
+        Args:
+            pole: (p,) complex, 1/s.
+            index: (k,) piece of each time.
+            u: (k,) s since the start of its piece.
+
+        Returns:
+            (p, k) complex, N s.
+        """
+        lam = pole[:, None]
+        total = self.constant[index] * (u * phi1(lam * u))
+        if (slope := self.slope[index]).any():
+            total = total + slope * (u * u * phi2(lam * u))
+        amplitude = self.amplitude[index]
+        if amplitude.any():
+            for c, mu in (
+                (amplitude, 1j * self.angular_frequency[index]),
+                (amplitude.conj(), -1j * self.angular_frequency[index]),
+            ):
+                total = total + 0.5 * c * np.exp(mu * u) * u * phi1((lam - mu) * u)
+        return total
+
+    def fourier_coefficients(self, harmonics: int) -> ComplexArray:
+        """The exact complex Fourier coefficients of the force repeated with period `end`.
+
+        c_k = (1/T) times the integral of F(t) exp(-1j k w t) over one period, w = 2 pi / T.
+        The paper's coefficients (eq. 12) are a_0 = c_0, a_j = 2 Re c_j, b_j = -2 Im c_j.
+
+        Args:
+            harmonics: the highest k.
+
+        Returns:
+            (harmonics + 1,) complex, N.
+        """
+        period = self.end
+        mu = -2j * np.pi / period * np.arange(harmonics + 1)
+        length = self.duration
+        total = np.zeros(harmonics + 1, dtype=np.complex128)
+        # integral of exp(mu u) F(u) du = exp(mu L) times the convolution with the pole -mu
+        for i, span in enumerate(length):
+            index, u = np.array([i]), np.array([span])
+            piece = np.exp(mu * span) * self.convolve(-mu, index, u)[:, 0]
+            total += np.exp(mu * self.start[i]) * piece
+        return total / period
+
+    def mean(self) -> float:
+        """The mean force over [0, end), N."""
+        return float(self.fourier_coefficients(0)[0].real)
+
+    def repeat(self, count: int, *, then_silence: bool = False) -> PiecewiseForce:
+        """The history `count` times in a row, then silence for ever if asked."""
+        if count < 1:
+            raise InputError("a burst needs at least one hit", key="hits", value=count)
+        offset = np.repeat(np.arange(count) * self.end, self.start.size)
+        pieces = {name: np.tile(getattr(self, name), count) for name in _PER_PIECE}
+        pieces["start"] = pieces["start"] + offset
+        end = count * self.end
+        if then_silence:
+            pieces = {n: np.append(v, end if n == "start" else 0.0) for n, v in pieces.items()}
+            end = np.inf
+        return PiecewiseForce(end=end, **pieces)
+
+    def scaled(self, factor: float) -> PiecewiseForce:
+        """The same history, `factor` times as strong."""
+        return PiecewiseForce(
+            self.start,
+            self.end,
+            self.constant * factor,
+            self.slope * factor,
+            self.amplitude * factor,
+            self.angular_frequency,
+        )
+
+
+_PER_PIECE = ("start", "constant", "slope", "amplitude", "angular_frequency")
+
+
+def _frozen(values: ArrayLike, dtype: type) -> FloatArray:
+    array: FloatArray = np.array(values, dtype=dtype)
+    array.flags.writeable = False
+    return array

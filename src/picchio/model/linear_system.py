@@ -1,0 +1,108 @@
+"""Linear equations of motion about a pose: M x'' + C x' + K x = B F(t) n."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class LinearSystem:
+    """Small vibration about the loaded equilibrium, paper eq. 5 with damping.
+
+    Attributes:
+        mass_matrix: (n, n) kg m^2 (kg for a prismatic coordinate), symmetric positive definite.
+        damping_matrix: (n, n) N m s/rad, symmetric.
+        stiffness_matrix: (n, n) N m/rad, symmetric positive definite.
+        input_matrix: (n, 3) m, generalised force per newton at the tool along x, y, z (world):
+            the transposed tool Jacobian.
+        output_matrix: (m, n), from coordinates to joint deflections.
+        output_names: m names, the joints.
+    """
+
+    mass_matrix: FloatArray
+    damping_matrix: FloatArray
+    stiffness_matrix: FloatArray
+    input_matrix: FloatArray
+    output_matrix: FloatArray
+    output_names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        n = self.mass_matrix.shape[0]
+        expected = {
+            "mass_matrix": (n, n),
+            "damping_matrix": (n, n),
+            "stiffness_matrix": (n, n),
+            "input_matrix": (n, 3),
+            "output_matrix": (len(self.output_names), n),
+        }
+        for name, shape in expected.items():
+            value = np.array(getattr(self, name), dtype=float)
+            if value.shape != shape:
+                raise InputError(f"{name} has shape {value.shape}, expected {shape}")
+            if not np.isfinite(value).all():
+                raise InputError(f"{name} holds a value that is not finite")
+            value.flags.writeable = False
+            object.__setattr__(self, name, value)
+
+
+def undamped_modes(
+    mass_matrix: FloatArray, stiffness_matrix: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Solve K S = M S D (paper eq. 8) with S^T M S = I.
+
+    Args:
+        mass_matrix: (n, n).
+        stiffness_matrix: (n, n).
+
+    Returns:
+        omega: (n,) rad/s, ascending; S: (n, n), a mode a column.
+
+    Raises:
+        InputError: M or K is not positive definite.
+    """
+    from scipy.linalg import LinAlgError, eigh
+
+    try:
+        squared, shapes = eigh(stiffness_matrix, mass_matrix)
+    except LinAlgError:
+        raise InputError("the mass matrix is not positive definite at this pose") from None
+    if squared[0] <= 0.0:
+        raise InputError(
+            "the stiffness matrix is not positive definite at this pose: "
+            "gravity overturns the springs",
+            value=float(squared[0]),
+        )
+    return np.sqrt(squared), shapes
+
+
+def modal_damping_matrix(
+    mass_matrix: FloatArray,
+    stiffness: FloatArray,
+    damping_ratio: ArrayLike,
+) -> FloatArray:
+    """C = M S diag(2 zeta omega) S^T M, with the undamped modes of M and the springs alone.
+
+    Where the joints' ratios differ, a mode's ratio is their mean, weighted by the share of the
+    mode's strain energy that each joint's spring holds (Johnson and Kienholz, AIAA Journal 20
+    (1982) 1284, doi:10.2514/3.51190).
+
+    Args:
+        mass_matrix: (n, n).
+        stiffness: (n,) N m/rad, the springs.
+        damping_ratio: scalar or (n,), one for each joint.
+
+    Returns:
+        (n, n) N m s/rad.
+    """
+    omega, shapes = undamped_modes(mass_matrix, np.diag(stiffness))
+    ratio = np.broadcast_to(np.asarray(damping_ratio, dtype=float), stiffness.shape)
+    energy = stiffness[:, None] * shapes**2  # (joint, mode); each column sums to omega^2
+    modal_ratio = ratio @ energy / omega**2
+    weighted = mass_matrix @ shapes
+    return (weighted * (2.0 * modal_ratio * omega)) @ weighted.T

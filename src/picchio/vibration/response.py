@@ -1,0 +1,245 @@
+"""A closed-form response: its values at any time, its turning points, its worst direction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from picchio.core.arrays import ComplexArray, FloatArray, IndexArray
+from picchio.core.errors import InputError
+from picchio.excitation import PiecewiseForce
+from picchio.vibration.extrema import Grid, refine_roots
+from picchio.vibration.modes import Modes
+
+# A ring-down is followed until its envelope has fallen to this share of its start.
+RING_DOWN_LEVEL = 1e-4
+
+
+class Peak(NamedTuple):
+    """Largest absolute deflection of one joint: value (rad, with its sign) and time (s)."""
+
+    value: float
+    time: float
+
+
+class WorstDirection(NamedTuple):
+    """Over all directions: value (rad), direction (3,) unit vector, time (s)."""
+
+    value: float
+    direction: FloatArray
+    time: float
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """The deflection of every joint, in closed form, for a force in any direction.
+
+    Attributes:
+        modes: the system.
+        force: the history that acts; of a periodic response, one period.
+        states: (p, m) complex, N s, modal states at the start of every piece of the force.
+        periodic: whether the response repeats with the force's period.
+    """
+
+    modes: Modes
+    force: PiecewiseForce
+    states: ComplexArray
+    periodic: bool
+
+    @property
+    def horizon(self) -> float:
+        """Until when there is anything to see, s: the period, or the ring-down's end.
+
+        Raises:
+            InputError: an undamped mode rings for ever.
+        """
+        if np.isfinite(self.force.end):
+            return float(self.force.end)
+        slowest = -float(self.modes.poles.real.max())
+        if slowest <= 0.0:
+            raise InputError(
+                "a mode has no damping: after the blows it rings for ever, and a rivet has no end",
+                key="damping_ratio",
+                value=0.0,
+                hint="give the joints a damping ratio above 0",
+            )
+        return float(self.force.start[-1] - np.log(RING_DOWN_LEVEL) / slowest)
+
+    def _locate(self, time: ArrayLike) -> tuple[IndexArray, FloatArray]:
+        t = np.asarray(time, dtype=float)
+        if self.periodic:
+            t = np.mod(t, self.force.end)
+        elif (t < 0.0).any() or (t > self.force.end).any():
+            raise InputError("time must lie within the force history", key="time")
+        index = np.searchsorted(self.force.start, t, side="right") - 1
+        return index, t - self.force.start[index]
+
+    def _modal(self, index: IndexArray, u: FloatArray) -> ComplexArray:
+        """Modal states (p, k) at `u` seconds after the start of piece `index`."""
+        poles = self.modes.poles
+        free = np.exp(poles[:, None] * u) * self.states[:, index]
+        return free + self.force.convolve(poles, index, u)
+
+    def unit_deflection(self, time: ArrayLike) -> FloatArray:
+        """g_j(t): deflection of joint j for the force along x, y and z.
+
+        Args:
+            time: (k,) s.
+
+        Returns:
+            (m, 3, k) rad; the deflection for direction n is the sum over axis 1 with n.
+        """
+        modal = self._modal(*self._locate(np.atleast_1d(time)))
+        return np.einsum("mpd,pk->mdk", self.modes.residues, modal).real
+
+    def deflection(self, time: ArrayLike, direction: ArrayLike) -> FloatArray:
+        """Deflection of every joint for one force direction.
+
+        Args:
+            time: (k,) s.
+            direction: (3,) unit vector, world.
+
+        Returns:
+            (m, k) rad.
+        """
+        modal = self._modal(*self._locate(np.atleast_1d(time)))
+        return (self._along(direction) @ modal).real
+
+    def velocity(self, time: ArrayLike, direction: ArrayLike) -> FloatArray:
+        """Deflection rate of every joint, (m, k) rad/s."""
+        modal = self._modal(*self._locate(np.atleast_1d(time)))
+        return ((self._along(direction) * self.modes.poles) @ modal).real
+
+    def acceleration(self, time: ArrayLike, direction: ArrayLike) -> FloatArray:
+        """Second derivative of every joint's deflection, (m, k) rad/s^2; jumps with the force."""
+        index, u = self._locate(np.atleast_1d(time))
+        weighted = self._along(direction) * self.modes.poles
+        rate = self.modes.poles[:, None] * self._modal(index, u)
+        return (weighted @ (rate + self.force.in_piece(index, u))).real
+
+    def _along(self, direction: ArrayLike) -> ComplexArray:
+        return self.modes.residues @ unit_vector(direction)
+
+    def turning_points(self, direction: ArrayLike) -> list[tuple[FloatArray, FloatArray]]:
+        """Every extremum of every joint's deflection, found from the closed form.
+
+        A response from rest starts at time 0 with deflection 0 and, after a ring-down, ends at
+        rest. A periodic one starts and ends at the same turning point, one period later.
+
+        Args:
+            direction: (3,) unit vector.
+
+        Returns:
+            for each output, (time (k,) s, deflection (k,) rad).
+        """
+        along = self._along(direction)
+        grid = Grid.of(self.modes.poles, self.force, self.horizon)
+        modal = self._modal(grid.index, grid.local)
+        result = []
+        for row in along:
+            on_grid = self._slope_of(row, modal, grid.index, grid.local)
+            index, u = refine_roots(grid, on_grid, partial(self._slope, row))
+            time = self.force.start[index] + u
+            value = (row @ self._modal(index, u)).real
+            result.append(self._close(time, value, row))
+        return result
+
+    def _slope(
+        self, row: ComplexArray, index: IndexArray, u: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """First and second derivative of one output."""
+        return self._slope_of(row, self._modal(index, u), index, u)
+
+    def _slope_of(
+        self, row: ComplexArray, modal: ComplexArray, index: IndexArray, u: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        # Not by BLAS: its threads cost more than these few rows.
+        weighted = row * self.modes.poles
+        first, second = np.einsum("dp,pk->dk", [weighted, weighted * self.modes.poles], modal).real
+        return first, second + weighted.sum().real * self.force.in_piece(index, u)
+
+    def _close(
+        self, time: FloatArray, value: FloatArray, row: ComplexArray
+    ) -> tuple[FloatArray, FloatArray]:
+        if self.periodic:
+            if not time.size:  # a constant
+                start = (row @ self.states[:, :1]).real
+                return np.zeros(1), start
+            return np.append(time, time[0] + self.force.end), np.append(value, value[0])
+        end = self.horizon
+        last = 0.0
+        if np.isfinite(self.force.end):
+            here, u = self._locate(np.array([end]))
+            last = float((row @ self._modal(here, u)).real[0])
+        return np.concatenate([[0.0], time, [end]]), np.concatenate([[0.0], value, [last]])
+
+    def peaks(self, direction: ArrayLike) -> list[Peak]:
+        """The largest absolute deflection of every joint for one direction, exact in time."""
+        result = []
+        for time, value in self.turning_points(direction):
+            k = int(np.abs(value).argmax())
+            result.append(Peak(float(value[k]), float(time[k])))
+        return result
+
+    def worst_directions(self) -> list[WorstDirection]:
+        """The largest deflection of every joint over all force directions, no direction sampled.
+
+        The deflection for direction n is g(t) . n, so its maximum over unit n and time is
+        max |g(t)|, reached along g. Where g vanishes the direction is +z.
+
+        Returns:
+            one for each output; either sign of the direction gives the same deflection.
+        """
+        grid = Grid.of(self.modes.poles, self.force, self.horizon, density=2)
+        modal = self._modal(grid.index, grid.local)
+        result = []
+        for residue in self.modes.residues:
+            if np.abs(residue).max() == 0.0:
+                result.append(WorstDirection(0.0, np.array([0.0, 0.0, 1.0]), 0.0))
+                continue
+            on_grid = self._norm_slope_of(residue, modal, grid.index, grid.local)
+            index, u = refine_roots(grid, on_grid, partial(self._norm_slope, residue))
+            # The grid itself as well: a monotonic response has its maximum at an end.
+            index, u = np.append(grid.index, index), np.append(grid.local, u)
+            g = np.einsum("pd,pk->dk", residue, self._modal(index, u)).real
+            norm = np.sqrt((g * g).sum(axis=0))
+            k = int(norm.argmax())
+            time = float(self.force.start[index[k]] + u[k])
+            direction = g[:, k] / norm[k] if norm[k] > 0 else np.array([0.0, 0.0, 1.0])
+            result.append(WorstDirection(float(norm[k]), direction, time))
+        return result
+
+    def _norm_slope(
+        self, residue: ComplexArray, index: IndexArray, u: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """First and second derivative of |g|^2 / 2."""
+        return self._norm_slope_of(residue, self._modal(index, u), index, u)
+
+    def _norm_slope_of(
+        self, residue: ComplexArray, modal: ComplexArray, index: IndexArray, u: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        poles = self.modes.poles[:, None]
+        g = (residue.T @ modal).real
+        v = ((residue * poles).T @ modal).real
+        a = ((residue * poles**2).T @ modal).real
+        a += (residue * poles).sum(axis=0).real[:, None] * self.force.in_piece(index, u)
+        return (g * v).sum(axis=0), (v * v).sum(axis=0) + (g * a).sum(axis=0)
+
+
+def unit_vector(direction: ArrayLike) -> FloatArray:
+    """The direction with length 1.
+
+    Raises:
+        InputError: not three finite numbers, or all zero.
+    """
+    n = np.asarray(direction, dtype=float)
+    if n.shape != (3,) or not np.isfinite(n).all():
+        raise InputError("must be three finite numbers", key="direction", value=direction)
+    length = float(np.linalg.norm(n))
+    if length == 0.0:
+        raise InputError("has zero length", key="direction", value=[float(c) for c in n])
+    return n / length

@@ -1,0 +1,136 @@
+"""Force histories: values, repetition, and Fourier coefficients against quadrature."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from picchio.core.errors import InputError
+from picchio.excitation import HalfSineTrain, MeasuredForce, PulseTrain
+
+MEASURED = MeasuredForce(
+    np.array([0.0, 0.001, 0.003, 0.004, 0.02]), np.array([0.0, 310.0, 80.0, -20.0, 0.0]), 0.04
+)
+TRAINS = [PulseTrain(300, 0.04, 0.004), HalfSineTrain(300, 0.04, 0.004), MEASURED]
+
+
+def test_a_pulse_has_its_value_just_after_a_jump():
+    force = PulseTrain(300.0, 0.04, 0.004).one_period()
+    assert force([0.0, 0.0039, 0.004, 0.03]).tolist() == [300.0, 300.0, 0.0, 0.0]
+    assert force([-0.001, 0.04]).tolist() == [0.0, 0.0]
+
+
+def test_a_half_sine_is_a_half_sine():
+    force = HalfSineTrain(300.0, 0.04, 0.004).one_period()
+    t = np.linspace(0, 0.0039, 40)
+    np.testing.assert_allclose(force(t), 300 * np.sin(np.pi * t / 0.004), atol=1e-10)
+    assert force(0.01) == 0.0
+
+
+def test_a_measured_blow_is_interpolated_and_then_silent():
+    t = np.linspace(0, 0.0399, 500)
+    expected = np.interp(t, MEASURED.time, MEASURED.samples)
+    np.testing.assert_allclose(MEASURED.one_period()(t), expected, atol=1e-10)
+
+
+@pytest.mark.parametrize("train", TRAINS, ids=["pulse", "half-sine", "measured"])
+def test_fourier_coefficients_against_quadrature(train):
+    force = train.one_period()
+    edges = [*force.start, force.end]
+    exact = force.fourier_coefficients(40)
+    w = 2 * np.pi / train.period
+    for k in (0, 1, 2, 7, 40):
+        parts = [
+            quad(lambda t, f=f, k=k: float(force(t)) * f(k * w * t), a, b, limit=200, epsabs=1e-12)
+            for a, b in zip(edges[:-1], edges[1:], strict=True)
+            for f in (np.cos, np.sin)
+        ]
+        values = [p[0] for p in parts]
+        expected = (sum(values[::2]) - 1j * sum(values[1::2])) / train.period
+        assert abs(exact[k] - expected) < 1e-9
+
+
+def test_the_pulse_train_has_the_papers_coefficients():
+    f0, period, width = 300.0, 0.04, 0.004
+    c = PulseTrain(f0, period, width).one_period().fourier_coefficients(50)
+    j = np.arange(1, 51)
+    assert c[0].real == pytest.approx(f0 * width / period, rel=1e-14)  # eq. 12, a_0
+    a = f0 / (j * np.pi) * np.sin(2 * j * np.pi * width / period)
+    b = f0 / (j * np.pi) * (1 - np.cos(2 * j * np.pi * width / period))
+    np.testing.assert_allclose(2 * c[1:].real, a, atol=1e-10)
+    np.testing.assert_allclose(-2 * c[1:].imag, b, atol=1e-10)
+
+
+@given(hits=st.integers(1, 30), fraction=st.floats(0.01, 0.99))
+def test_a_burst_is_the_period_h_times_and_then_nothing(hits, fraction):
+    train = HalfSineTrain(100.0, 0.05, 0.05 * fraction)
+    burst = train.burst(hits)
+    t = np.linspace(0, (hits + 2) * 0.05, 777)
+    phase = np.mod(t, 0.05)
+    inside = t < hits * 0.05
+    away = np.minimum(phase, 0.05 - phase) > 1e-9
+    expected = np.where(inside, train.one_period()(phase), 0.0)
+    np.testing.assert_allclose(burst(t)[away], expected[away], atol=1e-6)
+    assert burst.end == np.inf
+
+
+def test_mean_force_of_each_train():
+    assert PulseTrain(300, 0.04, 0.004).one_period().mean() == pytest.approx(30.0)
+    half_sine = HalfSineTrain(300, 0.04, 0.004).one_period().mean()
+    assert half_sine == pytest.approx(300 * 2 / np.pi * 0.1)
+
+
+@pytest.mark.parametrize("train", [PulseTrain, HalfSineTrain])
+@pytest.mark.parametrize(
+    ("arguments", "key"),
+    [
+        ((300, 0.04, 0.04), "width"),
+        ((300, 0.04, 0.05), "width"),
+        ((300, 0.04, 0.0), "width"),
+        ((300, -1.0, 0.004), "period"),
+        ((np.nan, 0.04, 0.004), "force"),
+        ((300, np.inf, 0.004), "period"),
+        ((300, 0.04, 0.004, np.nan), "preload"),
+    ],
+)
+def test_impossible_trains_are_refused_by_key(train, arguments, key):
+    with pytest.raises(InputError, match=key):
+        train(*arguments)
+
+
+def test_reading_a_measured_force(tmp_path):
+    path = tmp_path / "force.csv"
+    path.write_text("force [N],time [s]\n0,1.0\n300,1.001\n0,1.004\n")
+    force = MeasuredForce.from_csv(path, period=0.04)
+    assert force.peak_force == 300.0
+    assert force.period == 0.04
+    assert force.time[0] == 0.0
+    alone = MeasuredForce.from_csv(path)
+    assert alone.period == pytest.approx(0.004)
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("", "header"),
+        ("time [s],force [kgf]\n0,1\n1,2\n", "force [N]"),
+        ("time [s],force [N]\n0,1\n", "two or more samples"),
+        ("time [s],force [N]\n0,1\n1,x\n", "line 3"),
+        ("time [s],force [N]\n0,1\n1,nan\n", "sample 2"),
+        ("time [s],force [N]\n0,1\n0,2\n", "does not ascend"),
+        ("time [s],force [N]\n0,1\n1\n", "line 3"),
+    ],
+)
+def test_bad_measured_forces_are_refused(tmp_path, text, part):
+    path = tmp_path / "force.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        MeasuredForce.from_csv(path)
+    assert part in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def test_a_period_shorter_than_the_record_is_refused():
+    with pytest.raises(InputError, match="period"):
+        MeasuredForce(np.array([0.0, 1.0]), np.array([1.0, 2.0]), 0.5)
