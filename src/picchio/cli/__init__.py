@@ -1,0 +1,1 @@
+"""The `picchio` command, one file a subcommand."""

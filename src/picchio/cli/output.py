@@ -1,0 +1,89 @@
+"""What a command prints: tables for people, JSON for programs, progress on stderr."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+_PATIENCE = 2.0
+
+
+def console() -> Console:
+    """Where tables go: stdout, at least 100 columns wide where it is no terminal."""
+    from rich.console import Console
+
+    plain = not sys.stdout.isatty()
+    return Console(width=100 if plain else None, highlight=False, soft_wrap=False)
+
+
+def write_json(data: dict[str, Any], target: str) -> None:
+    """Write JSON to a file, whole or not at all, or to stdout for "-"."""
+    from picchio.core.files import atomic_write
+
+    text = json.dumps(finite(data), indent=2, allow_nan=False) + "\n"
+    if target == "-":
+        sys.stdout.write(text)
+        return
+    with atomic_write(target) as stream:
+        stream.write(text)
+
+
+def finite(value: Any) -> Any:
+    """The same structure with None for numbers that JSON can't hold, arrays as lists."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(k): finite(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+@contextmanager
+def progress(description: str) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on stderr, once work takes over two seconds and stderr is a terminal.
+
+    Yields:
+        a function to call with (done, total).
+    """
+    if not sys.stderr.isatty():
+        yield lambda done, total: None
+        return
+    import time
+
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed}/{task.total}"),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    began = time.monotonic()
+    task = bar.add_task(description, total=None)
+    started = False
+
+    def update(done: int, total: int) -> None:
+        nonlocal started
+        if not started and time.monotonic() - began > _PATIENCE:
+            bar.start()
+            started = True
+        bar.update(task, completed=done, total=total)
+
+    try:
+        yield update
+    finally:
+        if started:
+            bar.stop()

@@ -1,0 +1,76 @@
+"""`picchio robots`: the robots that can be named."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from picchio.cli.options import JsonOption
+
+if TYPE_CHECKING:
+    from picchio.robot import RobotEntry
+
+EPILOG = "Example: picchio robots --json robots.json"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the subcommand."""
+    app.command(epilog=EPILOG)(robots)
+
+
+def robots(json: JsonOption = None) -> None:
+    """List the robots that can be named, and which have stiffness data."""
+    from rich import box
+    from rich.table import Table
+
+    from picchio.cli.output import console, write_json
+    from picchio.robot.catalogue import list_robots
+
+    entries = list_robots()
+    if json is not None:
+        content: dict[str, Any] = {
+            "format": "picchio-robots/1",
+            "robots": [
+                {
+                    "name": entry.name,
+                    "urdf": str(entry.urdf),
+                    "dof": entry.dof,
+                    "flexible": list(entry.flexible),
+                    "with_stiffness": list(entry.with_stiffness),
+                    "stiffness_source": entry.stiffness_source,
+                    "estimated": entry.estimated,
+                    "problem": entry.problem,
+                }
+                for entry in entries
+            ],
+        }
+        write_json(content, json)
+    if json == "-":
+        return
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("name", no_wrap=True)
+    table.add_column("DoF", justify="right")
+    table.add_column("stiffness known")
+    table.add_column("source")
+    for entry in entries:
+        table.add_row(
+            entry.name,
+            str(entry.dof),
+            _span(entry.with_stiffness),
+            entry.problem or _origin(entry),
+        )
+    console().print(table)
+
+
+def _span(names: tuple[str, ...]) -> str:
+    return (
+        "-" if not names else f"{names[0]} ... {names[-1]}" if len(names) > 3 else ", ".join(names)
+    )
+
+
+def _origin(entry: RobotEntry) -> str:
+    if entry.stiffness_source is None:
+        return "-"
+    marked = entry.estimated and "estimate" not in entry.stiffness_source
+    return ("estimate: " if marked else "") + entry.stiffness_source

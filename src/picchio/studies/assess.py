@@ -1,0 +1,359 @@
+"""The main job: how many rivets each joint survives on a task."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.provenance import provenance
+from picchio.fatigue import (
+    DEFAULT_SN_CURVE,
+    PAPER_SN_CURVE,
+    SNCurve,
+    check_shaft,
+    life,
+    load_sn_curve,
+    peak_damage,
+)
+from picchio.fatigue.mean_stress import Rule
+from picchio.fatigue.rainflow import Residue
+from picchio.fatigue.sn_curve import MinerRule
+from picchio.model import Model
+from picchio.robot import FlexibleRobot
+from picchio.studies.assessment import (
+    Assessment,
+    JointLife,
+    OperationResult,
+    SteadyStateCheck,
+)
+from picchio.studies.life_rules import (
+    History,
+    LifeRule,
+    PaperRule,
+    RainflowRule,
+    peak,
+)
+from picchio.studies.task import Operation, Task
+from picchio.vibration import modal_analysis, response_from_rest, steady_state
+
+Method = Literal["rainflow", "paper"]
+METHODS: tuple[Method, ...] = ("rainflow", "paper")
+# A shaft that disagrees with its joint's stiffness by more than this is worth a warning.
+_SHAFT_TOLERANCE = 0.05
+
+
+def assess(
+    robot: FlexibleRobot,
+    task: Task,
+    *,
+    method: Method = "rainflow",
+    sn_curve: str | SNCurve | None = None,
+    residue: Residue = "half-cycles",
+    mean_stress: Rule = "none",
+    miner: MinerRule | None = None,
+    paper_mean_stress: bool = False,
+    gravity_stiffness: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Assessment:
+    """Life of every joint of a robot on a riveting task (paper section 3.4, eqs. 18-22).
+
+    Args:
+        robot: with stiffnesses, and shafts where stresses are wanted.
+        task: operations and poses.
+        method: "rainflow" (each rivet from rest, ring-down included, cycles counted) or
+            "paper" (steady state, peak stress, one cycle a hit).
+        sn_curve: for all joints, instead of their own.
+        residue: rainflow's rule for cycles that do not close.
+        mean_stress: correction for gravity and feed force.
+        miner: what cycles below the endurance limit do.
+        paper_mean_stress: the paper's life at the mean of the poses' peak stresses (Table 2).
+        gravity_stiffness: add dg/dq to the springs.
+        progress: called with (poses done, poses in all).
+
+    Returns:
+        the assessment.
+
+    Raises:
+        InputError: no flexible joint, an unknown method, a resonance without damping, a
+            ring-down without end.
+    """
+    if method not in METHODS:
+        raise InputError("unknown method", key="method", value=method, choices=METHODS)
+    if paper_mean_stress and method != "paper":
+        raise InputError("belongs to the method paper", key="paper_mean_stress", value=True)
+    if not robot.flexible_joints:
+        raise InputError(
+            "no joint has a stiffness, so nothing can vibrate",
+            file=robot.source,
+            hint="annotate the URDF, or give a sidecar with --flex",
+        )
+    rule: LifeRule = PaperRule() if method == "paper" else RainflowRule(residue, mean_stress, miner)
+    curves = _curves(robot, sn_curve, method)
+    _warn_about_shafts(robot)
+    _warn_about_limits(robot, task)
+    job = _Job(
+        Model(robot, gravity_stiffness), rule, curves, load_sn_curve(PAPER_SN_CURVE, quiet=True)
+    )
+    total = sum(len(operation.poses) for operation in task.operations)
+    results, checks = [], []
+    done = 0
+    for operation in task.operations:
+        rows = []
+        for pose in operation.poses:
+            rows.append(job.at_pose(operation, pose))
+            done += 1
+            if progress is not None:
+                progress(done, total)
+        results.append(_operation_result(operation, rows))
+        checks.append(np.array([row["check"] for row in rows]))
+    if paper_mean_stress:
+        results = [_at_mean_stress(result, robot, curves) for result in results]
+    joints = tuple(_joint_life(j, robot, task, results, curves) for j in range(len(curves)))
+    limiting = _limiting(joints)
+    used = [curve.name for curve in dict.fromkeys(c for c in curves if c is not None)]
+    name = "paper, at the poses' mean stress" if paper_mean_stress else method
+    return Assessment(
+        robot=robot.name,
+        method=name,
+        sn_curve=", ".join(dict.fromkeys(used)),
+        assumptions=_assumptions(rule, robot, gravity_stiffness, curves),
+        joints=joints,
+        operations=tuple(results),
+        limiting_joint=limiting.name if limiting else None,
+        rivets_to_failure=limiting.rivets_to_failure if limiting else math.inf,
+        steady_state=_steady_state_checks(joints, task, results, checks),
+        origins=robot.origins,
+        provenance=provenance([*robot.files, *task.files]),
+    )
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What every pose needs."""
+
+    model: Model
+    rule: LifeRule
+    curves: tuple[SNCurve | None, ...]
+    paper_curve: SNCurve
+
+    def at_pose(self, operation: Operation, pose: FloatArray) -> dict[str, FloatArray]:
+        """Every joint's numbers at one pose, each (n,)."""
+        robot = self.model.robot
+        state = robot.state(pose)
+        modes = modal_analysis(self.model.linear_system(pose))
+        damped = bool((modes.poles.real < 0.0).all())
+        needs_rest = isinstance(self.rule, RainflowRule)
+        rest = steady = None
+        if damped or needs_rest:
+            response = response_from_rest(modes, operation.excitation, operation.hits_per_rivet)
+            rest = [value for _, value in response.turning_points(operation.direction)]
+        if damped or not needs_rest:
+            response = steady_state(modes, operation.excitation)
+            steady = [value for _, value in response.turning_points(operation.direction)]
+        feed = operation.excitation.preload * (state.jacobian.T @ operation.direction)
+        static = (feed - state.gravity_torque) / robot.stiffness
+        n = len(robot.flexible_joints)
+        columns = ("peak_deflection", "peak_shear_stress", "utilisation", "damage_per_rivet")
+        out: dict[str, FloatArray] = {key: np.full(n, np.nan) for key in columns}
+        out["steady_peak_deflection"] = np.array(
+            [peak(None if steady is None else steady[j]) for j in range(n)]
+        )
+        out["rest_peak_deflection"] = np.array(
+            [peak(None if rest is None else rest[j]) for j in range(n)]
+        )
+        out["check"] = np.full((n, 2), np.nan)
+        own = out["rest_peak_deflection" if needs_rest else "steady_peak_deflection"]
+        out["peak_deflection"] = own
+        out["gravity_shear_stress"] = np.full(n, np.nan)
+        for j, (joint, curve) in enumerate(zip(robot.flexible_joints, self.curves, strict=True)):
+            if joint.shaft is None or curve is None:
+                continue
+            history = History(
+                None if steady is None else steady[j],
+                None if rest is None else rest[j],
+                float(static[j]),
+                operation.hits_per_rivet,
+            )
+            result = self.rule(joint, history, curve)
+            for key, value in zip(columns, result, strict=True):
+                out[key][j] = value
+            out["gravity_shear_stress"][j] = (
+                abs(state.gravity_torque[j]) * joint.shaft.radius / joint.shaft.polar_moment
+            )
+            if history.steady is not None and history.rest is not None:
+                # The paper's curve on both, so that only the steady state's share shows.
+                out["check"][j] = (
+                    PaperRule()(joint, history, self.paper_curve).damage,
+                    RainflowRule()(joint, history, self.paper_curve).damage,
+                )
+        out["natural_frequencies"] = modes.natural_frequencies
+        out["tool_position"] = state.tool_position
+        return out
+
+
+def _curves(
+    robot: FlexibleRobot, override: str | SNCurve | None, method: Method
+) -> tuple[SNCurve | None, ...]:
+    """The S-N curve of every joint that has a shaft."""
+    if override is None and method == "paper":
+        override = PAPER_SN_CURVE
+    loaded: dict[str, SNCurve] = {}
+    curves: list[SNCurve | None] = []
+    for joint in robot.flexible_joints:
+        if joint.shaft is None:
+            curves.append(None)
+        elif isinstance(override, SNCurve):
+            curves.append(override)
+        else:
+            name = override or joint.shaft.sn_curve or DEFAULT_SN_CURVE
+            if name not in loaded:
+                loaded[name] = load_sn_curve(name)
+            curves.append(loaded[name])
+    return tuple(curves)
+
+
+def _warn_about_shafts(robot: FlexibleRobot) -> None:
+    for joint in robot.flexible_joints:
+        if joint.shaft is None:
+            warnings.warn(
+                f"{joint.name} has no shaft: its stress and life can't be told, only its "
+                "deflection",
+                PicchioWarning,
+                stacklevel=3,
+            )
+        elif abs(off := check_shaft(joint.stiffness, joint.shaft)) > _SHAFT_TOLERANCE:
+            warnings.warn(
+                f"{joint.name}: the shaft's own stiffness G Jp / l is {100 * off:+.0f} % off the "
+                f"joint's {joint.stiffness:g}; the method paper takes the stress from the "
+                "deflection and is off by as much",
+                PicchioWarning,
+                stacklevel=3,
+            )
+
+
+def _warn_about_limits(robot: FlexibleRobot, task: Task) -> None:
+    for operation in task.operations:
+        beyond: dict[str, int] = {}
+        for pose in operation.poses:
+            for name in robot.limit_violations(pose):
+                beyond[name] = beyond.get(name, 0) + 1
+        for name, count in beyond.items():
+            warnings.warn(
+                f"operation {operation.name!r}: {name} is beyond its limits in {count} of "
+                f"{len(operation.poses)} poses",
+                PicchioWarning,
+                stacklevel=3,
+            )
+
+
+def _operation_result(operation: Operation, rows: list[dict[str, FloatArray]]) -> OperationResult:
+    stacked = {key: np.array([row[key] for row in rows]) for key in rows[0] if key != "check"}
+    return OperationResult(
+        name=operation.name,
+        direction=operation.direction,
+        excitation=operation.excitation.describe(),
+        hits_per_rivet=operation.hits_per_rivet,
+        rivets=operation.rivets,
+        poses=operation.poses,
+        **stacked,
+    )
+
+
+def _at_mean_stress(
+    result: OperationResult, robot: FlexibleRobot, curves: tuple[SNCurve | None, ...]
+) -> OperationResult:
+    """The same operation with every pose at the mean of the poses' peak stresses."""
+    changed = result.damage_per_rivet.copy()
+    for j, curve in enumerate(curves):
+        if curve is not None:
+            mean = float(result.peak_shear_stress[:, j].mean())
+            changed[:, j] = peak_damage(mean, result.hits_per_rivet, curve)
+    values = {name: getattr(result, name) for name in result.__dataclass_fields__}
+    return OperationResult(**(values | {"damage_per_rivet": changed}))
+
+
+def _joint_life(
+    j: int,
+    robot: FlexibleRobot,
+    task: Task,
+    results: list[OperationResult],
+    curves: tuple[SNCurve | None, ...],
+) -> JointLife:
+    joint, curve = robot.flexible_joints[j], curves[j]
+    # Miner over every pose and operation: eqs. 19-22 with a_i in the hits, b_i in the rivets.
+    spent = {r.name: float(r.damage_per_rivet[:, j].sum() * r.rivets) for r in results}
+    total = math.fsum(spent.values())
+    per_rivet = total / task.rivets_per_pass
+    ranked = [r.utilisation if curve is not None else r.peak_deflection for r in results]
+    k = int(np.argmax([column[:, j].max() for column in ranked]))
+    shares = {name: value / total for name, value in spent.items()} if total > 0.0 else {}
+    return JointLife(
+        name=joint.name,
+        peak_deflection=float(max(r.peak_deflection[:, j].max() for r in results)),
+        peak_shear_stress=float(max(r.peak_shear_stress[:, j].max() for r in results)),
+        gravity_shear_stress=float(max(r.gravity_shear_stress[:, j].max() for r in results)),
+        utilisation=float(max(r.utilisation[:, j].max() for r in results)),
+        damage_per_rivet=per_rivet,
+        rivets_to_failure=life(per_rivet) if curve is not None else math.nan,
+        sn_curve=curve.name if curve is not None else "",
+        worst_operation=results[k].name,
+        worst_pose=int(ranked[k][:, j].argmax()),
+        damage_share=shares,
+    )
+
+
+def _limiting(joints: tuple[JointLife, ...]) -> JointLife | None:
+    """The joint that ends the robot's life: the shortest, or else the most utilised."""
+    known = [joint for joint in joints if joint.sn_curve]
+    if not known:
+        return None
+    return min(known, key=lambda joint: (joint.rivets_to_failure, -joint.utilisation))
+
+
+def _steady_state_checks(
+    joints: tuple[JointLife, ...],
+    task: Task,
+    results: list[OperationResult],
+    checks: list[FloatArray],
+) -> tuple[SteadyStateCheck, ...]:
+    """Peaks at each joint's worst pose, and lives over the whole task."""
+    by_name: Mapping[str, OperationResult] = {result.name: result for result in results}
+    rivets = [operation.rivets for operation in task.operations]
+    found = []
+    for j, joint in enumerate(joints):
+        worst = by_name[joint.worst_operation]
+        spent = sum(c[:, j].sum(axis=0) * r for c, r in zip(checks, rivets, strict=True))
+        paper, counted = np.asarray(spent) / task.rivets_per_pass
+        found.append(
+            SteadyStateCheck(
+                joint.name,
+                float(worst.steady_peak_deflection[joint.worst_pose, j]),
+                float(worst.rest_peak_deflection[joint.worst_pose, j]),
+                life(float(paper)) if np.isfinite(paper) else math.nan,
+                life(float(counted)) if np.isfinite(counted) else math.nan,
+            )
+        )
+    return tuple(found)
+
+
+def _assumptions(
+    rule: LifeRule,
+    robot: FlexibleRobot,
+    gravity_stiffness: bool,
+    curves: tuple[SNCurve | None, ...],
+) -> tuple[str, ...]:
+    described = [curve.describe() for curve in dict.fromkeys(c for c in curves if c is not None)]
+    return (
+        f"gravity stiffness {'on' if gravity_stiffness else 'off'}",
+        "the motor side of every joint stands still while the tool hits",
+        *rule.assumptions(),
+        *(f"S-N curve {text}" for text in described),
+        "shafts only: reducers are not assessed",
+    )

@@ -1,0 +1,181 @@
+"""What an assessment found: the life of every joint, and where it goes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+
+FORMAT = "picchio-assessment/1"
+
+
+@dataclass(frozen=True, eq=False)
+class OperationResult:
+    """One operation, pose by pose.
+
+    Attributes:
+        name: of the operation.
+        direction: (3,) unit vector of the force.
+        excitation: the blows, in words.
+        hits_per_rivet: blows a rivet takes.
+        rivets: at each pose, per pass.
+        poses: (n_poses, nv) rad or m.
+        tool_position: (n_poses, 3) m.
+        natural_frequencies: (n_poses, n) Hz.
+        peak_deflection: (n_poses, n) rad, of the method's own response.
+        steady_peak_deflection: (n_poses, n) rad, exact steady state; NaN where there is none.
+        rest_peak_deflection: (n_poses, n) rad, a rivet from rest; NaN where it has no end.
+        peak_shear_stress: (n_poses, n) Pa, of the vibration; NaN for a joint without a shaft.
+        gravity_shear_stress: (n_poses, n) Pa, magnitude.
+        utilisation: (n_poses, n).
+        damage_per_rivet: (n_poses, n).
+    """
+
+    name: str
+    direction: FloatArray
+    excitation: str
+    hits_per_rivet: int
+    rivets: float
+    poses: FloatArray
+    tool_position: FloatArray
+    natural_frequencies: FloatArray
+    peak_deflection: FloatArray
+    steady_peak_deflection: FloatArray
+    rest_peak_deflection: FloatArray
+    peak_shear_stress: FloatArray
+    gravity_shear_stress: FloatArray
+    utilisation: FloatArray
+    damage_per_rivet: FloatArray
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, arrays as (pose, joint)."""
+        names = list(self.__dataclass_fields__)
+        return {name: getattr(self, name) for name in names}
+
+
+@dataclass(frozen=True)
+class JointLife:
+    """One joint over the whole task.
+
+    Attributes:
+        name: of the joint.
+        peak_deflection: rad, largest over the task.
+        peak_shear_stress: Pa, largest of the vibration; NaN without a shaft.
+        gravity_shear_stress: Pa, largest magnitude.
+        utilisation: largest equivalent amplitude over the allowable; NaN without a shaft.
+        damage_per_rivet: mean over the rivets of the task's mix.
+        rivets_to_failure: all rivets of the mix; infinite where the life has no end.
+        sn_curve: name of the curve; empty without a shaft.
+        worst_operation: where the utilisation (or, without a shaft, the deflection) is largest.
+        worst_pose: index of the pose there.
+        damage_share: of each operation in this joint's damage; empty without damage.
+    """
+
+    name: str
+    peak_deflection: float
+    peak_shear_stress: float
+    gravity_shear_stress: float
+    utilisation: float
+    damage_per_rivet: float
+    rivets_to_failure: float
+    sn_curve: str
+    worst_operation: str
+    worst_pose: int
+    damage_share: Mapping[str, float] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+@dataclass(frozen=True)
+class SteadyStateCheck:
+    """What the paper's steady state misjudges, one entry a joint, at the joint's worst pose.
+
+    Attributes:
+        joint: name.
+        steady_peak: rad, exact steady state.
+        rest_peak: rad, the rivet as it happens: from rest, ring-down included.
+        paper_life: rivets, by the paper's rule and curve on the steady state.
+        counted_life: rivets, same curve, cycles of the rivet from rest counted by rainflow.
+    """
+
+    joint: str
+    steady_peak: float
+    rest_peak: float
+    paper_life: float
+    counted_life: float
+
+    @property
+    def peak_ratio(self) -> float:
+        """Peak of the rivet over the peak of the steady state."""
+        return self.rest_peak / self.steady_peak if self.steady_peak > 0.0 else float("nan")
+
+    @property
+    def life_ratio(self) -> float:
+        """Life by counted cycles over the paper's life."""
+        if not np.isfinite(self.paper_life) or not np.isfinite(self.counted_life):
+            return float("nan")
+        return self.counted_life / self.paper_life
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, the ratios included."""
+        own = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return own | {"peak_ratio": self.peak_ratio, "life_ratio": self.life_ratio}
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """The life of a robot on a task.
+
+    Attributes:
+        robot: its name.
+        method: "rainflow" or "paper", and its variant.
+        sn_curve: names of the curves used.
+        assumptions: what was taken for granted, a sentence each.
+        joints: one entry a flexible joint.
+        operations: one entry an operation.
+        limiting_joint: shortest life, or largest utilisation where no life has an end; None
+            where no joint has a shaft.
+        rivets_to_failure: of the limiting joint; infinite where the life has no end.
+        steady_state: what the steady state misjudges, one entry a joint.
+        origins: where each value of the robot came from.
+        provenance: version and hashes.
+    """
+
+    robot: str
+    method: str
+    sn_curve: str
+    assumptions: tuple[str, ...]
+    joints: tuple[JointLife, ...]
+    operations: tuple[OperationResult, ...]
+    limiting_joint: str | None
+    rivets_to_failure: float
+    steady_state: tuple[SteadyStateCheck, ...]
+    origins: Mapping[str, str]
+    provenance: Mapping[str, Any]
+
+    def joint(self, name: str) -> JointLife:
+        """The entry of one joint."""
+        return next(joint for joint in self.joints if joint.name == name)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of `picchio-assessment/1`; infinite lives are left as inf."""
+        return {
+            "format": FORMAT,
+            "robot": self.robot,
+            "method": self.method,
+            "sn_curve": self.sn_curve,
+            "joints": [joint.to_dict() for joint in self.joints],
+            "operations": [operation.to_dict() for operation in self.operations],
+            "limiting_joint": self.limiting_joint,
+            "rivets_to_failure": self.rivets_to_failure,
+            "steady_state": [check.to_dict() for check in self.steady_state],
+            "assumptions": list(self.assumptions),
+            "origins": dict(self.origins),
+            "provenance": dict(self.provenance),
+        }

@@ -1,0 +1,201 @@
+"""The command as a stranger meets it: what is printed where, and every bad input."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+
+def picchio(*arguments, cwd=None, env=None):
+    return subprocess.run(
+        [sys.executable, "-c", "from picchio.cli.main import main; main()", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        env={**os.environ, **(env or {})},
+        timeout=120,
+    )
+
+
+TASK = """format = "picchio-task/1"
+[excitation]
+force = 300.0
+period = 0.04
+width = 0.004
+[[operation]]
+name = "forward"
+direction = [1.0, 0.0, 0.0]
+poses = [[0.0, 0.5, -0.8]]
+"""
+
+
+@pytest.fixture
+def robot(tmp_path, repository):
+    """A copy of the arm that a test may break."""
+    folder = tmp_path / "arm"
+    shutil.copytree(repository / "robots" / "fanuc_like_3dof", folder)
+    return folder / "robot.urdf"
+
+
+def test_the_main_job_prints_a_table_and_a_verdict(tmp_path):
+    done = picchio("assess", "fanuc_like_3dof", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    for word in ("joint_1", "joint_2", "joint_3", "rivets", "forward", "left", "upward"):
+        assert word in done.stdout
+    assert "\x1b" not in done.stdout
+    assert os.listdir(tmp_path) == []
+
+
+def test_json_has_the_contracts_keys_and_no_number_that_json_lacks(tmp_path):
+    done = picchio("assess", "fanuc_like_3dof", "--json", "-", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout, parse_constant=lambda name: pytest.fail(name))
+    assert found["format"] == "picchio-assessment/1"
+    assert {"robot", "method", "sn_curve", "limiting_joint", "rivets_to_failure"} <= set(found)
+    assert found["method"] == "rainflow"
+    assert found["rivets_to_failure"] is None
+    for joint in found["joints"]:
+        assert {
+            "name",
+            "peak_deflection",
+            "peak_shear_stress",
+            "gravity_shear_stress",
+            "utilisation",
+            "damage_per_rivet",
+            "rivets_to_failure",
+        } <= set(joint)
+        assert 0 < joint["utilisation"] < 1
+    for operation in found["operations"]:
+        assert len(operation["poses"]) == 15
+        for key in ("natural_frequencies", "peak_deflection", "peak_shear_stress"):
+            assert [len(row) for row in operation[key]] == [3] * 15
+        assert [len(row) for row in operation["damage_per_rivet"]] == [3] * 15
+    assert found["provenance"]["inputs"]
+
+
+def test_json_to_a_file_and_the_table_to_stdout(tmp_path):
+    target = tmp_path / "life.json"
+    done = picchio("assess", "fanuc_like_3dof", "--method", "paper", "--json", target)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(target.read_text())
+    assert found["method"] == "paper"
+    assert found["rivets_to_failure"] == min(j["rivets_to_failure"] for j in found["joints"])
+    rounded = float(f"{found['rivets_to_failure']:.4g}")
+    assert f"The robot survives {rounded:,.0f} rivets; joint_2 fails first" in done.stdout
+
+
+def test_help_shows_an_example_and_version_a_version():
+    assert "Example:" in picchio("assess", "--help").stdout
+    assert picchio("--version").stdout.startswith("picchio 0.")
+    listed = picchio("robots")
+    assert "fanuc_like_3dof" in listed.stdout
+    found = json.loads(picchio("robots", "--json", "-").stdout)
+    entry = next(r for r in found["robots"] if r["name"] == "fanuc_like_3dof")
+    assert entry["dof"] == 3
+    assert entry["flexible"] == ["joint_1", "joint_2", "joint_3"]
+    assert entry["stiffness_source"]
+
+
+def edit(path, old, new):
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+BAD_URDFS = {
+    "broken XML": ("</robot>", "", ["robot.urdf", "line"]),
+    "an undeclared prefix": (' xmlns:picchio="urn:picchio:1"', "", ["picchio", "prefix"]),
+    "negative stiffness": ('stiffness="2.4e5"', 'stiffness="-1"', ["joint_1", "stiffness", "-1"]),
+    "NaN stiffness": ('stiffness="2.4e5"', 'stiffness="nan"', ["joint_1", "stiffness", "nan"]),
+    "a number that is none": ('stiffness="2.4e5"', 'stiffness="a"', ["joint_1", "stiffness"]),
+    "a misspelt attribute": ("damping_ratio=", "dampig_ratio=", ["dampig_ratio", "damping_ratio"]),
+    "negative damping": ('damping_ratio="0.03"', 'damping_ratio="-0.1"', ["damping_ratio"]),
+    "negative radius": ('radius="0.01765"', 'radius="-1"', ["joint_1", "radius"]),
+    "negative mass": ('mass value="30"', 'mass value="-30"', ["mass", "-30"]),
+    "an unknown S-N curve": ('"42CrMo4-QT-shaft"', '"42CrMo4"', ["42CrMo4", "valid"]),
+}
+
+
+@pytest.mark.parametrize("name", BAD_URDFS)
+def test_a_bad_urdf_gives_one_line_and_exit_2(robot, tmp_path, name):
+    old, new, parts = BAD_URDFS[name]
+    edit(robot, old, new)
+    task = tmp_path / "task.toml"
+    task.write_text(TASK)
+    check_refused(picchio("assess", robot, "--task", task), parts)
+
+
+def check_refused(done, parts):
+    assert done.returncode == 2, done.stdout + done.stderr
+    lines = [line for line in done.stderr.splitlines() if "warning" not in line]
+    assert len(lines) == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    for part in parts:
+        assert part in lines[0], lines[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["no_such_robot"], ["no_such_robot", "fanuc_like_3dof"]),
+        (["no/such.urdf"], ["no/such.urdf", "no such file"]),
+        (["fanuc_like_3dof", "--tool", "tol"], ["tol", "did you mean 'tool'"]),
+        (["fanuc_like_3dof", "--task", "none.toml"], ["none.toml", "no such file"]),
+        (["fanuc_like_3dof", "--flex", "none.toml"], ["none.toml", "no such file"]),
+        (["fanuc_like_3dof", "--method", "papier"], ["papier", "paper", "rainflow"]),
+        (["fanuc_like_3dof", "--residue", "half"], ["half", "half-cycles"]),
+        (["fanuc_like_3dof", "--sn-curve", "steel"], ["steel", "nie-2016"]),
+        (["fanuc_like_3dof", "--json", "no/where.json"], ["no/where.json"]),
+        (["fanuc_like_3dof", "--nonsense"], ["--nonsense"]),
+        ([], ["ROBOT"]),
+    ],
+)
+def test_bad_arguments_give_one_line_and_exit_2(arguments, parts, tmp_path):
+    check_refused(picchio("assess", *arguments, cwd=tmp_path), parts)
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("sidecar", "parts"),
+    [
+        ('format = "picchio-sidecar/9"\n', ["flex.toml", "picchio-sidecar/1"]),
+        (
+            'format = "picchio-sidecar/1"\n[joint.joint_7]\nstiffness = 1e5\n',
+            ["joint_7", "joint_1"],
+        ),
+        (
+            'format = "picchio-sidecar/1"\n[joint.joint_1]\nstifness = 1\n',
+            ["stifness", "stiffness"],
+        ),
+        ('format = "picchio-sidecar/1"\n[joint.joint_1]\nstiffness = -1\n', ["joint_1", "-1"]),
+        ('format = "picchio-sidecar/1"\n[tool]\nframe = "flange"\n', ["flange", "tool"]),
+    ],
+)
+def test_a_bad_sidecar_gives_one_line_and_exit_2(sidecar, parts, tmp_path):
+    path = tmp_path / "flex.toml"
+    path.write_text(sidecar)
+    check_refused(picchio("assess", "fanuc_like_3dof", "--flex", path), parts)
+
+
+def test_a_pose_beyond_the_limits_is_a_warning(tmp_path):
+    task = tmp_path / "task.toml"
+    task.write_text(TASK.replace("-0.8", "-2.0"))
+    done = picchio("assess", "fanuc_like_3dof", "--task", task)
+    assert done.returncode == 0
+    assert "joint_3" in done.stderr
+    assert "limits" in done.stderr
+
+
+def test_import_is_light_and_the_example_is_quick():
+    """Neither pinocchio nor scipy, numba or yourdfpy may load with `import picchio`."""
+    code = (
+        "import sys, picchio\n"
+        "heavy = {'pinocchio', 'scipy', 'numba', 'yourdfpy', 'meshcat', 'pydantic', 'xarray'}\n"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
