@@ -23,7 +23,7 @@ def main() -> None:
     exact = picchio.steady_state(modes, blows)
     t = np.linspace(0.0, blows.period, 4001)
     x = exact.deflection(t, direction)[1:]
-    largest = np.array([abs(p.value) for p in exact.peaks(direction)[1:]])
+    largest = np.abs(x).max(axis=1)  # on the same samples
     began = time.perf_counter()
     for _ in range(20):
         exact.deflection(t, direction)

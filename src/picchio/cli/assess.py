@@ -20,6 +20,9 @@ from picchio.core.errors import InputError
 if TYPE_CHECKING:
     from picchio.studies import Assessment, JointLife, OperationResult
 
+# Below this a torque in N m or an angle in mrad is rounding, and is printed as 0.
+_ROUNDING = 1e-9
+
 EPILOG = "Example: picchio assess fanuc_like_3dof --method paper --json life.json"
 
 
@@ -119,7 +122,8 @@ def show(found: Assessment, task: Path) -> None:
     out.print(f"[bold]{verdict(found)}[/bold]\n")
     if len(found.operations) > 1 and any(joint.damage_share for joint in found.joints):
         out.print(_share_table(found))
-    out.print(_steady_table(found))
+    if found.steady_state:
+        out.print(_steady_table(found))
     out.print("[dim]How this was computed[/dim]")
     for line in found.assumptions:
         out.print(f"[dim]  - {line}[/dim]")
@@ -139,27 +143,32 @@ def verdict(found: Assessment) -> str:
 
 
 def _life_table(found: Assessment) -> Any:
+    shafts = [joint for joint in found.joints if joint.sn_curve]
+    torques = len(shafts) < len(found.joints)
+    columns = {
+        "peak\ndeflection\nmrad": lambda j: _number(j.peak_deflection * 1e3),
+        **({"peak\ntorque\nN m": lambda j: _number(j.peak_torque)} if torques else {}),
+        **({"gravity\ntorque\nN m": lambda j: _number(j.gravity_torque)} if torques else {}),
+    }
+    if shafts:
+        columns |= {
+            "peak\nstress\nMPa": lambda j: _number(j.peak_shear_stress / 1e6),
+            "gravity\nstress\nMPa": lambda j: _number(j.gravity_shear_stress / 1e6),
+            "utili-\nsation\n%": lambda j: _number(100 * j.utilisation),
+            "damage\na rivet\n": lambda j: f"{j.damage_per_rivet:.4g}",
+            "rivets to\nfailure\n": lambda j: _life(j),
+        }
     table = _table(
-        "Life of the joints",
+        "Life of the joints" if shafts else "The joints",
         ("joint", "left"),
-        ("peak\ndeflection\nmrad", "right"),
-        ("peak\nstress\nMPa", "right"),
-        ("gravity\nstress\nMPa", "right"),
-        ("utili-\nsation\n%", "right"),
-        ("damage\na rivet\n", "right"),
-        ("rivets to\nfailure\n", "right"),
+        *((name, "right") for name in columns),
         ("worst at", "left"),
     )
     for joint in found.joints:
         weakest = joint.name == found.limiting_joint
         table.add_row(
             joint.name,
-            f"{joint.peak_deflection * 1e3:.4g}",
-            _number(joint.peak_shear_stress / 1e6),
-            _number(joint.gravity_shear_stress / 1e6),
-            _number(100 * joint.utilisation),
-            _number(joint.damage_per_rivet),
-            _life(joint),
+            *(cell(joint) for cell in columns.values()),
             f"{joint.worst_operation}, pose {joint.worst_pose + 1}",
             style="bold" if weakest else None,
         )
@@ -217,7 +226,9 @@ def _life(joint: JointLife) -> str:
 
 
 def _number(value: float) -> str:
-    return "-" if math.isnan(value) else f"{value:.4g}"
+    if math.isnan(value):
+        return "-"
+    return "0" if abs(value) < _ROUNDING else f"{value:.4g}"
 
 
 def _count(value: float) -> str:

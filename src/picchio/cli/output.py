@@ -16,11 +16,11 @@ _PATIENCE = 2.0
 
 
 def console() -> Console:
-    """Where tables go: stdout, at least 100 columns wide where it is no terminal."""
+    """Where tables go: stdout, 120 columns wide where it is no terminal."""
     from rich.console import Console
 
     plain = not sys.stdout.isatty()
-    return Console(width=100 if plain else None, highlight=False, soft_wrap=False)
+    return Console(width=120 if plain else None, highlight=False, soft_wrap=False)
 
 
 def write_json(data: dict[str, Any], target: str) -> None:

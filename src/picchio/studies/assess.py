@@ -171,6 +171,8 @@ class _Job:
         out["check"] = np.full((n, 2), np.nan)
         own = out["rest_peak_deflection" if needs_rest else "steady_peak_deflection"]
         out["peak_deflection"] = own
+        out["peak_torque"] = robot.stiffness * own
+        out["gravity_torque"] = np.abs(state.gravity_torque)
         out["gravity_shear_stress"] = np.full(n, np.nan)
         for j, (joint, curve) in enumerate(zip(robot.flexible_joints, self.curves, strict=True)):
             if joint.shaft is None or curve is None:
@@ -220,15 +222,18 @@ def _curves(
 
 
 def _warn_about_shafts(robot: FlexibleRobot) -> None:
+    bare = [joint.name for joint in robot.flexible_joints if joint.shaft is None]
+    if bare:
+        warnings.warn(
+            f"no shaft is given for {', '.join(bare)}: deflection and torque can be told, stress "
+            "and life can't",
+            PicchioWarning,
+            stacklevel=3,
+        )
     for joint in robot.flexible_joints:
         if joint.shaft is None:
-            warnings.warn(
-                f"{joint.name} has no shaft: its stress and life can't be told, only its "
-                "deflection",
-                PicchioWarning,
-                stacklevel=3,
-            )
-        elif abs(off := check_shaft(joint.stiffness, joint.shaft)) > _SHAFT_TOLERANCE:
+            continue
+        if abs(off := check_shaft(joint.stiffness, joint.shaft)) > _SHAFT_TOLERANCE:
             warnings.warn(
                 f"{joint.name}: the shaft's own stiffness G Jp / l is {100 * off:+.0f} % off the "
                 f"joint's {joint.stiffness:g}; the method paper takes the stress from the "
@@ -297,6 +302,8 @@ def _joint_life(
     return JointLife(
         name=joint.name,
         peak_deflection=float(max(r.peak_deflection[:, j].max() for r in results)),
+        peak_torque=float(max(r.peak_torque[:, j].max() for r in results)),
+        gravity_torque=float(max(r.gravity_torque[:, j].max() for r in results)),
         peak_shear_stress=float(max(r.peak_shear_stress[:, j].max() for r in results)),
         gravity_shear_stress=float(max(r.gravity_shear_stress[:, j].max() for r in results)),
         utilisation=float(max(r.utilisation[:, j].max() for r in results)),

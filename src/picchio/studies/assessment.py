@@ -29,6 +29,9 @@ class OperationResult:
         peak_deflection: (n_poses, n) rad, of the method's own response.
         steady_peak_deflection: (n_poses, n) rad, exact steady state; NaN where there is none.
         rest_peak_deflection: (n_poses, n) rad, a rivet from rest; NaN where it has no end.
+        peak_torque: (n_poses, n) N m (N for a prismatic joint), of the vibration, through the
+            spring: what shaft and reducer carry.
+        gravity_torque: (n_poses, n) N m, magnitude.
         peak_shear_stress: (n_poses, n) Pa, of the vibration; NaN for a joint without a shaft.
         gravity_shear_stress: (n_poses, n) Pa, magnitude.
         utilisation: (n_poses, n).
@@ -46,6 +49,8 @@ class OperationResult:
     peak_deflection: FloatArray
     steady_peak_deflection: FloatArray
     rest_peak_deflection: FloatArray
+    peak_torque: FloatArray
+    gravity_torque: FloatArray
     peak_shear_stress: FloatArray
     gravity_shear_stress: FloatArray
     utilisation: FloatArray
@@ -64,6 +69,8 @@ class JointLife:
     Attributes:
         name: of the joint.
         peak_deflection: rad, largest over the task.
+        peak_torque: N m, largest of the vibration.
+        gravity_torque: N m, largest magnitude.
         peak_shear_stress: Pa, largest of the vibration; NaN without a shaft.
         gravity_shear_stress: Pa, largest magnitude.
         utilisation: largest equivalent amplitude over the allowable; NaN without a shaft.
@@ -77,6 +84,8 @@ class JointLife:
 
     name: str
     peak_deflection: float
+    peak_torque: float
+    gravity_torque: float
     peak_shear_stress: float
     gravity_shear_stress: float
     utilisation: float
