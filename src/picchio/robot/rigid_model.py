@@ -49,6 +49,7 @@ class RigidModel:
         # q = follow @ pose + offset; the identity where nothing mimics.
         self._follow, self._offset = _mimic_matrix(tree, every, free)
         self._plain = len(every) == len(free)
+        self._all = len(every)
         self._frames: dict[str, int] = {
             frame.name: index
             for index, frame in enumerate(self._model.frames)
@@ -78,8 +79,10 @@ class RigidModel:
     def _q(self, pose: Array) -> Array:
         return pose if self._plain else self._follow @ pose + self._offset
 
-    def _reduce(self, matrix: Array) -> Array:
-        return matrix if self._plain else self._follow.T @ matrix @ self._follow
+    def _reduce(self, matrix: Any) -> Array:
+        # Pinocchio's bindings flatten matrices of one row or column.
+        full = np.array(matrix).reshape(self._all, self._all)
+        return full if self._plain else self._follow.T @ full @ self._follow
 
     def followed(self, joint: str) -> tuple[Array, float]:
         """A joint's position as row (nv,) @ pose + shift: more than a one where it mimics."""
@@ -100,24 +103,26 @@ class RigidModel:
     def mass_matrix(self, pose: Array) -> Array:
         """Joint-space mass matrix (nv, nv), kg m^2, kg m, kg."""
         matrix = pin.crba(self._model, self._data(), self._q(pose))
-        return self._reduce(np.array(matrix))
+        return self._reduce(matrix)
 
     def jacobian(self, pose: Array, frame: int) -> Array:
         """Jacobian (6, nv) of a frame's origin, world axes: linear m/rad, then angular."""
         matrix = pin.computeFrameJacobian(
             self._model, self._data(), self._q(pose), frame, pin.LOCAL_WORLD_ALIGNED
         )
-        return np.array(matrix) if self._plain else matrix @ self._follow
+        full = np.array(matrix).reshape(6, self._all)
+        return full if self._plain else full @ self._follow
 
     def gravity_torque(self, pose: Array) -> Array:
         """Torque (nv,) that holds the arm against gravity, N m (N)."""
         torque = pin.computeGeneralizedGravity(self._model, self._data(), self._q(pose))
-        return np.array(torque) if self._plain else self._follow.T @ torque
+        full = np.array(torque).reshape(self._all)
+        return full if self._plain else self._follow.T @ full
 
     def gravity_gradient(self, pose: Array) -> Array:
         """Its derivative (nv, nv) by the pose, N m/rad."""
         matrix = pin.computeGeneralizedGravityDerivatives(self._model, self._data(), self._q(pose))
-        return self._reduce(np.array(matrix))
+        return self._reduce(matrix)
 
     def placement(self, pose: Array, frame: int) -> tuple[Array, Array]:
         """World position (3,) in m and rotation (3, 3) of a frame."""

@@ -86,7 +86,7 @@ class _Reader:
         mine = tag.startswith(f"{self.namespace} ")
         name = tag.removeprefix(f"{self.namespace} ")
         if self._depth == 1:
-            self.root_name_end = start + 1 + len(tag.encode())
+            self.root_name_end = _name_end(self.content, start)
         elif self._depth == 2 and tag == "joint":
             self._joint = Place(insert=end)
             self.places["joint", attributes["name"]] = self._joint
@@ -129,6 +129,13 @@ class _Reader:
         while begin > 0 and self.content[begin - 1 : begin] in (b" ", b"\t", b"\r", b"\n"):
             begin -= 1
         return self.content[begin:place].decode("ascii")
+
+
+def _name_end(content: bytes, start: int) -> int:
+    place = start + 1
+    while content[place : place + 1] not in (b" ", b"\t", b"\r", b"\n", b"/", b">", b""):
+        place += 1
+    return place
 
 
 def _tag_end(content: bytes, start: int) -> int:
