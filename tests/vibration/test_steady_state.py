@@ -140,5 +140,5 @@ def test_linear_in_the_force_and_in_the_direction(tools, seed, ratio, factor, fr
         np.einsum("mdk,d->mk", one.unit_deflection(time), DIRECTION),
         x,
         rtol=0,
-        atol=1e-12 * np.abs(x).max(),
+        atol=1e-9 * np.abs(x).max(),  # next to critical damping two poles cancel to 1e-11
     )
