@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 import picchio.cli.assess
+import picchio.cli.envelope
 import picchio.cli.robots
 from picchio.core.errors import PicchioError
 
@@ -21,7 +22,11 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for register in (picchio.cli.assess.register, picchio.cli.robots.register):
+for register in (
+    picchio.cli.assess.register,
+    picchio.cli.envelope.register,
+    picchio.cli.robots.register,
+):
     register(app)
 
 # Typer carries its own copy of click since 0.20: this is whichever it uses.

@@ -38,7 +38,7 @@ class Model:
             InputError: wrong length, a singular mass matrix.
         """
         state = self.robot.state(pose)
-        springs = self.robot.stiffness
+        springs = state.stiffness
         damping = modal_damping_matrix(state.mass_matrix, springs, self.robot.damping_ratio)
         stiffness = np.diag(springs)
         if self.gravity_stiffness:

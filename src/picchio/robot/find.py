@@ -52,14 +52,14 @@ def find_robot(robot: str | Path) -> FoundRobot:
         return _with_neighbours(path)
     if path.is_dir() and (path / "robot.urdf").is_file():
         return _with_neighbours(path / "robot.urdf")
-    shipped = shipped_robots()
-    if text in shipped:
-        return shipped[text]
+    shipped = shipped_robot(text)
+    if shipped is not None:
+        return shipped
     found = example_robot(text)
     if found is not None:
         return FoundRobot(text, found)
     raise InputError("no such robot", key="ROBOT", value=text,
-                     choices=[*shipped, *example_robots()],
+                     choices=[*shipped_robots(), *example_robots()],
                      hint="a path to a URDF is fine, too")  # fmt: skip
 
 
@@ -84,17 +84,29 @@ def robots_folder() -> Path:
 
 def shipped_robots() -> dict[str, FoundRobot]:
     """The robots of this project by name."""
-    robots: dict[str, FoundRobot] = {}
     folder = robots_folder()
-    for entry in sorted(folder.iterdir()) if folder.is_dir() else ():
-        urdf = _if_file(entry / "robot.urdf")
-        flex = _if_file(entry / "flex.toml")
-        if urdf is None and flex is not None:
-            named = read_sidecar(flex).robot
-            urdf = example_robot(named) if named else None
-        if urdf is not None:
-            robots[entry.name] = FoundRobot(entry.name, urdf, flex, _if_file(entry / "task.toml"))
-    return robots
+    names = sorted(entry.name for entry in folder.iterdir()) if folder.is_dir() else []
+    found = {name: shipped_robot(name) for name in names}
+    return {name: robot for name, robot in found.items() if robot is not None}
+
+
+def shipped_robot(name: str) -> FoundRobot | None:
+    """One robot of this project, or None.
+
+    A folder without a URDF has a flex.toml whose `robot` names one of example-robot-data.
+
+    Raises:
+        InputError: the folder's flex.toml cannot be read.
+    """
+    folder = robots_folder() / name
+    if not name or folder.parent != robots_folder():
+        return None
+    urdf = _if_file(folder / "robot.urdf")
+    flex = _if_file(folder / "flex.toml")
+    if urdf is None and flex is not None:
+        named = read_sidecar(flex).robot
+        urdf = example_robot(named) if named else None
+    return FoundRobot(name, urdf, flex, _if_file(folder / "task.toml")) if urdf else None
 
 
 @cache

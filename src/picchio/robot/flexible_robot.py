@@ -153,12 +153,14 @@ class FlexibleRobot:
             tool_rotation=rotation,
         )
 
-    def mass_and_jacobian(self, pose: Array) -> tuple[Array, Array]:
-        """Only M (n, n) and J (3, n), for maps of many poses; the pose is taken unchecked."""
+    def mass_and_jacobian(self, poses: Array) -> tuple[Array, Array]:
+        """Only M (p, n, n) and J (p, 3, n) at many poses (p, nv), which are taken unchecked."""
         index = self.flexible_index
-        mass = self.rigid.mass_matrix(pose)
-        jacobian = self.rigid.jacobian(pose, self.rigid.frame(self.tool_point))
-        return mass[index[:, None], index], jacobian[:3, index]
+        point = self.rigid.frame(self.tool_point)
+        mass, jacobian = self.rigid.mass_and_jacobian(poses, point)
+        if len(index) == self.rigid.nv:
+            return mass, np.ascontiguousarray(jacobian)
+        return mass[:, index[:, None], index], jacobian[:, :, index]
 
     def gravity_torque(self, pose: ArrayLike) -> Array:
         """Torque (n,) that the springs carry at rest, N m (N), balancers taken off."""

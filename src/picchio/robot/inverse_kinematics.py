@@ -9,7 +9,7 @@ the joints' ranges, and `picchio.robot.self_motion` moves along it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +25,6 @@ Array = NDArray[np.float64]
 TOLERANCE = 1e-8
 # With fewer joints the direction of the tool follows from the point.
 LEAST_JOINTS_FOR_AXIS = 5
-STARTS = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +82,9 @@ def solve_many(
     points: ArrayLike,
     *,
     axes: ArrayLike | None = None,
-    starts: int = STARTS,
+    starts: int | None = None,
     seed: int = 0,
+    scattered: bool = False,
 ) -> Solutions:
     """All branches at many points, in compiled code.
 
@@ -92,8 +92,11 @@ def solve_many(
         robot: the robot.
         points: (p, 3) m, world.
         axes: (p, 3) or (3,), or None to leave the tool's direction free.
-        starts: how many first guesses a point gets; more find more branches.
+        starts: how many first guesses a point gets; more find more branches. By default 64
+            for up to three joints and 256 for more.
         seed: moves them.
+        scattered: leave a redundant arm's solutions where the search found them, scattered
+            along the self-motion, instead of moving them to the middle of the ranges.
 
     Raises:
         InputError: wrong shapes, not finite numbers, or no joint moves the tool.
@@ -111,16 +114,20 @@ def solve_many(
     weight = max(0.3 * chain.reach, 1e-3) if with_axis else 0.0
     redundant = joints > (5 if with_axis else 3)
     lower, upper, centre = _ranges(chain)
-    guesses = _spread(starts, lower, upper, seed)
+    guesses = _spread(starts or (64 if joints <= 3 else 256), lower, upper, seed)
     found = np.empty((len(targets), len(guesses), joints))
     errors = np.empty((len(targets), len(guesses)))
     solve_points(
-        (chain.rotation, chain.offset, chain.axis, chain.slides, chain.follow, chain.shift,
-         chain.tool_axis),
-        guesses, centre, chain.lower, chain.upper, targets, wanted, weight, redundant, found,
-        errors,
+        tables_of(chain), guesses, centre, chain.wraps, chain.lower, chain.upper, targets,
+        wanted, weight, redundant and not scattered, found, errors,
     )  # fmt: skip
     return _collect(robot, chain, centre, found, errors, 1e-2 if redundant else 1e-5)
+
+
+def tables_of(chain: Chain) -> tuple[NDArray[Any], ...]:
+    """The chain as the compiled code takes it."""
+    return (chain.rotation, chain.offset, chain.axis, chain.slides, chain.follow, chain.shift,
+            chain.tool_axis)  # fmt: skip
 
 
 def _collect(
@@ -143,12 +150,8 @@ def _collect(
 
 def _distinct(chain: Chain, centre: Array, candidates: Array, same: float) -> list[Array]:
     """Different poses, a full turn of a joint counting as none, the least bent first."""
-    turn = np.where(chain.wraps, 2.0 * np.pi, np.inf)
-    brought = []
-    for q in candidates:
-        nearer = q - np.where(chain.wraps, turn * np.round((q - centre) / turn), 0.0)
-        inside = (nearer >= chain.lower - 1e-12) & (nearer <= chain.upper + 1e-12)
-        brought.append(np.where(inside, nearer, q))
+    turn = 2.0 * np.pi
+    brought = list(candidates)
     # Rounded keys: the order must not hang on the last bit.
     brought.sort(key=lambda q: (round(float(np.abs(q - centre).max()), 4), np.round(q, 4).tolist()))
     kept: list[Array] = []

@@ -56,6 +56,7 @@ def load_robot(
     srdf = find_srdf(tree)
     sources, flex_file = _sources(root, found, flex, values, srdf)
     joints, origins = flexible_joints(tree, sources)
+    _check_balancers(sources, joints)
     chosen_tool, tool_origins = choose_tool(tree, tool, sources, srdf)
     gun, gun_origins = choose_gun(sources)
     mounting, base_origins = choose_mounting(sources)
@@ -87,7 +88,6 @@ def load_robot(
         rigid=rigid,
         tool_point=urdf.tool_point,
     )
-    _check_balancers(sources, joints)
     check_masses(result)
     return result
 

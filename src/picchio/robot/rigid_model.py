@@ -113,6 +113,25 @@ class RigidModel:
         full = np.array(matrix).reshape(6, self._all)
         return full if self._plain else full @ self._follow
 
+    def mass_and_jacobian(self, poses: Array, frame: int) -> tuple[Array, Array]:
+        """Mass matrices (p, nv, nv) and a frame's linear Jacobians (p, 3, nv) at many poses.
+
+        Two Pinocchio calls a pose and nothing else: the floor under the cost of a map.
+        """
+        model, data, size = self._model, self._data(), self._all
+        crba, frame_jacobian, world = pin.crba, pin.computeFrameJacobian, pin.LOCAL_WORLD_ALIGNED
+        masses, jacobians = [], []
+        every = poses if self._plain else poses @ self._follow.T + self._offset
+        for q in np.ascontiguousarray(every):
+            masses.append(crba(model, data, q))  # a copy of its own
+            jacobians.append(frame_jacobian(model, data, q, frame, world))
+        # The bindings flatten matrices of one row or column.
+        mass = np.concatenate(masses, axis=None).reshape(-1, size, size)
+        jacobian = np.concatenate(jacobians, axis=None).reshape(-1, 6, size)[:, :3]
+        if self._plain:
+            return mass, jacobian
+        return self._follow.T @ mass @ self._follow, jacobian @ self._follow
+
     def gravity_torque(self, pose: Array) -> Array:
         """Torque (nv,) that holds the arm against gravity, N m (N)."""
         torque = pin.computeGeneralizedGravity(self._model, self._data(), self._q(pose))

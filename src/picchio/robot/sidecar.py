@@ -1,6 +1,45 @@
 """The sidecar `picchio-sidecar/1`: what a URDF does not say, value by value with its source.
 
 The same records validate the `picchio:` annotations of a URDF, so the two can say the same.
+
+```toml
+format = "picchio-sidecar/1"
+robot = "ur10"               # optional: the example-robot-data arm it belongs to
+
+[joint.elbow_joint]
+stiffness = 2.4e5            # N m/rad; N/m for a prismatic joint, which has no shaft
+# or, from a strain-wave catalogue (N m/rad, N m); the slope at the gravity torque is used:
+# stiffness_curve = { k1 = 1e4, k2 = 2e4, k3 = 3e4, t1 = 10.0, t2 = 40.0 }
+damping_ratio = 0.03
+source = "..."
+estimated = true             # not measured
+shaft = { radius = 0.01765, length = 0.0504, shear_modulus = 79.3e9, sn_curve = "..." }
+reducer = "RV-80E-121"
+rotor_inertia = 1e-4         # kg m^2, on the motor's side
+gear_ratio = 121.0
+# a spring [N/m] between two points [m] in the joint's frame at position zero; it may also have
+# a free_length [m] and a constant force [N]:
+balancer = { parent_point = [0, 0, 0.3], child_point = [0.2, 0, 0], stiffness = 9e3 }
+
+[tool]                       # on top of the URDF's own masses
+frame = "tool0"
+xyz = [0.0, 0.0, 0.1]        # m, from the frame to where the force acts
+axis = [0.0, 0.0, 1.0]       # the way the tool points, in the frame
+mass = 2.0                   # kg
+com = [0.0, 0.0, 0.05]       # m, in the frame
+inertia = [0.01, 0, 0, 0.01, 0, 0.01]   # kg m^2 about com: ixx ixy ixz iyy iyz izz
+
+[gun]                        # its body, at the tool point
+mass = 1.5                   # kg
+recoil_stiffness = 3e4       # N/m, optional: the body then slides along the tool's axis
+damping_ratio = 0.1
+feed_force = 80.0            # N
+
+[base]
+xyz = [0.0, 0.0, 0.0]        # m
+rpy = [0.0, 0.0, 0.0]        # rad
+gravity = [0.0, 0.0, -9.81]  # m/s^2, world
+```
 """
 
 from __future__ import annotations
@@ -11,6 +50,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from picchio.core.errors import InputError
 from picchio.core.model import Finite, NotNegative, Positive, StrictModel
 from picchio.core.toml import parse_toml
 
@@ -143,7 +183,10 @@ def read_sidecar(path: str | Path) -> Sidecar:
     Raises:
         InputError: no such file, bad TOML, a misspelt key, a value that cannot be.
     """
-    return parse_toml(path, Sidecar, format=FORMAT)
+    try:
+        return parse_toml(path, Sidecar, format=FORMAT)
+    except ValueError as error:  # tomllib on an integer of thousands of digits
+        raise InputError(f"is not valid TOML: {error}", file=path) from None
 
 
 def given(entry: StrictModel | None) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from picchio.core.errors import InputError
 
 # Above this a sum of squares in the dynamics is on its way to overflow.
 LARGEST = 1e12
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\Z")
 _INFINITE = re.compile(r"[+-]?inf(inity)?\Z", re.IGNORECASE)
 Vector = tuple[float, float, float]
 

@@ -80,6 +80,8 @@ def _reason(error: etree.XMLSyntaxError) -> str:
 def _hint(error: etree.XMLSyntaxError) -> str | None:
     if "Namespace prefix picchio" in str(error.msg):
         return f'write <robot name="..." xmlns:picchio="{NAMESPACE}">'
+    if "Namespace prefix" in str(error.msg):
+        return 'declare it: <robot name="..." xmlns:PREFIX="...">'
     return None
 
 

@@ -158,7 +158,7 @@ class _Job:
             response = steady_state(modes, operation.excitation)
             steady = [value for _, value in response.turning_points(operation.direction)]
         feed = operation.excitation.preload * (state.jacobian.T @ operation.direction)
-        static = (feed - state.gravity_torque) / robot.stiffness
+        static = (feed - state.gravity_torque) / state.stiffness
         n = len(robot.flexible_joints)
         columns = ("peak_deflection", "peak_shear_stress", "utilisation", "damage_per_rivet")
         out: dict[str, FloatArray] = {key: np.full(n, np.nan) for key in columns}
@@ -171,7 +171,7 @@ class _Job:
         out["check"] = np.full((n, 2), np.nan)
         own = out["rest_peak_deflection" if needs_rest else "steady_peak_deflection"]
         out["peak_deflection"] = own
-        out["peak_torque"] = robot.stiffness * own
+        out["peak_torque"] = state.stiffness * own
         out["gravity_torque"] = np.abs(state.gravity_torque)
         out["gravity_shear_stress"] = np.full(n, np.nan)
         for j, (joint, curve) in enumerate(zip(robot.flexible_joints, self.curves, strict=True)):
@@ -181,6 +181,7 @@ class _Job:
                 None if steady is None else steady[j],
                 None if rest is None else rest[j],
                 float(static[j]),
+                float(state.stiffness[j]),
                 operation.hits_per_rivet,
             )
             result = self.rule(joint, history, curve)

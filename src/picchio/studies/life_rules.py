@@ -30,12 +30,14 @@ class History(NamedTuple):
         steady: (k,) rad, over one period; None where no steady state exists.
         rest: (k,) rad, from rest to the end of the ring-down; None where it has no end.
         static: rad, deflection before the first blow, by gravity and the feed force.
+        stiffness: N m/rad, of the joint at this pose.
         hits: blows.
     """
 
     steady: FloatArray | None
     rest: FloatArray | None
     static: float
+    stiffness: float
     hits: int
 
 
@@ -80,9 +82,9 @@ class RainflowRule:
     def __call__(self, joint: Joint, history: History, sn_curve: SNCurve) -> JointDamage:
         """Damage of one rivet; needs `history.rest`."""
         assert joint.shaft is not None and history.rest is not None
-        torque = joint.stiffness * history.rest
+        torque = history.stiffness * history.rest
         stress = shear_stress(torque, joint.shaft)
-        static = float(shear_stress(joint.stiffness * history.static, joint.shaft))
+        static = float(shear_stress(history.stiffness * history.static, joint.shaft))
         cycles = rainflow(stress, residue=self.residue).shifted(static)
         return JointDamage(
             peak(history.rest),

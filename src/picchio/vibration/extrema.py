@@ -177,3 +177,30 @@ def _newton(
         if (moved <= _PRECISION * width).all():
             break
     return x
+
+
+def golden_maximum(
+    grid: Grid, values: FloatArray, function: Callable[[IndexArray, FloatArray], FloatArray]
+) -> tuple[IndexArray, FloatArray]:
+    """Where a function is largest, by golden sections beside every sample that may be the top.
+
+    Args:
+        grid: the samples.
+        values: the function there, (k,), not negative.
+        function: the same anywhere.
+
+    Returns:
+        (piece, local time) of the candidates.
+    """
+    top = np.flatnonzero(values >= 0.9 * values.max())
+    # A piece has its own ends as samples, so that no bracket leaves it.
+    low = np.where((top > 0) & (grid.index[top - 1] == grid.index[top]), top - 1, top)
+    after = np.minimum(top + 1, grid.index.size - 1)
+    high = np.where(grid.index[after] == grid.index[top], after, top)
+    index, a, b = grid.index[top], grid.local[low].copy(), grid.local[high].copy()
+    section = (np.sqrt(5.0) - 1.0) / 2.0
+    for _ in range(50):
+        c, d = b - section * (b - a), a + section * (b - a)
+        left = function(index, c) > function(index, d)
+        a, b = np.where(left, a, c), np.where(left, d, b)
+    return index, 0.5 * (a + b)

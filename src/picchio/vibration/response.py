@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from picchio.core.arrays import ComplexArray, FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.excitation import PiecewiseForce
-from picchio.vibration.extrema import Grid, refine_roots
+from picchio.vibration.extrema import Grid, golden_maximum, refine_roots
 from picchio.vibration.modes import Modes
 
 # A ring-down is followed until its envelope has fallen to this share of its start.
@@ -212,6 +212,31 @@ class Response:
             direction = g[:, k] / norm[k] if norm[k] > 0 else np.array([0.0, 0.0, 1.0])
             result.append(WorstDirection(float(norm[k]), direction, time))
         return result
+
+    def worst_combination(self, rows: FloatArray) -> tuple[float, FloatArray]:
+        """Largest length of a vector output over time and all force directions.
+
+        The output rows @ x(t) is G(t) n with G (r, 3), so its largest length over unit n is G's
+        largest singular value, along its right singular vector.
+
+        Args:
+            rows: (r, m), such as the tool's Jacobian for its displacement.
+
+        Returns:
+            the value (per unit of the rows) and the direction (3,).
+        """
+        grid = Grid.of(self.modes.poles, self.force, self.horizon, density=2)
+        residues = np.einsum("rm,mpd->rpd", rows, self.modes.residues)
+
+        def largest(index: IndexArray, u: FloatArray) -> FloatArray:
+            g = np.einsum("rpd,pk->krd", residues, self._modal(index, u)).real
+            return np.asarray(np.linalg.svd(g, compute_uv=False)[:, 0])
+
+        size = largest(grid.index, grid.local)
+        index, u = golden_maximum(grid, size, largest)
+        k = int(np.argmax(final := largest(index, u)))
+        at = np.einsum("rpd,pk->krd", residues, self._modal(index[k : k + 1], u[k : k + 1])).real[0]
+        return float(final[k]), np.linalg.svd(at)[2][0]
 
     def _norm_slope(
         self, residue: ComplexArray, index: IndexArray, u: FloatArray
