@@ -11,6 +11,7 @@ import typer
 
 import picchio.cli.assess
 import picchio.cli.envelope
+import picchio.cli.map
 import picchio.cli.robots
 from picchio.core.errors import PicchioError
 
@@ -25,6 +26,7 @@ app = typer.Typer(
 for register in (
     picchio.cli.assess.register,
     picchio.cli.envelope.register,
+    picchio.cli.map.register,
     picchio.cli.robots.register,
 ):
     register(app)

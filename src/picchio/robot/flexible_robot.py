@@ -16,6 +16,7 @@ from picchio.robot.joint import Joint
 from picchio.robot.pose import check_pose
 from picchio.robot.rigid_model import RigidModel
 from picchio.robot.state import RobotState
+from picchio.robot.statics import balancing, stiffness_at_torque
 from picchio.robot.tool import Gun, Mounting, Tool
 from picchio.robot.urdf_tree import UrdfTree
 
@@ -147,7 +148,7 @@ class FlexibleRobot:
             pose=full,
             mass_matrix=self.rigid.mass_matrix(full)[np.ix_(index, index)],
             jacobian=jacobian,
-            stiffness=self._stiffness_at(torque),
+            stiffness=stiffness_at_torque(self.flexible_joints, torque),
             gravity_torque=torque,
             tool_position=position,
             tool_rotation=rotation,
@@ -162,41 +163,28 @@ class FlexibleRobot:
             return mass, np.ascontiguousarray(jacobian)
         return mass[:, index[:, None], index], jacobian[:, :, index]
 
+    def tool_position(self, pose: Array) -> Array:
+        """Only the point (3,) in m where the force acts; the pose is taken unchecked."""
+        return self.rigid.placement(pose, self.rigid.frame(self.tool_point))[0]
+
     def gravity_torque(self, pose: ArrayLike) -> Array:
         """Torque (n,) that the springs carry at rest, N m (N), balancers taken off."""
         full = self.pose(pose)
-        torque = self.rigid.gravity_torque(full)[self.flexible_index]
-        return torque + self._balancing(full)[0]
+        index = self.flexible_index
+        balanced, _ = balancing(self.flexible_joints, self.tree, full[index])
+        return self.rigid.gravity_torque(full)[index] + balanced
 
     def gravity_stiffness(self, pose: ArrayLike) -> Array:
         """dg/dq (n, n) of the flexible joints, N m/rad, balancers included."""
         full = self.pose(pose)
         index = self.flexible_index
         gradient = self.rigid.gravity_gradient(full)[np.ix_(index, index)]
-        return gradient + np.diag(self._balancing(full)[1])
+        _, balanced = balancing(self.flexible_joints, self.tree, full[index])
+        return gradient + np.diag(balanced)
 
     def stiffness_at(self, pose: ArrayLike) -> Array:
         """Stiffness (n,) at a pose: curves give their slope at the gravity torque there."""
-        return self._stiffness_at(self.gravity_torque(pose))
-
-    def _stiffness_at(self, torque: Array) -> Array:
-        stiffness = self.stiffness.copy()
-        for row, joint in enumerate(self.flexible_joints):
-            if joint.stiffness_curve is not None:
-                stiffness[row] = joint.stiffness_curve.tangent(torque[row])
-        return stiffness
-
-    def _balancing(self, full: Array) -> tuple[Array, Array]:
-        torque = np.zeros(len(self.flexible_joints))
-        stiffness = np.zeros(len(self.flexible_joints))
-        for row, (joint, column) in enumerate(
-            zip(self.flexible_joints, self.flexible_index, strict=True)
-        ):
-            if joint.balancer is not None:
-                axis = self.tree.joints[joint.name].axis
-                added = joint.balancer.torque_and_stiffness(axis, full[column])
-                torque[row], stiffness[row] = added
-        return torque, stiffness
+        return stiffness_at_torque(self.flexible_joints, self.gravity_torque(pose))
 
     def link_of(self, frame: str) -> str:
         """The link whose frame this is: a link's name, or a joint's for the link it carries.

@@ -111,7 +111,9 @@ def _sources(
                          Sidecar, format=FORMAT)  # fmt: skip
         sources.append(Source("argument", given))
     if flex_file is not None:
-        sources.append(Source(flex_file.name, read_sidecar(flex_file), str(flex_file)))
+        sidecar = read_sidecar(flex_file)
+        _check_owner(sidecar, flex_file, found, str(root.get("name")))
+        sources.append(Source(flex_file.name, sidecar, str(flex_file)))
     urdf = found.urdf.name
     if annotation is not None:
         sources.append(Source(f"{urdf}, picchio annotation", annotation, str(found.urdf)))
@@ -121,6 +123,17 @@ def _sources(
         sources.append(Source(f"{srdf.path.name}, rotor_params", srdf.rotors,
                               str(srdf.path), strict=False))  # fmt: skip
     return sources, flex_file
+
+
+def _check_owner(sidecar: Sidecar, file: Path, found: FoundRobot, name: str) -> None:
+    """Warn of a sidecar that names another robot: arms of one maker share their joints' names."""
+    known = {text.removesuffix("_robot") for text in (found.name, name, found.urdf.stem) if text}
+    if sidecar.robot is not None and sidecar.robot.removesuffix("_robot") not in known:
+        warnings.warn(
+            f"{file}: says that it belongs to robot {sidecar.robot!r}, not to {found.urdf}",
+            PicchioWarning,
+            stacklevel=4,
+        )
 
 
 def _warn(tree: UrdfTree) -> None:

@@ -77,6 +77,9 @@ class RigidModel:
         return data
 
     def _q(self, pose: Array) -> Array:
+        if pose.shape != (self.nv,):
+            raise InputError("a pose of the wrong shape", key="pose", value=pose.shape,
+                             choices=[str((self.nv,))])  # fmt: skip
         return pose if self._plain else self._follow @ pose + self._offset
 
     def _reduce(self, matrix: Any) -> Array:
@@ -100,6 +103,10 @@ class RigidModel:
             raise InputError("no such frame", key="frame", value=link, choices=self._frames)
         return index
 
+    def _check_frame(self, frame: int) -> None:
+        if not 0 <= frame < self._model.nframes:  # Pinocchio would crash
+            raise InputError("no such frame", key="frame", value=frame)
+
     def mass_matrix(self, pose: Array) -> Array:
         """Joint-space mass matrix (nv, nv), kg m^2, kg m, kg."""
         matrix = pin.crba(self._model, self._data(), self._q(pose))
@@ -107,6 +114,7 @@ class RigidModel:
 
     def jacobian(self, pose: Array, frame: int) -> Array:
         """Jacobian (6, nv) of a frame's origin, world axes: linear m/rad, then angular."""
+        self._check_frame(frame)
         matrix = pin.computeFrameJacobian(
             self._model, self._data(), self._q(pose), frame, pin.LOCAL_WORLD_ALIGNED
         )
@@ -118,6 +126,12 @@ class RigidModel:
 
         Two Pinocchio calls a pose and nothing else: the floor under the cost of a map.
         """
+        self._check_frame(frame)
+        if poses.ndim != 2 or poses.shape[1] != self.nv:
+            raise InputError("poses of the wrong shape", key="poses", value=poses.shape,
+                             choices=[f"(p, {self.nv})"])  # fmt: skip
+        if not len(poses):
+            return np.empty((0, self.nv, self.nv)), np.empty((0, 3, self.nv))
         model, data, size = self._model, self._data(), self._all
         crba, frame_jacobian, world = pin.crba, pin.computeFrameJacobian, pin.LOCAL_WORLD_ALIGNED
         masses, jacobians = [], []
@@ -145,6 +159,7 @@ class RigidModel:
 
     def placement(self, pose: Array, frame: int) -> tuple[Array, Array]:
         """World position (3,) in m and rotation (3, 3) of a frame."""
+        self._check_frame(frame)
         data = self._data()
         pin.forwardKinematics(self._model, data, self._q(pose))
         placement = pin.updateFramePlacement(self._model, data, frame)

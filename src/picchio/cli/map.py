@@ -1,0 +1,134 @@
+"""`picchio map`: peaks, worst directions and frequencies all over the workspace."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from picchio.cli.envelope import ForceOption, PeriodOption, WidthOption, choose_blows
+from picchio.cli.options import FlexOption, RobotArgument, ToolOption
+from picchio.core.errors import InputError
+
+if TYPE_CHECKING:
+    from picchio.robot import FlexibleRobot
+    from picchio.studies.places import Places
+
+EPILOG = "Example: picchio map fanuc_like_3dof --plane xz --spacing 0.1 --out map.nc"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the subcommand."""
+    app.command("map", epilog=EPILOG)(map_)
+
+
+def map_(
+    robot: RobotArgument,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="map.nc (netCDF) or map.zarr (Zarr).")
+    ],
+    plane: Annotated[str | None, typer.Option(help="Points on a plane: xy, xz or yz.")] = None,
+    at: Annotated[float, typer.Option(help="m, where the plane cuts the third axis.")] = 0.0,
+    box: Annotated[bool, typer.Option("--box", help="Points in a box.")] = False,
+    points: Annotated[
+        Path | None,
+        typer.Option(metavar="CSV", help="Points from x [m], y [m], z [m], and nx, ny, nz."),
+    ] = None,
+    joint_grid: Annotated[
+        str | None, typer.Option(metavar="N[,N...]", help="Poses on a grid in joint space.")
+    ] = None,
+    spacing: Annotated[float | None, typer.Option(help="m, between points.")] = None,
+    bounds: Annotated[
+        str | None, typer.Option(metavar="LOW,HIGH,...", help="m, for each axis of plane or box.")
+    ] = None,
+    direction: Annotated[
+        str, typer.Option(help="x,y,z of the force; worst for each joint; normal of the surface.")
+    ] = "worst",
+    branch: Annotated[
+        str, typer.Option(help="all, any, elbow-up, elbow-down, or words such as joint_3+.")
+    ] = "all",
+    hits: Annotated[
+        int | None, typer.Option(help="Blows of a burst from rest; steady state if not given.")
+    ] = None,
+    force: ForceOption = None,
+    period: PeriodOption = None,
+    width: WidthOption = None,
+    flex: FlexOption = None,
+    tool: ToolOption = None,
+    chunk: Annotated[int, typer.Option(help="Places at a time.")] = 4096,
+    workers: Annotated[
+        int | None, typer.Option(help="Processes; 0 for none. By default, as the map is large.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A dask scheduler to use instead.")
+    ] = None,
+) -> None:
+    """Map the workspace; stopped and started again, it goes on where it was."""
+    from picchio.cli.output import progress
+    from picchio.robot import load_robot
+    from picchio.studies.map import workspace_map
+
+    loaded = load_robot(robot, flex=flex, tool=tool)
+    where = _places(loaded, plane, at, box, points, joint_grid, spacing, bounds)
+    along = direction if direction in ("worst", "normal") else _numbers(direction, "--direction")
+    blows = choose_blows(loaded, force, period, width)
+    with progress("places") as report:
+        found = workspace_map(
+            loaded, where, blows, out, direction=along, branch=branch, hits=hits, chunk=chunk,
+            workers=workers, scheduler=scheduler, progress=report,
+        )  # fmt: skip
+    with found:
+        _show(found, out)
+
+
+def _places(
+    robot: FlexibleRobot,
+    plane: str | None,
+    at: float,
+    box: bool,
+    points: Path | None,
+    grid: str | None,
+    spacing: float | None,
+    bounds: str | None,
+) -> Places:
+    from picchio.studies import places
+
+    asked = {"--plane": plane, "--box": box or None, "--points": points, "--joint-grid": grid}
+    given = [key for key, value in asked.items() if value is not None]
+    if len(given) > 1:
+        raise InputError("choose one", key=" ".join(given), choices=list(asked))
+    limits = None if bounds is None else _numbers(bounds, "--bounds")
+    if points is not None:
+        return places.points_from_csv(points)
+    if grid is not None:
+        counts = [int(n) for n in _numbers(grid, "--joint-grid")]
+        return places.joint_grid(robot, counts[0] if len(counts) == 1 else counts)
+    if box:
+        if spacing is None:
+            raise InputError("a box needs it", key="--spacing")
+        return places.box(robot, spacing=spacing, bounds=limits)
+    return places.plane(robot, plane or "xz", at=at, spacing=spacing, bounds=limits)
+
+
+def _numbers(text: str, key: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError("must be numbers separated by commas", key=key, value=text) from None
+
+
+def _show(found: Any, out: Path) -> None:
+    from picchio.cli.output import console
+
+    screen = console()
+    count = found.sizes["point"]
+    places = len(set(found["place"].values.tolist()))
+    screen.print(f"[bold]{found.attrs['robot']}[/bold]: {count} poses at {places} places, in {out}")
+    peaks = found["peak_deflection"].values
+    for j, joint in enumerate(found["joint"].values):
+        k = int(peaks[:, j].argmax())
+        x, y, z = found["position"].values[k]
+        screen.print(
+            f"  {joint}: up to {1e3 * peaks[k, j]:.4g} mrad, at ({x:.3f}, {y:.3f}, {z:.3f}) m"
+        )

@@ -1,0 +1,124 @@
+"""One chunk of a workspace map: a pure function, run here or on any worker."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.excitation import Excitation
+from picchio.robot import FlexibleRobot
+from picchio.studies.places import Listed, Places
+from picchio.vibration.batch import batch_peaks
+
+Columns = dict[str, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class MapJob:
+    """All that a chunk needs; it travels to workers as it is.
+
+    Attributes:
+        robot: with stiffnesses.
+        excitation: the blows.
+        places: where.
+        direction: (3,) unit vector, "worst" for each joint's own, or "normal" for the surface's.
+        branch: "all", or words that choose one branch (see `picchio.robot.branch`).
+        hits: of a burst from rest; None for the steady state.
+    """
+
+    robot: FlexibleRobot
+    excitation: Excitation
+    places: Places
+    direction: tuple[float, float, float] | str
+    branch: str
+    hits: int | None
+
+    def compute(self, first: int, last: int) -> Columns:
+        """Rows of the places first to last - 1: one row a point and branch, none out of reach."""
+        robot = self.robot
+        place = np.arange(first, last)
+        rows = self.places.rows(first, last)
+        if self.places.kind == "pose":
+            poses = rows
+        else:
+            poses, place = self._poses(rows, first)
+        mass, jacobian = robot.mass_and_jacobian(poses)
+        stiffness = robot.stiffness
+        if any(joint.stiffness_curve is not None for joint in robot.flexible_joints):
+            stiffness = np.array([robot.stiffness_at(pose) for pose in poses])
+            stiffness = stiffness.reshape(len(poses), len(robot.flexible_joints))
+        found = batch_peaks(
+            mass,
+            jacobian,
+            stiffness,
+            robot.damping_ratio,
+            self.excitation,
+            hits=self.hits,
+            direction=self._direction(place),
+        )
+        # The translation part of the Jacobian is cheap, the position itself is one more call.
+        position = np.array([robot.tool_position(pose) for pose in poses]).reshape(-1, 3)
+        torque = np.broadcast_to(stiffness, found.peak_deflection.shape) * found.peak_deflection
+        factor = [
+            joint.shaft.radius / joint.shaft.polar_moment if joint.shaft else np.nan
+            for joint in robot.flexible_joints
+        ]
+        stress = torque * np.array(factor)
+        rank = np.where(np.isfinite(stress).all(axis=1)[:, None], stress, torque)
+        return {
+            "place": place,
+            "position": position,
+            "pose": poses,
+            "branch": branch_codes(poses),
+            "natural_frequency": found.natural_frequencies,
+            "peak_deflection": found.peak_deflection,
+            "peak_torque": torque,
+            "peak_shear_stress": stress,
+            "worst_direction": found.direction,
+            "limiting_joint": _argmax(rank),
+        }
+
+    def _direction(self, place: FloatArray) -> FloatArray | None:
+        if self.direction == "worst":
+            return None
+        if self.direction == "normal":
+            if not isinstance(self.places, Listed) or self.places.normals is None:
+                raise InputError("the places have no normals", key="direction", value="normal")
+            return self.places.normals[place]
+        return np.tile(np.asarray(self.direction, dtype=float), (len(place), 1))
+
+    def _poses(self, points: FloatArray, first: int) -> tuple[FloatArray, FloatArray]:
+        from picchio.robot.branch import branch_words, choose_branch
+        from picchio.robot.inverse_kinematics import solve_many
+
+        axes = None
+        if not isinstance(self.direction, str):
+            axes = np.tile(-np.asarray(self.direction, dtype=float), (len(points), 1))
+        elif self.direction == "normal":
+            axes = -np.asarray(self._direction(np.arange(first, first + len(points))))
+        solved = solve_many(self.robot, points, axes=axes)
+        if self.branch == "all":
+            return solved.poses, solved.point + first
+        branch_words(self.robot, self.branch)
+        chosen, place = [], []
+        for k in np.unique(solved.point):
+            try:
+                pose = choose_branch(self.robot, list(solved.poses[solved.point == k]), self.branch)
+            except InputError:
+                continue  # this point has no pose on the branch
+            chosen.append(pose)
+            place.append(k + first)
+        return np.array(chosen).reshape(-1, solved.poses.shape[1]), np.array(place, dtype=int)
+
+
+def branch_codes(poses: FloatArray) -> FloatArray:
+    """Signs of the joints as one number: bit k is set where joint k's position is negative."""
+    return ((poses < 0.0) @ (1 << np.arange(poses.shape[1]))).astype(np.int32)
+
+
+def _argmax(rank: FloatArray) -> FloatArray:
+    known = np.where(np.isnan(rank), -np.inf, rank)
+    return known.argmax(axis=1).astype(np.int32) if len(rank) else np.empty(0, np.int32)
