@@ -21,6 +21,10 @@ ARMS = [
     ("z1", "link06", 6, "joint"),
     ("tiago", "arm_tool_link", 7, "arm_"),
     ("talos_left_arm", "gripper_left_base_link", 6, "arm_left"),
+    # One limb of a humanoid and of a quadruped; the rest is rigid, the base held.
+    ("talos_reduced", "gripper_left_base_link", 7, "arm_left"),
+    ("anymal_c_simple/anymal", "LF_FOOT", 3, "LF_"),
+    ("go1", "FR_foot", 3, "FR_"),
 ]
 
 

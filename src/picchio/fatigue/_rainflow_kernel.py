@@ -32,20 +32,26 @@ def push(
     Returns:
         the new depth, and the number of cycles closed.
     """
-    closed = 0
-    for i in range(values.shape[0]):
+    closed, first = 0, 0
+    while depth < 2 and first < values.shape[0]:
+        if depth == 0 or values[first] != stack[0]:
+            stack[depth] = values[first]
+            depth += 1
+        first += 1
+    if depth < 2:
+        return depth, closed
+    top = stack[depth - 1]
+    rising = top > stack[depth - 2]
+    for i in range(first, values.shape[0]):
         value = values[i]
-        if depth < 2:
-            if depth == 0 or value != stack[0]:
-                stack[depth] = value
-                depth += 1
+        if rising:
+            if value >= top:
+                top = value
+                continue
+        elif value <= top:
+            top = value
             continue
-        top = stack[depth - 1]
-        if value == top:
-            continue
-        if (value > top) == (top > stack[depth - 2]):
-            stack[depth - 1] = value
-            continue
+        stack[depth - 1] = top
         while depth >= 4:
             b = stack[depth - 3]
             c = stack[depth - 2]
@@ -59,6 +65,9 @@ def push(
             depth -= 2
         stack[depth] = value
         depth += 1
+        top = value
+        rising = not rising
+    stack[depth - 1] = top
     return depth, closed
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 
-FloatArray = npt.NDArray[np.float64]
+__all__ = ["FloatArray", "as_floats"]
 
 
 def as_floats(values: Any, key: str, *, finite: bool = True) -> FloatArray:
-    """`values` as float64, refusing what is no real number.
+    """`values` as float64, refusing what is no real number. Not copied where it is that already.
 
     Args:
         values: a scalar or an array-like of real numbers.
@@ -27,7 +27,7 @@ def as_floats(values: Any, key: str, *, finite: bool = True) -> FloatArray:
         raw = np.asarray(values)
         if raw.dtype.kind not in "iufb" and not (raw.dtype.kind == "O" and raw.size):
             raise TypeError
-        array = raw.astype(np.float64)
+        array = np.asarray(raw, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError("must be real numbers", key=key, value=values) from None
     bad = ~np.isfinite(array) if finite else np.isnan(array)

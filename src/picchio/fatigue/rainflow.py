@@ -25,6 +25,8 @@ from picchio.fatigue.cycles import Cycles
 Residue = Literal["half-cycles", "repeated", "discarded"]
 RESIDUE_RULES: tuple[Residue, ...] = get_args(Residue)
 
+_BLOCK = 1 << 15
+
 
 def rainflow(history: npt.ArrayLike, residue: Residue = "half-cycles") -> Cycles:
     """Count the cycles of a history.
@@ -77,14 +79,20 @@ class RainflowCounter:
             return
         from picchio.fatigue._rainflow_kernel import push
 
-        depth = len(self._stack)
-        room = depth + len(values)
-        stack, ranges, means = np.empty(room), np.empty(room // 2), np.empty(room // 2)
-        stack[:depth] = self._stack
-        depth, closed = push(np.ascontiguousarray(values), stack, depth, ranges, means)
-        self._stack = stack[:depth].copy()
-        if closed:
-            self._closed.append((ranges[:closed].copy(), means[:closed].copy()))
+        values = np.ascontiguousarray(values)
+        # Block by block through small arrays: fresh memory costs more than the counting.
+        ranges, means = np.empty(_BLOCK), np.empty(_BLOCK)
+        for start in range(0, len(values), _BLOCK):
+            block = values[start : start + _BLOCK]
+            depth = len(self._stack)
+            stack = np.empty(depth + len(block))
+            stack[:depth] = self._stack
+            if depth + len(block) > 2 * _BLOCK:
+                ranges, means = np.empty(len(stack) // 2), np.empty(len(stack) // 2)
+            depth, closed = push(block, stack, depth, ranges, means)
+            self._stack = stack[:depth].copy()
+            if closed:
+                self._closed.append((ranges[:closed].copy(), means[:closed].copy()))
 
     def cycles(self, residue: Residue = "half-cycles") -> Cycles:
         """The cycles counted so far, as if the history ended here. More may be added after.
@@ -96,11 +104,16 @@ class RainflowCounter:
             InputError: an unknown residue rule.
         """
         rest, last = _close(self._stack)
+        outer = _count_residue(rest, residue)
         whole = [*self._closed, last]
-        ranges = np.concatenate([part[0] for part in whole])
-        means = np.concatenate([part[1] for part in whole])
-        closed = Cycles(ranges, means, np.ones(len(ranges)))
-        return closed + _count_residue(rest, residue)
+        closed = sum(len(part[0]) for part in whole)
+        count = np.ones(closed + len(outer))
+        count[closed:] = outer.count
+        return Cycles.trusted(
+            np.concatenate([*(part[0] for part in whole), outer.range]),
+            np.concatenate([*(part[1] for part in whole), outer.mean]),
+            count,
+        )
 
     def drain(self) -> Cycles:
         """Hand over the closed cycles and forget them, so that a long history needs no memory."""
@@ -108,7 +121,8 @@ class RainflowCounter:
         if not whole:
             return Cycles.none()
         ranges = np.concatenate([part[0] for part in whole])
-        return Cycles(ranges, np.concatenate([part[1] for part in whole]), np.ones(len(ranges)))
+        means = np.concatenate([part[1] for part in whole])
+        return Cycles.trusted(ranges, means, np.ones(len(ranges)))
 
     @property
     def residue(self) -> FloatArray:

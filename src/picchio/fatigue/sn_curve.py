@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from picchio.core.errors import InputError
+from picchio.fatigue._sn_check import check_curve, check_probability
 from picchio.fatigue._types import FloatArray, as_floats
 
 MinerRule = Literal["original", "elementary", "haibach"]
@@ -74,7 +75,7 @@ class SNCurve:
     def __post_init__(self) -> None:
         for name in ("slopes", "knees", "assumptions"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        self._check()
+        check_curve(self)
         object.__setattr__(self, "_knots", self._knot_amplitudes())
 
     @property
@@ -167,7 +168,7 @@ class SNCurve:
             raise InputError("the curve has no survival probability", key=self.name)
         if spread is None:
             raise InputError("the curve has no scatter; give one", key=self.name)
-        wanted = _probability(probability)
+        wanted = check_probability(probability)
         shift = NormalDist().inv_cdf(self.survival) - NormalDist().inv_cdf(wanted)
         moved = self.scaled(10.0 ** (spread * shift), f"survival {self.survival:g} to {wanted:g}")
         return dataclasses.replace(moved, survival=wanted, scatter=spread)
@@ -238,45 +239,6 @@ class SNCurve:
             stress *= (knees[i] / at) ** (-1.0 / slopes[i + 1])
             knots[i], at = stress, knees[i]
         return knots
-
-    def _check(self) -> None:
-        if self.kind != "shear":
-            raise InputError("must be a shear curve", key="kind", value=self.kind)
-        if self.miner not in MINER_RULES:
-            raise InputError("unknown rule", key="miner", value=self.miner, choices=MINER_RULES)
-        for name in (
-            "strength",
-            "cycles",
-            "slopes",
-            "knees",
-            "ultimate_shear",
-            "yield_shear",
-            "tensile_strength",
-        ):
-            value = getattr(self, name)
-            if value is not None and (as_floats(value, name) <= 0).any():
-                raise InputError("must be positive", key=name, value=value)
-        if self.scatter is not None and float(as_floats(self.scatter, "scatter")) < 0:
-            raise InputError("must not be negative", key="scatter", value=self.scatter)
-        if self.survival is not None:
-            _probability(self.survival)
-        if not self.slopes or len(self.slopes) - len(self.knees) not in (0, 1):
-            raise InputError(
-                "needs as many knees as slopes (endurance limit) or one fewer",
-                key="knees",
-                value=self.knees,
-            )
-        if any(b <= a for a, b in zip(self.knees, self.knees[1:], strict=False)):
-            raise InputError("must ascend", key="knees", value=self.knees)
-        if len(self.knees) == len(self.slopes) and self.cycles > self.knees[-1]:
-            raise InputError("lies beyond the last knee", key="cycles", value=self.cycles)
-
-
-def _probability(value: float) -> float:
-    number = float(as_floats(value, "survival"))
-    if not 0.0 < number < 1.0:
-        raise InputError("must lie between 0 and 1", key="survival", value=value)
-    return number
 
 
 def _power(base: FloatArray, exponent: FloatArray) -> FloatArray:

@@ -1,0 +1,116 @@
+"""The question asked backwards: what may the load, or the shaft, be for a wanted life."""
+
+from __future__ import annotations
+
+import math
+
+from picchio.core.errors import InputError
+from picchio.fatigue._types import as_floats
+from picchio.fatigue.cycles import Cycles
+from picchio.fatigue.damage import damage
+from picchio.fatigue.mean_stress import MeanStress, Rule
+from picchio.fatigue.sn_curve import MinerRule, SNCurve
+
+_STEPS = 200
+
+
+def allowable_factor(
+    cycles: Cycles,
+    sn_curve: SNCurve,
+    allowed_damage: float,
+    *,
+    steady_stress: float = 0.0,
+    steady_scales: bool = False,
+    mean_stress: MeanStress | Rule = "none",
+    miner: MinerRule | None = None,
+) -> float:
+    """By which factor the cycles may grow until their damage is `allowed_damage`.
+
+    A linear model's stress is proportional to the force, so the allowable force is the force
+    times this factor.
+
+    Args:
+        cycles: of shear stress at the present force, Pa, for one unit of work.
+        sn_curve: the curve, moved to the wanted probability of survival (`at_survival`).
+        allowed_damage: for that unit: 1 / units of the wanted life.
+        steady_stress: Pa, a mean that is there anyway: gravity's.
+        steady_scales: whether it grows as well (as it does with a thinner shaft).
+        mean_stress: a rule or its name.
+        miner: as in `damage`.
+
+    Returns:
+        the largest factor; inf where no factor does damage (there is no cycle).
+
+    Raises:
+        InputError: an allowed damage that is not positive and finite, or a steady stress that
+            alone breaks the part.
+    """
+    limit = float(as_floats(allowed_damage, "allowed_damage"))
+    if limit <= 0:
+        raise InputError("must be positive", key="allowed_damage", value=allowed_damage)
+    if not len(cycles) or float(cycles.range.max()) == 0.0:
+        return math.inf
+
+    def spent(factor: float) -> float:
+        steady = steady_stress * (factor if steady_scales else 1.0)
+        try:
+            return damage(cycles.scaled(factor).shifted(steady), sn_curve, mean_stress, miner)
+        except InputError:
+            # Above the static strength: no life.
+            return math.inf
+
+    low, high = 1.0, 1.0
+    while spent(low) > limit:
+        low /= 2.0
+        if low < 1e-12:
+            raise InputError(
+                "the steady stress alone breaks the part", key="steady_stress", value=steady_stress
+            )
+    while spent(high) <= limit:
+        high *= 2.0
+    low = max(low, high / 2.0) if spent(max(low, high / 2.0)) <= limit else low
+    for _ in range(_STEPS):
+        middle = math.sqrt(low * high)
+        if middle in (low, high):
+            break
+        low, high = (middle, high) if spent(middle) <= limit else (low, middle)
+    return low
+
+
+def allowable_radius(
+    radius: float,
+    cycles: Cycles,
+    sn_curve: SNCurve,
+    allowed_damage: float,
+    *,
+    steady_stress: float = 0.0,
+    mean_stress: MeanStress | Rule = "none",
+    miner: MinerRule | None = None,
+) -> float:
+    """The smallest radius of the solid shaft that bears the same torques.
+
+    Shear stress falls with the cube of the radius. The joint's stiffness is taken to stay as it
+    is: the shaft is not its only spring.
+
+    Args:
+        radius: the present one, m, that gave `cycles` and `steady_stress`.
+        cycles: as in `allowable_factor`.
+        sn_curve: likewise.
+        allowed_damage: likewise.
+        steady_stress: likewise; it changes with the radius, too.
+        mean_stress: likewise.
+        miner: likewise.
+
+    Returns:
+        m; 0 where there is no cycle.
+    """
+    factor = allowable_factor(
+        cycles,
+        sn_curve,
+        allowed_damage,
+        steady_stress=steady_stress,
+        steady_scales=True,
+        mean_stress=mean_stress,
+        miner=miner,
+    )
+    return 0.0 if math.isinf(factor) else float(radius * factor ** (-1.0 / 3.0))

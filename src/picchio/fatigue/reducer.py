@@ -1,0 +1,220 @@
+"""Reducers: catalogue life while turning, and the torque limits that bind at standstill.
+
+Catalogue life is the life of rolling contacts that turn: the wave generator's bearing of a
+strain-wave gear (exponent 3), the crank's roller bearings of a cycloidal one (exponent 10/3). A
+joint that stands still under blows rolls over nothing: its contacts fret at one spot (false
+brinelling), which no catalogue covers. So for percussive work the binding check is the peak torque,
+gravity and vibration together, against the limit for repeated peaks: a blow is duty, not an
+accident, and the limit for momentary peaks is for emergencies alone.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from picchio.core.errors import InputError
+from picchio.fatigue._types import as_floats
+
+Kind = Literal["strain-wave", "cycloidal"]
+
+LIFE_EXPONENT: dict[Kind, float] = {"strain-wave": 3.0, "cycloidal": 10.0 / 3.0}
+MOMENTARY_EVENTS = 1e4
+"""Flexspline deformations that a strain-wave gear stands at momentary peaks (Harmonic Drive)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reducer:
+    """A reducer's ratings; every torque is at the output.
+
+    Attributes:
+        name: as in the catalogue.
+        kind: "strain-wave" or "cycloidal".
+        manufacturer: who makes it.
+        ratio: input turns for one output turn; None where the name does not say.
+        rated_torque: N m.
+        rated_speed: rad/s at which the rated life is stated: of the input (strain-wave) or of the
+            output (cycloidal).
+        rated_life: s, life L10 at rated torque and speed.
+        repeated_peak_torque: N m, limit of peaks that belong to the duty: "repeated peak"
+            (strain-wave), "acceleration and deceleration" (cycloidal).
+        momentary_peak_torque: N m, limit for emergencies.
+        average_torque: N m, limit of the mean torque; None where the catalogue has none.
+        ratcheting_torque: N m, at which teeth skip; None where not known.
+        source: where the ratings come from.
+    """
+
+    name: str
+    kind: Kind
+    manufacturer: str
+    rated_torque: float
+    rated_speed: float
+    rated_life: float
+    repeated_peak_torque: float
+    momentary_peak_torque: float
+    ratio: float | None = None
+    average_torque: float | None = None
+    ratcheting_torque: float | None = None
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        if self.kind not in LIFE_EXPONENT:
+            raise InputError("unknown kind", key="kind", value=self.kind, choices=LIFE_EXPONENT)
+        for key, value in asdict(self).items():
+            number = value if isinstance(value, int | float) else 1.0
+            if not (math.isfinite(number) and number > 0):
+                raise InputError("must be positive", key=f"{self.name}.{key}", value=value)
+
+    @property
+    def life_exponent(self) -> float:
+        """Of torque in the life: 3 (ball bearing) or 10/3 (roller bearing)."""
+        return LIFE_EXPONENT[self.kind]
+
+    def mean_torque(
+        self, torque: npt.ArrayLike, speed: npt.ArrayLike, duration: npt.ArrayLike
+    ) -> float:
+        """The steady torque that wears as much as a cycle of torques.
+
+        (sum |n| t |T|^p / sum |n| t)^(1/p), p the life exponent; Harmonic Drive Engineering Data,
+        equation 18.2 (p = 3); Nabtesco RV catalogue (p = 10/3).
+
+        Args:
+            torque: (c,) N m of each part of the cycle.
+            speed: (c,) of the output, any unit.
+            duration: (c,) s.
+
+        Returns:
+            N m; at standstill throughout, the largest torque, since nothing averages it.
+        """
+        load = np.abs(as_floats(torque, "torque"))
+        turns = np.abs(as_floats(speed, "speed")) * as_floats(duration, "duration")
+        load, turns = np.broadcast_arrays(load, turns)
+        if load.size == 0 or (turns < 0).any():
+            raise InputError("needs parts of the cycle with durations", key="duration")
+        if turns.sum() == 0:
+            return float(load.max())
+        p = self.life_exponent
+        return float((np.sum(turns * load**p) / turns.sum()) ** (1.0 / p))
+
+    def life(self, mean_torque: float, mean_speed: float) -> float:
+        """Catalogue life L10 while turning: L (n_rated / n) (T_rated / T)^p.
+
+        Args:
+            mean_torque: N m, from `mean_torque`.
+            mean_speed: rad/s, over the whole cycle with its pauses, of the shaft that
+                `rated_speed` is for.
+
+        Returns:
+            s; inf at standstill or without torque, which promises nothing (see the module).
+        """
+        torque = abs(float(as_floats(mean_torque, "mean_torque")))
+        speed = abs(float(as_floats(mean_speed, "mean_speed")))
+        if torque == 0 or speed == 0:
+            return math.inf
+        ratio = self.rated_torque / torque
+        return self.rated_life * (self.rated_speed / speed) * ratio**self.life_exponent
+
+    def momentary_events(self, output_speed: float, duration: float) -> float | None:
+        """How many momentary peaks are allowed: 1e4 / (2 n t), n the input's turns a second.
+
+        Harmonic Drive Engineering Data, equation 18.8. For emergencies; not in the normal cycle.
+
+        Args:
+            output_speed: rad/s while the peak lasts.
+            duration: s of one peak.
+
+        Returns:
+            the number of events; None at standstill, where the budget counts turns that do not
+            happen, and for reducers whose catalogue has no such budget.
+        """
+        turns = abs(float(as_floats(output_speed, "output_speed"))) / (2.0 * math.pi)
+        if self.kind != "strain-wave" or self.ratio is None or turns == 0:
+            return None
+        length = float(as_floats(duration, "duration"))
+        if length <= 0:
+            raise InputError("must be positive", key="duration", value=duration)
+        return MOMENTARY_EVENTS / (2.0 * turns * self.ratio * length)
+
+    def check_blows(self, peak_torque: float, holding_torque: float = 0.0) -> ReducerCheck:
+        """Check a joint that stands still under blows.
+
+        Args:
+            peak_torque: N m, the largest magnitude of gravity's and the vibration's torque
+                together.
+            holding_torque: N m, gravity's alone.
+
+        Raises:
+            InputError: torques that are not finite.
+        """
+        peak = abs(float(as_floats(peak_torque, "peak_torque")))
+        hold = abs(float(as_floats(holding_torque, "holding_torque")))
+        limits = {
+            "repeated peak torque": (peak, self.repeated_peak_torque),
+            "momentary peak torque": (peak, self.momentary_peak_torque),
+            "ratcheting torque": (peak, self.ratcheting_torque),
+            "rated torque, held": (hold, self.rated_torque),
+        }
+        shares = {k: torque / limit for k, (torque, limit) in limits.items() if limit is not None}
+        governed = max(shares, key=lambda key: shares[key])
+        return ReducerCheck(
+            reducer=self.name,
+            peak_torque=peak,
+            holding_torque=hold,
+            utilisations=shares,
+            governed_by=governed,
+            utilisation=shares[governed],
+            warnings=self._warnings(shares),
+        )
+
+    def _warnings(self, shares: dict[str, float]) -> tuple[str, ...]:
+        lines = [
+            f"{self.name}: catalogue life presumes turning; a joint that stands still under blows "
+            "risks false brinelling, which no catalogue covers"
+        ]
+        if shares["repeated peak torque"] > 1.0:
+            lines.append(
+                f"{self.name}: the blows' peak torque exceeds the limit for repeated peaks "
+                f"({shares['repeated peak torque']:.2f} times)"
+            )
+        if shares["momentary peak torque"] > 1.0:
+            lines.append(
+                f"{self.name}: the peak torque exceeds even the limit for emergencies "
+                f"({shares['momentary peak torque']:.2f} times)"
+            )
+        return tuple(lines)
+
+
+@dataclass(frozen=True)
+class ReducerCheck:
+    """How far blows at standstill use a reducer's limits.
+
+    Attributes:
+        reducer: its name.
+        peak_torque: N m, gravity and vibration together.
+        holding_torque: N m, gravity alone.
+        utilisations: torque over limit, by limit.
+        governed_by: the limit that binds.
+        utilisation: torque over that limit; above 1 is too much.
+        warnings: what the catalogue does not promise, and which limits are exceeded.
+    """
+
+    reducer: str
+    peak_torque: float
+    holding_torque: float
+    utilisations: dict[str, float]
+    governed_by: str
+    utilisation: float
+    warnings: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether no limit is exceeded."""
+        return self.utilisation <= 1.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {**asdict(self), "warnings": list(self.warnings), "passed": self.passed}

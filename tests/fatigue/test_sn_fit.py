@@ -1,0 +1,293 @@
+from __future__ import annotations
+
+import math
+import re
+import zipfile
+from importlib.metadata import distribution
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pandas as pd
+import pylife.materialdata.woehler as pylife
+import pytest
+from scipy import stats
+
+from picchio.core.errors import InputError, PicchioWarning
+from picchio.fatigue import SNCurve
+from picchio.fatigue._sn_kernel import bivariate_upper
+from picchio.fatigue._sn_likelihood import Likelihood
+from picchio.fatigue.sn_fit import Estimate, SNFit, fit_sn
+from picchio.fatigue.sn_tests import read_sn_tests
+
+TRUTH = SNCurve(
+    name="truth", strength=290e6, cycles=1e6, slopes=(8.0,), knees=(1e6,), survival=0.5,
+    scatter=0.03,
+)  # fmt: skip
+STOP = 1e7
+Tests = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+def synthetic(number: int, rng: np.random.Generator, share: float = 0.5) -> Tests:
+    """Tests whose scatter is to `share` (of the variance) strength, and else life by itself."""
+    levels = np.r_[np.linspace(0.92, 1.08, 5), np.linspace(1.15, 1.5, 6)]
+    stress = np.resize(levels, number) * TRUTH.strength
+    strength = 10.0 ** (0.03 * math.sqrt(share) * rng.standard_normal(number))
+    life = 10.0 ** (8.0 * 0.03 * math.sqrt(1.0 - share) * rng.standard_normal(number))
+    cycles = TRUTH.cycles_to_failure(stress / strength) * life
+    return stress, np.minimum(cycles, STOP), cycles < STOP
+
+
+def truths() -> dict[str, float]:
+    return {
+        "slope": 8.0, "knee": 1e6, "endurance_limit": 290e6, "scatter": 0.03,
+        "design": TRUTH.at_survival(0.975).strength,
+    }  # fmt: skip
+
+
+def contains(fit: SNFit, name: str) -> bool:
+    estimate = getattr(fit, name)
+    return bool(estimate.low <= truths()[name] <= estimate.high)
+
+
+def run_pylife(tests: Tests, method: type = pylife.MaxLikeFull) -> pd.Series:
+    frame = pd.DataFrame({"load": tests[0] / 1e6, "cycles": tests[1], "fracture": tests[2]})
+    return method(frame).analyze()
+
+
+def some_likelihood(z: float) -> Likelihood:
+    rng = np.random.default_rng(0)
+    return Likelihood(
+        np.log(rng.uniform(280, 330, 12)), np.log(rng.uniform(1e5, 1e7, 12)),
+        rng.random(12) < 0.7, z,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("share", [-3.0, -1.0, 0.0, 1.5, 4.0])
+@pytest.mark.parametrize("z", [0.0, 1.96])
+def test_gradient(z: float, share: float) -> None:
+    likelihood = some_likelihood(z)
+    theta = np.array([np.log(290.0), np.log(1e6), np.log(9.0), np.log(0.05), share])
+    _, gradient = likelihood(theta)
+    differences = [
+        (likelihood(theta + step)[0] - likelihood(theta - step)[0]) / 2e-5
+        for step in 1e-5 * np.eye(5)
+    ]
+    np.testing.assert_allclose(gradient, differences, rtol=1e-6, atol=1e-6)
+
+
+def test_the_likelihood_is_a_probability() -> None:
+    # For one specimen, the density over ln N up to the stop, and the run-out there, make one.
+    theta = np.array([np.log(290.0), np.log(1e6), np.log(8.0), np.log(0.07), 0.4])
+    log_cycles = np.linspace(np.log(1e2), np.log(3e6), 20_001)
+    for stress in (270.0, 290.0, 320.0):
+
+        def value(log_n: float, failed: bool, stress: float = stress) -> float:
+            one = Likelihood(np.array([np.log(stress)]), np.array([log_n]), np.array([failed]))
+            return math.exp(one(theta)[0] + 0.5 * 0.4**2)
+
+        density = [value(log_n, True) for log_n in log_cycles]
+        total = np.trapezoid(density, log_cycles) + value(log_cycles[-1], False)
+        assert total == pytest.approx(1.0, abs=1e-6)
+
+
+def test_bivariate_normal_against_scipy() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(200):
+        h, k = 2.0 * rng.standard_normal(2)
+        r = float(rng.uniform(-0.9999, 0.9999))
+        expected = stats.multivariate_normal.cdf([-h, -k], cov=[[1.0, r], [r, 1.0]])
+        assert bivariate_upper(h, k, r) == pytest.approx(float(expected), abs=1e-12)
+
+
+def test_without_run_outs_it_is_least_squares() -> None:
+    # Closed form: log-normal strength about a straight line is a normal linear model of ln N on
+    # ln S. Its slope's exact interval is Student's, its scatter's is by chi-square.
+    rng = np.random.default_rng(5)
+    stress = np.repeat([300e6, 340e6, 380e6, 420e6], 4)
+    cycles = 1e6 * (stress / 300e6) ** -9.0 * np.exp(0.4 * rng.standard_normal(16))
+    fit = fit_sn(stress, cycles, np.ones(16, dtype=bool), knee=False)
+    line = stats.linregress(np.log(stress), np.log(cycles))
+    assert fit.slope.value == pytest.approx(-line.slope, rel=1e-6)
+    half = stats.t.ppf(0.95, 14) * line.stderr
+    assert fit.slope.low == pytest.approx(-line.slope - half, rel=1e-3)
+    assert fit.slope.high == pytest.approx(-line.slope + half, rel=1e-3)
+    residual = np.log(cycles) - line.intercept - line.slope * np.log(stress)
+    unbiased = math.sqrt((residual**2).sum() / 14) / fit.slope.value / math.log(10)
+    assert fit.scatter.value == pytest.approx(unbiased, rel=0.02)
+    assert fit.knee is None
+    assert fit.curve().endurance_limit is None
+
+
+def test_large_sample_finds_the_truth_and_agrees_with_pylife() -> None:
+    tests = synthetic(3000, np.random.default_rng(3))
+    fit, theirs = fit_sn(*tests), run_pylife(tests)
+    assert fit.knee is not None
+    assert fit.slope.value == pytest.approx(8.0, rel=0.03)
+    assert fit.knee.value == pytest.approx(1e6, rel=0.05)
+    assert fit.endurance_limit.value == pytest.approx(290e6, rel=0.005)
+    assert fit.scatter.value == pytest.approx(0.03, rel=0.05)
+    assert fit.slope.value == pytest.approx(theirs.k_1, rel=0.02)
+    assert fit.endurance_limit.value == pytest.approx(theirs.SD * 1e6, rel=0.005)
+    # pyLife's TS and TN are 10 to 90 % spreads of the limit's strength and of life.
+    strength = fit.scatter.value * math.sqrt(fit.strength_share)
+    assert strength == pytest.approx(math.log10(theirs.TS) / 2.5631, rel=0.15)
+    assert fit.scatter.value == pytest.approx(math.log10(theirs.TN) / 2.5631 / theirs.k_1, rel=0.05)
+
+
+def test_levels_that_never_mix_still_give_a_scatter() -> None:
+    # Every specimen breaks above 310 MPa and none below. Taken by themselves, as pyLife does,
+    # the levels about the limit carry no scatter: MaxLikeInf refuses, and MaxLikeFull returns
+    # whatever spread its optimiser started from (the likelihood is flat there). Here the
+    # finite-life tests inform the same scatter.
+    rng = np.random.default_rng(0)
+    stress = np.repeat([400e6, 360e6, 330e6, 300e6], 5)
+    cycles = 1e6 * (stress / 320e6) ** -8 * np.exp(0.3 * rng.standard_normal(20))
+    failed = stress > 310e6
+    cycles[~failed] = STOP
+    with pytest.raises(ValueError, match="mixed load levels"):
+        run_pylife((stress, cycles, failed), pylife.MaxLikeInf)
+    fit = fit_sn(stress, cycles, failed)
+    assert fit.scatter.low > 0.0
+    # The true scatter in strength is 0.3 / 8 / ln 10 = 0.0163.
+    assert fit.scatter.low < 0.0163 < fit.scatter.high
+    assert 300e6 < fit.endurance_limit.value < 330e6
+
+
+def pylife_example() -> Tests:
+    """452 real tests that pyLife's wheel carries (material undocumented); 1e7 is a run-out."""
+    path = Path(str(distribution("pylife").locate_file("pylife/materialdata/data/Test_dat.xlsx")))
+    with zipfile.ZipFile(path) as book:
+        sheet = ElementTree.fromstring(book.read("xl/worksheets/sheet1.xml"))
+    space = {"x": "http://schemas.openxmlformats.org/spreadsheetml/2006/main"}
+    cells: dict[str, list[float]] = {}
+    for cell in sheet.iterfind(".//x:c", space):
+        value = cell.find("x:v", space)
+        if value is not None and value.text and cell.get("t") != "s":
+            column = re.sub(r"\d", "", cell.get("r", ""))
+            cells.setdefault(column, []).append(float(value.text))
+    first, second = (np.array(values) for values in list(cells.values())[:2])
+    stress, cycles = (first, second) if first.max() < second.max() else (second, first)
+    return stress * 1e6, cycles, cycles < cycles.max()
+
+
+def test_real_data_agree_with_pylife() -> None:
+    tests = pylife_example()
+    assert len(tests[0]) > 400
+    assert 80 < (~tests[2]).sum() < 100
+    fit, theirs = fit_sn(*tests), run_pylife(tests)
+    assert fit.knee is not None
+    # Two models of one knee: pyLife's estimates lie within our 90 % intervals.
+    assert fit.endurance_limit.low < theirs.SD * 1e6 < fit.endurance_limit.high
+    assert fit.slope.low < theirs.k_1 < fit.slope.high
+    assert fit.knee.low < theirs.ND < fit.knee.high
+    # Life scatters more than strength about the limit here: T_N > T_S^k, and the share says so.
+    assert theirs.TS**theirs.k_1 < theirs.TN
+    assert fit.strength_share < 0.5
+
+
+def test_small_real_looking_set_gives_honest_ends() -> None:
+    fit = fit_sn(*synthetic(12, np.random.default_rng(8)), survival=0.9)
+    record = fit.to_dict()
+    assert record["format"] == "picchio-sn/1"
+    for name in ("slope", "endurance_limit", "design", "scatter"):
+        estimate = getattr(fit, name)
+        assert 0.0 <= estimate.low < estimate.value < estimate.high
+    assert fit.design.value < fit.endurance_limit.value
+    curve = fit.curve(0.9)
+    assert curve.survival == 0.9
+    assert curve.endurance_limit == pytest.approx(
+        fit.endurance_limit.value * 10 ** (-1.2816 * fit.scatter.value), rel=1e-4
+    )
+    assert Estimate(2.0, 0.0, math.inf).to_dict() == {"value": 2.0, "low": 0.0, "high": None}
+
+
+def test_fit_is_in_the_users_units_only_by_scale() -> None:
+    stress, cycles, failed = synthetic(40, np.random.default_rng(2))
+    one, two = fit_sn(stress, cycles, failed), fit_sn(2.0 * stress, 3.0 * cycles, failed)
+    assert one.knee is not None
+    assert two.knee is not None
+    assert two.slope.value == pytest.approx(one.slope.value, rel=1e-6)
+    assert two.endurance_limit.low == pytest.approx(2 * one.endurance_limit.low, rel=1e-4)
+    assert two.knee.high == pytest.approx(3 * one.knee.high, rel=1e-3)
+    assert two.scatter.high == pytest.approx(one.scatter.high, rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [30, 100])
+def test_intervals_cover_what_they_say(number: int) -> None:
+    """90 % intervals hold the truth in 88 to 92 % of 2,000 sets (plus 2 standard errors)."""
+    rng = np.random.default_rng(2026)
+    sets, names = 2000, ("slope", "knee", "endurance_limit", "design", "scatter")
+    hits = dict.fromkeys(names, 0)
+    for _ in range(sets):
+        fit = fit_sn(*synthetic(number, rng))
+        for name in names:
+            hits[name] += contains(fit, name)
+    cover = {name: count / sets for name, count in hits.items()}
+    print(number, cover)
+    error = 2.0 * math.sqrt(0.9 * 0.1 / sets)
+    for name in names:
+        assert 0.88 - error <= cover[name] <= 0.92 + error, (number, cover)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"amplitude": [-1.0] * 8}, "amplitude"),
+        ({"cycles": [math.nan] * 8}, "cycles"),
+        ({"failed": [2] * 8}, "failed"),
+        ({"failed": [True] * 5}, "equally long"),
+        ({"failed": [True] * 5 + [False] * 3}, "6 failures"),
+        ({"amplitude": [3e8] * 8}, "two stresses"),
+        ({"level": 1.0}, "level"),
+        ({"survival": 0.0}, "survival"),
+        ({"knee": True}, "run-outs"),
+    ],
+)
+def test_bad_tests_are_named(changes: dict[str, object], key: str) -> None:
+    values: dict[str, object] = {
+        "amplitude": np.linspace(3e8, 4e8, 8), "cycles": np.geomspace(1e6, 1e5, 8) * 1.1,
+        "failed": [True] * 8, "knee": False,
+    }  # fmt: skip
+    with pytest.raises(InputError, match=key):
+        fit_sn(**{**values, **changes})  # type: ignore[arg-type]
+
+
+def test_a_perfect_line_has_no_scatter_and_is_refused() -> None:
+    stress = np.linspace(3e8, 4e8, 8)
+    with pytest.raises(InputError, match="no scatter"):
+        fit_sn(stress, 1e6 * (stress / 3e8) ** -8.0, [True] * 8, knee=False)
+
+
+def test_reading_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "tests.csv"
+    path.write_text("Stress S [Mpa],Cycles N [-],Comment\n300,1e5,Failure\n280,1e7,RunOut\n")
+    tests = read_sn_tests(path)
+    assert tests.amplitude.tolist() == [300e6, 280e6]
+    assert tests.failed.tolist() == [True, False]
+    path.write_text("Stress [ksi]\tCycles\n40\t1e5\n30\t1e7\n29\t1e7\n")
+    with pytest.warns(PicchioWarning, match="1e\\+07 cycles are run-outs"):
+        tests = read_sn_tests(path)
+    assert tests.failed.tolist() == [True, False, False]
+    assert tests.amplitude[0] == pytest.approx(40 * 6.894757e6, rel=1e-6)
+    assert read_sn_tests(path, run_out_cycles=2e7).failed.all()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("Stress [MPa],Cycles\n", "no tests"),
+        ("Strain [-],Cycles\n1,2\n", "column named like 'stress'"),
+        ("Stress,Cycles\n1,2\n", "unit"),
+        ("Stress [furlong],Cycles\n1,2\n", "furlong"),
+        ("Stress [MPa],Cycles\n300,many\n", "row 2.*many"),
+        ("Stress [MPa],Cycles\n300,1e5\n-5,1e5\n", "row 3"),
+        ("Stress [MPa],Cycles,Outcome\n300,1e5,maybe\n", "row 2.*maybe"),
+    ],
+)
+def test_a_bad_table_names_its_row(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "tests.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_sn_tests(path)

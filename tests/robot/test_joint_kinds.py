@@ -1,0 +1,148 @@
+"""Joints of every kind: what moves, what is held, what follows."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+import yourdfpy
+
+from picchio.core.errors import InputError, PicchioWarning
+from picchio.robot import load_robot
+from picchio.robot.find import shipped_robots
+from picchio.robot.sidecar import __doc__ as sidecar_example
+from picchio.robot.sidecar import read_sidecar
+
+BODY = (
+    '<inertial><origin xyz="0.1 0.2 0.3"/><mass value="2"/>'
+    '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+)
+
+
+@pytest.mark.parametrize("kind", ["floating", "planar"])
+def test_joints_of_several_freedoms_are_held_and_told(write, kind, arm_text):
+    text = arm_text.replace(
+        '<link name="base"/>',
+        f'<link name="world"/><joint name="free" type="{kind}"><parent link="world"/>'
+        '<child link="base"/><origin xyz="0 0 1"/></joint><link name="base"/>',
+    )
+    with pytest.warns(PicchioWarning, match=r"held fixed: free"):
+        robot = load_robot(write("free.urdf", text), values={"a": {"stiffness": 1e4}})
+    assert robot.joint_names == ("a", "b", "c")
+    fixed = load_robot(write("arm.urdf", arm_text), values={"a": {"stiffness": 1e4}})
+    one, other = robot.state([0.1, 0.2, 0.1]), fixed.state([0.1, 0.2, 0.1])
+    np.testing.assert_allclose(one.mass_matrix, other.mass_matrix)
+    np.testing.assert_allclose(one.tool_position, np.add(other.tool_position, [0, 0, 1]))
+    with pytest.raises(InputError, match=f"a {kind} joint cannot be flexible"):
+        load_robot(robot.source, values={"free": {"stiffness": 1e4}})
+
+
+def test_limits_by_kind(arm, flex):
+    robot = load_robot(arm, flex=flex)
+    assert [joint.kind for joint in robot.flexible_joints] == ["revolute", "revolute", "prismatic"]
+    np.testing.assert_array_equal(robot.lower, [-2, -np.inf, 0])
+    np.testing.assert_array_equal(robot.upper, [2, np.inf, 0.3])
+    assert robot.limit_violations([2.1, 99.0, -0.1]) == ["a", "c"]
+    # One number for a continuous joint; a full turn changes nothing.
+    one, other = robot.state([0.3, 1.0, 0.1]), robot.state([0.3, 1.0 + 2 * np.pi, 0.1])
+    np.testing.assert_allclose(one.mass_matrix, other.mass_matrix, atol=1e-12)
+
+
+def test_places_against_yourdfpy(arm, flex):
+    robot = load_robot(arm, flex=flex)
+    oracle = yourdfpy.URDF.load(str(arm), load_meshes=False)
+    for pose in ([0.0, 0.0, 0.0], [0.5, -2.0, 0.2], [-1.9, 3.0, 0.05]):
+        oracle.update_cfg(pose)
+        for link in ("upper", "lower", "slide", "tip"):
+            position, rotation = robot.frame_placement(pose, link)
+            np.testing.assert_allclose(oracle.get_transform(link)[:3, 3], position, atol=1e-12)
+            np.testing.assert_allclose(oracle.get_transform(link)[:3, :3], rotation, atol=1e-12)
+
+
+def test_a_flexible_joint_takes_its_mimic_along(write):
+    """Two wheels of a gear on parallel axes: the follower turns with ratio -2, energy by hand."""
+    text = f"""<robot name="g"><link name="w"/><link name="x">{BODY}</link>
+    <link name="y">{BODY}</link>
+    <joint name="one" type="continuous"><parent link="w"/><child link="x"/><axis xyz="0 0 1"/>
+    </joint><joint name="two" type="continuous"><parent link="w"/><child link="y"/>
+    <axis xyz="0 0 1"/><mimic joint="one" multiplier="-2" offset="0.5"/></joint></robot>"""
+    urdf = write("g.urdf", text)
+    robot = load_robot(urdf, values={"one": {"stiffness": 1.0}}, tool="y")
+    about_axis = 1 + 2 * (0.1**2 + 0.2**2)
+    assert robot.joint_names == ("one",)
+    assert robot.state([0.3]).mass_matrix[0, 0] == pytest.approx(about_axis * (1 + 4))
+    with pytest.raises(InputError, match="mimics 'one' and has no spring of its own"):
+        load_robot(urdf, values={"two": {"stiffness": 1.0}}, tool="y")
+
+
+@pytest.mark.parametrize("which", ["one joint", "arm", "mimic", "gun"])
+def test_many_poses_at_once(arm, write, which, sidecar_text):
+    if which == "one joint":
+        text = f"""<robot name="g"><link name="w"/><link name="x">{BODY}</link>
+        <joint name="j" type="continuous"><parent link="w"/><child link="x"/></joint></robot>"""
+        robot = load_robot(write("o.urdf", text), values={"j": {"stiffness": 1.0}})
+    elif which == "mimic":
+        robot = load_robot("panda")
+    else:
+        gun = "[gun]\nmass = 1.0\nrecoil_stiffness = 1e4\n" if which == "gun" else ""
+        robot = load_robot(arm, flex=write("f.toml", sidecar_text + gun))
+    poses = np.random.default_rng(0).uniform(-1, 1, (7, len(robot.joint_names)))
+    mass, jacobian = robot.mass_and_jacobian(poses)
+    for i, pose in enumerate(poses):
+        state = robot.state(pose)
+        np.testing.assert_array_equal(mass[i], state.mass_matrix)
+        np.testing.assert_array_equal(jacobian[i], state.jacobian)
+
+
+def test_every_tool_frame_that_is_guessed_says_why(arm_text, write):
+    values = {"a": {"stiffness": 1e4}}
+    robot = load_robot(write("a.urdf", arm_text), values=values)
+    assert (robot.tool_frame, robot.origins["tool.frame"]) == ("tip", "the only link at an end")
+    two = arm_text.replace(
+        "</robot>",
+        '<link name="lamp"/><joint name="l" type="fixed"><parent link="upper"/>'
+        '<child link="lamp"/></joint></robot>',
+    )
+    with pytest.raises(InputError, match=r"several frames could carry the tool; valid: tip, lamp"):
+        load_robot(write("b.urdf", two), values=values)
+    named = two.replace('"lamp"', '"tcp"')
+    assert load_robot(write("c.urdf", named), values=values).tool_frame == "tcp"
+
+
+@pytest.mark.parametrize("name", sorted(shipped_robots()))
+def test_no_warning_for_a_shipped_robot(name):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        load_robot(name)
+
+
+def test_a_sidecar_of_another_robot_is_told():
+    flex = shipped_robots()["ur5"].flex
+    with pytest.warns(PicchioWarning, match="belongs to robot 'ur5_robot', not to .*ur10_robot"):
+        load_robot("ur10", flex=flex)
+
+
+def test_pinocchio_is_never_called_with_what_crashes_it(arm, flex):
+    rigid = load_robot(arm, flex=flex).rigid
+    pose = np.zeros(3)
+    for frame in (-1, 10**6):
+        for call in (rigid.jacobian, rigid.placement):
+            with pytest.raises(InputError, match="no such frame"):
+                call(pose, frame)
+        with pytest.raises(InputError, match="no such frame"):
+            rigid.mass_and_jacobian(pose[None], frame)
+    for wrong in (np.zeros(2), np.zeros(4), np.zeros((1, 3)), np.zeros(0)):
+        for call in (rigid.mass_matrix, rigid.gravity_torque, rigid.gravity_gradient):
+            with pytest.raises(InputError, match="wrong shape"):
+                call(wrong)
+    with pytest.raises(InputError, match="wrong shape"):
+        rigid.mass_and_jacobian(pose, 0)
+
+
+def test_the_documented_sidecar_is_a_sidecar(write):
+    assert sidecar_example is not None
+    text = sidecar_example.split("```toml\n")[1].split("```")[0]
+    sidecar = read_sidecar(write("documented.toml", text))
+    assert sidecar.joint["elbow_joint"].balancer is not None
+    assert sidecar.gun is not None
