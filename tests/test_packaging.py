@@ -37,5 +37,5 @@ def test_an_installed_wheel_assesses_the_shipped_robot_in_an_empty_folder(tmp_pa
     assert done.returncode == 0, done.stderr
     where, _, rest = done.stdout.partition("\n")
     assert where.startswith(str(site))
-    assert "joint_2 comes closest" in rest
+    assert "of joint_2 comes closest" in rest
     assert list(empty.iterdir()) == []

@@ -132,14 +132,27 @@ def show(found: Assessment, task: Path) -> None:
 def verdict(found: Assessment) -> str:
     """The result in a sentence."""
     if found.limiting_joint is None:
-        return "No joint has a shaft, so no life can be told; give shafts in the sidecar."
-    joint = next(j for j in found.joints if j.name == found.limiting_joint)
-    if math.isinf(joint.rivets_to_failure):
         return (
-            f"No shaft fails: every stress stays below its endurance limit. {joint.name} comes "
-            f"closest, at {100 * joint.utilisation:.3g} % of its allowable."
+            "No joint has a shaft or a reducer, so no life can be told; give them in the sidecar."
         )
-    return f"The robot survives {_count(joint.rivets_to_failure)} rivets; {joint.name} fails first."
+    joint = next(j for j in found.joints if j.name == found.limiting_joint)
+    if math.isfinite(joint.life):
+        return f"The robot survives {_count(joint.life)} rivets; {joint.name} fails first."
+    over = [j.name for j in found.joints if j.reducer_utilisation > 1.0]
+    if over:
+        return (
+            f"Blows and gravity exceed the torque limits of the reducer in {', '.join(over)}: no "
+            "life can be promised there."
+        )
+    part = f"reducer {joint.reducer}" if joint.reducer_utilisation > joint.utilisation else "shaft"
+    if not joint.sn_curve:
+        part = f"reducer {joint.reducer}"
+    shafts = any(j.sn_curve for j in found.joints)
+    first = "No shaft fails: every stress stays below its endurance limit. " if shafts else ""
+    return (
+        f"{first}The {part} of {joint.name} comes closest, at "
+        f"{100 * joint.governing_utilisation:.3g} % of its allowable."
+    )
 
 
 def _life_table(found: Assessment) -> Any:
@@ -150,11 +163,19 @@ def _life_table(found: Assessment) -> Any:
         **({"peak\ntorque\nN m": lambda j: _number(j.peak_torque)} if torques else {}),
         **({"gravity\ntorque\nN m": lambda j: _number(j.gravity_torque)} if torques else {}),
     }
-    if shafts:
+    reducer = {
+        "reducer\nused\n%": lambda j: _number(100 * j.reducer_utilisation),
+    }
+    if not any(joint.reducer for joint in found.joints):
+        reducer = {}
+    if not shafts:
+        columns |= reducer
+    else:
         columns |= {
             "peak\nstress\nMPa": lambda j: _number(j.peak_shear_stress / 1e6),
             "gravity\nstress\nMPa": lambda j: _number(j.gravity_shear_stress / 1e6),
             "utili-\nsation\n%": lambda j: _number(100 * j.utilisation),
+            **reducer,
             "damage\na rivet\n": lambda j: f"{j.damage_per_rivet:.4g}",
             "rivets to\nfailure\n": lambda j: _life(j),
         }

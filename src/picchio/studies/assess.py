@@ -24,6 +24,8 @@ from picchio.fatigue import (
 )
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.rainflow import Residue
+from picchio.fatigue.reducer import Reducer
+from picchio.fatigue.reducer_library import load_reducer
 from picchio.fatigue.sn_curve import MinerRule
 from picchio.model import Model
 from picchio.robot import FlexibleRobot
@@ -33,15 +35,9 @@ from picchio.studies.assessment import (
     OperationResult,
     SteadyStateCheck,
 )
-from picchio.studies.life_rules import (
-    History,
-    LifeRule,
-    PaperRule,
-    RainflowRule,
-    peak,
-)
+from picchio.studies.life_rules import LifeRule, PaperRule, RainflowRule, peak
+from picchio.studies.loads import loads_at
 from picchio.studies.task import Operation, Task
-from picchio.vibration import modal_analysis, response_from_rest, steady_state
 
 Method = Literal["rainflow", "paper"]
 METHODS: tuple[Method, ...] = ("rainflow", "paper")
@@ -98,9 +94,9 @@ def assess(
     curves = _curves(robot, sn_curve, method)
     _warn_about_shafts(robot)
     _warn_about_limits(robot, task)
-    job = _Job(
-        Model(robot, gravity_stiffness), rule, curves, load_sn_curve(PAPER_SN_CURVE, quiet=True)
-    )
+    reducers = tuple(load_reducer(j.reducer) if j.reducer else None for j in robot.flexible_joints)
+    paper_curve = load_sn_curve(PAPER_SN_CURVE, quiet=True)
+    job = _Job(Model(robot, gravity_stiffness), rule, curves, reducers, paper_curve)
     total = sum(len(operation.poses) for operation in task.operations)
     results, checks = [], []
     done = 0
@@ -123,11 +119,11 @@ def assess(
         robot=robot.name,
         method=name,
         sn_curve=", ".join(dict.fromkeys(used)),
-        assumptions=_assumptions(rule, robot, gravity_stiffness, curves),
+        assumptions=_assumptions(rule, gravity_stiffness, curves, reducers),
         joints=joints,
         operations=tuple(results),
         limiting_joint=limiting.name if limiting else None,
-        rivets_to_failure=limiting.rivets_to_failure if limiting else math.inf,
+        rivets_to_failure=limiting.life if limiting else math.inf,
         steady_state=_steady_state_checks(joints, task, results, checks),
         origins=robot.origins,
         provenance=provenance([*robot.files, *task.files]),
@@ -141,63 +137,48 @@ class _Job:
     model: Model
     rule: LifeRule
     curves: tuple[SNCurve | None, ...]
+    reducers: tuple[Reducer | None, ...]
     paper_curve: SNCurve
 
     def at_pose(self, operation: Operation, pose: FloatArray) -> dict[str, FloatArray]:
         """Every joint's numbers at one pose, each (n,)."""
         robot = self.model.robot
-        state = robot.state(pose)
-        modes = modal_analysis(self.model.linear_system(pose))
-        damped = bool((modes.poles.real < 0.0).all())
-        needs_rest = isinstance(self.rule, RainflowRule)
-        rest = steady = None
-        if damped or needs_rest:
-            response = response_from_rest(modes, operation.excitation, operation.hits_per_rivet)
-            rest = [value for _, value in response.turning_points(operation.direction)]
-        if damped or not needs_rest:
-            response = steady_state(modes, operation.excitation)
-            steady = [value for _, value in response.turning_points(operation.direction)]
-        feed = operation.excitation.preload * (state.jacobian.T @ operation.direction)
-        static = (feed - state.gravity_torque) / state.stiffness
+        loads = loads_at(self.model, operation, pose, need=self.rule.needs)
         n = len(robot.flexible_joints)
         columns = ("peak_deflection", "peak_shear_stress", "utilisation", "damage_per_rivet")
-        out: dict[str, FloatArray] = {key: np.full(n, np.nan) for key in columns}
-        out["steady_peak_deflection"] = np.array(
-            [peak(None if steady is None else steady[j]) for j in range(n)]
-        )
-        out["rest_peak_deflection"] = np.array(
-            [peak(None if rest is None else rest[j]) for j in range(n)]
-        )
+        out = {key: np.full(n, np.nan) for key in columns}
+        out["steady_peak_deflection"] = np.array([peak(load.steady) for load in loads.joints])
+        out["rest_peak_deflection"] = np.array([peak(load.rest) for load in loads.joints])
         out["check"] = np.full((n, 2), np.nan)
-        own = out["rest_peak_deflection" if needs_rest else "steady_peak_deflection"]
-        out["peak_deflection"] = own
-        out["peak_torque"] = state.stiffness * own
-        out["gravity_torque"] = np.abs(state.gravity_torque)
+        own = out[f"{self.rule.needs}_peak_deflection"]
+        out["peak_deflection"] = own.copy()
+        out["peak_torque"] = loads.stiffness * own
+        out["gravity_torque"] = np.abs(loads.gravity_torque)
         out["gravity_shear_stress"] = np.full(n, np.nan)
-        for j, (joint, curve) in enumerate(zip(robot.flexible_joints, self.curves, strict=True)):
+        out["reducer_utilisation"] = np.full(n, np.nan)
+        hits = operation.hits_per_rivet
+        for j, (joint, load) in enumerate(zip(robot.flexible_joints, loads.joints, strict=True)):
+            reducer = self.reducers[j]
+            if reducer is not None and load.rest is not None:
+                held = load.stiffness * load.static
+                found = reducer.check_blows(load.peak_torque_with_gravity, held)
+                out["reducer_utilisation"][j] = found.utilisation
+            curve = self.curves[j]
             if joint.shaft is None or curve is None:
                 continue
-            history = History(
-                None if steady is None else steady[j],
-                None if rest is None else rest[j],
-                float(static[j]),
-                float(state.stiffness[j]),
-                operation.hits_per_rivet,
-            )
-            result = self.rule(joint, history, curve)
-            for key, value in zip(columns, result, strict=True):
+            for key, value in zip(columns, self.rule(joint, load, hits, curve), strict=True):
                 out[key][j] = value
             out["gravity_shear_stress"][j] = (
-                abs(state.gravity_torque[j]) * joint.shaft.radius / joint.shaft.polar_moment
+                out["gravity_torque"][j] * joint.shaft.radius / joint.shaft.polar_moment
             )
-            if history.steady is not None and history.rest is not None:
+            if load.steady is not None and load.rest is not None:
                 # The paper's curve on both, so that only the steady state's share shows.
                 out["check"][j] = (
-                    PaperRule()(joint, history, self.paper_curve).damage,
-                    RainflowRule()(joint, history, self.paper_curve).damage,
+                    PaperRule()(joint, load, hits, self.paper_curve).damage,
+                    RainflowRule()(joint, load, hits, self.paper_curve).damage,
                 )
-        out["natural_frequencies"] = modes.natural_frequencies
-        out["tool_position"] = state.tool_position
+        out["natural_frequencies"] = loads.natural_frequencies
+        out["tool_position"] = loads.tool_position
         return out
 
 
@@ -308,6 +289,8 @@ def _joint_life(
         peak_shear_stress=float(max(r.peak_shear_stress[:, j].max() for r in results)),
         gravity_shear_stress=float(max(r.gravity_shear_stress[:, j].max() for r in results)),
         utilisation=float(max(r.utilisation[:, j].max() for r in results)),
+        reducer=joint.reducer or "",
+        reducer_utilisation=float(max(r.reducer_utilisation[:, j].max() for r in results)),
         damage_per_rivet=per_rivet,
         rivets_to_failure=life(per_rivet) if curve is not None else math.nan,
         sn_curve=curve.name if curve is not None else "",
@@ -318,11 +301,11 @@ def _joint_life(
 
 
 def _limiting(joints: tuple[JointLife, ...]) -> JointLife | None:
-    """The joint that ends the robot's life: the shortest, or else the most utilised."""
-    known = [joint for joint in joints if joint.sn_curve]
+    """The joint that ends the robot's life: the shortest, or else the most utilised part."""
+    known = [joint for joint in joints if joint.sn_curve or joint.reducer]
     if not known:
         return None
-    return min(known, key=lambda joint: (joint.rivets_to_failure, -joint.utilisation))
+    return min(known, key=lambda joint: (joint.life, -joint.governing_utilisation))
 
 
 def _steady_state_checks(
@@ -353,15 +336,22 @@ def _steady_state_checks(
 
 def _assumptions(
     rule: LifeRule,
-    robot: FlexibleRobot,
     gravity_stiffness: bool,
     curves: tuple[SNCurve | None, ...],
+    reducers: tuple[Reducer | None, ...],
 ) -> tuple[str, ...]:
     described = [curve.describe() for curve in dict.fromkeys(c for c in curves if c is not None)]
+    named = [r for r in dict.fromkeys(reducers) if r is not None]
+    standstill = (
+        "reducers: peak torque of gravity and blows against the catalogue's limits; a joint that "
+        "stands still under blows risks false brinelling, which no catalogue covers"
+    )
     return (
         f"gravity stiffness {'on' if gravity_stiffness else 'off'}",
         "the motor side of every joint stands still while the tool hits",
         *rule.assumptions(),
         *(f"S-N curve {text}" for text in described),
-        "shafts only: reducers are not assessed",
+        *((standstill,) if named else ()),
+        *(f"reducer {r.name}: {r.manufacturer}, {r.kind}; {r.source}" for r in named),
+        *(() if named else ("shafts only: no joint names its reducer, so none is checked",)),
     )

@@ -34,7 +34,9 @@ class OperationResult:
         gravity_torque: (n_poses, n) N m, magnitude.
         peak_shear_stress: (n_poses, n) Pa, of the vibration; NaN for a joint without a shaft.
         gravity_shear_stress: (n_poses, n) Pa, magnitude.
-        utilisation: (n_poses, n).
+        utilisation: (n_poses, n) of the shafts.
+        reducer_utilisation: (n_poses, n) of the reducers, torque over the limit that binds; NaN
+            where a joint names none.
         damage_per_rivet: (n_poses, n).
     """
 
@@ -54,6 +56,7 @@ class OperationResult:
     peak_shear_stress: FloatArray
     gravity_shear_stress: FloatArray
     utilisation: FloatArray
+    reducer_utilisation: FloatArray
     damage_per_rivet: FloatArray
 
     def to_dict(self) -> dict[str, Any]:
@@ -74,6 +77,9 @@ class JointLife:
         peak_shear_stress: Pa, largest of the vibration; NaN without a shaft.
         gravity_shear_stress: Pa, largest magnitude.
         utilisation: largest equivalent amplitude over the allowable; NaN without a shaft.
+        reducer: its catalogue name; empty where it is not known.
+        reducer_utilisation: largest torque, gravity and blows together, over the limit that binds;
+            NaN without a reducer.
         damage_per_rivet: mean over the rivets of the task's mix.
         rivets_to_failure: all rivets of the mix; infinite where the life has no end.
         sn_curve: name of the curve; empty without a shaft.
@@ -89,12 +95,24 @@ class JointLife:
     peak_shear_stress: float
     gravity_shear_stress: float
     utilisation: float
+    reducer: str
+    reducer_utilisation: float
     damage_per_rivet: float
     rivets_to_failure: float
     sn_curve: str
     worst_operation: str
     worst_pose: int
     damage_share: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def life(self) -> float:
+        """Rivets to failure; infinite where a shaft has no end, or no shaft is known."""
+        return self.rivets_to_failure if self.sn_curve else float("inf")
+
+    @property
+    def governing_utilisation(self) -> float:
+        """The larger of shaft's and reducer's."""
+        return float(np.nanmax([self.utilisation, self.reducer_utilisation, 0.0]))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""

@@ -1,9 +1,9 @@
-"""How a joint's response to one rivet becomes damage: two named methods."""
+"""How a joint's load under one rivet becomes damage: two named methods."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -12,7 +12,6 @@ from picchio.fatigue import (
     SNCurve,
     damage,
     peak_damage,
-    rainflow,
     shear_stress,
     shear_stress_from_deflection,
     utilisation,
@@ -21,24 +20,7 @@ from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.rainflow import Residue
 from picchio.fatigue.sn_curve import MinerRule
 from picchio.robot import Joint
-
-
-class History(NamedTuple):
-    """A joint's turning points under one rivet.
-
-    Attributes:
-        steady: (k,) rad, over one period; None where no steady state exists.
-        rest: (k,) rad, from rest to the end of the ring-down; None where it has no end.
-        static: rad, deflection before the first blow, by gravity and the feed force.
-        stiffness: N m/rad, of the joint at this pose.
-        hits: blows.
-    """
-
-    steady: FloatArray | None
-    rest: FloatArray | None
-    static: float
-    stiffness: float
-    hits: int
+from picchio.studies.loads import JointLoad
 
 
 class JointDamage(NamedTuple):
@@ -51,10 +33,14 @@ class JointDamage(NamedTuple):
 
 
 class LifeRule(Protocol):
-    """A method that turns a joint's history into damage."""
+    """A method that turns a joint's load into damage."""
 
-    def __call__(self, joint: Joint, history: History, sn_curve: SNCurve) -> JointDamage:
-        """Damage of one rivet."""
+    @property
+    def needs(self) -> Literal["rest", "steady"]:
+        """Which response it looks at."""
+
+    def __call__(self, joint: Joint, load: JointLoad, hits: int, sn_curve: SNCurve) -> JointDamage:
+        """Damage of one rivet of `hits` blows; the joint has a shaft."""
 
     def assumptions(self) -> tuple[str, ...]:
         """What the method takes for granted, a sentence each."""
@@ -79,16 +65,19 @@ class RainflowRule:
     mean_stress: Rule = "none"
     miner: MinerRule | None = None
 
-    def __call__(self, joint: Joint, history: History, sn_curve: SNCurve) -> JointDamage:
-        """Damage of one rivet; needs `history.rest`."""
-        assert joint.shaft is not None and history.rest is not None
-        torque = history.stiffness * history.rest
-        stress = shear_stress(torque, joint.shaft)
-        static = float(shear_stress(history.stiffness * history.static, joint.shaft))
-        cycles = rainflow(stress, residue=self.residue).shifted(static)
+    @property
+    def needs(self) -> Literal["rest", "steady"]:
+        """The rivet as it happens."""
+        return "rest"
+
+    def __call__(self, joint: Joint, load: JointLoad, hits: int, sn_curve: SNCurve) -> JointDamage:
+        """Damage of one rivet; the hits are in the load already."""
+        assert joint.shaft is not None
+        assert load.rest is not None
+        cycles = load.stress_cycles(joint, self.residue).shifted(load.static_stress(joint))
         return JointDamage(
-            peak(history.rest),
-            peak(stress),
+            peak(load.rest),
+            peak(shear_stress(load.stiffness * load.rest, joint.shaft)),
             utilisation(cycles, sn_curve, self.mean_stress),
             damage(cycles, sn_curve, self.mean_stress, self.miner),
         )
@@ -108,16 +97,18 @@ class RainflowRule:
 class PaperRule:
     """Nie et al. 2016: steady state, peak stress as amplitude, one cycle a hit."""
 
-    def __call__(self, joint: Joint, history: History, sn_curve: SNCurve) -> JointDamage:
-        """Damage of one rivet; needs `history.steady`."""
-        assert joint.shaft is not None and history.steady is not None
-        deflection = peak(history.steady)
+    @property
+    def needs(self) -> Literal["rest", "steady"]:
+        """The paper looks at the steady state alone."""
+        return "steady"
+
+    def __call__(self, joint: Joint, load: JointLoad, hits: int, sn_curve: SNCurve) -> JointDamage:
+        """Damage of one rivet."""
+        assert joint.shaft is not None
+        deflection = peak(load.steady)
         stress = float(shear_stress_from_deflection(deflection, joint.shaft))
         return JointDamage(
-            deflection,
-            stress,
-            stress / sn_curve.allowable,
-            peak_damage(stress, history.hits, sn_curve),
+            deflection, stress, stress / sn_curve.allowable, peak_damage(stress, hits, sn_curve)
         )
 
     def assumptions(self) -> tuple[str, ...]:

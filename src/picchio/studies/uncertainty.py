@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from statistics import NormalDist
 from typing import Any
 
-import numpy as np
-
-from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.excitation import Excitation, HalfSineTrain, PulseTrain
-from picchio.fatigue import Cycles, SNCurve, damage, life, rainflow, shear_stress, utilisation
+from picchio.fatigue import SNCurve
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.rainflow import Residue
 from picchio.fatigue.sampling import LifeSpread, Uncertain, design
-from picchio.model import LinearSystem, Model
-from picchio.robot import FlexibleRobot, Joint
-from picchio.studies.task import Operation, Task
-from picchio.vibration import modal_analysis, response_from_rest
+from picchio.model import Model
+from picchio.robot import FlexibleRobot
+from picchio.studies.task import Task
+from picchio.studies.uncertain_job import LifeJob, place_of
 
 # Relative, as the campaign's tolerances; the width and the model's error are judgements.
 DEFAULT_INPUTS: dict[str, Uncertain] = {
@@ -31,8 +25,6 @@ DEFAULT_INPUTS: dict[str, Uncertain] = {
     "width": Uncertain(1.0, 0.05),
     "model": Uncertain(1.0, 0.10),
 }
-_DYNAMIC = ("stiffness", "damping_ratio", "width")
-_SCALES = ("force", "model", "strength")
 
 
 @dataclass(frozen=True)
@@ -42,7 +34,8 @@ class UncertainLife:
     Attributes:
         joints: of each joint with a shaft, rivets of the task's mix.
         robot: of the weakest joint, sample by sample.
-        inputs: what was varied; factors on the nominal values.
+        inputs: what was varied: factors on the nominal values; of "strength", ln is the
+            specimens' standard normal score, which each curve's own scatter multiplies.
         assumptions: what was taken for granted.
         seed: of the samples.
     """
@@ -62,19 +55,6 @@ class UncertainLife:
             "assumptions": list(self.assumptions),
             "seed": self.seed,
         }
-
-
-@dataclass(frozen=True)
-class _Place:
-    """One pose of one operation, ready to be perturbed."""
-
-    system: LinearSystem
-    excitation: Excitation
-    direction: FloatArray
-    hits: int
-    rivets: float
-    stiffness: FloatArray
-    static_torque: FloatArray
 
 
 def uncertain_life(
@@ -120,15 +100,15 @@ def uncertain_life(
         if name not in DEFAULT_INPUTS:
             raise InputError("unknown input", key="inputs", value=name, choices=DEFAULT_INPUTS)
     columns = [robot.flexible_names.index(joint.name) for joint in joints]
-    job = _Job(joints, columns, [curves[j.name] for j in joints], residue, mean_stress)
+    job = LifeJob(joints, columns, [curves[j.name] for j in joints], residue, mean_stress)
     model = Model(robot)
-    places = [_place(model, op, pose) for op in task.operations for pose in op.poses]
+    places = [place_of(model, op, pose) for op in task.operations for pose in op.poses]
     kept, left_out = job.worst(places, [len(op.poses) for op in task.operations], poses)
     varied = dict(inputs)
-    if any(job.curves[k].scatter for k in range(len(joints))):
-        # A rank, not a factor: each joint's curve has its own scatter.
-        varied["strength"] = Uncertain(0.0, 1.0, "normal")
-    plan = design(_ranked(varied), samples=samples, seed=seed)
+    if any(curve.scatter for curve in job.curves):
+        # A rank: ln of it is the specimen's standard normal score; each curve has its scatter.
+        varied["strength"] = Uncertain(1.0, 1.0)
+    plan = design(varied, samples=samples, seed=seed)
     lives, used = job.run(places, kept, left_out, plan.values, progress)
     lives *= task.rivets_per_pass
     spreads = {
