@@ -185,6 +185,10 @@ def _life_table(found: Assessment) -> Any:
         *((name, "right") for name in columns),
         ("worst at", "left"),
     )
+    slides = [joint.name for joint in found.joints if joint.kind == "prismatic"]
+    if slides:
+        table.caption = f"{', '.join(slides)} slides: mm and N, not mrad and N m"
+        table.caption_justify = "left"
     for joint in found.joints:
         weakest = joint.name == found.limiting_joint
         table.add_row(

@@ -9,8 +9,10 @@ from typing import Annotated, Any
 
 import typer
 
+import picchio.cli.annotate
 import picchio.cli.assess
 import picchio.cli.envelope
+import picchio.cli.import_
 import picchio.cli.map
 import picchio.cli.robots
 from picchio.core.errors import PicchioError
@@ -24,8 +26,10 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for register in (
+    picchio.cli.annotate.register,
     picchio.cli.assess.register,
     picchio.cli.envelope.register,
+    picchio.cli.import_.register,
     picchio.cli.map.register,
     picchio.cli.robots.register,
 ):

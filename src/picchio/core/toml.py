@@ -25,7 +25,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     text = read_text(path)
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # syntax, or an integer of thousands of digits
         raise InputError(f"is not valid TOML: {error}", file=path) from None
     except RecursionError:
         raise InputError("is nested too deeply", file=path) from None

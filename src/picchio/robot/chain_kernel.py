@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from picchio.robot.small_matrices import cross, rotate, turn, turn_about
+from picchio.robot.small_matrices import copy, copy_matrix, cross, rotate, turn, turn_about
 
 
 @njit(cache=True)
@@ -42,25 +42,27 @@ def forward(tables, q, residual, jacobian, target, axis, weight):  # type: ignor
         if slides[i]:
             for r in range(3):
                 place[r] += spins[i, r] * position
-            turned[:] = other
+            copy_matrix(other, turned)
         else:
             turn_about(axes[i], position, spin)
             turn(other, spin, turned)
-        origins[i] = place
+        copy(place, origins[i])
     rotate(turned, offset[m], arm)
     for r in range(3):
         place[r] += arm[r]
-    pointing = np.empty(3)
+    pointing, nothing = np.empty(3), np.zeros(3)
     rotate(rotation[m], tool_axis, arm)
     rotate(turned, arm, pointing)
     for r in range(3):
         residual[r] = place[r] - target[r]
         residual[r + 3] = weight * (pointing[r] - axis[r])
-    jacobian[:] = 0.0
+    for r in range(6):
+        for j in range(k):
+            jacobian[r, j] = 0.0
     for i in range(m):
         if slides[i]:
-            linear[:] = spins[i]
-            angular[:] = 0.0
+            copy(spins[i], linear)
+            copy(nothing, angular)
         else:
             for r in range(3):
                 arm[r] = place[r] - origins[i, r]
@@ -99,4 +101,13 @@ def square(vector):  # type: ignore[no-untyped-def]
     total = 0.0
     for value in vector:
         total += value * value
+    return total
+
+
+@njit(cache=True)
+def gap(a, b):  # type: ignore[no-untyped-def]
+    """Sum of squared differences."""
+    total = 0.0
+    for i in range(a.shape[0]):
+        total += (a[i] - b[i]) ** 2
     return total

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from picchio.robot.chain_kernel import forward, normal_equations, square
-from picchio.robot.small_matrices import cholesky_solve
+from picchio.robot.chain_kernel import forward, gap, normal_equations, square
+from picchio.robot.small_matrices import cholesky_solve, copy, copy_matrix
 
 
 @njit(cache=True)
@@ -32,8 +32,8 @@ def descend(tables, q, lower, upper, target, axis, weight, steps):  # type: igno
             at_lower = q[j] <= lower[j] and gradient[j] > 0.0
             at_upper = q[j] >= upper[j] and gradient[j] < 0.0
             if at_lower or at_upper:
-                normal[j, :] = 0.0
-                normal[:, j] = 0.0
+                for i in range(k):
+                    normal[i, j] = normal[j, i] = 0.0
                 gradient[j] = 0.0
                 normal[j, j] = largest
         if np.sqrt(square(gradient)) < 1e-14 * largest:
@@ -41,7 +41,7 @@ def descend(tables, q, lower, upper, target, axis, weight, steps):  # type: igno
         improved = False
         trial_cost = cost
         while damping < 1e8:
-            system[:] = normal
+            copy_matrix(normal, system)
             for j in range(k):
                 system[j, j] += damping * largest
                 step[j] = gradient[j]
@@ -57,9 +57,9 @@ def descend(tables, q, lower, upper, target, axis, weight, steps):  # type: igno
         if not improved:
             break
         stalled = cost - trial_cost < 1e-13 * cost and cost > 1e-16
-        q[:] = trial
-        residual[:] = trial_residual
-        jacobian[:] = trial_jacobian
+        copy(trial, q)
+        copy(trial_residual, residual)
+        copy_matrix(trial_jacobian, jacobian)
         cost = trial_cost
         damping = max(damping * 0.1, 1e-15)
         if stalled:
@@ -106,7 +106,8 @@ def relax(tables, q, centre, lower, upper, target, axis, weight, steps):  # type
         for j in range(k):
             wish[j] = centre[j] - q[j]
         before = square(wish)
-        held[:] = False
+        for j in range(k):
+            held[j] = False
         for _again in range(k):
             along_self_motion(jacobian, wish, held, step)
             pushed = False
@@ -129,13 +130,13 @@ def relax(tables, q, centre, lower, upper, target, axis, weight, steps):  # type
             for j in range(k):
                 trial[j] = min(max(q[j] + share * step[j], lower[j]), upper[j])
             error = descend(tables, trial, lower, upper, target, axis, weight, 20)
-            nearer = error < 1e-8 and square(centre - trial) < before
+            nearer = error < 1e-8 and gap(centre, trial) < before
             if nearer:
                 break
             share *= 0.4
         if not nearer:
             break
-        q[:] = trial
+        copy(trial, q)
 
 
 @njit(cache=True)
@@ -169,12 +170,13 @@ def solve_points(  # type: ignore[no-untyped-def]
         found: (p, s, k) out: where each start ended.
         errors: (p, s) out: what is left there, m.
     """
+    q = np.empty(starts.shape[1])
     for p in range(targets.shape[0]):
         for s in range(starts.shape[0]):
-            q = starts[s].copy()
+            copy(starts[s], q)
             error = descend(tables, q, lower, upper, targets[p], axes[p], weight, 100)
             unwind(q, centre, wraps, lower, upper)
             if redundant and error < 1e-8:
                 relax(tables, q, centre, lower, upper, targets[p], axes[p], weight, 100)
-            found[p, s] = q
+            copy(q, found[p, s])
             errors[p, s] = error

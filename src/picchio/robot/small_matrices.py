@@ -1,9 +1,28 @@
-"""Products of 3-vectors and 3 x 3 matrices and a small solver, for compiled code; no copies."""
+"""Products of 3-vectors and 3 x 3 matrices and a small solver, for compiled code.
+
+Results go into arrays that are handed in. Loops are written out: numba takes seconds to
+compile an assignment to a slice.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
+
+
+@njit(cache=True)
+def copy(source, out):  # type: ignore[no-untyped-def]
+    """Out = source, both (n,)."""
+    for i in range(source.shape[0]):
+        out[i] = source[i]
+
+
+@njit(cache=True)
+def copy_matrix(source, out):  # type: ignore[no-untyped-def]
+    """Out = source, both (n, m)."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            out[i, j] = source[i, j]
 
 
 @njit(cache=True)

@@ -28,7 +28,7 @@ from picchio.fatigue.reducer import Reducer
 from picchio.fatigue.reducer_library import load_reducer
 from picchio.fatigue.sn_curve import MinerRule
 from picchio.model import Model
-from picchio.robot import FlexibleRobot
+from picchio.robot import FlexibleRobot, Joint
 from picchio.studies.assessment import (
     Assessment,
     JointLife,
@@ -94,7 +94,7 @@ def assess(
     curves = _curves(robot, sn_curve, method)
     _warn_about_shafts(robot)
     _warn_about_limits(robot, task)
-    reducers = tuple(load_reducer(j.reducer) if j.reducer else None for j in robot.flexible_joints)
+    reducers = tuple(_reducer(joint) for joint in robot.flexible_joints)
     paper_curve = load_sn_curve(PAPER_SN_CURVE, quiet=True)
     job = _Job(Model(robot, gravity_stiffness), rule, curves, reducers, paper_curve)
     total = sum(len(operation.poses) for operation in task.operations)
@@ -111,7 +111,9 @@ def assess(
         checks.append(np.array([row["check"] for row in rows]))
     if paper_mean_stress:
         results = [_at_mean_stress(result, robot, curves) for result in results]
-    joints = tuple(_joint_life(j, robot, task, results, curves) for j in range(len(curves)))
+    joints = tuple(
+        _joint_life(j, robot, task, results, curves, reducers[j]) for j in range(len(curves))
+    )
     limiting = _limiting(joints)
     used = [curve.name for curve in dict.fromkeys(c for c in curves if c is not None)]
     name = "paper, at the poses' mean stress" if paper_mean_stress else method
@@ -203,6 +205,17 @@ def _curves(
     return tuple(curves)
 
 
+def _reducer(joint: Joint) -> Reducer | None:
+    """The joint's reducer; one that no catalogue has is told and left unchecked."""
+    if joint.reducer is None:
+        return None
+    try:
+        return load_reducer(joint.reducer)
+    except InputError as error:
+        warnings.warn(f"{joint.name}: {error}; it is left unchecked", PicchioWarning, stacklevel=3)
+        return None
+
+
 def _warn_about_shafts(robot: FlexibleRobot) -> None:
     bare = [joint.name for joint in robot.flexible_joints if joint.shaft is None]
     if bare:
@@ -272,6 +285,7 @@ def _joint_life(
     task: Task,
     results: list[OperationResult],
     curves: tuple[SNCurve | None, ...],
+    reducer: Reducer | None,
 ) -> JointLife:
     joint, curve = robot.flexible_joints[j], curves[j]
     # Miner over every pose and operation: eqs. 19-22 with a_i in the hits, b_i in the rivets.
@@ -283,13 +297,14 @@ def _joint_life(
     shares = {name: value / total for name, value in spent.items()} if total > 0.0 else {}
     return JointLife(
         name=joint.name,
+        kind=joint.kind,
         peak_deflection=float(max(r.peak_deflection[:, j].max() for r in results)),
         peak_torque=float(max(r.peak_torque[:, j].max() for r in results)),
         gravity_torque=float(max(r.gravity_torque[:, j].max() for r in results)),
         peak_shear_stress=float(max(r.peak_shear_stress[:, j].max() for r in results)),
         gravity_shear_stress=float(max(r.gravity_shear_stress[:, j].max() for r in results)),
         utilisation=float(max(r.utilisation[:, j].max() for r in results)),
-        reducer=joint.reducer or "",
+        reducer=reducer.name if reducer is not None else "",
         reducer_utilisation=float(max(r.reducer_utilisation[:, j].max() for r in results)),
         damage_per_rivet=per_rivet,
         rivets_to_failure=life(per_rivet) if curve is not None else math.nan,

@@ -71,6 +71,7 @@ class JointLife:
 
     Attributes:
         name: of the joint.
+        kind: "revolute" or "prismatic"; of a prismatic one, angles are metres, torques newtons.
         peak_deflection: rad, largest over the task.
         peak_torque: N m, largest of the vibration.
         gravity_torque: N m, largest magnitude.
@@ -89,6 +90,7 @@ class JointLife:
     """
 
     name: str
+    kind: str
     peak_deflection: float
     peak_torque: float
     gravity_torque: float

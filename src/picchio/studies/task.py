@@ -126,6 +126,8 @@ def _build(table: TaskTable, robot: FlexibleRobot, file: Path | None) -> Task:
             raise InputError("names two operations", file=file, key=f"{key}.name", value=entry.name)
         names.add(entry.name)
         merged = table.excitation.overridden_by(entry.own_excitation())
+        if merged.preload is None and robot.gun is not None and robot.gun.feed_force:
+            merged = merged.overridden_by(ExcitationTable(preload=robot.gun.feed_force))
         own = entry.own_excitation() != ExcitationTable()
         excitation = merged.build(file=file, key=key if own else "excitation")
         if merged.file is not None and file is not None:

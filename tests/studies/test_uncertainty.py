@@ -1,0 +1,130 @@
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from picchio.core.errors import InputError
+from picchio.fatigue import SNCurve
+from picchio.fatigue.sampling import Uncertain
+from picchio.model import Model
+from picchio.robot import FlexibleRobot, load_robot
+from picchio.studies import Task, assess, task_from_dict
+from picchio.studies.uncertain_job import LifeJob, place_of
+from picchio.studies.uncertainty import DEFAULT_INPUTS, uncertain_life
+
+STRAIGHT = SNCurve(name="straight", strength=60e6, cycles=1e6, slopes=(5.0,))
+SURE = 1e-9
+
+
+@pytest.fixture(scope="module")
+def robot() -> FlexibleRobot:
+    return load_robot("fanuc_like_3dof")
+
+
+@pytest.fixture(scope="module")
+def task(robot: FlexibleRobot) -> Task:
+    return task_from_dict(
+        {
+            "hits_per_rivet": 3,
+            "excitation": {
+                "kind": "pulse_train", "force": 300.0, "period": 0.04, "width": 0.004,
+            },
+            "operation": [
+                {"name": "up", "direction": [0.0, 0.0, 1.0], "rivets": 2,
+                 "poses": [[0.0, 0.5, -0.8], [0.3, 1.1, -1.0]]},
+                {"name": "side", "direction": [0.0, 1.0, 0.0], "poses": [[0.7, 0.0, 0.0]]},
+            ],
+        },
+        robot,
+    )  # fmt: skip
+
+
+def curves(robot: FlexibleRobot, curve: SNCurve = STRAIGHT) -> dict[str, SNCurve]:
+    return dict.fromkeys(robot.flexible_names, curve)
+
+
+def test_without_spread_it_is_the_assessment(robot: FlexibleRobot, task: Task) -> None:
+    inputs = {name: Uncertain(1.0, SURE) for name in DEFAULT_INPUTS}
+    found = uncertain_life(robot, task, curves(robot), inputs=inputs, samples=8)
+    nominal = assess(robot, task, sn_curve=STRAIGHT)
+    assert found.robot.p50 == pytest.approx(nominal.rivets_to_failure, rel=1e-6)
+    for joint in nominal.joints:
+        spread = found.joints[joint.name]
+        assert joint.rivets_to_failure is not None
+        assert spread.p10 == pytest.approx(joint.rivets_to_failure, rel=1e-6)
+        assert spread.p90 == pytest.approx(spread.p10, rel=1e-6)
+
+
+def test_poses_left_out_keep_their_share(robot: FlexibleRobot, task: Task) -> None:
+    inputs = {"force": Uncertain(1.0, SURE)}
+    lives = [
+        uncertain_life(robot, task, curves(robot), inputs=inputs, samples=8, poses=n).robot.p50
+        for n in (1, 2)
+    ]
+    assert lives[0] == pytest.approx(lives[1], rel=1e-6)
+
+
+def test_force_and_model_error_in_closed_form(robot: FlexibleRobot, task: Task) -> None:
+    # Life goes with (force * model error)^-5: log-normal, sigma = 5 sqrt(0.1^2 + 0.1^2).
+    inputs = {"force": Uncertain(1.0, 0.1), "model": Uncertain(1.0, 0.1)}
+    found = uncertain_life(robot, task, curves(robot), inputs=inputs, samples=1024).robot
+    nominal = assess(robot, task, sn_curve=STRAIGHT).rivets_to_failure
+    sigma = 5.0 * math.sqrt(0.02)
+    assert found.p50 == pytest.approx(nominal, rel=0.03)
+    assert found.p10 == pytest.approx(nominal * math.exp(-1.2816 * sigma), rel=0.05)
+    assert found.p90 == pytest.approx(nominal * math.exp(1.2816 * sigma), rel=0.05)
+    assert found.shares["force"] == pytest.approx(0.5, abs=0.04)
+    assert found.shares["model"] == pytest.approx(0.5, abs=0.04)
+
+
+def test_specimens_scatter_as_their_curve_says(robot: FlexibleRobot, task: Task) -> None:
+    curve = dataclasses.replace(STRAIGHT, survival=0.9, scatter=0.04)
+    found = uncertain_life(
+        robot, task, curves(robot, curve), inputs={"force": Uncertain(1.0, SURE)}, samples=1024
+    )
+    # The curve that 90 % of specimens survive gives the life that 90 % of lives exceed.
+    assert found.robot.p10 == pytest.approx(
+        assess(robot, task, sn_curve=curve).rivets_to_failure, rel=0.03
+    )
+    assert found.robot.shares["strength"] == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_perturbed_system_is_the_perturbed_robot(robot: FlexibleRobot, task: Task) -> None:
+    factor, damping = 1.2, 0.8
+    other = dataclasses.replace(
+        robot,
+        flexible_joints=tuple(
+            dataclasses.replace(
+                j, stiffness=factor * j.stiffness, damping_ratio=damping * j.damping_ratio
+            )
+            for j in robot.flexible_joints
+        ),
+    )
+    operation = task.operations[0]
+    pose = operation.poses[0]
+    joints = list(robot.flexible_joints)
+    job = LifeJob(joints, [0, 1, 2], [STRAIGHT] * 3, "half-cycles", "none")
+    ours = job.cycles(place_of(Model(robot), operation, pose), factor, damping, 1.0)
+    theirs = job.cycles(place_of(Model(other), operation, pose), 1.0, 1.0, 1.0)
+    for (a, _), (b, _) in zip(ours, theirs, strict=True):
+        big = b.range > 1.0  # Pa; an upward force does not move joint_1
+        np.testing.assert_allclose(a.range[: len(b)][big], b.range[big], rtol=1e-6)
+
+
+def test_one_seed_one_result(robot: FlexibleRobot, task: Task) -> None:
+    first, again, other = (
+        uncertain_life(robot, task, curves(robot), samples=8, seed=seed).to_dict()
+        for seed in (1, 1, 2)
+    )
+    assert first == again
+    assert first["robot"] != other["robot"]
+
+
+def test_bad_input_is_named(robot: FlexibleRobot, task: Task) -> None:
+    with pytest.raises(InputError, match="did you mean 'stiffness'"):
+        uncertain_life(robot, task, curves(robot), inputs={"stifness": Uncertain(1.0, 0.1)})
+    with pytest.raises(InputError, match="no joint has a shaft"):
+        uncertain_life(robot, task, {})
