@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from picchio.core.errors import InputError
 from picchio.fatigue._types import as_floats
@@ -10,8 +11,6 @@ from picchio.fatigue.cycles import Cycles
 from picchio.fatigue.damage import damage
 from picchio.fatigue.mean_stress import MeanStress, Rule
 from picchio.fatigue.sn_curve import MinerRule, SNCurve
-
-_STEPS = 200
 
 
 def allowable_factor(
@@ -53,28 +52,41 @@ def allowable_factor(
 
     def spent(factor: float) -> float:
         steady = steady_stress * (factor if steady_scales else 1.0)
+        return damage(cycles.scaled(factor).shifted(steady), sn_curve, mean_stress, miner)
+
+    return largest_factor(spent, limit)
+
+
+def largest_factor(spent: Callable[[float], float], limit: float) -> float:
+    """The largest factor whose damage is within a limit, by bisection to the last bit.
+
+    Args:
+        spent: damage at a factor, never falling; an InputError (above the static strength)
+            counts as endless damage.
+        limit: what may be spent.
+
+    Raises:
+        InputError: even a vanishing factor spends more, so what does not scale breaks the part.
+    """
+
+    def too_much(factor: float) -> bool:
         try:
-            return damage(cycles.scaled(factor).shifted(steady), sn_curve, mean_stress, miner)
+            return spent(factor) > limit
         except InputError:
-            # Above the static strength: no life.
-            return math.inf
+            return True
 
     low, high = 1.0, 1.0
-    while spent(low) > limit:
-        low /= 2.0
+    while too_much(low):
+        high, low = low, low / 2.0
         if low < 1e-12:
-            raise InputError(
-                "the steady stress alone breaks the part", key="steady_stress", value=steady_stress
-            )
-    while spent(high) <= limit:
-        high *= 2.0
-    low = max(low, high / 2.0) if spent(max(low, high / 2.0)) <= limit else low
-    for _ in range(_STEPS):
-        middle = math.sqrt(low * high)
+            raise InputError("the steady stress alone breaks the part", key="steady_stress")
+    while not too_much(high):
+        low, high = high, high * 2.0
+    while True:
+        middle = 0.5 * (low + high)
         if middle in (low, high):
-            break
-        low, high = (middle, high) if spent(middle) <= limit else (low, middle)
-    return low
+            return low
+        low, high = (low, middle) if too_much(middle) else (middle, high)
 
 
 def allowable_radius(

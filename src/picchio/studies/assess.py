@@ -14,7 +14,6 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, PicchioWarning
 from picchio.core.provenance import provenance
 from picchio.fatigue import (
-    DEFAULT_SN_CURVE,
     PAPER_SN_CURVE,
     SNCurve,
     check_shaft,
@@ -35,6 +34,7 @@ from picchio.studies.assessment import (
     OperationResult,
     SteadyStateCheck,
 )
+from picchio.studies.curves import curves_of
 from picchio.studies.life_rules import LifeRule, PaperRule, RainflowRule, peak
 from picchio.studies.loads import loads_at
 from picchio.studies.task import Operation, Task
@@ -91,7 +91,9 @@ def assess(
             hint="annotate the URDF, or give a sidecar with --flex",
         )
     rule: LifeRule = PaperRule() if method == "paper" else RainflowRule(residue, mean_stress, miner)
-    curves = _curves(robot, sn_curve, method)
+    if sn_curve is None and method == "paper":
+        sn_curve = PAPER_SN_CURVE
+    curves = curves_of(robot, sn_curve)
     _warn_about_shafts(robot)
     _warn_about_limits(robot, task)
     reducers = tuple(_reducer(joint) for joint in robot.flexible_joints)
@@ -182,27 +184,6 @@ class _Job:
         out["natural_frequencies"] = loads.natural_frequencies
         out["tool_position"] = loads.tool_position
         return out
-
-
-def _curves(
-    robot: FlexibleRobot, override: str | SNCurve | None, method: Method
-) -> tuple[SNCurve | None, ...]:
-    """The S-N curve of every joint that has a shaft."""
-    if override is None and method == "paper":
-        override = PAPER_SN_CURVE
-    loaded: dict[str, SNCurve] = {}
-    curves: list[SNCurve | None] = []
-    for joint in robot.flexible_joints:
-        if joint.shaft is None:
-            curves.append(None)
-        elif isinstance(override, SNCurve):
-            curves.append(override)
-        else:
-            name = override or joint.shaft.sn_curve or DEFAULT_SN_CURVE
-            if name not in loaded:
-                loaded[name] = load_sn_curve(name)
-            curves.append(loaded[name])
-    return tuple(curves)
 
 
 def _reducer(joint: Joint) -> Reducer | None:

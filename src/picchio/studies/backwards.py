@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from picchio.core.errors import InputError
 from picchio.fatigue import Cycles, SNCurve, damage
@@ -18,7 +20,7 @@ from picchio.robot import FlexibleRobot, Joint
 from picchio.studies.task import Task
 from picchio.studies.uncertain_job import LifeJob, Place, place_of
 
-_MOST_HITS = 1 << 14
+_MOST_HITS = 1 << 10
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Allowable:
         force_factor: by which every blow's force may be multiplied; inf where the blows do not
             move the joint.
         radius: m, the smallest shaft radius, at the same joint stiffness.
-        hits: blows a rivet may take; None where operations differ in it, or where more than 16384
+        hits: blows a rivet may take; None where operations differ in it, or where more than 1024
             are allowed.
         life: rivets to failure as things are, at that survival.
     """
@@ -66,7 +68,8 @@ def allowable(
     """Allowable force, hits and shaft radius of every joint for a wanted life.
 
     Rivets start from rest and ring down, cycles are counted by rainflow. Gravity's stress does not
-    grow with the force, but with a thinner shaft.
+    grow with the force, but with a thinner shaft. Where the curve knows its yield strength in
+    shear, the largest stress must stay below it, too.
 
     Args:
         robot: with shafts.
@@ -94,8 +97,9 @@ def allowable(
     places = [place_of(model, op, pose) for op in task.operations for pose in op.poses]
     loads = _loads(job, places)
     limit = task.rivets_per_pass / rivets
+    after = _AfterHits(job, places)
     return tuple(
-        _joint(job, k, places, loads[k], limit, task, rivets, survival) for k in range(len(joints))
+        _joint(job, k, after, loads[k], limit, task, rivets, survival) for k in range(len(joints))
     )
 
 
@@ -111,10 +115,24 @@ def _loads(job: LifeJob, places: Sequence[Place]) -> list[Load]:
     ]
 
 
+class _AfterHits:
+    """The loads after any number of blows, computed once for all joints."""
+
+    def __init__(self, job: LifeJob, places: list[Place]) -> None:
+        self._job, self._places = job, places
+        self._known: dict[int, list[Load]] = {}
+
+    def __call__(self, hits: int, joint: int) -> Load:
+        if hits not in self._known:
+            changed = [dataclasses.replace(place, hits=hits) for place in self._places]
+            self._known[hits] = _loads(self._job, changed)
+        return self._known[hits][joint]
+
+
 def _joint(
     job: LifeJob,
     k: int,
-    places: list[Place],
+    after: _AfterHits,
     load: Load,
     limit: float,
     task: Task,
@@ -124,8 +142,11 @@ def _joint(
     joint: Joint = job.joints[k]
     curve, rule = job.curves[k], job.mean_stress
     assert joint.shaft is not None
+    strength = curve.yield_shear or curve.ultimate_shear or math.inf
 
     def spent(factor: float, steady_factor: float = 1.0, of: Load = load) -> float:
+        if _largest(of, factor, steady_factor) >= strength:
+            return math.inf
         return math.fsum(
             number * damage(cycles.scaled(factor).shifted(steady * steady_factor), curve, rule)
             for cycles, steady, number in of
@@ -142,27 +163,36 @@ def _joint(
         survival=survival,
         force_factor=force,
         radius=0.0 if math.isinf(slimmer) else joint.shaft.radius * slimmer ** (-1.0 / 3.0),
-        hits=_hits(job, k, places, spent, limit, task) if moved else None,
+        hits=_hits(k, after, spent, limit, task) if moved else None,
         life=math.inf if now == 0.0 else task.rivets_per_pass / now,
     )
 
 
+def _largest(load: Load, factor: float, steady_factor: float) -> float:
+    """The largest stress of all, gravity and blows together, Pa."""
+    largest = 0.0
+    for cycles, steady, _ in load:
+        held = steady * steady_factor
+        largest = max(largest, abs(held))
+        if len(cycles):
+            swing = np.abs(held + factor * cycles.mean) + factor * cycles.amplitude
+            largest = max(largest, float(swing.max()))
+    return largest
+
+
 def _hits(
-    job: LifeJob, k: int, places: list[Place], spent: Any, limit: float, task: Task
+    k: int, after: _AfterHits, spent: Callable[..., float], limit: float, task: Task
 ) -> int | None:
     """The most blows a rivet may take; the response to each number is computed anew."""
     if len({operation.hits_per_rivet for operation in task.operations}) != 1:
         return None
 
     def too_much(hits: int) -> bool:
-        more = [dataclasses.replace(place, hits=hits) for place in places]
-        return bool(spent(1.0, 1.0, _loads(job, more)[k]) > limit)
+        return spent(1.0, 1.0, after(hits, k)) > limit
 
-    low, high = 0, 1
-    while not too_much(high):
-        low, high = high, 2 * high
-        if high > _MOST_HITS:
-            return None
+    if not too_much(_MOST_HITS):
+        return None
+    low, high = 0, _MOST_HITS
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if too_much(middle) else (middle, high)
