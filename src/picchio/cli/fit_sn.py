@@ -1,0 +1,106 @@
+"""`picchio fit-sn`: an S-N curve from test data, run-outs included."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from picchio.cli.options import JsonOption
+from picchio.core.errors import InputError
+
+if TYPE_CHECKING:
+    from picchio.fatigue.sn_fit import Estimate, SNFit
+
+EPILOG = "Example: picchio fit-sn tests.csv --survival 0.99 --out my-steel.toml"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the subcommand."""
+    app.command("fit-sn", epilog=EPILOG)(fit_sn_command)
+
+
+def fit_sn_command(
+    tests: Annotated[
+        Path,
+        typer.Argument(
+            metavar="TESTS.csv",
+            help="Columns such as `Stress [MPa]`, `Cycles`, `Comment` (Failure, RunOut).",
+            show_default=False,
+        ),
+    ],
+    survival: Annotated[float, typer.Option(help="Of the design strength.")] = 0.975,
+    level: Annotated[float, typer.Option(help="Of the two-sided confidence intervals.")] = 0.90,
+    run_out_cycles: Annotated[
+        float | None, typer.Option(help="Without an outcome column: run-outs reached this.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Write the curve as TOML, for --sn-curve."),
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Fit slope, knee, endurance limit and scatter, each with its interval."""
+    from picchio.cli.output import write_json
+    from picchio.core.provenance import provenance
+    from picchio.fatigue.sn_fit import fit_sn
+    from picchio.fatigue.sn_tests import read_sn_tests
+
+    data = read_sn_tests(tests, run_out_cycles=run_out_cycles)
+    for key, value in (("--survival", survival), ("--level", level)):
+        if not 0.0 < value < 1.0:
+            raise InputError("must lie between 0 and 1", key=key, value=value)
+    found = fit_sn(data.amplitude, data.cycles, data.failed, level=level, survival=survival)
+    if out is not None:
+        _write_curve(found, survival, out)
+    if json is not None:
+        content = found.to_dict()
+        content["assumptions"] = [*content["assumptions"], *data.assumptions]
+        write_json(content | {"provenance": provenance([tests])}, json)
+    if json != "-":
+        _show(found, tests, data.assumptions)
+
+
+def _write_curve(found: SNFit, survival: float, out: Path) -> None:
+    import tomlkit
+
+    from picchio.core.files import atomic_write
+    from picchio.fatigue.sn_library import SN_FORMAT
+
+    curve = found.curve(survival, name=out.stem)
+    keys = ("name", "kind", "strength", "cycles", "slopes", "knees", "miner", "survival", "scatter")
+    values = {"format": SN_FORMAT, **{key: getattr(curve, key) for key in keys}}
+    values |= {"source": curve.source, "assumptions": curve.assumptions}
+    text = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
+    with atomic_write(out) as stream:
+        stream.write(tomlkit.dumps(text))
+
+
+def _show(found: SNFit, tests: Path, notes: tuple[str, ...]) -> None:
+    from rich import box
+    from rich.table import Table
+
+    from picchio.cli.output import console
+
+    screen = console()
+    screen.print(f"[bold]{tests.name}[/bold]: {found.failures} failures, {found.run_outs} run-outs")
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("")
+    table.add_column("value", justify="right")
+    table.add_column(f"{100 * found.level:g} % interval", justify="right")
+    at = f"at {found.reference_cycles:.3g} cycles"
+    limit = "endurance limit, median, MPa" if found.knee else f"strength {at}, median, MPa"
+    rows: list[tuple[str, Estimate, float, str]] = [
+        ("slope", found.slope, 1.0, ".3g"),
+        *([("knee, cycles", found.knee, 1.0, ".3g")] if found.knee else []),
+        (limit, found.endurance_limit, 1e-6, ".4g"),
+        (f"the same, survival {found.design_survival:g}, MPa", found.design, 1e-6, ".4g"),
+        ("scatter of log10 strength", found.scatter, 1.0, ".3g"),
+    ]
+    for name, value, factor, spec in rows:
+        low, high = (format(end * factor, spec) for end in (value.low, value.high))
+        table.add_row(name, format(value.value * factor, spec), f"{low} to {high}")
+    screen.print(table)
+    for line in (*found.assumptions, *notes):
+        screen.print(f"[dim]  - {line}[/dim]")

@@ -1,0 +1,78 @@
+"""`picchio fit-sn` on made and on real tests."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from picchio.fatigue import load_sn_curve
+
+
+def picchio(*arguments):
+    return subprocess.run(
+        [sys.executable, "-c", "from picchio.cli.main import main; main()", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+@pytest.fixture
+def tests_file(tmp_path):
+    """Forty tests of a known law: slope 6, scatter 0.03, limit 300 MPa."""
+    rng = np.random.default_rng(1)
+    rows = ["Stress [MPa],Cycles,Comment"]
+    for stress in np.repeat([280, 320, 360, 420, 480], 8):
+        strength = 300 * 10 ** (0.03 * rng.normal())
+        life = 1e6 * (stress / strength) ** -6.0
+        failed = stress > strength and life < 1e7
+        cycles, outcome = (life, "Failure") if failed else (1e7, "RunOut")
+        rows.append(f"{stress},{cycles:.0f},{outcome}")
+    path = tmp_path / "tests.csv"
+    path.write_text("\n".join(rows))
+    return path
+
+
+def test_a_curve_that_assess_can_use(tests_file, tmp_path):
+    out = tmp_path / "my-steel.toml"
+    done = picchio("fit-sn", tests_file, "--out", out, "--json", "-")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["format"] == "picchio-sn/1"
+    assert found["slope"]["low"] < 6.0 < found["slope"]["high"]
+    assert found["endurance_limit"]["value"] == pytest.approx(300e6, rel=0.05)
+    assert found["scatter"]["value"] > 0.01
+    curve = load_sn_curve(out)
+    assert curve.survival == 0.975
+    assert curve.endurance_limit == pytest.approx(found["design"]["value"], rel=0.01)
+    done = picchio("assess", "fanuc_like_3dof", "--sn-curve", out)
+    assert done.returncode == 0, done.stderr
+    assert "my-steel" in done.stdout
+
+
+def test_real_tests_print_a_table(measured_data):
+    done = picchio("fit-sn", measured_data / "sn-tests" / "fatigue-data-fractures.csv")
+    assert done.returncode == 0, done.stderr
+    for word in ("slope", "endurance limit", "scatter", "interval", "run-outs"):
+        assert word in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("", "no tests"),
+        ("Stress [MPa],Cycles\n300,x\n", "row"),
+        ("Load [kgf],Cycles\n300,10\n", "kgf"),
+        ("a,b\n1,2\n", "stress"),
+    ],
+)
+def test_bad_tables(tmp_path, text, part):
+    path = tmp_path / "tests.csv"
+    path.write_text(text)
+    done = picchio("fit-sn", path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert len(done.stderr.splitlines()) == 1
+    assert part in done.stderr.lower()
