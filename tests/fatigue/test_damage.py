@@ -40,6 +40,16 @@ def test_blocks_by_hand() -> None:
     assert damage(cycles, CURVE, miner="haibach") == pytest.approx(haibach, rel=1e-12)
 
 
+def test_shigley_worked_example_of_miner() -> None:
+    # Shigley's, 9th ed., section 6-15: S_ut = 80, S_e = 40 kpsi, f = 0.9: at 60 kpsi a part lives
+    # N_1 = 8520 cycles; after 3000 of them it has 5520 left.
+    slope = 3.0 / math.log10(0.9 * 80.0 / 40.0)
+    sn = SNCurve(name="s", strength=40.0, cycles=1e6, slopes=(slope,), knees=(1e6,))
+    spent = damage(cycles_of([60.0], [3000.0]), sn)
+    assert float(sn.cycles_to_failure(60.0)) == pytest.approx(8520.0, abs=5.0)
+    assert (1.0 - spent) * float(sn.cycles_to_failure(60.0)) == pytest.approx(5520.0, abs=5.0)
+
+
 @given(stresses, stresses)
 def test_damage_adds_and_doubles(first: list[float], second: list[float]) -> None:
     a, b = rainflow(first), rainflow(second)

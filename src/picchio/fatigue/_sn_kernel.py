@@ -82,9 +82,13 @@ def log_likelihood(
     cycles: FloatArray,
     failed: np.ndarray,
     z_p: float,
+    limited: bool,
     gradient: FloatArray,
 ) -> float:
-    """See `_sn_likelihood`; the gradient (5,) is added up in place, from zero."""
+    """See `_sn_likelihood`; the gradient (5,) is added up in place, from zero.
+
+    `limited`: whether there is an endurance limit; else the line goes on for ever.
+    """
     t, k = math.exp(theta[3]), math.exp(theta[2])
     share = 1.0 / (1.0 + math.exp(-theta[4]))
     rho, rest = math.sqrt(share), math.sqrt(1.0 - share)
@@ -97,7 +101,18 @@ def log_likelihood(
         gap = (cycles[i] - theta[1]) / (k * t)
         w = gap + x
         # What the term's derivatives by x, w and rho are; then the chain rule.
-        if failed[i]:
+        if not limited:
+            by_x, by_rho = 0.0, 0.0
+            if failed[i]:
+                total += -0.5 * w * w - _HALF_LOG_2PI - theta[3] - theta[2]
+                by_w = -w
+                gradient[2] -= 1.0
+                gradient[3] -= 1.0
+            else:
+                alive_log = log_normal_cdf(-w)
+                total += alive_log
+                by_w = -math.exp(-0.5 * w * w - _HALF_LOG_2PI - alive_log)
+        elif failed[i]:
             q = (x - w * share) / g
             below = log_normal_cdf(q)
             total += -0.5 * w * w - _HALF_LOG_2PI - theta[3] - theta[2] + below

@@ -36,12 +36,15 @@ class Likelihood:
         cycles: (n,) ln of the cycles at failure, or reached without.
         failed: (n,) whether it failed.
         z: standard normal quantile z_P of the survival that the first parameter is for.
+        limited: whether there is an endurance limit. Without one, the line goes on for ever and
+            SD is the strength at ND, which is anyone's choice.
     """
 
     stress: FloatArray
     cycles: FloatArray
     failed: np.ndarray
     z: float = 0.0
+    limited: bool = True
 
     def __call__(self, theta: FloatArray) -> tuple[float, FloatArray]:
         """Value and gradient (5,) at theta."""
@@ -49,7 +52,7 @@ class Likelihood:
 
         gradient = np.zeros(5)
         value = log_likelihood(
-            theta, self.stress, self.cycles, self.failed, float(self.z), gradient
+            theta, self.stress, self.cycles, self.failed, float(self.z), self.limited, gradient
         )
         gradient[4] -= theta[4]
         return float(value) - 0.5 * float(theta[4]) ** 2, gradient

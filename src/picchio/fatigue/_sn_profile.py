@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -11,7 +12,6 @@ from picchio.fatigue._types import FloatArray
 
 _FARTHEST = 12.0
 """Where an interval is called unbounded: a factor e^12 (1.6e5) from the estimate."""
-
 
 _NEVER = -1e12
 """A log-likelihood that no data have; finite, so that searches can compute with it."""
@@ -37,7 +37,7 @@ class Profile:
         self.value, self.theta = maximise(likelihood, theta, free)
         information = -likelihood.hessian(self.theta)
         # Uncensored normal tests give 2 n: so many failures is what the tests are worth.
-        at_median = Likelihood(likelihood.stress, likelihood.cycles, likelihood.failed)
+        at_median = dataclasses.replace(likelihood, z=0.0)
         median = self.theta.copy()
         median[0] += likelihood.z * np.exp(median[3])
         effective = max(-float(at_median.hessian(median)[3, 3]) / 2.0, 1.0)

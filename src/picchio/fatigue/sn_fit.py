@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 from dataclasses import dataclass
 from typing import Any
@@ -57,7 +58,7 @@ class SNFit:
         level: of the intervals, two-sided.
         failures: number of failed specimens.
         run_outs: number of survivors.
-        log_likelihood: at the maximum, natural, density in ln cycles.
+        log_likelihood: at the maximum, natural, density in ln cycles, penalty included.
         assumptions: what was assumed, in words.
     """
 
@@ -147,7 +148,9 @@ def fit_sn(
     run_outs = int((~tests.failed).sum())
     with_knee = run_outs > 0 if knee is None else knee
     notes = [f"{tests.failed.sum()} failures, {run_outs} run-outs taken as tests stopped alive"]
-    if not with_knee:
+    if with_knee:
+        notes.append("about half of the scatter is strength unless the tests know better")
+    else:
         notes.append("no knee: a straight line")
     if with_knee and run_outs == 0:
         raise InputError("needs run-outs", key="knee", value=knee)
@@ -158,13 +161,13 @@ def fit_sn(
             stacklevel=2,
         )
     free = [0, 1, 2, 3, 4] if with_knee else [0, 2, 3]
+    tests = dataclasses.replace(tests, limited=with_knee)
     theta = _best(tests, free)
     median = Profile(tests, theta, free, level)
     at_quantile = theta.copy()
     z = _normal_quantile(survival)
     at_quantile[0] -= z * np.exp(theta[3])
-    shifted = Likelihood(tests.stress, tests.cycles, tests.failed, z)
-    design = Profile(shifted, at_quantile, free, level)
+    design = Profile(dataclasses.replace(tests, z=z), at_quantile, free, level)
 
     def estimate(profile: Profile, index: int) -> Estimate:
         low, high = profile.interval(index)
@@ -176,11 +179,15 @@ def fit_sn(
         slope=estimate(median, 2),
         knee=estimate(median, 1) if with_knee else None,
         endurance_limit=estimate(median, 0),
-        design=estimate(design, 0),
+        design=dataclasses.replace(
+            estimate(design, 0),
+            # With the same scatter as `curve`, so that both say the same.
+            value=float(np.exp(median.theta[0])) * 10.0 ** (-z * spread),
+        ),
         scatter=scatter,
         strength_share=float(1.0 / (1.0 + np.exp(-median.theta[4]))),
         design_survival=survival,
-        reference_cycles=float(np.exp(theta[1])),
+        reference_cycles=float(f"{np.exp(median.theta[1]):.12g}"),
         level=level,
         failures=int(tests.failed.sum()),
         run_outs=run_outs,
@@ -218,8 +225,9 @@ def _best(tests: Likelihood, free: list[int]) -> FloatArray:
     """The maximum, from several starts: the likelihood can have more than one."""
     stress, life = tests.stress[tests.failed], tests.cycles[tests.failed]
     slope = float(np.clip(-np.polyfit(stress, life, 1)[0], 1.0, 60.0))
-    # Without a knee the limit stands far below every test: a straight line.
-    knees = np.quantile(life, [0.4, 0.7, 0.95]) if 1 in free else [tests.cycles.max() + _FAR]
+    # Without a knee the strength is told at a round number of cycles amid the failures.
+    decade = np.log(10.0) * np.round(np.mean(life) / np.log(10.0))
+    knees = np.quantile(life, [0.4, 0.7, 0.95]) if 1 in free else [decade]
     best: tuple[float, FloatArray] | None = None
     for knee in knees:
         limit = float(np.mean(stress) - (knee - np.mean(life)) / slope)
@@ -232,10 +240,6 @@ def _best(tests: Likelihood, free: list[int]) -> FloatArray:
     if best is None or best[1][3] < np.log(1e-6):
         raise InputError("the tests lie on a line: no scatter can be estimated", key="tests")
     return best[1]
-
-
-_FAR = 15.0
-"""By how much ln ND is put beyond every test where there is to be no knee."""
 
 
 def _normal_quantile(probability: float) -> float:
