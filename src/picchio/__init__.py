@@ -15,6 +15,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from picchio import datasets
+    from picchio.campaign import Campaign, Record, load_campaign, write_campaign
     from picchio.core.errors import InputError, PicchioError, PicchioWarning
     from picchio.excitation import HalfSineTrain, MeasuredForce, PulseTrain
     from picchio.fatigue import SNCurve, load_sn_curve, rainflow
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "Assessment": "studies",
+    "Campaign": "campaign",
     "FlexibleRobot": "robot",
     "HalfSineTrain": "excitation",
     "InputError": "core.errors",
@@ -39,9 +42,11 @@ _HOME = {
     "PicchioError": "core.errors",
     "PicchioWarning": "core.errors",
     "PulseTrain": "excitation",
+    "Record": "campaign",
     "SNCurve": "fatigue",
     "Task": "studies",
     "assess": "studies",
+    "load_campaign": "campaign",
     "load_robot": "robot",
     "load_sn_curve": "fatigue",
     "load_task": "studies",
@@ -51,10 +56,12 @@ _HOME = {
     "steady_state": "vibration",
     "task_from_dict": "studies",
     "truncated_fourier_response": "vibration",
+    "write_campaign": "campaign",
 }
 
 __all__ = [
     "Assessment",
+    "Campaign",
     "FlexibleRobot",
     "HalfSineTrain",
     "InputError",
@@ -64,9 +71,12 @@ __all__ = [
     "PicchioError",
     "PicchioWarning",
     "PulseTrain",
+    "Record",
     "SNCurve",
     "Task",
     "assess",
+    "datasets",
+    "load_campaign",
     "load_robot",
     "load_sn_curve",
     "load_task",
@@ -76,12 +86,15 @@ __all__ = [
     "steady_state",
     "task_from_dict",
     "truncated_fourier_response",
+    "write_campaign",
 ]
 
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         return import_module("picchio.core.provenance").package_version()
+    if name == "datasets":
+        return import_module("picchio.datasets")
     if name in _HOME:
         return getattr(import_module(f"picchio.{_HOME[name]}"), name)
     raise AttributeError(f"module 'picchio' has no attribute {name!r}")

@@ -1,0 +1,92 @@
+"""What a reader of a foreign file hands over: named series, as they stand in the file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class RawChannel:
+    """One series of a foreign file.
+
+    Attributes:
+        name: unique in its file.
+        values: (m,) float64, as stored.
+        time: (m,) s from the file's beginning, where the format itself says; else None.
+        unit: as the file says, or None.
+        suggestion: the contract's channel it seems to be, or None.
+        note: for people.
+    """
+
+    name: str
+    values: FloatArray
+    time: FloatArray | None = None
+    unit: str | None = None
+    suggestion: str | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class RawFile:
+    """A foreign file.
+
+    Attributes:
+        path: the file.
+        kind: "csv", "uff", "mcap" or "matlab".
+        channels: by name.
+        taken: when it was recorded, where the format says.
+    """
+
+    path: Path
+    kind: str
+    channels: dict[str, RawChannel]
+    taken: datetime | None = None
+
+    def channel(self, name: str, *, mapping: Path | None = None, key: str = "from") -> RawChannel:
+        """A series by name.
+
+        Raises:
+            InputError: the file has no such series.
+        """
+        if name not in self.channels:
+            raise InputError(f"{self.path.name} has no such series", file=mapping, key=key,
+                             value=name, choices=self.channels)  # fmt: skip
+        return self.channels[name]
+
+
+class Names:
+    """Makes names unique by a trailing #2, #3, ..."""
+
+    def __init__(self) -> None:
+        self._seen: dict[str, int] = {}
+
+    def __call__(self, name: str) -> str:
+        """The name, or with its number where it was given out before."""
+        self._seen[name] = self._seen.get(name, 0) + 1
+        return name if self._seen[name] == 1 else f"{name}#{self._seen[name]}"
+
+
+def as_series(values: object, what: str, path: Path) -> FloatArray:
+    """(m,) float64 from a reader's array.
+
+    Raises:
+        InputError: complex, or not one-dimensional numbers.
+    """
+    array = np.asarray(values)
+    if array.dtype.kind == "c":
+        raise InputError("holds complex numbers; only time histories can be imported",
+                         file=path, key=what)  # fmt: skip
+    if array.dtype.kind not in "fiub" or array.ndim != 1:
+        raise InputError("is not a series of numbers", file=path, key=what)
+    return array.astype(np.float64)
+
+
+Reader = Callable[..., RawFile]

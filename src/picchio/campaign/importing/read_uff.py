@@ -1,0 +1,86 @@
+"""Universal file format, data set 58: what modal-test systems export (needs pyuff)."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from picchio.campaign.importing.mapping import Mapping
+from picchio.campaign.importing.raw import Names, RawChannel, RawFile, as_series
+from picchio.core.errors import InputError, PicchioWarning
+
+# Function types of data set 58 that are histories in time: general, and time response.
+_TIME_HISTORIES = (0, 1)
+_TIME_ABSCISSA = (0, 17)
+_DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ",
+               -1: "-X", -2: "-Y", -3: "-Z", -4: "-RX", -5: "-RY", -6: "-RZ"}  # fmt: skip
+_NO_UNIT = ("", "none", "unknown")
+
+
+def read(path: Path, mapping: Mapping | None) -> RawFile:
+    """Every time history of the file, named by its response node and direction, as "12+X".
+
+    Spectra and FRFs are left out, with a warning.
+
+    Raises:
+        InputError: pyuff is missing, the file is no UFF, or holds no time history.
+    """
+    try:
+        import pyuff
+    except ImportError:
+        raise InputError("UFF files need pyuff", hint="pip install 'picchio[import]'") from None
+    try:
+        # pyuff prints as it reads.
+        with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = pyuff.UFF(str(path)).read_sets()
+    except Exception as error:  # pyuff raises bare Exceptions
+        raise InputError(f"is not a readable universal file: {_first_line(error)}",
+                         file=path) from None  # fmt: skip
+    sets = [found] if isinstance(found, dict) else list(found)
+    unique = Names()
+    channels: dict[str, RawChannel] = {}
+    skipped = 0
+    for data in sets:
+        if data.get("type") != 58:
+            continue
+        if int(data.get("func_type", 0)) not in _TIME_HISTORIES or (
+            int(data.get("abscissa_spec_data_type", 0)) not in _TIME_ABSCISSA
+        ):
+            skipped += 1
+            continue
+        channel = _channel(data, unique, path)
+        channels[channel.name] = channel
+    if skipped:
+        text = f"{path}: {skipped} data sets are no time histories and were left out"
+        warnings.warn(text, PicchioWarning, stacklevel=2)
+    if not channels:
+        raise InputError("holds no time history in a data set 58", file=path)
+    return RawFile(path, "uff", channels)
+
+
+def _channel(data: dict[str, Any], unique: Names, path: Path) -> RawChannel:
+    direction = _DIRECTIONS.get(int(data.get("rsp_dir", 0)), "")
+    name = unique(f"{int(data.get('rsp_node', 0))}{direction}")
+    values = as_series(data["data"], name, path)
+    if values.size != int(data.get("num_pts", values.size)):
+        raise InputError(f"must hold {int(data['num_pts'])} samples as its header says", file=path,
+                         key=name, value=values.size)  # fmt: skip
+    unit = str(data.get("ordinate_axis_units_lab") or "").strip()
+    label = " ".join(str(data.get(key) or "").strip() for key in ("id1", "rsp_ent_name"))
+    return RawChannel(
+        name,
+        values,
+        np.asarray(data["x"], dtype=np.float64),
+        None if unit.lower() in _NO_UNIT else unit,
+        note=label.strip(),
+    )
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error) or type(error).__name__).partition("\n")[0]

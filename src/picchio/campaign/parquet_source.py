@@ -1,0 +1,116 @@
+"""A record in a Parquet file (needs pyarrow: `pip install picchio[parquet]`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from picchio.campaign.channels import Channel
+from picchio.campaign.source import Block, Column, Source, parse_columns
+from picchio.core.errors import InputError
+
+
+def _pyarrow() -> tuple[Any, Any]:
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise InputError("Parquet files need pyarrow", hint="pip install 'picchio[parquet]'") from (
+            None
+        )
+    return pyarrow, pyarrow.parquet
+
+
+class ParquetSource(Source):
+    """A Parquet file whose columns are named `channel [unit]`; integers and floats.
+
+    Args:
+        path: the file; its schema is read at once, its samples when asked for.
+        key: the record's name in messages.
+
+    Raises:
+        InputError: pyarrow is missing; the file is missing, no Parquet, or its columns are wrong.
+    """
+
+    row_word = "row"
+
+    def __init__(self, path: Path, key: str = "record") -> None:
+        self.path: Path = path
+        self.key = key
+        arrow, _ = _pyarrow()
+        with self._open() as file:
+            schema = file.schema_arrow
+            if file.metadata.num_rows == 0:
+                raise self.error("is empty")
+        self.columns: dict[str, Column] = parse_columns(self, schema.names)
+        for name, column in self.columns.items():
+            kind = schema.types[column.index]
+            if not (arrow.types.is_floating(kind) or arrow.types.is_integer(kind)):
+                raise self.error("must be a column of numbers", channel=name, value=str(kind))
+        self.channels: dict[str, Channel] = {
+            name: column.channel for name, column in list(self.columns.items())[1:]
+        }
+        self._headers = list(schema.names)
+
+    def _open(self) -> Any:
+        arrow, parquet = _pyarrow()
+        if not self.path.exists():
+            raise self.error("no such file")
+        try:
+            return parquet.ParquetFile(self.path)
+        except (arrow.ArrowException, OSError, ValueError) as error:
+            reason = str(error).partition("\n")[0]
+            raise self.error(f"is not a readable Parquet file: {reason}") from None
+
+    def blocks(self, names: Sequence[str], size: int) -> Iterator[Block]:
+        """As `Source`; only the columns asked for leave the disk, one row group at a time."""
+        arrow, _ = _pyarrow()
+        wanted = [self.columns[name] for name in names]
+        headers = [self._headers[column.index] for column in wanted]
+        with self._open() as file:
+            first = 0
+            try:
+                # Over all groups at once pyarrow (26) keeps what it has read.
+                for group in range(file.num_row_groups):
+                    for batch in file.iter_batches(size, row_groups=[group], columns=headers):
+                        yield first, self._converted(wanted, batch, first)
+                        first += batch.num_rows
+            except (arrow.ArrowException, OSError) as error:
+                reason = str(error).partition("\n")[0]
+                raise self.error(f"cannot be read: {reason}", sample=first) from None
+
+    def _converted(self, columns: list[Column], batch: Any, first: int) -> dict[str, Any]:
+        found = {}
+        for column in columns:
+            name = column.channel.name
+            cells = batch.column(self._headers[column.index])
+            if cells.null_count:
+                empty = int(np.flatnonzero(cells.is_null().to_numpy(zero_copy_only=False))[0])
+                raise self.error("the value is missing", channel=name, sample=first + empty)
+            values = cells.to_numpy(zero_copy_only=False).astype(np.float64)
+            self.require_finite(name, values, first)
+            found[name] = column.convert(values)
+        return found
+
+
+def write_parquet(path: Path, channels: Sequence[Channel], blocks: Iterator[Block]) -> int:
+    """Write a record in float64, bit for bit.
+
+    Returns:
+        how many samples were written.
+    """
+    arrow, parquet = _pyarrow()
+    schema = arrow.schema([(channel.header, arrow.float64()) for channel in channels])
+    samples = 0
+    try:
+        with parquet.ParquetWriter(path, schema) as writer:
+            for _, block in blocks:
+                arrays = [arrow.array(block[channel.name]) for channel in channels]
+                writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
+                samples += len(arrays[0])
+    except OSError as error:
+        raise InputError(f"cannot be written: {error.strerror}", file=path) from None
+    return samples

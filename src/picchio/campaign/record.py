@@ -1,0 +1,229 @@
+"""One record: what was done, and the samples, read when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from picchio.campaign.channels import TIME, Channel, parse_channel
+from picchio.campaign.clock import TOLERANCE, Clock, ClockCheck
+from picchio.campaign.source import MemorySource, Source
+from picchio.campaign.tables import FORMAT, CampaignExcitation, CampaignTable, RecordTable
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.core.toml import validate
+from picchio.excitation import Excitation
+
+BLOCK = 16384
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One record of a campaign.
+
+    Attributes:
+        table: the `[[record]]` table as written.
+        source: the samples.
+        base_excitation: the campaign's `[excitation]`.
+        folder: the campaign's folder; None in memory.
+        clock_tolerance: how uneven the clock may be, in steps.
+    """
+
+    table: RecordTable
+    source: Source
+    base_excitation: CampaignExcitation = field(default_factory=CampaignExcitation)
+    folder: Path | None = None
+    clock_tolerance: float = TOLERANCE
+
+    @classmethod
+    def from_arrays(
+        cls,
+        file: str,
+        time: FloatArray,
+        channels: Mapping[str, FloatArray],
+        /,
+        *,
+        units: Mapping[str, str] | None = None,
+        **table: Any,
+    ) -> Record:
+        """A record in memory.
+
+        Args:
+            file: the name it will have in a campaign, such as "r01.csv".
+            time: (m,) s.
+            channels: {name: (m,)} in SI.
+            units: the SI unit of a channel where its kind allows several and it is not the
+                first: {"position.slide": "m"}.
+            **table: the other keys of `[[record]]`: kind, pose, direction, hits, time
+                (when it was taken), ...
+
+        Raises:
+            InputError: an unknown channel or key, arrays that don't fit.
+        """
+        found = [parse_channel(name, (units or {}).get(name))[0] for name in channels]
+        return cls(_table(file, table), MemorySource(found, {**channels, TIME: time}, file))
+
+    @classmethod
+    def from_function(
+        cls,
+        file: str,
+        names: Sequence[str],
+        read: Callable[[], Mapping[str, FloatArray]],
+        /,
+        *,
+        units: Mapping[str, str] | None = None,
+        **table: Any,
+    ) -> Record:
+        """A record whose arrays, "time" among them, are made when they are first asked for.
+
+        Args and errors: as `from_arrays`; `names` are the channels that `read` returns.
+        """
+        found = [parse_channel(name, (units or {}).get(name))[0] for name in names]
+        return cls(_table(file, table), MemorySource(found, read, file))
+
+    @property
+    def file(self) -> str:
+        """The file's name within the campaign: what the record is called."""
+        return self.table.file
+
+    @property
+    def kind(self) -> str:
+        """What was done: "percussion" or "motion"."""
+        return self.table.kind
+
+    @property
+    def pose(self) -> dict[str, float] | list[float] | None:
+        """Link-side joint positions (rad or m), as `FlexibleRobot.pose` takes them."""
+        return self.table.pose
+
+    @property
+    def direction(self) -> FloatArray | None:
+        """(3,) unit vector, world; None for motion."""
+        if self.table.direction is None or self.kind == "motion":
+            return None
+        direction = np.array(self.table.direction, dtype=np.float64)
+        return direction / np.linalg.norm(direction)
+
+    @property
+    def taken(self) -> datetime | None:
+        """When it was taken."""
+        return self.table.time
+
+    @property
+    def temperature(self) -> float | None:
+        """Of the surroundings, deg C."""
+        return self.table.temperature
+
+    @cached_property
+    def excitation(self) -> CampaignExcitation:
+        """The blows as programmed: the campaign's table with the record's own keys in it."""
+        return self.base_excitation.overridden_by(self.table.own_excitation())
+
+    @property
+    def hits(self) -> int | None:
+        """Blows of the burst; None in a steady record."""
+        return self.excitation.hits
+
+    def blows(self) -> Excitation | None:
+        """The programmed blow train; None where none is stated.
+
+        Raises:
+            InputError: a key of the excitation is missing or out of range.
+        """
+        if self.kind == "motion" or not self.excitation.blows.model_dump(exclude_none=True):
+            return None
+        file = self.folder / "campaign.toml" if self.folder is not None else None
+        return self.excitation.blows.build(file=file, key=f"{self.source.key}.excitation")
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels' names, without the time."""
+        return tuple(self.source.channels)
+
+    def channel(self, name: str) -> Channel:
+        """What a channel measures.
+
+        Raises:
+            InputError: this record has no such channel.
+        """
+        try:
+            return self.source.channels[name]
+        except KeyError:
+            raise self.source.error(
+                "the record has no such channel", value=name, choices=self.channels
+            ) from None
+
+    def chunks(
+        self, channels: Iterable[str] | None = None, size: int = BLOCK
+    ) -> Iterator[dict[str, FloatArray]]:
+        """The record block by block, in constant memory, checked on the way.
+
+        Args:
+            channels: their names; all where None.
+            size: at most so many samples a block.
+
+        Yields:
+            {"time": (m,) s, name: (m,) in the channel's SI unit}, float64.
+
+        Raises:
+            InputError: a sample that is missing, not finite or out of time, with its line.
+        """
+        if size < 1:
+            raise InputError("must be positive", key="size", value=size)
+        names = list(self.channels if channels is None else channels)
+        for name in names:
+            if name != TIME:
+                self.channel(name)
+        check = ClockCheck(self.source, self.clock_tolerance)
+        for first, block in self.source.blocks([TIME, *dict.fromkeys(names)], size):
+            check.feed(block[TIME], first)
+            yield block
+        clock = check.finish()
+        self.__dict__.setdefault("clock", clock)
+
+    def read(self, channels: Iterable[str] | None = None) -> dict[str, FloatArray]:
+        """The record, or some of its channels, at once; as one block of `chunks`."""
+        blocks = list(self.chunks(channels))
+        return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """(m,) one channel, or the time."""
+        return self.read([name])[name]
+
+    @property
+    def time(self) -> FloatArray:
+        """(m,) s, as written."""
+        return self[TIME]
+
+    @cached_property
+    def clock(self) -> Clock:
+        """Start, step and length; reads the time column once."""
+        check = ClockCheck(self.source, self.clock_tolerance)
+        for first, block in self.source.blocks([TIME], BLOCK):
+            check.feed(block[TIME], first)
+        return check.finish()
+
+    def check_samples(self) -> Clock:
+        """Read everything once, in constant memory, and return the clock.
+
+        Raises:
+            InputError: as `chunks`.
+        """
+        for _ in self.chunks():
+            pass
+        return self.clock
+
+    def within(self, excitation: CampaignExcitation) -> Record:
+        """The same record in a campaign with this `[excitation]`."""
+        return replace(self, base_excitation=excitation)
+
+
+def _table(file: str, table: Mapping[str, Any]) -> RecordTable:
+    content = {"format": FORMAT, "record": [{"file": file, **table}]}
+    return validate(content, CampaignTable, format=FORMAT).record[0]

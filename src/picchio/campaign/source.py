@@ -1,0 +1,152 @@
+"""Where a record's samples come from: one interface for CSV, Parquet and arrays in memory."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from picchio.campaign.channels import TIME, Channel, parse_header
+from picchio.campaign.units import Conversion
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+
+Block = tuple[int, dict[str, FloatArray]]
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a file: its place, its channel, and how its values become SI."""
+
+    index: int
+    channel: Channel
+    convert: Conversion
+
+
+class Source(ABC):
+    """The samples of one record.
+
+    Attributes:
+        key: the record's name in messages, such as "record[2]".
+        path: its file; None in memory.
+        channels: by name, without the time, in the file's order.
+        row_word: what messages call a sample: "line", "row" or "sample".
+    """
+
+    key: str
+    path: Path | None
+    channels: Mapping[str, Channel]
+    row_word: str = "sample"
+    first_row: int = 1
+
+    @abstractmethod
+    def blocks(self, names: Sequence[str], size: int) -> Iterator[Block]:
+        """Blocks of about `size` samples in the record's order: first index, {name: (m,) SI}.
+
+        `names` may hold "time" and any of `channels`; every value given is finite.
+        """
+
+    def error(self, problem: str, *, channel: str | None = None, sample: int | None = None,
+              **more: object) -> InputError:  # fmt: skip
+        """An InputError that names file, record, channel and line."""
+        parts = [self.key]
+        if channel is not None:
+            parts.append(f"channel {channel}")
+        if sample is not None:
+            parts.append(f"{self.row_word} {sample + self.first_row}")
+        return InputError(problem, file=self.path, key=", ".join(parts), **more)  # type: ignore[arg-type]
+
+    def require_finite(self, name: str, values: FloatArray, first: int) -> None:
+        """Raise for the first NaN or infinity of a column."""
+        if not np.isfinite(values).all():
+            bad = int(np.flatnonzero(~np.isfinite(values))[0])
+            raise self.error("is not a finite number", channel=name, sample=first + bad,
+                             value=float(values[bad]))  # fmt: skip
+
+
+def parse_columns(source: Source, cells: Sequence[str]) -> dict[str, Column]:
+    """The columns of a file by channel name, the time first.
+
+    Raises:
+        InputError: a header that is none, an unknown channel, a wrong unit, a duplicate, the
+            time missing or not first, or nothing beside it.
+    """
+    columns: dict[str, Column] = {}
+    for index, cell in enumerate(cells):
+        try:
+            channel, convert = parse_header(cell)
+        except InputError as error:
+            where = f"{source.key}, column {index + 1}" + (f", {error.key}" if error.key else "")
+            shown = {} if error.value is None else {"value": error.value}
+            raise InputError(error.problem, file=source.path, key=where, choices=error.choices,
+                             hint=error.hint, **shown) from None  # fmt: skip
+        if channel.name in columns:
+            raise source.error(
+                f"columns {columns[channel.name].index + 1} and {index + 1} are the same channel",
+                channel=channel.name,
+            )
+        columns[channel.name] = Column(index, channel, convert)
+    if next(iter(columns), None) != TIME:
+        first = cells[0].strip() if cells else ""
+        raise source.error("the first column must be 'time [s]'", value=first)
+    if len(columns) == 1:
+        raise source.error("holds no channel beside the time")
+    return columns
+
+
+class MemorySource(Source):
+    """Arrays in memory, or a function that makes them when they are first asked for.
+
+    Args:
+        channels: those of the record, without the time.
+        arrays: {name: (m,) SI}, the time among them; or a function that returns it.
+        key: the record's name in messages.
+
+    Raises:
+        InputError: arrays of several lengths, a channel without array, fewer than two samples.
+    """
+
+    path = None
+
+    def __init__(
+        self,
+        channels: Sequence[Channel],
+        arrays: Mapping[str, FloatArray] | Callable[[], Mapping[str, FloatArray]],
+        key: str = "record",
+    ) -> None:
+        self.key = key
+        self.channels = {channel.name: channel for channel in channels}
+        self._arrays: dict[str, FloatArray] | None = None
+        self._make = arrays if callable(arrays) else lambda: arrays
+        if not callable(arrays):
+            self.arrays()
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """All arrays, the time first, read-only."""
+        if self._arrays is None:
+            made = self._make()
+            found: dict[str, FloatArray] = {}
+            for name in (TIME, *self.channels):
+                if name not in made:
+                    raise self.error("has no array", channel=name)
+                values = np.array(made[name], dtype=np.float64)
+                if values.ndim != 1:
+                    raise self.error("must be a one-dimensional array", channel=name,
+                                     value=values.shape)  # fmt: skip
+                if values.shape != (length := np.shape(made[TIME])):
+                    raise self.error(f"must have as many samples as the time ({length[0]})",
+                                     channel=name, value=values.size)  # fmt: skip
+                self.require_finite(name, values, 0)
+                values.flags.writeable = False
+                found[name] = values
+            self._arrays = found
+        return self._arrays
+
+    def blocks(self, names: Sequence[str], size: int) -> Iterator[Block]:
+        """Views of the arrays."""
+        arrays = self.arrays()
+        for first in range(0, arrays[TIME].size, size):
+            yield first, {name: arrays[name][first : first + size] for name in names}

@@ -1,0 +1,175 @@
+"""What `campaign.toml` holds: `picchio-campaign/1`."""
+
+from __future__ import annotations
+
+import math
+from datetime import UTC, datetime
+from pathlib import PurePosixPath, PureWindowsPath
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator
+
+from picchio.core.model import Finite, NotNegative, Positive, StrictModel
+from picchio.excitation import ExcitationTable
+
+FORMAT = "picchio-campaign/1"
+CAMPAIGN_FILE = "campaign.toml"
+SUFFIXES = (".csv", ".parquet")
+_ABSOLUTE_ZERO = -273.15
+
+
+def _inside(value: str) -> str:
+    """A relative path with forward slashes that does not leave the campaign's folder."""
+    path = PurePosixPath(value)
+    leaves = path.is_absolute() or ".." in path.parts or PureWindowsPath(value).drive
+    if not value or leaves or "\\" in value or "\0" in value:
+        raise ValueError("must be a file inside the campaign's folder")
+    return path.as_posix()
+
+
+def _data_file(value: str) -> str:
+    if PurePosixPath(value).suffix not in SUFFIXES:
+        raise ValueError(f"must be one of {', '.join(SUFFIXES)}")
+    return value
+
+
+def _date(value: Any) -> Any:
+    # TOML has dates of its own; a number would silently be seconds since 1970.
+    if not isinstance(value, datetime):
+        raise ValueError("must be a date and time such as 2026-03-01T08:00:00Z, without quotes")
+    return value if value.tzinfo else value.replace(tzinfo=UTC)
+
+
+def _direction(value: list[float]) -> list[float]:
+    if math.hypot(*value) == 0.0:
+        raise ValueError("must not be the zero vector")
+    return value
+
+
+def _pose(value: Any) -> Any:
+    """By joint name or in the robot's order; one message for both, so no union of types."""
+    named = isinstance(value, dict)
+    if not named and not isinstance(value, list):
+        raise ValueError("must be a table of joint names and values, or a list of values")
+    for name, number in value.items() if named else enumerate(value):
+        if isinstance(number, bool) or not isinstance(number, (int, float)):
+            raise ValueError(f"joint {name!r} must be a number")
+        if not math.isfinite(number):
+            raise ValueError(f"joint {name!r} must be finite")
+        if name == "":
+            raise ValueError("a joint has no name")
+    if named:
+        return {name: float(number) for name, number in value.items()}
+    return [float(number) for number in value]
+
+
+def _finite_leaves(value: Any) -> Any:
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError("every number must be finite")
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    for part in inner:
+        _finite_leaves(part)
+    return value
+
+
+InsideFile = Annotated[str, AfterValidator(_inside)]
+DataFile = Annotated[str, AfterValidator(_inside), AfterValidator(_data_file)]
+Direction = Annotated[list[Finite], Field(min_length=3, max_length=3), AfterValidator(_direction)]
+Pose = Annotated[dict[str, float] | list[float], PlainValidator(_pose)]
+FreeTable = Annotated[dict[str, Any], AfterValidator(_finite_leaves)]
+Hits = Annotated[int, Field(gt=0, strict=True)]
+
+
+class CampaignExcitation(ExcitationTable):
+    """`[excitation]`: the blows as programmed.
+
+    Attributes:
+        hits: blows of the burst, silence after it; steady state where it is absent.
+    """
+
+    file: InsideFile | None = None
+    hits: Hits | None = None
+
+    def overridden_by(self, other: ExcitationTable | None) -> CampaignExcitation:
+        """This table with every key that `other` gives taken from it."""
+        given = self.model_dump(exclude_none=True)
+        given |= other.model_dump(exclude_none=True) if other is not None else {}
+        return CampaignExcitation(**given)
+
+    @property
+    def blows(self) -> ExcitationTable:
+        """The table without `hits`."""
+        return ExcitationTable(**self.model_dump(exclude_none=True, exclude={"hits"}))
+
+
+class Tolerance(StrictModel):
+    """`[tolerance]`: relative standard deviations of the nominal values."""
+
+    stiffness: NotNegative = 0.05
+    damping_ratio: NotNegative = 0.20
+    force: NotNegative = 0.05
+
+
+class RecordTable(StrictModel):
+    """One `[[record]]`.
+
+    Attributes:
+        file: CSV or Parquet, relative to the campaign's folder.
+        kind: "percussion" (the robot stands, the tool hits) or "motion" (it moves, nothing hits).
+        pose: rad or m, by joint name or in the robot's order; percussion only.
+        direction: world, of any length; percussion only.
+        excitation: keys that override the campaign's (so do the flat ones below).
+        hits, force, period, width, preload: as in `[excitation]`.
+        time: when it was taken; taken as UTC where it names no zone.
+        temperature: deg C.
+        notes: for people.
+    """
+
+    file: DataFile
+    kind: Literal["percussion", "motion"] = "percussion"
+    pose: Pose | None = None
+    direction: Direction | None = None
+    excitation: CampaignExcitation | None = None
+    hits: Hits | None = None
+    force: Finite | None = None
+    period: Positive | None = None
+    width: Positive | None = None
+    preload: Finite | None = None
+    time: Annotated[datetime, BeforeValidator(_date)] | None = None
+    temperature: Annotated[float, Field(gt=_ABSOLUTE_ZERO, allow_inf_nan=False)] | None = None
+    notes: str | None = None
+
+    def own_excitation(self) -> CampaignExcitation:
+        """The excitation's keys given here, in a table of their own or flat."""
+        names = ("hits", "force", "period", "width", "preload")
+        flat = {name: value for name in names if (value := getattr(self, name)) is not None}
+        return (self.excitation or CampaignExcitation()).overridden_by(CampaignExcitation(**flat))
+
+    def percussion_keys(self) -> list[str]:
+        """The keys given here that only a percussion record has a use for."""
+        names = ("pose", "direction", "excitation", "hits", "force", "period", "width", "preload")
+        return [name for name in names if getattr(self, name) is not None]
+
+
+class CampaignTable(StrictModel):
+    """A campaign file as it is written.
+
+    Attributes:
+        robot: a name, or a URDF relative to this file.
+        tool: frame where the tool's force acts.
+        excitation: as programmed.
+        tolerance: of the nominal model.
+        controller: a known control law; free keys, for the reader of motion records.
+        record: the records.
+        notes: for people.
+        provenance: where the data come from.
+    """
+
+    robot: Annotated[str, Field(min_length=1)] | None = None
+    tool: Annotated[str, Field(min_length=1)] | None = None
+    excitation: CampaignExcitation = CampaignExcitation()
+    tolerance: Tolerance = Tolerance()
+    controller: FreeTable | None = None
+    record: list[RecordTable] = Field(min_length=1)
+    notes: str | None = None
+    provenance: FreeTable | None = None

@@ -1,0 +1,115 @@
+"""Units against CODATA's and NIST SP 811's factors; names against the contract's grammar."""
+
+import numpy as np
+import pytest
+
+from picchio.campaign import ChannelKind, parse_channel, parse_header, register_channel_kind
+from picchio.campaign import channels as channels_module
+from picchio.campaign.units import conversion
+from picchio.core.errors import InputError
+
+# NIST SP 811 (2008), appendix B: exact factors, or to the digits printed there.
+FACTORS = [
+    ("time [ms]", 1e-3),
+    ("time [min]", 60.0),
+    ("force [kN]", 1e3),
+    ("force [lbf]", 4.4482216152605),
+    ("force [kgf]", 9.80665),
+    ("deflection.j [deg]", np.pi / 180),
+    ("deflection.j [°]", np.pi / 180),
+    ("deflection.j [mrad]", 1e-3),
+    ("deflection.j [arcmin]", np.pi / 180 / 60),
+    ("deflection.j [mm]", 1e-3),
+    ("deflection.j [µm]", 1e-6),
+    ("acceleration.tool.x [g]", 9.80665),
+    ("acceleration.tool.x [mg]", 9.80665e-3),
+    ("acceleration.tool.x [m/s2]", 1.0),
+    ("acceleration.tool.x [m s^-2]", 1.0),
+    ("acceleration.tool.x [mm/s**2]", 1e-3),
+    ("acceleration.tool.x [Gal]", 1e-2),
+    ("velocity.tool.y [mm/s]", 1e-3),
+    ("velocity.tool.y [in/s]", 0.0254),
+    ("velocity.j [rpm]", 2 * np.pi / 60),
+    ("velocity.j [deg/s]", np.pi / 180),
+    ("velocity.j [m/min]", 1 / 60),
+    ("torque.j [Nm]", 1.0),
+    ("torque.j [kN*m]", 1e3),
+    ("torque.j [N·m]", 1.0),
+    ("torque.j [ft*lbf]", 0.3048 * 4.4482216152605),
+    ("torque.j [kN]", 1e3),
+]
+
+
+@pytest.mark.parametrize(("header", "factor"), FACTORS)
+def test_units_become_si(header, factor):
+    _, convert = parse_header(header)
+    np.testing.assert_allclose(convert(np.array([0.0, 2.0])), [0.0, 2.0 * factor], rtol=5e-16)
+
+
+def test_temperatures_have_their_own_zero():
+    for unit, value in (("K", 293.15), ("degF", 68.0), ("°C", 20.0)):
+        _, convert = parse_header(f"temperature.j [{unit}]")
+        assert convert(np.array([value]))[0] == pytest.approx(20.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        ("force [mm]", ["force", "'mm'", "N"]),
+        ("force [g]", ["force", "'g'"]),
+        ("deflection.j [%]", ["deflection.j", "not a unit"]),
+        ("deflection.j [1]", ["not a unit"]),
+        ("velocity.j [Hz]", ["rad/s", "'Hz'"]),
+        ("torque.j [N*m/rad]", ["torque.j"]),
+        ("torque.j [J/K]", ["torque.j"]),
+        ("acceleration.tool.x [rad/s^2]", ["m/s^2"]),
+        ("time [9**9**9*s]", ["not a unit"]),
+        ("time [__import__('os')]", ["not a unit"]),
+        ("force", ["channel [unit]"]),
+        ("force [N", ["channel [unit]"]),
+        ("force []", ["not a unit"]),
+        ("deflexion.j [rad]", ["unknown channel", "'deflection'"]),
+        ("deflection [rad]", ["deflection.<joint>"]),
+        ("force.x [N]", ["named force"]),
+        ("acceleration.tool [m/s^2]", ["acceleration.<frame>.x"]),
+        ("acceleration.tool.w [m/s^2]", ["acceleration.<frame>.x"]),
+        ("deflection. [rad]", ["deflection.<joint>"]),
+        (" [N]", ["unknown channel"]),
+    ],
+)
+def test_bad_headers_are_refused_in_one_line(header, words):
+    with pytest.raises(InputError) as caught:
+        parse_header(header)
+    text = str(caught.value)
+    assert "\n" not in text
+    assert all(word in text for word in words), text
+
+
+def test_the_grammar_tells_a_joint_from_a_frame():
+    frame, _ = parse_header("velocity.tool.x [m/s]")
+    assert (frame.subject, frame.axis, frame.group) == ("tool", "x", "velocity.tool")
+    dotted, _ = parse_header("acceleration.arm.tip.z [m/s^2]")
+    assert (dotted.subject, dotted.axis) == ("arm.tip", "z")
+    joint, _ = parse_header("velocity.arm.x [rad/s]")
+    assert (joint.subject, joint.axis) == ("arm.x", None)
+    slide, _ = parse_header("motor_position.slide [mm]")
+    assert (slide.unit, slide.kind.free_offset) == ("m", True)
+    assert parse_channel("force")[0].header == "force [N]"
+
+
+def test_a_stranger_adds_a_kind_in_one_place(monkeypatch):
+    monkeypatch.setattr(channels_module, "KINDS", list(channels_module.KINDS))
+    with pytest.raises(InputError, match="unknown channel"):
+        parse_header("strain.link_2 [m/m]")
+    kind = ChannelKind("current", "joint", ("N*m",), meaning="a stranger's")
+    register_channel_kind(kind)
+    assert parse_header("current.j [Nm]")[0].kind is kind
+    with pytest.raises(InputError, match="known already"):
+        register_channel_kind(kind)
+    channels_module._parse.cache_clear()
+
+
+def test_values_in_si_keep_their_bits():
+    _, convert = conversion("rad", ("rad", "m"))
+    values = np.random.default_rng(1).normal(size=50)
+    assert (convert(values) == values).all()
