@@ -199,3 +199,58 @@ def test_import_is_light_and_the_example_is_quick():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["--method", "paper", "--mean-stress", "goodman"], "--mean-stress"),
+        (["--method", "paper", "--for-life", "1e6"], "--for-life"),
+        (["--survival", "0.9"], "--survival"),
+        (["--for-life", "-1"], "--for-life"),
+        (["--for-life", "1e6", "--survival", "99"], "--survival"),
+        (["--seed", "3"], "--seed"),
+        (["--paper-mean-stress"], "--paper-mean-stress"),
+    ],
+)
+def test_options_that_do_not_belong_are_refused_not_ignored(arguments, part):
+    check_refused(picchio("assess", "fanuc_like_3dof", *arguments), [part])
+
+
+def test_no_output_destroys_an_input(robot, tmp_path):
+    task = tmp_path / "task.toml"
+    task.write_text(TASK)
+    for target in (robot, task):
+        before = target.read_bytes()
+        done = picchio("assess", robot, "--task", task, "--json", target)
+        check_refused(done, ["would overwrite an input"])
+        assert target.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "part"),
+    [
+        ("force = 300.0", "force = -300.0", "excitation.force"),
+        ("force = 300.0", "force = '300'", "excitation.force"),
+        ("[excitation]", "hits_per_rivet = 100000000\n[excitation]", "hits_per_rivet"),
+    ],
+)
+def test_slips_in_a_task_are_refused(tmp_path, old, new, part):
+    task = tmp_path / "task.toml"
+    task.write_text(TASK.replace(old, new))
+    check_refused(picchio("assess", "fanuc_like_3dof", "--task", task), [part])
+
+
+def test_an_absurd_force_ends_in_words_not_in_a_traceback(tmp_path):
+    task = tmp_path / "task.toml"
+    task.write_text(TASK.replace("300.0", "1e300"))
+    done = picchio("assess", "fanuc_like_3dof", "--task", task)
+    assert "Traceback" not in done.stderr
+
+
+def test_two_runs_write_the_same_bytes(tmp_path):
+    written = [
+        picchio("assess", "fanuc_like_3dof", "--json", "-", env={"PYTHONHASHSEED": seed}).stdout
+        for seed in ("1", "2")
+    ]
+    assert written[0] == written[1]

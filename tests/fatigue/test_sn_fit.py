@@ -238,6 +238,7 @@ def test_fit_is_in_the_users_units_only_by_scale() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("number", [30, 100])
 def test_intervals_cover_what_they_say(number: int) -> None:
     """90 % intervals hold the truth in 88 to 92 % of 2,000 sets (plus 2 standard errors)."""

@@ -173,7 +173,7 @@ def test_damage_adds_over_any_split_of_a_task(robot, hits, split, rivets):
 
 def test_a_pose_beyond_the_limits_is_a_warning_that_names_the_joint(robot):
     work = task(robot, ([1, 0, 0], [[0.0, 0.0, 2.0]], {}))
-    with pytest.warns(PicchioWarning, match="joint_3 is beyond its limits in 1 of 1"):
+    with pytest.warns(PicchioWarning, match="joint_3 is beyond its limits"):
         picchio.assess(robot, work)
 
 
@@ -185,3 +185,22 @@ def test_bad_methods(robot):
         picchio.assess(robot, work, paper_mean_stress=True)
     with pytest.raises(InputError, match="nie-2016"):
         picchio.assess(robot, work, sn_curve="nie-2061")
+
+
+def test_a_pose_in_degrees_is_suspected(robot):
+    work = task(robot, ([1, 0, 0], [[30.0, 60.0, -90.0]], {}))
+    with pytest.warns(PicchioWarning, match="angles are in radians"):
+        picchio.assess(robot, work)
+
+
+def test_a_shaft_that_yields_is_told_whatever_its_fatigue_life(robot):
+    work = task(robot, ([0, 0, 1], [POSE_A], {}), force=30000.0)
+    with pytest.warns(PicchioWarning, match=r"joint_2.*yields"):
+        found = picchio.assess(robot, work)
+    # Against Pinocchio's gravity and dense samples.
+    modes = picchio.modal_analysis(picchio.Model(robot).linear_system(robot.pose(POSE_A)))
+    response = picchio.response_from_rest(modes, work.operations[0].excitation, 12)
+    swing = 1e5 * response.deflection(np.linspace(0, response.horizon, 100_001), [0, 0, 1])[1]
+    torque = np.abs(swing - robot.state(POSE_A).gravity_torque[1]).max()
+    stress = 2 * torque / (math.pi * 0.0132**3)
+    assert found.joint("joint_2").peak_total_stress == pytest.approx(stress, rel=1e-5)

@@ -66,7 +66,7 @@ def assess(
     uncertainty: Annotated[
         bool, typer.Option("--uncertainty", help="Life as P10, P50, P90 (takes a minute).")
     ] = False,
-    seed: Annotated[int, typer.Option(help="Of --uncertainty.")] = 0,
+    seed: Annotated[int | None, typer.Option(help="Of --uncertainty; 0 if not given.")] = None,
     compare_methods: Annotated[
         bool,
         typer.Option("--compare-methods", help="The paper's method against this one, by terms."),
@@ -76,7 +76,7 @@ def assess(
 ) -> None:
     """How many rivets each joint of a robot survives on a task."""
     from picchio.cli.assess_tables import show, show_allowable, show_spread
-    from picchio.cli.output import progress, write_json
+    from picchio.cli.output import check_target, progress, write_json
     from picchio.fatigue.mean_stress import RULES
     from picchio.fatigue.rainflow import RESIDUE_RULES
     from picchio.robot import load_robot
@@ -93,10 +93,28 @@ def assess(
     ):
         if value not in choices:
             raise InputError("unknown choice", key=key, value=value, choices=choices)
-    if for_life is not None and method != "rainflow":
-        raise InputError("belongs to the method rainflow", key="--for-life", value=for_life)
+    rainflow_only = {
+        "--for-life": for_life,
+        "--residue": None if residue == "half-cycles" else residue,
+        "--mean-stress": None if mean_stress == "none" else mean_stress,
+        "--uncertainty": uncertainty or None,
+    }
+    for key, given in rainflow_only.items():
+        if method != "rainflow" and given is not None:
+            raise InputError("belongs to the method rainflow", key=key, value=given)
+    if paper_mean_stress and method != "paper":
+        raise InputError("belongs to --method paper", key="--paper-mean-stress", value=True)
     if survival is not None and for_life is None:
         raise InputError("belongs to --for-life", key="--survival", value=survival)
+    if survival is not None and not 0.0 < survival < 1.0:
+        raise InputError("must lie between 0 and 1", key="--survival", value=survival)
+    if for_life is not None and not (math.isfinite(for_life) and for_life > 0):
+        raise InputError("must be a positive number of rivets", key="--for-life", value=for_life)
+    if seed is not None and not uncertainty:
+        raise InputError("belongs to --uncertainty", key="--seed", value=seed)
+    if seed is not None and seed < 0:
+        raise InputError("must not be negative", key="--seed", value=seed)
+    check_target(json, [robot, task, flex, sn_curve])
     loaded = load_robot(robot, flex=flex, tool=tool)
     path = task or loaded.task_path
     if path is None:
@@ -105,7 +123,9 @@ def assess(
             key="--task",
             hint="give one: a TOML file of the format picchio-task/1",
         )
+    check_target(json, loaded.files)
     work = load_task(path, loaded)
+    check_target(json, work.files)
     with progress("poses") as report:
         found = run(
             loaded,
@@ -131,7 +151,7 @@ def assess(
         content["for_life"] = [joint.to_dict() for joint in allowed]
     if uncertainty:
         with progress("samples") as report:
-            spread = uncertain_life(loaded, work, named, seed=seed, progress=report, **options)
+            spread = uncertain_life(loaded, work, named, seed=seed or 0, progress=report, **options)
         content["uncertainty"] = spread.to_dict()
     if json is not None:
         write_json(content, json)

@@ -68,7 +68,7 @@ def _life_table(found: Assessment) -> Any:
             "gravity\nstress\nMPa": lambda j: _number(j.gravity_shear_stress / 1e6),
             "utili-\nsation\n%": lambda j: _number(100 * j.utilisation),
             **reducer,
-            "damage\na rivet\n": lambda j: f"{j.damage_per_rivet:.4g}",
+            "damage\na rivet\n": lambda j: f"{j.damage_per_rivet:.4g}" if j.sn_curve else "-",
             "rivets to\nfailure\n": lambda j: _life(j),
         }
     table = _table(
@@ -104,26 +104,37 @@ def _share_table(found: Assessment) -> Any:
 
 
 def _steady_table(found: Assessment) -> Any:
+    lives = any(not math.isnan(check.paper_life) for check in found.steady_state)
     table = _table(
-        "The paper's steady state against a rivet as it happens\n(the paper's S-N curve on both)",
+        "The paper's steady state against a rivet as it happens, largest over the task"
+        + ("\n(the paper's S-N curve on both)" if lives else ""),
         ("joint", "left"),
         ("steady\npeak\nmrad", "right"),
         ("rivet's\npeak\nmrad", "right"),
         ("\nratio\n", "right"),
-        ("rivets,\nsteady, one\ncycle a hit", "right"),
-        ("rivets,\nfrom rest,\ncounted", "right"),
-        ("\nratio\n", "right"),
+        *(
+            (
+                ("rivets,\nsteady, one\ncycle a hit", "right"),
+                ("rivets,\nfrom rest,\ncounted", "right"),
+                ("\nratio\n", "right"),
+            )
+            if lives
+            else ()
+        ),
     )
     for check in found.steady_state:
-        table.add_row(
-            check.joint,
+        cells = [
             _number(check.steady_peak * 1e3),
             _number(check.rest_peak * 1e3),
             _number(check.peak_ratio),
-            format_count(check.paper_life),
-            format_count(check.counted_life),
-            _number(check.life_ratio),
-        )
+        ]
+        if lives:
+            cells += [
+                format_count(check.paper_life),
+                format_count(check.counted_life),
+                _number(check.life_ratio),
+            ]
+        table.add_row(check.joint, *cells)
     return table
 
 

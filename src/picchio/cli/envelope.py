@@ -53,14 +53,18 @@ def envelope(
     json: JsonOption = None,
 ) -> None:
     """The worst force direction of every joint at a pose, exact: no direction is sampled."""
-    from picchio.cli.output import write_json
+    from picchio.cli.output import check_target, write_json
     from picchio.model import Model
     from picchio.robot import load_robot
     from picchio.studies.envelope import direction_envelope
+    from picchio.studies.limits import warn_beyond_limits
 
+    check_target(json, [robot, flex])
     loaded = load_robot(robot, flex=flex, tool=tool)
+    check_target(json, loaded.files)
     blows = choose_blows(loaded, force, period, width)
     at = loaded.pose(parse_pose(pose))
+    warn_beyond_limits(loaded, [at], "the pose")
     found = direction_envelope(Model(loaded, gravity_stiffness), at, blows, hits)
     if json is not None:
         write_json(found.to_dict(), json)
@@ -92,10 +96,12 @@ def choose_blows(
     Raises:
         InputError: neither the command line nor a task gives them.
     """
+    from picchio.cli.output import check_numbers
     from picchio.core.toml import parse_toml
     from picchio.excitation import ExcitationTable
     from picchio.studies.task import FORMAT, TaskTable
 
+    check_numbers(force=force, period=period, width=width)
     file = task or robot.task_path
     table = ExcitationTable()
     if file is not None:
@@ -103,14 +109,20 @@ def choose_blows(
     given: dict[str, Any] = {"force": force, "period": period, "width": width}
     for key, value in given.items():
         if value is not None:
-            if key != "force" and not value > 0:
+            if not value > 0:
                 raise InputError("must be positive", key=f"--{key}", value=value)
             table = table.overridden_by(ExcitationTable(**{key: value}))
         elif getattr(table, key) is None and table.kind != "measured":
             raise InputError(
                 f"{robot.name} has no example task that gives it", key=f"--{key}", hint="give it"
             )
-    return table.build(file=file)
+    try:
+        return table.build(file=file)
+    except InputError as error:
+        key = (error.key or "").rpartition(".")[2]
+        if given.get(key) is None:
+            raise
+        raise InputError(error.problem, key=f"--{key}", value=error.value) from None
 
 
 def _show(found: DirectionEnvelope) -> None:

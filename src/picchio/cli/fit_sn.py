@@ -13,6 +13,11 @@ from picchio.core.errors import InputError
 if TYPE_CHECKING:
     from picchio.fatigue.sn_fit import Estimate, SNFit
 
+# Distortion energy: the shear strength of ductile steel is 1 / sqrt(3) of the normal one.
+_TO_SHEAR = {
+    "shear": (1.0, "the tests' stresses are taken as shear (--kind)"),
+    "normal": (3.0**-0.5, "normal stresses were divided by sqrt(3) to shear"),
+}
 EPILOG = "Example: picchio fit-sn tests.csv --survival 0.99 --out my-steel.toml"
 
 
@@ -32,6 +37,9 @@ def fit_sn_command(
     ],
     survival: Annotated[float, typer.Option(help="Of the design strength.")] = 0.975,
     level: Annotated[float, typer.Option(help="Of the two-sided confidence intervals.")] = 0.90,
+    kind: Annotated[
+        str, typer.Option(help="What the stress is: shear, or normal (bending, axial).")
+    ] = "shear",
     run_out_cycles: Annotated[
         float | None, typer.Option(help="Without an outcome column: run-outs reached this.")
     ] = None,
@@ -42,27 +50,36 @@ def fit_sn_command(
     json: JsonOption = None,
 ) -> None:
     """Fit slope, knee, endurance limit and scatter, each with its interval."""
-    from picchio.cli.output import write_json
+    from picchio.cli.output import check_target, write_json
     from picchio.core.provenance import provenance
     from picchio.fatigue.sn_fit import fit_sn
     from picchio.fatigue.sn_tests import read_sn_tests
 
+    for target in (out, json):
+        check_target(target, [tests])
+    if run_out_cycles is not None and not 0.0 < run_out_cycles < float("inf"):
+        raise InputError("must be positive", key="--run-out-cycles", value=run_out_cycles)
+    if kind not in _TO_SHEAR:
+        raise InputError("unknown", key="--kind", value=kind, choices=_TO_SHEAR)
     data = read_sn_tests(tests, run_out_cycles=run_out_cycles)
+    factor, note = _TO_SHEAR[kind]
     for key, value in (("--survival", survival), ("--level", level)):
         if not 0.0 < value < 1.0:
             raise InputError("must lie between 0 and 1", key=key, value=value)
-    found = fit_sn(data.amplitude, data.cycles, data.failed, level=level, survival=survival)
+    found = fit_sn(
+        factor * data.amplitude, data.cycles, data.failed, level=level, survival=survival
+    )
     if out is not None:
-        _write_curve(found, survival, out)
+        _write_curve(found, survival, out, note)
     if json is not None:
         content = found.to_dict()
-        content["assumptions"] = [*content["assumptions"], *data.assumptions]
+        content["assumptions"] = [note, *content["assumptions"], *data.assumptions]
         write_json(content | {"provenance": provenance([tests])}, json)
     if json != "-":
-        _show(found, tests, data.assumptions)
+        _show(found, tests, (note, *data.assumptions))
 
 
-def _write_curve(found: SNFit, survival: float, out: Path) -> None:
+def _write_curve(found: SNFit, survival: float, out: Path, note: str) -> None:
     import tomlkit
 
     from picchio.core.files import atomic_write
@@ -71,7 +88,7 @@ def _write_curve(found: SNFit, survival: float, out: Path) -> None:
     curve = found.curve(survival, name=out.stem)
     keys = ("name", "kind", "strength", "cycles", "slopes", "knees", "miner", "survival", "scatter")
     values = {"format": SN_FORMAT, **{key: getattr(curve, key) for key in keys}}
-    values |= {"source": curve.source, "assumptions": curve.assumptions}
+    values |= {"source": curve.source, "assumptions": (note, *curve.assumptions)}
     text = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
     with atomic_write(out) as stream:
         stream.write(tomlkit.dumps(text))
@@ -90,7 +107,11 @@ def _show(found: SNFit, tests: Path, notes: tuple[str, ...]) -> None:
     table.add_column("value", justify="right")
     table.add_column(f"{100 * found.level:g} % interval", justify="right")
     at = f"at {found.reference_cycles:.3g} cycles"
-    limit = "endurance limit, median, MPa" if found.knee else f"strength {at}, median, MPa"
+    limit = (
+        "endurance limit in shear, median, MPa"
+        if found.knee
+        else f"strength in shear {at}, median, MPa"
+    )
     rows: list[tuple[str, Estimate, float, str]] = [
         ("slope", found.slope, 1.0, ".3g"),
         *([("knee, cycles", found.knee, 1.0, ".3g")] if found.knee else []),

@@ -12,9 +12,11 @@ import typer
 import picchio.cli.annotate
 import picchio.cli.assess
 import picchio.cli.envelope
+import picchio.cli.fit_sn
 import picchio.cli.import_
 import picchio.cli.map
 import picchio.cli.robots
+import picchio.cli.view
 from picchio.core.errors import PicchioError
 
 app = typer.Typer(
@@ -29,9 +31,11 @@ for register in (
     picchio.cli.annotate.register,
     picchio.cli.assess.register,
     picchio.cli.envelope.register,
+    picchio.cli.fit_sn.register,
     picchio.cli.import_.register,
     picchio.cli.map.register,
     picchio.cli.robots.register,
+    picchio.cli.view.register,
 ):
     register(app)
 
@@ -81,6 +85,8 @@ def run(arguments: list[str] | None = None) -> int:
     except (typer.Abort, KeyboardInterrupt):
         _fail("interrupted")
         return 130
+    except MemoryError:
+        return _fail("there is not enough memory for this: ask for less at a time")
     except BrokenPipeError:
         # The reader has gone: keep Python from complaining at exit, too.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -28,7 +28,9 @@ def map_(
     out: Annotated[
         Path, typer.Option("--out", metavar="FILE", help="map.nc (netCDF) or map.zarr (Zarr).")
     ],
-    plane: Annotated[str | None, typer.Option(help="Points on a plane: xy, xz or yz.")] = None,
+    plane: Annotated[
+        str | None, typer.Option(help="Points on a plane: xy, xz or yz; xz if no places are given.")
+    ] = None,
     at: Annotated[float, typer.Option(help="m, where the plane cuts the third axis.")] = 0.0,
     box: Annotated[bool, typer.Option("--box", help="Points in a box.")] = False,
     points: Annotated[
@@ -57,6 +59,9 @@ def map_(
     flex: FlexOption = None,
     tool: ToolOption = None,
     chunk: Annotated[int, typer.Option(help="Places at a time.")] = 4096,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="Throw away what an interrupted map has left.")
+    ] = False,
     workers: Annotated[
         int | None, typer.Option(help="Processes; 0 for none. By default, as the map is large.")
     ] = None,
@@ -65,18 +70,28 @@ def map_(
     ] = None,
 ) -> None:
     """Map the workspace; stopped and started again, it goes on where it was."""
-    from picchio.cli.output import progress
+    from picchio.cli.output import check_numbers, check_target, progress
     from picchio.robot import load_robot
     from picchio.studies.map import workspace_map
 
+    check_target(out, [robot, flex, points])
+    check_numbers(at=at, spacing=spacing)
+    for key, number, least in (
+        ("--chunk", chunk, 1),
+        ("--workers", workers, 0),
+        ("--hits", hits, 1),
+    ):
+        if number is not None and number < least:
+            raise InputError(f"must be at least {least}", key=key, value=number)
     loaded = load_robot(robot, flex=flex, tool=tool)
+    check_target(out, loaded.files)
     where = _places(loaded, plane, at, box, points, joint_grid, spacing, bounds)
     along = direction if direction in ("worst", "normal") else _numbers(direction, "--direction")
     blows = choose_blows(loaded, force, period, width)
     with progress("places") as report:
         found = workspace_map(
             loaded, where, blows, out, direction=along, branch=branch, hits=hits, chunk=chunk,
-            workers=workers, scheduler=scheduler, progress=report,
+            workers=workers, scheduler=scheduler, restart=restart, progress=report,
         )  # fmt: skip
     with found:
         _show(found, out)

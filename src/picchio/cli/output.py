@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,6 +25,44 @@ def console() -> Console:
 
     plain = not sys.stdout.isatty()
     return Console(width=120 if plain else None, highlight=False, soft_wrap=False)
+
+
+def check_target(target: str | Path | None, inputs: Iterable[str | Path | None]) -> None:
+    """Refuse, before any work, an output that cannot be written or would destroy an input.
+
+    Args:
+        target: where a result shall go; None or "-" for nowhere.
+        inputs: files that the command reads.
+
+    Raises:
+        InputError: the folder is missing or read-only, or the file is one of the inputs.
+    """
+    if target is None or str(target) == "-":
+        return
+    path = Path(target)
+    if path.is_dir() and path.suffix != ".zarr":
+        raise InputError("is a folder, not a file to write", file=path)
+    if not path.parent.is_dir():
+        raise InputError("cannot write here: the folder does not exist", file=path)
+    if not os.access(path.parent, os.W_OK):
+        raise InputError("cannot write here: the folder is read-only", file=path)
+    for source in inputs:
+        both = source is not None and path.exists() and Path(source).exists()
+        if source is not None and both and path.samefile(source):
+            raise InputError("would overwrite an input of this command", file=path)
+
+
+def check_numbers(**options: float | None) -> None:
+    """Refuse options that are not finite numbers, named as on the command line.
+
+    Raises:
+        InputError: NaN or infinite.
+    """
+    for name, value in options.items():
+        if value is not None and not math.isfinite(value):
+            raise InputError(
+                "must be a finite number", key=f"--{name.replace('_', '-')}", value=value
+            )
 
 
 def write_json(data: dict[str, Any], target: str) -> None:

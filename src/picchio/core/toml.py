@@ -99,6 +99,8 @@ def _as_input_error(
 def _dotted(loc: tuple[int | str, ...]) -> str:
     text = ""
     for part in loc:
+        if isinstance(part, str) and not part.replace("_", "").replace("-", "").isalnum():
+            continue  # pydantic's name for one arm of a union, no key of the file
         if isinstance(part, int):
             text += f"[{part}]"
         else:

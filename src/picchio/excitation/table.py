@@ -29,7 +29,7 @@ class ExcitationTable(StrictModel):
     """
 
     kind: Kind | None = None
-    force: Finite | None = None
+    force: Positive | None = None
     period: Positive | None = None
     width: Positive | None = None
     preload: Finite | None = None

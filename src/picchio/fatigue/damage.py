@@ -77,7 +77,9 @@ def peak_damage(peak_stress: float, hits: float, sn_curve: SNCurve) -> float:
     if number < 0:
         raise InputError("must not be negative", key="hits", value=hits)
     amplitude = abs(float(as_floats(peak_stress, "peak_stress")))
-    return number / float(sn_curve.cycles_to_failure(amplitude))
+    cycles = float(sn_curve.cycles_to_failure(amplitude))
+    # A stress so absurd that the life underflows fails at once.
+    return number / cycles if cycles > 0.0 else math.inf * number if number else 0.0
 
 
 def life(damage_per_unit: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -20,6 +20,7 @@ from picchio.fatigue import (
     life,
     load_sn_curve,
     peak_damage,
+    shear_stress,
 )
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.rainflow import Residue
@@ -36,6 +37,7 @@ from picchio.studies.assessment import (
 )
 from picchio.studies.curves import curves_of
 from picchio.studies.life_rules import LifeRule, PaperRule, RainflowRule, peak
+from picchio.studies.limits import warn_beyond_limits
 from picchio.studies.loads import loads_at
 from picchio.studies.task import Operation, Task
 
@@ -95,7 +97,8 @@ def assess(
         sn_curve = PAPER_SN_CURVE
     curves = curves_of(robot, sn_curve)
     _warn_about_shafts(robot)
-    _warn_about_limits(robot, task)
+    for operation in task.operations:
+        warn_beyond_limits(robot, operation.poses, f"operation {operation.name!r}")
     reducers = tuple(_reducer(joint) for joint in robot.flexible_joints)
     paper_curve = load_sn_curve(PAPER_SN_CURVE, quiet=True)
     job = _Job(Model(robot, gravity_stiffness), rule, curves, reducers, paper_curve)
@@ -116,6 +119,7 @@ def assess(
     joints = tuple(
         _joint_life(j, robot, task, results, curves, reducers[j]) for j in range(len(curves))
     )
+    _warn_about_yield(joints, curves)
     limiting = _limiting(joints)
     used = [curve.name for curve in dict.fromkeys(c for c in curves if c is not None)]
     name = "paper, at the poses' mean stress" if paper_mean_stress else method
@@ -123,7 +127,7 @@ def assess(
         robot=robot.name,
         method=name,
         sn_curve=", ".join(dict.fromkeys(used)),
-        assumptions=_assumptions(rule, gravity_stiffness, curves, reducers),
+        assumptions=_assumptions(rule, robot, gravity_stiffness, curves, reducers),
         joints=joints,
         operations=tuple(results),
         limiting_joint=limiting.name if limiting else None,
@@ -160,6 +164,7 @@ class _Job:
         out["gravity_torque"] = np.abs(loads.gravity_torque)
         out["gravity_shear_stress"] = np.full(n, np.nan)
         out["reducer_utilisation"] = np.full(n, np.nan)
+        out["peak_total_stress"] = np.full(n, np.nan)
         hits = operation.hits_per_rivet
         for j, (joint, load) in enumerate(zip(robot.flexible_joints, loads.joints, strict=True)):
             reducer = self.reducers[j]
@@ -175,6 +180,9 @@ class _Job:
             out["gravity_shear_stress"][j] = (
                 out["gravity_torque"][j] * joint.shaft.radius / joint.shaft.polar_moment
             )
+            if load.rest is not None:
+                total = float(shear_stress(load.peak_torque_with_gravity, joint.shaft))
+                out["peak_total_stress"][j] = total
             if load.steady is not None and load.rest is not None:
                 # The paper's curve on both, so that only the steady state's share shows.
                 out["check"][j] = (
@@ -209,26 +217,34 @@ def _warn_about_shafts(robot: FlexibleRobot) -> None:
     for joint in robot.flexible_joints:
         if joint.shaft is None:
             continue
-        if abs(off := check_shaft(joint.stiffness, joint.shaft)) > _SHAFT_TOLERANCE:
-            warnings.warn(
-                f"{joint.name}: the shaft's own stiffness G Jp / l is {100 * off:+.0f} % off the "
-                f"joint's {joint.stiffness:g}; the method paper takes the stress from the "
-                "deflection and is off by as much",
-                PicchioWarning,
-                stacklevel=3,
+        ratio = 1.0 + check_shaft(joint.stiffness, joint.shaft)
+        if ratio < 1.0 - _SHAFT_TOLERANCE:
+            problem = (
+                f"is {1.0 / ratio:.3g} times softer than the joint it is a part of, which cannot "
+                "be: radius, length or stiffness is wrong"
             )
+        elif ratio > 1.0 + _SHAFT_TOLERANCE:
+            problem = (
+                f"is {ratio:.3g} times stiffer than the joint: something else yields as well, and "
+                "the stress by the paper's formula (from the deflection) is too high by as much"
+            )
+        else:
+            continue
+        warnings.warn(
+            f"{joint.name}: the shaft, by G Jp / l, {problem}", PicchioWarning, stacklevel=3
+        )
 
 
-def _warn_about_limits(robot: FlexibleRobot, task: Task) -> None:
-    for operation in task.operations:
-        beyond: dict[str, int] = {}
-        for pose in operation.poses:
-            for name in robot.limit_violations(pose):
-                beyond[name] = beyond.get(name, 0) + 1
-        for name, count in beyond.items():
+def _warn_about_yield(joints: tuple[JointLife, ...], curves: tuple[SNCurve | None, ...]) -> None:
+    for joint, curve in zip(joints, curves, strict=True):
+        if curve is None:
+            continue
+        strength = curve.yield_shear or curve.ultimate_shear
+        if strength is not None and joint.peak_total_stress >= strength:
             warnings.warn(
-                f"operation {operation.name!r}: {name} is beyond its limits in {count} of "
-                f"{len(operation.poses)} poses",
+                f"{joint.name}: gravity and blows together reach "
+                f"{joint.peak_total_stress / 1e6:.4g} MPa in shear, and {curve.name} yields at "
+                f"{strength / 1e6:.4g} MPa: no fatigue life holds there",
                 PicchioWarning,
                 stacklevel=3,
             )
@@ -284,6 +300,7 @@ def _joint_life(
         gravity_torque=float(max(r.gravity_torque[:, j].max() for r in results)),
         peak_shear_stress=float(max(r.peak_shear_stress[:, j].max() for r in results)),
         gravity_shear_stress=float(max(r.gravity_shear_stress[:, j].max() for r in results)),
+        peak_total_stress=float(max(r.peak_total_stress[:, j].max() for r in results)),
         utilisation=float(max(r.utilisation[:, j].max() for r in results)),
         reducer=reducer.name if reducer is not None else "",
         reducer_utilisation=float(max(r.reducer_utilisation[:, j].max() for r in results)),
@@ -310,19 +327,17 @@ def _steady_state_checks(
     results: list[OperationResult],
     checks: list[FloatArray],
 ) -> tuple[SteadyStateCheck, ...]:
-    """Peaks at each joint's worst pose, and lives over the whole task."""
-    by_name: Mapping[str, OperationResult] = {result.name: result for result in results}
+    """Peaks and lives over the whole task, whatever the method."""
     rivets = [operation.rivets for operation in task.operations]
     found = []
     for j, joint in enumerate(joints):
-        worst = by_name[joint.worst_operation]
         spent = sum(c[:, j].sum(axis=0) * r for c, r in zip(checks, rivets, strict=True))
         paper, counted = np.asarray(spent) / task.rivets_per_pass
         found.append(
             SteadyStateCheck(
                 joint.name,
-                float(worst.steady_peak_deflection[joint.worst_pose, j]),
-                float(worst.rest_peak_deflection[joint.worst_pose, j]),
+                float(max(r.steady_peak_deflection[:, j].max() for r in results)),
+                float(max(r.rest_peak_deflection[:, j].max() for r in results)),
                 life(float(paper)) if np.isfinite(paper) else math.nan,
                 life(float(counted)) if np.isfinite(counted) else math.nan,
             )
@@ -332,22 +347,46 @@ def _steady_state_checks(
 
 def _assumptions(
     rule: LifeRule,
+    robot: FlexibleRobot,
     gravity_stiffness: bool,
     curves: tuple[SNCurve | None, ...],
     reducers: tuple[Reducer | None, ...],
 ) -> tuple[str, ...]:
     described = [curve.describe() for curve in dict.fromkeys(c for c in curves if c is not None)]
     named = [r for r in dict.fromkeys(reducers) if r is not None]
-    standstill = (
-        "reducers: peak torque of gravity and blows against the catalogue's limits; a joint that "
-        "stands still under blows risks false brinelling, which no catalogue covers"
-    )
-    return (
+    unchecked = [
+        joint.name
+        for joint, reducer in zip(robot.flexible_joints, reducers, strict=True)
+        if reducer is None
+    ]
+    lines = [
         f"gravity stiffness {'on' if gravity_stiffness else 'off'}",
         "the motor side of every joint stands still while the tool hits",
-        *rule.assumptions(),
+        *_estimates(robot),
+        *(rule.assumptions() if described else ("each rivet starts from rest and rings down",)),
         *(f"S-N curve {text}" for text in described),
-        *((standstill,) if named else ()),
-        *(f"reducer {r.name}: {r.manufacturer}, {r.kind}; {r.source}" for r in named),
-        *(() if named else ("shafts only: no joint names its reducer, so none is checked",)),
-    )
+    ]
+    if named:
+        lines += [
+            "reducers: the peak torque of gravity and blows against the catalogue's limits for "
+            "repeated and momentary peaks, gravity's torque against the rated torque; a joint that "
+            "stands still under blows risks false brinelling, which no catalogue covers",
+            *(f"reducer {r.name}: {r.manufacturer}, {r.kind}; {r.source}" for r in named),
+        ]
+    if unchecked:
+        lines.append(f"no reducer is checked in {', '.join(unchecked)}: none is named or known")
+    return tuple(lines)
+
+
+def _estimates(robot: FlexibleRobot) -> list[str]:
+    """What of the robot is an estimate or a default, one line a source."""
+    said: dict[str, list[str]] = {}
+    for joint in robot.flexible_joints:
+        if joint.estimated:
+            source = robot.origins.get(f"{joint.name}.stiffness", "marked as an estimate")
+            said.setdefault(f"stiffness is an estimate ({source})", []).append(joint.name)
+        damping = robot.origins.get(f"{joint.name}.damping_ratio", "")
+        if "default" in damping:
+            text = f"damping ratio {joint.damping_ratio:g} is assumed ({damping})"
+            said.setdefault(text, []).append(joint.name)
+    return [f"{', '.join(names)}: {text}" for text, names in said.items()]

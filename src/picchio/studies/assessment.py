@@ -34,6 +34,7 @@ class OperationResult:
         gravity_torque: (n_poses, n) N m, magnitude.
         peak_shear_stress: (n_poses, n) Pa, of the vibration; NaN for a joint without a shaft.
         gravity_shear_stress: (n_poses, n) Pa, magnitude.
+        peak_total_stress: (n_poses, n) Pa, largest magnitude of gravity and vibration together.
         utilisation: (n_poses, n) of the shafts.
         reducer_utilisation: (n_poses, n) of the reducers, torque over the limit that binds; NaN
             where a joint names none.
@@ -55,6 +56,7 @@ class OperationResult:
     gravity_torque: FloatArray
     peak_shear_stress: FloatArray
     gravity_shear_stress: FloatArray
+    peak_total_stress: FloatArray
     utilisation: FloatArray
     reducer_utilisation: FloatArray
     damage_per_rivet: FloatArray
@@ -77,6 +79,7 @@ class JointLife:
         gravity_torque: N m, largest magnitude.
         peak_shear_stress: Pa, largest of the vibration; NaN without a shaft.
         gravity_shear_stress: Pa, largest magnitude.
+        peak_total_stress: Pa, largest magnitude of gravity and vibration together, from rest.
         utilisation: largest equivalent amplitude over the allowable; NaN without a shaft.
         reducer: its catalogue name; empty where it is not known.
         reducer_utilisation: largest torque, gravity and blows together, over the limit that binds;
@@ -96,6 +99,7 @@ class JointLife:
     gravity_torque: float
     peak_shear_stress: float
     gravity_shear_stress: float
+    peak_total_stress: float
     utilisation: float
     reducer: str
     reducer_utilisation: float
@@ -123,7 +127,7 @@ class JointLife:
 
 @dataclass(frozen=True)
 class SteadyStateCheck:
-    """What the paper's steady state misjudges, one entry a joint, at the joint's worst pose.
+    """What the paper's steady state misjudges, one entry a joint, largest over the task.
 
     Attributes:
         joint: name.

@@ -180,6 +180,8 @@ def direction_envelope(
         else response_from_rest(modes, excitation, hits)
     )
     worst = response.worst_directions()
+    if not all(np.isfinite(w.value) for w in worst):
+        raise InputError("the deflections overflow", key="force", value=excitation.peak_force)
     tool, direction = response.worst_combination(state.jacobian)
     stress = [
         k * joint.shaft.radius / joint.shaft.polar_moment if joint.shaft else np.nan

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     import xarray
 
 CHUNK = 4096
+MOST_PLACES = 10**10
 ENDINGS = (".nc", ".zarr")
 # Fewer places than this are not worth starting workers for.
 _WORTH_WORKERS = 50_000
@@ -47,6 +48,7 @@ def workspace_map(
     chunk: int = CHUNK,
     workers: int | None = None,
     scheduler: str | None = None,
+    restart: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> xarray.Dataset:
     """Compute a map, or go on with one that was stopped, and open it.
@@ -63,6 +65,7 @@ def workspace_map(
         chunk: places at a time.
         workers: processes; as many as cores, or none for small maps, if not given.
         scheduler: address of a dask scheduler to use instead.
+        restart: throw away what an interrupted map has left, instead of going on.
         progress: called with (places done, places in all).
 
     Returns:
@@ -89,7 +92,15 @@ def workspace_map(
         branch_words(robot, branch)
     if chunk < 1:
         raise InputError("must be at least 1", key="chunk", value=chunk)
+    if len(places) > MOST_PLACES:
+        raise InputError(
+            f"{len(places):.3g} places are more than the {MOST_PLACES:.0e} of one map",
+            key="places",
+            hint="take a wider spacing or a coarser grid",
+        )
     job = MapJob(robot, excitation, places, direction, branch, hits)
+    if restart:
+        shutil.rmtree(_folder_of(target), ignore_errors=True)
     folder = _open_folder(target, job, chunk)
     spans = [(k, min(k + chunk, len(places))) for k in range(0, len(places), chunk)]
     missing = [span for span in spans if not _file(folder, span).exists()]
@@ -122,9 +133,13 @@ def open_map(path: str | Path) -> xarray.Dataset:
         raise InputError(f"cannot be read as a map: {error}", file=target) from None
 
 
+def _folder_of(target: Path) -> Path:
+    return target.with_name(f".{target.name}.chunks")
+
+
 def _open_folder(target: Path, job: MapJob, chunk: int) -> Path:
     """The folder of finished chunks; one that belongs to another map is not touched."""
-    folder = target.with_name(f".{target.name}.chunks")
+    folder = _folder_of(target)
     plan = {
         "robot": [hashlib.sha256(path.read_bytes()).hexdigest() for path in job.robot.files],
         "tool": job.robot.tool_frame,
@@ -143,7 +158,7 @@ def _open_folder(target: Path, job: MapJob, chunk: int) -> Path:
         raise InputError(
             "holds the unfinished chunks of another map",
             file=folder,
-            hint="remove that folder, or write to another file",
+            hint="--restart throws them away; or write to another file",
         )
     folder.mkdir(exist_ok=True)
     if not label.exists():

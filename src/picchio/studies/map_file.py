@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import warnings
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -137,4 +138,10 @@ class _ZarrWriter:
             )
 
     def close(self) -> None:
-        pass
+        if self._mode == "a":
+            import zarr
+
+            with warnings.catch_warnings():
+                # Zarr 3 has consolidated metadata ahead of its own specification.
+                warnings.simplefilter("ignore")
+                zarr.consolidate_metadata(str(self._path))

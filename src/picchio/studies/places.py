@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from picchio.robot import FlexibleRobot
 
 PLANES = ("xy", "xz", "yz")
 _AXES = "xyz"
+_MOST_STEPS = 10**6
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +34,7 @@ class Grid:
     axes: tuple[FloatArray, ...]
 
     def __len__(self) -> int:
-        return int(np.prod([len(axis) for axis in self.axes]))
+        return math.prod(len(axis) for axis in self.axes)
 
     def rows(self, first: int, last: int) -> FloatArray:
         """Rows first to last - 1 as (k, columns)."""
@@ -131,6 +133,8 @@ def joint_grid(robot: FlexibleRobot, counts: int | list[int]) -> Grid:
     each = [counts] * nv if isinstance(counts, int) else list(counts)
     if len(each) != nv or min(each) < 1:
         raise InputError(f"must be one positive number or {nv}", key="joint-grid", value=counts)
+    if max(each) > _MOST_STEPS:
+        raise InputError(f"at most {_MOST_STEPS} a joint", key="joint-grid", value=counts)
     axes = []
     for low, high, count in zip(robot.lower, robot.upper, each, strict=True):
         if not np.isfinite([low, high]).all():
@@ -186,6 +190,14 @@ def reach_box(robot: FlexibleRobot) -> tuple[FloatArray, FloatArray]:
 def _steps(low: float, high: float, step: float) -> FloatArray:
     if not (np.isfinite([low, high, step]).all() and high >= low and step > 0):
         raise InputError(
-            "bounds must ascend and the spacing be positive", key="bounds", value=[low, high, step]
+            "bounds must ascend and the spacing be positive",
+            key="bounds",
+            value=[float(low), float(high), float(step)],
+        )
+    if (high - low) / step > _MOST_STEPS:
+        raise InputError(
+            f"{(high - low) / step:.3g} points along one axis are too many",
+            key="spacing",
+            value=float(step),
         )
     return low + step * np.arange(int(np.floor((high - low) / step + 1e-9)) + 1)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, PositiveInt
+from pydantic import Field
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
@@ -24,6 +24,10 @@ FORMAT = "picchio-task/1"
 _LEAST_JOINTS_TO_AIM = 5
 
 
+# A rivet takes a dozen; more than this is a slip, and would fill the memory.
+Hits = Annotated[int, Field(gt=0, le=10_000, strict=True)]
+
+
 class OperationTable(StrictModel):
     """One `[[operation]]`; keys of the excitation given here override the task's."""
 
@@ -33,10 +37,10 @@ class OperationTable(StrictModel):
     points: list[list[Finite]] | None = None
     branch: str | list[str] = "any"
     rivets: Positive = 1.0
-    hits_per_rivet: PositiveInt | None = None
+    hits_per_rivet: Hits | None = None
     excitation: ExcitationTable | None = None
     kind: Kind | None = None
-    force: Finite | None = None
+    force: Positive | None = None
     period: Positive | None = None
     width: Positive | None = None
     preload: Finite | None = None
@@ -55,7 +59,7 @@ class OperationTable(StrictModel):
 class TaskTable(StrictModel):
     """A task file as it is written."""
 
-    hits_per_rivet: PositiveInt = 12
+    hits_per_rivet: Hits = 12
     excitation: ExcitationTable = ExcitationTable()
     operation: list[OperationTable] = Field(min_length=1)
 
@@ -159,8 +163,10 @@ def _poses(
     file: Path | None,
     key: str,
 ) -> FloatArray:
-    if (entry.poses is None) == (entry.points is None):
-        raise InputError("needs either poses or points", file=file, key=key)
+    if entry.poses is None and entry.points is None:
+        raise InputError("needs poses or points", file=file, key=key)
+    if entry.poses is not None and entry.points is not None:
+        raise InputError("has both poses and points; give one", file=file, key=key)
     given: list[Any] = (entry.poses if entry.poses is not None else entry.points) or []
     what = "poses" if entry.poses is not None else "points"
     if not given:

@@ -39,5 +39,7 @@ def format_count(value: float) -> str:
         return "-"
     if math.isinf(value):
         return "no end"
+    if value < 10:
+        return f"{value:.3g}"
     # Four digits are more than the physics deserves.
     return f"{float(f'{value:.4g}'):,.0f}" if value < 1e12 else f"{value:.3e}"

@@ -1,0 +1,163 @@
+"""`picchio view`: the 3-D scene as one offline HTML file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from picchio.cli.envelope import (
+    ForceOption,
+    PeriodOption,
+    WidthOption,
+    choose_blows,
+    parse_pose,
+)
+from picchio.cli.options import (
+    FlexOption,
+    GravityStiffnessOption,
+    JsonOption,
+    RobotArgument,
+    ToolOption,
+)
+from picchio.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray
+
+    from picchio.robot import FlexibleRobot
+    from picchio.view.scene import Scene
+
+EPILOG = "Example: picchio view fanuc_like_3dof --out scene.html"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the subcommand."""
+    app.command(epilog=EPILOG)(view)
+
+
+def view(
+    robot: RobotArgument,
+    out: Annotated[
+        Path,
+        typer.Option("--out", metavar="FILE", help="Where the HTML goes.", show_default=False),
+    ],
+    task: Annotated[
+        Path | None,
+        typer.Option("--task", metavar="FILE", help="Task (TOML); the robot's own if not given."),
+    ] = None,
+    pose: Annotated[
+        str | None,
+        typer.Option(
+            "--pose", metavar="Q1,Q2,...", help="rad or m; the task's worst pose if not given."
+        ),
+    ] = None,
+    hits: Annotated[
+        int | None,
+        typer.Option(help="With --pose: blows of a burst from rest; steady state if not given."),
+    ] = None,
+    force: ForceOption = None,
+    period: PeriodOption = None,
+    width: WidthOption = None,
+    map_: Annotated[
+        Path | None,
+        typer.Option("--map", metavar="FILE", help="A workspace map (picchio map) as a layer."),
+    ] = None,
+    joint: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Whose envelope is shown first."),
+    ] = None,
+    flex: FlexOption = None,
+    tool: ToolOption = None,
+    gravity_stiffness: GravityStiffnessOption = False,
+    json: JsonOption = None,
+) -> None:
+    """See it: robot, direction envelopes, rivets and vibration in one HTML file.
+
+    The file needs no network. Without --pose the task is assessed and shown at its worst rivet.
+    """
+    from picchio.cli.output import write_json
+    from picchio.core.files import atomic_write
+    from picchio.model import Model
+    from picchio.robot import load_robot
+    from picchio.view.scene import build_scene
+
+    loaded = load_robot(robot, flex=flex, tool=tool)
+    workspace = None
+    if map_ is not None:
+        from picchio.studies.map import open_map
+
+        workspace = open_map(map_)
+    if pose is None:
+        for key, value in (("--force", force), ("--period", period), ("--width", width),
+                           ("--hits", hits)):  # fmt: skip
+            if value is not None:
+                raise InputError("needs --pose: a task says its blows itself", key=key, value=value)
+        scene = _of_task(loaded, task, joint, gravity_stiffness, workspace)
+    else:
+        blows = choose_blows(loaded, force, period, width, task)
+        at = loaded.pose(parse_pose(pose))
+        Model(loaded, gravity_stiffness).linear_system(at)  # bad numbers are told before meshes
+        scene = build_scene(
+            loaded,
+            at,
+            blows,
+            hits=hits,
+            joint=joint,
+            gravity_stiffness=gravity_stiffness,
+            workspace=workspace,
+        )
+    page = scene.html()
+    with atomic_write(out) as stream:
+        stream.write(page)
+    if json is not None:
+        write_json(_summary(scene, out, len(page.encode())), json)
+    typer.echo(f"{out}: {scene.title}, {len(page.encode()) / 1e6:.1f} MB; open it in a browser",
+               err=True)  # fmt: skip
+
+
+def _of_task(
+    robot: FlexibleRobot,
+    task: Path | None,
+    joint: str | None,
+    gravity_stiffness: bool,
+    workspace: xarray.Dataset | None,
+) -> Scene:
+    from picchio.cli.output import progress
+    from picchio.studies import assess, load_task
+    from picchio.view.scene import build_scene
+    from picchio.view.worst import worst_rivet
+
+    path = task or robot.task_path
+    if path is None:
+        raise InputError(
+            f"{robot.name} has no example task of its own", key="--task", hint="give one, or --pose"
+        )
+    work = load_task(path, robot)
+    with progress("poses") as report:
+        found = assess(robot, work, gravity_stiffness=gravity_stiffness, progress=report)
+    worst = worst_rivet(found, robot, work, gravity_stiffness=gravity_stiffness)
+    return build_scene(
+        robot,
+        worst.pose,
+        worst.operation.excitation,
+        hits=worst.operation.hits_per_rivet,
+        direction=worst.operation.direction,
+        assessment=found,
+        joint=joint,
+        gravity_stiffness=gravity_stiffness,
+        workspace=workspace,
+    )
+
+
+def _summary(scene: Scene, out: Path, size: int) -> dict[str, Any]:
+    """What `--json` writes."""
+    return {
+        "format": "picchio-scene/1",
+        "file": str(out),
+        "bytes": size,
+        "layers": [{"id": name, "text": text} for name, text, _ in scene.layers],
+        "envelope": scene.envelope.to_dict(),
+        "provenance": dict(scene.envelope.origin),
+    }
