@@ -106,8 +106,8 @@ def _share_table(found: Assessment) -> Any:
 def _steady_table(found: Assessment) -> Any:
     lives = any(not math.isnan(check.paper_life) for check in found.steady_state)
     table = _table(
-        "The paper's steady state against a rivet as it happens, largest over the task"
-        + ("\n(the paper's S-N curve on both)" if lives else ""),
+        "The paper's steady state against a rivet as it happens\n(largest over the task"
+        + ("; the paper's S-N curve on both)" if lives else ")"),
         ("joint", "left"),
         ("steady\npeak\nmrad", "right"),
         ("rivet's\npeak\nmrad", "right"),
