@@ -254,3 +254,15 @@ def test_two_runs_write_the_same_bytes(tmp_path):
         for seed in ("1", "2")
     ]
     assert written[0] == written[1]
+
+
+def test_a_report_that_opens_offline(tmp_path):
+    out = tmp_path / "report.html"
+    done = picchio("assess", "fanuc_like_3dof", "--report", out)
+    assert done.returncode == 0, done.stderr
+    page = out.read_text()
+    assert page.startswith("<!doctype html>") or page.startswith("<!DOCTYPE html>")
+    for word in ("joint_2", "8.68", "42CrMo4-QT-shaft", "picchio assess", "rainflow"):
+        assert word in page
+    missing = picchio("assess", "fanuc_like_3dof", "--report", tmp_path / "no" / "report.html")
+    check_refused(missing, ["folder does not exist"])

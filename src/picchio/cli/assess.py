@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import shlex
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -72,11 +74,16 @@ def assess(
         typer.Option("--compare-methods", help="The paper's method against this one, by terms."),
     ] = False,
     gravity_stiffness: GravityStiffnessOption = False,
+    report: Annotated[
+        Path | None,
+        typer.Option("--report", metavar="OUT.html", help="A report to print and to mail."),
+    ] = None,
     json: JsonOption = None,
 ) -> None:
     """How many rivets each joint of a robot survives on a task."""
     from picchio.cli.assess_tables import show, show_allowable, show_spread
-    from picchio.cli.output import check_target, progress, write_json
+    from picchio.cli.output import check_target, progress, said_warnings, write_json
+    from picchio.core.files import atomic_write
     from picchio.fatigue.mean_stress import RULES
     from picchio.fatigue.rainflow import RESIDUE_RULES
     from picchio.robot import load_robot
@@ -85,6 +92,7 @@ def assess(
     from picchio.studies.backwards import allowable
     from picchio.studies.curves import curves_of
     from picchio.studies.uncertainty import uncertain_life
+    from picchio.view.report import assessment_report
 
     for key, value, choices in (
         ("--method", method, ("rainflow", "paper")),
@@ -93,6 +101,95 @@ def assess(
     ):
         if value not in choices:
             raise InputError("unknown choice", key=key, value=value, choices=choices)
+    _check_options(
+        method, residue, mean_stress, paper_mean_stress, for_life, survival, uncertainty, seed
+    )
+    for target in (json, report):
+        check_target(target, [robot, task, flex, sn_curve])
+    loaded = load_robot(robot, flex=flex, tool=tool)
+    path = task or loaded.task_path
+    if path is None:
+        raise InputError(
+            f"{loaded.name} has no example task of its own",
+            key="--task",
+            hint="give one: a TOML file of the format picchio-task/1",
+        )
+    work = load_task(path, loaded)
+    for target in (json, report):
+        check_target(target, [*loaded.files, *work.files])
+    with progress("poses") as tick:
+        found = run(
+            loaded,
+            work,
+            method=method,  # type: ignore[arg-type]
+            sn_curve=sn_curve,
+            residue=residue,  # type: ignore[arg-type]
+            mean_stress=mean_stress,  # type: ignore[arg-type]
+            paper_mean_stress=paper_mean_stress,
+            gravity_stiffness=gravity_stiffness,
+            progress=tick,
+        )
+    content = found.to_dict()
+    curves = curves_of(loaded, sn_curve)
+    named = {j.name: c for j, c in zip(loaded.flexible_joints, curves, strict=True) if c}
+    terms = _terms(loaded, work, found) if compare_methods or report is not None else ()
+    if terms:
+        content["method_terms"] = [term.to_dict() for term in terms]
+    options: dict[str, Any] = {"residue": residue, "mean_stress": mean_stress}
+    allowed = spread = None
+    if for_life is not None:
+        allowed = allowable(loaded, work, named, for_life, survival=survival, **options)
+        content["for_life"] = [joint.to_dict() for joint in allowed]
+    if uncertainty:
+        with progress("samples") as tick:
+            spread = uncertain_life(loaded, work, named, seed=seed or 0, progress=tick, **options)
+        content["uncertainty"] = spread.to_dict()
+    if report is not None:
+        page = assessment_report(
+            found,
+            loaded,
+            work,
+            warnings=said_warnings(),
+            command=" ".join(["picchio", *map(shlex.quote, sys.argv[1:])]),
+            gravity_stiffness=gravity_stiffness,
+            sn_curve=sn_curve,
+            allowed=allowed or (),
+            spread=spread,
+            terms=terms,
+        )
+        with atomic_write(report) as stream:
+            stream.write(page)
+    if json is not None:
+        write_json(content, json)
+    if json != "-":
+        show(found, path, terms)
+        if allowed is not None:
+            show_allowable(allowed, work)
+        if spread is not None:
+            show_spread(spread)
+
+
+def _terms(robot: FlexibleRobot, task: Task, found: Assessment) -> tuple[Term, ...]:
+    """The way from the paper's method to the default, where there is one."""
+    from picchio.fatigue import DEFAULT_SN_CURVE, load_sn_curve
+    from picchio.studies.method_terms import compare_methods
+
+    known = any(joint.sn_curve for joint in found.joints)
+    damped = all(math.isfinite(check.rest_peak) for check in found.steady_state)
+    return compare_methods(robot, task, load_sn_curve(DEFAULT_SN_CURVE)) if known and damped else ()
+
+
+def _check_options(
+    method: str,
+    residue: str,
+    mean_stress: str,
+    paper_mean_stress: bool,
+    for_life: float | None,
+    survival: float | None,
+    uncertainty: bool,
+    seed: int | None,
+) -> None:
+    """Refuse options that would be ignored, and numbers out of range."""
     rainflow_only = {
         "--for-life": for_life,
         "--residue": None if residue == "half-cycles" else residue,
@@ -114,60 +211,3 @@ def assess(
         raise InputError("belongs to --uncertainty", key="--seed", value=seed)
     if seed is not None and seed < 0:
         raise InputError("must not be negative", key="--seed", value=seed)
-    check_target(json, [robot, task, flex, sn_curve])
-    loaded = load_robot(robot, flex=flex, tool=tool)
-    path = task or loaded.task_path
-    if path is None:
-        raise InputError(
-            f"{loaded.name} has no example task of its own",
-            key="--task",
-            hint="give one: a TOML file of the format picchio-task/1",
-        )
-    check_target(json, loaded.files)
-    work = load_task(path, loaded)
-    check_target(json, work.files)
-    with progress("poses") as report:
-        found = run(
-            loaded,
-            work,
-            method=method,  # type: ignore[arg-type]
-            sn_curve=sn_curve,
-            residue=residue,  # type: ignore[arg-type]
-            mean_stress=mean_stress,  # type: ignore[arg-type]
-            paper_mean_stress=paper_mean_stress,
-            gravity_stiffness=gravity_stiffness,
-            progress=report,
-        )
-    content = found.to_dict()
-    curves = curves_of(loaded, sn_curve)
-    named = {j.name: c for j, c in zip(loaded.flexible_joints, curves, strict=True) if c}
-    terms = _terms(loaded, work, found) if compare_methods else ()
-    if terms:
-        content["method_terms"] = [term.to_dict() for term in terms]
-    options: dict[str, Any] = {"residue": residue, "mean_stress": mean_stress}
-    allowed = spread = None
-    if for_life is not None:
-        allowed = allowable(loaded, work, named, for_life, survival=survival, **options)
-        content["for_life"] = [joint.to_dict() for joint in allowed]
-    if uncertainty:
-        with progress("samples") as report:
-            spread = uncertain_life(loaded, work, named, seed=seed or 0, progress=report, **options)
-        content["uncertainty"] = spread.to_dict()
-    if json is not None:
-        write_json(content, json)
-    if json != "-":
-        show(found, path, terms)
-        if allowed is not None:
-            show_allowable(allowed, work)
-        if spread is not None:
-            show_spread(spread)
-
-
-def _terms(robot: FlexibleRobot, task: Task, found: Assessment) -> tuple[Term, ...]:
-    """The way from the paper's method to the default, where there is one."""
-    from picchio.fatigue import DEFAULT_SN_CURVE, load_sn_curve
-    from picchio.studies.method_terms import compare_methods
-
-    known = any(joint.sn_curve for joint in found.joints)
-    damped = all(math.isfinite(check.rest_peak) for check in found.steady_state)
-    return compare_methods(robot, task, load_sn_curve(DEFAULT_SN_CURVE)) if known and damped else ()

@@ -100,4 +100,6 @@ def _fail(problem: str) -> int:
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    print(f"picchio: warning: {' '.join(str(message).split())}", file=sys.stderr)
+    from picchio.cli.output import say_warning
+
+    say_warning(str(message))

@@ -17,6 +17,20 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 _PATIENCE = 2.0
+_said: list[str] = []
+
+
+def say_warning(message: str) -> None:
+    """Print a warning on stderr, once, and keep it for a report."""
+    line = " ".join(message.split())
+    if line not in _said:
+        _said.append(line)
+        print(f"picchio: warning: {line}", file=sys.stderr)
+
+
+def said_warnings() -> list[str]:
+    """The warnings printed so far."""
+    return list(_said)
 
 
 def console() -> Console:

@@ -1,0 +1,8 @@
+"""The 3-D scene: a robot, what shakes it and what that costs, in one offline HTML file."""
+
+from __future__ import annotations
+
+from picchio.view.scene.build import build_scene
+from picchio.view.scene.scene import Scene
+
+__all__ = ["Scene", "build_scene"]

@@ -1,0 +1,98 @@
+"""The scene as one HTML file: meshcat's viewer, the data, the controls; no network."""
+
+from __future__ import annotations
+
+from html import escape
+from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from picchio.view.scene.kinematics import Frame
+from picchio.view.scene.pack import Packer, script_json
+from picchio.view.scene.scene import Scene
+
+# One scope, in this order.
+_SCRIPTS = ("0-data.js", "1-robot.js", "2-overlay.js", "3-controls.js", "4-stage.js")
+
+
+def scene_html(scene: Scene) -> str:
+    """The page; every name in it is data, never markup or code."""
+    folder = files("picchio.view.scene") / "page_files"
+    packer = Packer()
+    data = scene_data(scene, packer)
+    parts = {
+        "title": escape(scene.title),
+        "subtitle": escape(scene.subtitle),
+        "version": escape(scene.version),
+        "style": (folder / "page.css").read_text("utf-8"),
+        "viewer": _viewer(),
+        "data": script_json(data),
+        "arrays": packer.text(),
+        "script": "\n".join((folder / name).read_text("utf-8") for name in _SCRIPTS),
+    }
+    # Split at the marks rather than replaced one after another: names may look like marks.
+    pieces = (folder / "page.html").read_text("utf-8").split("@@")
+    return "".join(parts[p] if k % 2 else p for k, p in enumerate(pieces))
+
+
+def scene_data(scene: Scene, packer: Packer) -> dict[str, Any]:
+    """What the page's script reads; arrays are references into the packer."""
+    motion = scene.motion
+    samples = np.asarray(motion["samples"])
+    return {
+        "title": scene.title,
+        "frames": [_frame(frame) for frame in scene.frames],
+        "meshes": [packer.add_mesh(mesh) for mesh in scene.meshes],
+        "items": [
+            {
+                "mesh": item.mesh,
+                "layer": item.layer,
+                "node": item.node,
+                "matrix": _matrix(item.matrix),
+                "colour": item.colour,
+                "joint": item.joint,
+            }
+            for item in scene.items
+        ],
+        "layers": [{"id": i, "text": text, "on": on} for i, text, on in scene.layers],
+        "labels": scene.labels,
+        "joints": scene.joints,
+        "scales": {layer: scale.to_dict() for layer, scale in scene.scales.items()},
+        "motion": {
+            "samples": packer.add(samples, "f4"),
+            "count": samples.shape[2],
+            **{key: motion[key] for key in ("step", "directions", "factor", "slow")},
+        },
+        "camera": scene.camera.tolist(),
+        "floor": scene.floor,
+        "tool": scene.envelope.tool_position.tolist(),
+        "chosen": scene.chosen,
+    }
+
+
+def _frame(frame: Frame) -> dict[str, Any]:
+    return {
+        "path": frame.path,
+        "matrix": _matrix(frame.matrix),
+        "axis": None if frame.axis is None else frame.axis.tolist(),
+        "prismatic": frame.prismatic,
+        "position": frame.position,
+        "follows": frame.follows.tolist() if frame.follows.any() else None,
+    }
+
+
+def _matrix(matrix: Any) -> list[float]:
+    """Column by column, as three.js has it."""
+    return [round(float(value), 9) for value in np.asarray(matrix).T.ravel()]
+
+
+def _viewer() -> str:
+    """Meshcat's viewer as it is installed, MIT licence."""
+    # Importing meshcat would start its server's libraries; only a file of it is wanted.
+    found = find_spec("meshcat")
+    assert found is not None and found.origin is not None
+    source = Path(found.origin).parent / "viewer" / "dist" / "main.min.js"
+    return source.read_text("utf-8").replace("</script", "<\\/script")

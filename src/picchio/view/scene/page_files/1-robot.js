@@ -1,0 +1,56 @@
+// --- robot ------------------------------------------------------------------------------
+const turn = new THREE.Matrix4(), own = new THREE.Matrix4(), axis = new THREE.Vector3();
+
+function pathOf(layer, node) {
+  return ROOT.concat(layer, node ? node.split("/") : []);
+}
+
+function place(layer, frame, moved) {
+  own.fromArray(frame.matrix);
+  if (frame.axis) {
+    axis.fromArray(frame.axis);
+    const at = frame.position + moved;
+    if (frame.prismatic) turn.makeTranslation(...axis.multiplyScalar(at).toArray());
+    else turn.makeRotationAxis(axis, at);
+    own.multiply(turn);
+  }
+  viewer.set_transform(pathOf(layer, frame.path), own.toArray());
+}
+
+const moving = data.frames.filter((frame) => frame.axis && frame.follows);
+const layersOfRobot = ["robot", "ghost", "joints"];
+// Rings sit on the same tree as the links; the ghost stays where it is.
+for (const layer of layersOfRobot) for (const frame of data.frames) place(layer, frame, 0);
+
+// --- state ------------------------------------------------------------------------------
+const motion = data.motion;
+const state = { joint: data.chosen, size: 1, factor: motion.factor, direction: 0, time: 0,
+  playing: !matchMedia("(prefers-reduced-motion: reduce)").matches, on: {} };
+const duration = motion.step * motion.count;
+let samples = null;
+const made = [];
+
+function deflections(time) {
+  const n = data.joints.length, at = time / motion.step;
+  const i = Math.floor(at) % motion.count, next = (i + 1) % motion.count, part = at - Math.floor(at);
+  const along = motion.directions[state.direction].along, x = new Array(n).fill(0);
+  for (let j = 0; j < n; j++)
+    for (let d = 0; d < 3; d++) {
+      const row = (3 * j + d) * motion.count;
+      x[j] += along[d] * ((1 - part) * samples[row + i] + part * samples[row + next]);
+    }
+  return x;
+}
+
+function drawMotion() {
+  const x = deflections(state.time);
+  for (const frame of moving) {
+    const moved = frame.follows.reduce((sum, f, j) => sum + f * x[j], 0) * state.factor;
+    place("robot", frame, moved);
+    place("joints", frame, moved);
+  }
+  byId("clock").textContent = `${(1e3 * state.time).toFixed(0)} ms of ` +
+    `${(1e3 * duration).toFixed(0)}, ${motion.slow}\u00d7 slow`;
+  byId("time").value = state.time / duration;
+  viewer.set_dirty();
+}

@@ -1,0 +1,263 @@
+"""The pages in a real browser, offline: they open, show what they should, and obey."""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import picchio
+from picchio.excitation import PulseTrain
+from picchio.view.report import assessment_report
+from picchio.view.scene import build_scene
+
+pytestmark = pytest.mark.slow
+
+BLOWS = PulseTrain(50.0, 0.040, 0.004)
+SEEN = 24
+"""Difference of a pixel, of 255, that an eye sees."""
+
+
+def picture(page: Any, keep: Path | None = None) -> np.ndarray:
+    """The 3-D pane's pixels."""
+    page.wait_for_timeout(250)
+    content = page.locator("#pane").screenshot()
+    if keep is not None:
+        page.screenshot(path=str(keep))
+    return np.asarray(Image.open(io.BytesIO(content)).convert("RGB")).astype(int)
+
+
+def changed(a: np.ndarray, b: np.ndarray) -> int:
+    """Pixels that differ visibly."""
+    return int((np.abs(a - b).max(axis=2) > SEEN).sum())
+
+
+def opened(open_page: Any, path: Path, **options: Any) -> Any:
+    page = open_page(path, **options)
+    page.wait_for_selector("html[data-ready]", timeout=60_000)
+    page.wait_for_timeout(500)
+    return page
+
+
+def set_range(page: Any, name: str, value: float) -> None:
+    """Move a slider as a hand would."""
+    page.eval_on_selector(
+        f"#{name}",
+        "(e, v) => { e.value = v; e.dispatchEvent(new Event('input', {bubbles: true})); }",
+        value,
+    )
+
+
+@pytest.fixture(scope="module")
+def arm_scene(arm: SimpleNamespace, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    operation = arm.worst.operation
+    scene = build_scene(arm.robot, arm.worst.pose, operation.excitation, hits=12,
+                        direction=operation.direction, assessment=arm.assessment)  # fmt: skip
+    path = tmp_path_factory.mktemp("scene") / "arm.html"
+    path.write_text(scene.html())
+    return path
+
+
+def hide_labels(page: Any) -> None:
+    page.add_style_tag(content="#labels { display: none; }")
+
+
+def test_overlays_are_there_and_layers_switch(open_page, arm_scene, pictures) -> None:
+    page = opened(open_page, arm_scene)
+    everything = picture(page, pictures / "scene-fanuc_like_3dof.png")
+    hide_labels(page)
+    everything = picture(page)
+    # An empty stage against each layer alone: something of it must be seen.
+    boxes = page.locator("#layers input")
+    names = [boxes.nth(k).get_attribute("id") for k in range(boxes.count())]
+    for name in names:
+        page.locator(f"#{name}").set_checked(False)
+    empty = picture(page)
+    assert changed(everything, empty) > 20_000
+    least = {"layer-tool": 300, "layer-joints": 800, "layer-worst": 800}
+    for name in names:
+        page.locator(f"#{name}").set_checked(True)
+        alone = picture(page)
+        assert changed(alone, empty) > least.get(name, 500), name
+        page.locator(f"#{name}").set_checked(False)
+        assert changed(picture(page), empty) == 0, name
+
+
+def test_envelope_is_where_the_tool_is_and_as_large_as_told(open_page, arm_scene, arm) -> None:
+    page = opened(open_page, arm_scene)
+    box = page.evaluate(
+        """() => {
+          const { made, viewer } = picchio, T = MeshCat.THREE;
+          viewer.scene.updateMatrixWorld(true);
+          const { object } = made.find((m) => m.item.layer === "envelope" && m.object.visible);
+          const own = new T.Box3().setFromObject(object);
+          const to = new T.Matrix4().copy(viewer.scene.matrixWorld).invert();
+          own.applyMatrix4(to);
+          return [own.min.toArray(), own.max.toArray()];
+        }"""
+    )
+    low, high = np.array(box)
+    tool = arm.robot.state(arm.worst.pose).tool_position
+    np.testing.assert_allclose(0.5 * (low + high), tool, atol=1e-4)
+
+
+def test_links_are_where_pinocchio_has_them(open_page, arm_scene, arm) -> None:
+    page = opened(open_page, arm_scene)
+    set_range(page, "time", 0.0)
+    places = page.evaluate(
+        """() => {
+          const { viewer, data } = picchio, T = MeshCat.THREE;
+          viewer.scene.updateMatrixWorld(true);
+          const to = new T.Matrix4().copy(viewer.scene.matrixWorld).invert();
+          return data.frames.map((f) => {
+            const node = viewer.scene_tree.find(["picchio", "robot", ...f.path.split("/")]);
+            return new T.Vector3().setFromMatrixPosition(node.object.matrixWorld).applyMatrix4(to)
+              .toArray();
+          });
+        }"""
+    )
+    from picchio.view.scene.kinematics import frames
+
+    for frame, place in zip(frames(arm.robot, arm.worst.pose), places, strict=True):
+        expected, _ = arm.robot.frame_placement(arm.worst.pose, frame.link)
+        np.testing.assert_allclose(place, expected, atol=1e-6)
+
+
+def test_sliders_and_choices_change_the_picture(open_page, arm_scene, pictures) -> None:
+    page = opened(open_page, arm_scene)
+    hide_labels(page)
+    first = picture(page)
+    assert changed(first, picture(page)) == 0  # nothing moves by itself
+    set_range(page, "size", 2.0)
+    assert changed(first, picture(page)) > 10_000
+    assert "2.00" in page.locator("#size-out").inner_text()
+    set_range(page, "size", 1.0)
+    assert changed(first, picture(page)) == 0
+    page.locator("#joint").select_option(label="joint_1")
+    assert changed(first, picture(page, pictures / "scene-joint_1.png")) > 5_000
+    page.locator("#joint").select_option(label="joint_2")
+    set_range(page, "time", 0.02)
+    moved = picture(page)
+    assert changed(first, moved) > 2_000
+    set_range(page, "factor", 0.6)
+    assert changed(moved, picture(page)) > 2_000
+    assert "200" in page.locator("#factor-out").inner_text()
+    page.locator("#direction").select_option(index=2)
+    page.locator("#play").click()
+    page.wait_for_timeout(400)
+    assert page.evaluate("picchio.state.playing")
+    assert page.locator("#clock").inner_text().endswith("slow")
+    assert changed(picture(page), first) > 500
+
+
+def test_it_can_be_used_by_keyboard(open_page, arm_scene) -> None:
+    page = opened(open_page, arm_scene)
+    reached = set()
+    for _ in range(24):
+        page.keyboard.press("Tab")
+        reached.add(page.evaluate("document.activeElement.id"))
+    assert {"joint", "size", "play", "direction", "factor", "layer-robot"} <= reached
+    page.locator("#size").focus()
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate("picchio.state.size") == pytest.approx(1.05)
+
+
+def test_motion_is_shown_unless_it_is_unwanted(open_page, arm_scene) -> None:
+    page = opened(open_page, arm_scene, reduced_motion="no-preference")
+    before = page.evaluate("picchio.state.time")
+    page.wait_for_timeout(600)
+    assert page.evaluate("picchio.state.time") != before
+
+
+@pytest.mark.parametrize("name", ["ur10", "panda"])
+def test_scenes_of_other_robots(open_page, tmp_path, pictures, name: str) -> None:
+    robot = picchio.load_robot(name)
+    task = picchio.load_task(robot.task_path, robot)
+    path = tmp_path / f"{name}.html"
+    path.write_text(build_scene(robot, task.operations[0].poses[0], BLOWS).html())
+    page = opened(open_page, path)
+    shown = picture(page, pictures / f"scene-{name}.png")
+    page.locator("#layer-robot").set_checked(False)
+    assert changed(shown, picture(page)) > 20_000
+
+
+def test_a_robot_without_meshes(open_page, tmp_path, pictures, missing_meshes) -> None:
+    flex = picchio.robot.find.robots_folder() / "ur10" / "flex.toml"
+    robot = picchio.load_robot(missing_meshes, flex=flex)
+    path = tmp_path / "bare.html"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        scene = build_scene(robot, [0.0, -1.2, 1.6, -0.4, 1.57, 0.0], BLOWS)
+    path.write_text(scene.html())
+    page = opened(open_page, path)
+    shown = picture(page, pictures / "scene-missing-meshes.png")
+    page.locator("#layer-robot").set_checked(False)
+    assert changed(shown, picture(page)) > 3_000
+
+
+def test_hostile_names_do_nothing(open_page, tmp_path, hostile_urdf) -> None:
+    robot = picchio.load_robot(hostile_urdf)
+    path = tmp_path / "hostile.html"
+    path.write_text(
+        build_scene(robot, [0.3] * len(robot.joint_names), BLOWS, subdivisions=2).html()
+    )
+    page = opened(open_page, path)
+    told = page.locator("#joint option").all_inner_texts()
+    assert told == list(robot.flexible_names)
+    assert page.locator("#labels span").first.inner_text().startswith(robot.flexible_names[0])
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_report_opens_unfolds_and_its_links_work(
+    open_page, tmp_path, arm, arm_scene, pictures, theme: str
+) -> None:
+    path = tmp_path / "report.html"
+    path.write_text(assessment_report(arm.assessment, arm.robot, arm.task,
+                                      scene=arm_scene.read_text()))  # fmt: skip
+    page = open_page(path, color_scheme=theme)
+    assert "joint_2" in page.locator("#verdict").inner_text()
+    page.screenshot(path=str(pictures / f"report-{theme}.png"), full_page=True)
+    for link in page.locator("nav a").all():
+        link.click()
+        assert page.evaluate("location.hash") == link.get_attribute("href")
+        assert page.evaluate("document.querySelector(location.hash) !== null")
+    for fold in page.locator("details").all():
+        fold.locator("summary").focus()
+        page.keyboard.press("Enter")
+        assert fold.get_attribute("open") is not None
+    frame = page.frame_locator("iframe")
+    frame.locator("html[data-ready]").wait_for(timeout=60_000)
+    assert frame.locator("#joint").input_value() == "1"
+    # Nothing may be wider than the page.
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_report_on_a_telephone(open_page, tmp_path, ur10) -> None:
+    path = tmp_path / "report.html"
+    path.write_text(assessment_report(ur10.assessment, ur10.robot, ur10.task))
+    page = open_page(path, viewport={"width": 390, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_report_prints_on_two_pages(open_page, tmp_path, arm, pictures) -> None:
+    path = tmp_path / "report.html"
+    path.write_text(assessment_report(arm.assessment, arm.robot, arm.task))
+    page = open_page(path)
+    content = page.pdf(prefer_css_page_size=True)
+    (pictures / "report.pdf").write_bytes(content)
+    assert content.startswith(b"%PDF")
+    assert 1 <= len(re.findall(rb"/Type\s*/Page\b", content)) <= 2
+    page.emulate_media(media="print")
+    # What is wider than the paper would be cut off: 182 mm at 96 dpi.
+    page.set_viewport_size({"width": 688, "height": 1000})
+    assert page.evaluate(
+        "[...document.querySelectorAll('table')].filter(t => t.offsetParent !== null)"
+        ".every(t => t.scrollWidth <= 688)"
+    )
