@@ -114,7 +114,7 @@ def test_catalogue_entry(full, flex):
     assert (entry.dof, entry.flexible, entry.with_stiffness) == (3, ("a", "b", "c"), ("a",))
     entry = describe_robot(FoundRobot("x", flex))
     assert entry.problem is not None
-    assert "is not valid XML" in entry.problem
+    assert "is a TOML file, not a URDF" in entry.problem
 
 
 @pytest.mark.parametrize(

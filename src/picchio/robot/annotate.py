@@ -1,7 +1,8 @@
 """Write a sidecar's values into a URDF as `picchio:` annotations, touching nothing else.
 
 The file is not parsed and written back: the new elements are cut into its bytes, so comments,
-order, other tools' tags and even odd spacing stay as they are.
+order, other tools' tags and even odd spacing stay as they are. What comes out is read back
+before it is handed over.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
+from lxml import etree
 from pydantic import BaseModel
 
 from picchio.core.errors import InputError
@@ -32,8 +34,8 @@ def annotate(urdf: str | Path, sidecar: Sidecar) -> bytes:
         sidecar: the values to write.
 
     Raises:
-        InputError: the URDF or the sidecar cannot be used together, or the URDF's encoding is
-            not a superset of ASCII.
+        InputError: the URDF or the sidecar cannot be used together, the URDF's encoding is
+            not a superset of ASCII, or the result would not read back as the same values.
     """
     path = Path(urdf)
     content = read_urdf_bytes(path)
@@ -45,7 +47,11 @@ def annotate(urdf: str | Path, sidecar: Sidecar) -> bytes:
         raise InputError("only URDFs in UTF-8 or another superset of ASCII can be annotated",
                          file=path)  # fmt: skip
     prefix = next((key for key, address in root.nsmap.items() if address == NAMESPACE and key), "")
-    places = find_places(content, NAMESPACE)
+    try:
+        places = find_places(content, NAMESPACE)
+    except ValueError as error:
+        raise InputError(f"cannot be annotated in this encoding: {error}", file=path) from None
+    expected: dict[tuple[str, str], dict[str, Any]] = {}
     edits = []
     if not prefix:
         prefix = "picchio"
@@ -57,12 +63,46 @@ def annotate(urdf: str | Path, sidecar: Sidecar) -> bytes:
         if "stiffness_curve" in given(entry):
             merged.pop("stiffness", None)
         JointEntry.model_validate({key: _plain(value) for key, value in merged.items()})
+        expected["joint", name] = merged
         edits += _replace(places, ("joint", name), _joint_elements(prefix, merged))
     for tag in IN_ROBOT:
         values = {**given(getattr(before, tag)), **given(getattr(sidecar, tag))}
         if given(getattr(sidecar, tag)):
+            expected["robot", tag] = values
             edits += _replace(places, ("robot", tag), [_element(prefix, tag, values, {})])
-    return _apply(content, edits, places.newline)
+    result = _apply(content, edits, places.newline)
+    _read_back(result, path, root, expected)
+    return result
+
+
+def _read_back(
+    result: bytes,
+    path: Path,
+    before: etree._Element,
+    expected: Mapping[tuple[str, str], Mapping[str, Any]],
+) -> None:
+    """Refuse a result that picchio's own reader would refuse, or read as something else."""
+    try:
+        root = parse_urdf(result, path)
+        read_tree(root, path)
+        found = read_annotations(root, path) or Sidecar()
+    except InputError as error:
+        raise InputError(f"cannot be annotated, the result would not read back: {error.problem}",
+                         file=path, key=error.key) from None  # fmt: skip
+    for (kind, name), values in expected.items():
+        entry = found.joint.get(name) if kind == "joint" else getattr(found, name)
+        if given(entry) != values:
+            raise InputError("cannot be annotated, the result would not read back as the values "
+                             "given", file=path, key=f"{kind}.{name}")  # fmt: skip
+    if _outline(root) != _outline(before):
+        raise InputError("cannot be annotated without a change to its own elements", file=path)
+
+
+def _outline(root: etree._Element) -> list[tuple[str, dict[str, str]]]:
+    """Everything but the annotations, in the file's order."""
+    return [(str(element.tag), {str(key): str(text) for key, text in element.attrib.items()})
+            for element in root.iter(etree.Element)
+            if not str(element.tag).startswith(f"{{{NAMESPACE}}}")]  # fmt: skip
 
 
 def _joint_elements(prefix: str, values: Mapping[str, Any]) -> list[str]:
@@ -99,7 +139,7 @@ def _replace(places: Places, where: tuple[str, str], elements: list[str]) -> lis
     """Take the old annotations at a place out and put new ones in."""
     place = places.at[where]
     edits = [Edit(start, end - start, "") for start, end in place.old]
-    lines = "".join(f"\n{place.indent}{element}" for element in elements)
+    lines = "".join(f"{place.lead or ''}{element}" for element in elements)
     return [*edits, Edit(place.insert, 0, lines)]
 
 

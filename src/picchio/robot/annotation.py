@@ -90,7 +90,8 @@ def read_annotations(root: etree._Element, path: Path) -> Sidecar | None:
     for element in root.iter(f"{{{NAMESPACE}}}*"):
         parent = element.getparent()
         name = local_name(element)
-        if parent is not None and parent is not root and parent.tag == "joint":
+        # Not the <joint> of a <transmission>, which only refers to one.
+        if parent is not None and parent.tag == "joint" and parent.getparent() is root:
             _read_in_joint(element, found["joint"].setdefault(parent.get("name"), {}), path)
         elif parent is root and name in IN_ROBOT:
             if name in found:
@@ -162,7 +163,9 @@ def _refuse(element: etree._Element, path: Path) -> None:
     name = local_name(element)
     line = f"line {element.sourceline}"
     if name in IN_JOINT:
-        raise InputError(f"<picchio:{name}> belongs directly in a <joint> ({line})", file=path)
+        raise InputError(
+            f"<picchio:{name}> belongs directly in a <joint> of <robot> ({line})", file=path
+        )
     if name in IN_ROBOT:
         raise InputError(f"<picchio:{name}> belongs directly in <robot> ({line})", file=path)
     raise InputError(f"unknown picchio element ({line})", file=path, value=name,

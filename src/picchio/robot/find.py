@@ -6,6 +6,7 @@ looks like a path is taken as one. `package://` addresses go through the same ro
 
 from __future__ import annotations
 
+import difflib
 import os
 from dataclasses import dataclass
 from functools import cache
@@ -37,7 +38,7 @@ def find_robot(robot: str | Path) -> FoundRobot:
     """Look a robot up.
 
     Raises:
-        InputError: neither a file nor a known name.
+        InputError: neither a file nor a known name, or a folder without robot.urdf.
     """
     text = os.fspath(robot)
     if not text or "\0" in text:
@@ -45,12 +46,16 @@ def find_robot(robot: str | Path) -> FoundRobot:
     if text.startswith("package://"):
         return FoundRobot(None, resolve_package(text))
     path = Path(text)
+    try:
+        is_file, is_folder = path.is_file(), path.is_dir()
+    except OSError as error:  # such as a name too long for the system
+        raise InputError(f"cannot be read: {error.strerror}", key="ROBOT", value=text) from None
     # A name never ends like a URDF and holds no separator unless it is a known one.
-    if path.suffix in (".urdf", ".xml") or path.is_file():
-        if not path.is_file() and not path.is_dir():
+    if path.suffix in (".urdf", ".xml", ".toml") or is_file:
+        if not is_file and not is_folder:
             raise InputError("no such file", file=path)
         return _with_neighbours(path)
-    if path.is_dir() and (path / "robot.urdf").is_file():
+    if is_folder and (path / "robot.urdf").is_file():
         return _with_neighbours(path / "robot.urdf")
     shipped = shipped_robot(text)
     if shipped is not None:
@@ -58,9 +63,29 @@ def find_robot(robot: str | Path) -> FoundRobot:
     found = example_robot(text)
     if found is not None:
         return FoundRobot(text, found)
-    raise InputError("no such robot", key="ROBOT", value=text,
-                     choices=[*shipped_robots(), *example_robots()],
-                     hint="a path to a URDF is fine, too")  # fmt: skip
+    if is_folder:
+        raise InputError("is a folder without robot.urdf", file=path, hint=_folder_hint(path))
+    names = [*shipped_robots(), *example_robots()]
+    raise InputError("no such robot", key="ROBOT", value=text, choices=names,
+                     hint=_other_case(text, names) + "a path to a URDF is fine, too"
+                     )  # fmt: skip
+
+
+def _folder_hint(folder: Path) -> str:
+    here = folder.resolve()
+    if here.parent == robots_folder().resolve() and shipped_robot(here.name):
+        return f"ask for {here.name!r}"
+    urdfs = [file.name for file in sorted(folder.glob("*.urdf"))[:5]]
+    return f"name a URDF in it: {', '.join(urdfs)}" if urdfs else "there is no URDF in it"
+
+
+def _other_case(text: str, names: list[str]) -> str:
+    """A name that is close but for upper and lower case, which the message does not show yet."""
+    if difflib.get_close_matches(text, names, n=1):
+        return ""
+    lowered = {name.lower(): name for name in reversed(names)}
+    close = difflib.get_close_matches(text.lower(), lowered, n=1)
+    return f"did you mean {lowered[close[0]]!r}? " if close else ""
 
 
 def _with_neighbours(urdf: Path) -> FoundRobot:

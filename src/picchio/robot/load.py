@@ -57,6 +57,7 @@ def load_robot(
     sources, flex_file = _sources(root, found, flex, values, srdf)
     joints, origins = flexible_joints(tree, sources)
     _check_balancers(sources, joints)
+    _warn_of_damping(joints, origins)
     chosen_tool, tool_origins = choose_tool(tree, tool, sources, srdf)
     gun, gun_origins = choose_gun(sources)
     mounting, base_origins = choose_mounting(sources)
@@ -144,6 +145,18 @@ def _warn(tree: UrdfTree) -> None:
         )
     for remark in remarks:
         warnings.warn(f"{tree.path}: {remark}", PicchioWarning, stacklevel=3)
+
+
+def _warn_of_damping(joints: Mapping[str, Joint], origins: Mapping[str, str]) -> None:
+    for name, joint in joints.items():
+        if joint.damping_ratio > 1:
+            origin = origins[f"{name}.damping_ratio"]
+            warnings.warn(
+                f"joint {name!r}: damping_ratio {joint.damping_ratio:g} is above 1, so it does "
+                f"not swing; drives usually have 0.01 to 0.1 ({origin})",
+                PicchioWarning,
+                stacklevel=3,
+            )
 
 
 def _recoil(name: str, gun: Gun) -> Joint:

@@ -48,7 +48,7 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from picchio.core.errors import InputError
 from picchio.core.model import Finite, NotNegative, Positive, StrictModel
@@ -57,13 +57,33 @@ from picchio.core.toml import parse_toml
 FORMAT = "picchio-sidecar/1"
 Vector = tuple[Finite, Finite, Finite]
 Tensor = Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
+LONGEST_SHAFT = 2.0  # m: no arm has a longer one, a number beyond it is in millimetres
+SOFTEST, STIFFEST = 1e-3, 1e12  # N m/rad or N/m: far beyond any drive on either side
+
+
+def _in_metres(value: float) -> float:
+    if value > LONGEST_SHAFT:
+        raise ValueError(f"is above {LONGEST_SHAFT:g} m (in metres?)")
+    return value
+
+
+def _in_newtons(value: float) -> float:
+    if not SOFTEST <= value <= STIFFEST:
+        raise ValueError(
+            f"is outside {SOFTEST:g} to {STIFFEST:g} N m/rad (N/m for a prismatic joint)"
+        )
+    return value
+
+
+ShaftLength = Annotated[Positive, AfterValidator(_in_metres)]
+Stiffness = Annotated[Positive, AfterValidator(_in_newtons)]
 
 
 class ShaftEntry(StrictModel):
     """A round shaft: m, m, Pa, and the name of its S-N curve."""
 
-    radius: Positive
-    length: Positive
+    radius: ShaftLength
+    length: ShaftLength
     shear_modulus: Positive
     sn_curve: str | None = None
 
@@ -71,9 +91,9 @@ class ShaftEntry(StrictModel):
 class StiffnessCurveEntry(StrictModel):
     """K1, K2, K3 [N m/rad] and T1, T2 [N m] of a strain-wave catalogue."""
 
-    k1: Positive
-    k2: Positive
-    k3: Positive
+    k1: Stiffness
+    k2: Stiffness
+    k3: Stiffness
     t1: Positive
     t2: Positive
 
@@ -97,7 +117,7 @@ class BalancerEntry(StrictModel):
 class JointEntry(StrictModel):
     """One joint's drive."""
 
-    stiffness: Positive | None = None
+    stiffness: Stiffness | None = None
     stiffness_curve: StiffnessCurveEntry | None = None
     damping_ratio: NotNegative | None = None
     shaft: ShaftEntry | None = None
@@ -190,8 +210,9 @@ def read_sidecar(path: str | Path) -> Sidecar:
 
 
 def given(entry: StrictModel | None) -> dict[str, Any]:
-    """The values that were actually written, not the defaults."""
+    """The values that were actually written, not the defaults, in the record's order."""
     if entry is None:
         return {}
-    return {name: getattr(entry, name) for name in entry.model_fields_set
-            if getattr(entry, name) is not None}  # fmt: skip
+    written = entry.model_fields_set  # a set: its own order changes from run to run
+    return {name: getattr(entry, name) for name in type(entry).model_fields
+            if name in written and getattr(entry, name) is not None}  # fmt: skip

@@ -57,7 +57,7 @@ def _link(tree: UrdfTree, frame: str, file: str | None, key: str) -> str:
     if frame in tree.joints:
         return tree.joints[frame].child
     raise InputError("the robot has no frame of this name", file=file, key=key, value=frame,
-                     choices=[*tree.leaves(), *(set(tree.links) - set(tree.leaves()))])  # fmt: skip
+                     choices=dict.fromkeys([*tree.leaves(), *tree.links]))  # fmt: skip
 
 
 def _usual_frame(tree: UrdfTree, srdf: Srdf | None) -> tuple[str, str]:

@@ -20,14 +20,21 @@ class Place:
     """One element that can carry annotations.
 
     Args:
-        insert: byte where new elements go.
-        indent: white space before each.
+        insert: byte where new elements go: before the closing tag and its white space.
+        lead: white space before each, a line break included where children have lines of
+            their own; None until a child is seen.
         old: byte ranges of the present annotations, with the white space before them.
     """
 
     insert: int = 0
-    indent: str = ""
+    lead: str | None = None
     old: list[tuple[int, int]] = field(default_factory=list)
+
+    def see_child(self, blank: str) -> None:
+        """Take the lead over from a child that has a line of its own, else from the first."""
+        if self.lead is None or ("\n" in blank and "\n" not in self.lead):
+            line = blank.rpartition("\n")
+            self.lead = line[1] + line[2]
 
 
 @dataclass
@@ -54,6 +61,9 @@ def find_places(content: bytes, namespace: str) -> Places:
     Args:
         content: the file's bytes, in a superset of ASCII.
         namespace: of the annotations.
+
+    Raises:
+        ValueError: expat cannot follow the file's encoding.
     """
     reader = _Reader(content, namespace)
     reader.parse()
@@ -72,57 +82,62 @@ class _Reader:
         self._parser = expat.ParserCreate(namespace_separator=" ")
         self._parser.StartElementHandler = self._start
         self._parser.EndElementHandler = self._end
-        self._depth = 0
+        # Of each open element whether it is self-closing: expat then reports the end of
+        # `<limit/>` at the byte after it, where another element's closing tag may stand.
+        self._open: list[bool] = []
         self._joint: Place | None = None
         self._robot = {tag: Place() for tag in ROBOT_TAGS}
 
     def parse(self) -> None:
-        self._parser.Parse(self.content, True)
+        try:
+            self._parser.Parse(self.content, True)
+        except (expat.ExpatError, LookupError) as error:
+            raise ValueError(str(error)) from None
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         start = self._parser.CurrentByteIndex
         end = _tag_end(self.content, start)
-        self._depth += 1
+        self._open.append(self.content[end - 2 : end] == b"/>")
+        depth = len(self._open)
+        blank = self._blank_before(start)
+        old = (start - len(blank), end)
         mine = tag.startswith(f"{self.namespace} ")
-        name = tag.removeprefix(f"{self.namespace} ")
-        if self._depth == 1:
+        if depth == 1:
             self.root_name_end = _name_end(self.content, start)
-        elif self._depth == 2 and tag == "joint":
-            self._joint = Place(insert=end)
-            self.places["joint", attributes["name"]] = self._joint
-        elif self._depth == 3 and self._joint is not None:
-            if not self._joint.indent:
-                self._joint.indent = self._blank_before(start).rpartition("\n")[2]
+        elif depth == 2:
+            if tag == "joint":
+                self._joint = self.places["joint", attributes["name"]] = Place()
+            for name, place in self._robot.items():
+                place.see_child(blank)
+                if tag == f"{self.namespace} {name}":
+                    place.old.append(old)
+        elif depth == 3 and self._joint is not None:
+            self._joint.see_child(blank)
             if mine:
-                self._joint.old.append((start - len(self._blank_before(start)), end))
-            else:
-                self._joint.insert = end  # a child with children moves on at its end
-        if self._depth == 2:
-            if mine and name in self._robot:
-                self._robot[name].old.append((start - len(self._blank_before(start)), end))
-            for place in self._robot.values():
-                place.indent = place.indent or self._blank_before(start).rpartition("\n")[2]
+                self._joint.old.append(old)
 
     def _end(self, tag: str) -> None:
-        start = self._parser.CurrentByteIndex
-        closing = self.content[start : start + 2] == b"</"
-        end = _tag_end(self.content, start)
-        mine = tag.startswith(f"{self.namespace} ")
-        if self._depth == 3 and self._joint is not None and closing:
-            if mine:
-                self._joint.old[-1] = (self._joint.old[-1][0], end)
-            else:
-                self._joint.insert = end
-        if self._depth == 2:
+        depth = len(self._open)
+        if not self._open.pop():
+            start = self._parser.CurrentByteIndex
+            blank = self._blank_before(start)
+            self._close(tag, depth, start - len(blank), _tag_end(self.content, start))
+        if depth == 2:
             self._joint = None
-            name = tag.removeprefix(f"{self.namespace} ")
-            if mine and closing and self._robot[name].old:
-                self._robot[name].old[-1] = (self._robot[name].old[-1][0], end)
-        if self._depth == 1:
+
+    def _close(self, tag: str, depth: int, insert: int, end: int) -> None:
+        """A closing tag that, with the white space before it, stands at insert..end."""
+        if depth == 1:
             for name, place in self._robot.items():
-                place.insert = start - len(self._blank_before(start))
+                place.insert = insert
                 self.places["robot", name] = place
-        self._depth -= 1
+        elif depth == 2 and self._joint is not None:
+            self._joint.insert = insert
+        elif tag.startswith(f"{self.namespace} "):
+            name = tag.removeprefix(f"{self.namespace} ")
+            place = self._robot.get(name) if depth == 2 else self._joint if depth == 3 else None
+            if place is not None:
+                place.old[-1] = (place.old[-1][0], end)
 
     def _blank_before(self, place: int) -> str:
         begin = place

@@ -6,6 +6,7 @@ is said in one line. Everything that needs the XML itself (reading, annotating) 
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 from lxml import etree
@@ -48,7 +49,8 @@ def parse_urdf(content: bytes, path: Path) -> etree._Element:
         path: named in errors.
 
     Raises:
-        InputError: not XML, a document type declaration, an undeclared prefix, wrong encoding.
+        InputError: not XML, a document type declaration, an undeclared prefix, wrong encoding, a
+            TOML file.
     """
     if not content.strip():
         raise InputError("is empty", file=path)
@@ -62,12 +64,27 @@ def parse_urdf(content: bytes, path: Path) -> etree._Element:
     try:
         root = etree.fromstring(content, parser)
     except etree.XMLSyntaxError as error:
+        if _is_toml(content, path):
+            raise InputError("is a TOML file, not a URDF", file=path,
+                             hint="a sidecar belongs to --flex, a task to --task"
+                             ) from None  # fmt: skip
         raise InputError(_reason(error), file=path, hint=_hint(error)) from None
     except (ValueError, LookupError) as error:
         raise InputError(f"is not readable as XML: {error}", file=path) from None
     if root.getroottree().docinfo.doctype:
         raise InputError("has a document type declaration, which is not accepted", file=path)
     return root
+
+
+def _is_toml(content: bytes, path: Path) -> bool:
+    if path.suffix.lower() == ".toml":
+        return True
+    if len(content) > 1 << 20:
+        return False
+    try:
+        return bool(tomllib.loads(content.decode("utf-8")))
+    except (ValueError, RecursionError):
+        return False
 
 
 def _reason(error: etree.XMLSyntaxError) -> str:
