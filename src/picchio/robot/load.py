@@ -152,8 +152,8 @@ def _warn_of_damping(joints: Mapping[str, Joint], origins: Mapping[str, str]) ->
         if joint.damping_ratio > 1:
             origin = origins[f"{name}.damping_ratio"]
             warnings.warn(
-                f"joint {name!r}: damping_ratio {joint.damping_ratio:g} is above 1, so it does "
-                f"not swing; drives usually have 0.01 to 0.1 ({origin})",
+                f"joint {name!r}: damping_ratio {joint.damping_ratio:g} is above 1 (it does "
+                f"not swing), which is unusual; from {origin}",
                 PicchioWarning,
                 stacklevel=3,
             )

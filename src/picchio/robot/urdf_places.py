@@ -135,9 +135,9 @@ class _Reader:
             self._joint.insert = insert
         elif tag.startswith(f"{self.namespace} "):
             name = tag.removeprefix(f"{self.namespace} ")
-            place = self._robot.get(name) if depth == 2 else self._joint if depth == 3 else None
-            if place is not None:
-                place.old[-1] = (place.old[-1][0], end)
+            holder = self._robot.get(name) if depth == 2 else self._joint if depth == 3 else None
+            if holder is not None:
+                holder.old[-1] = (holder.old[-1][0], end)
 
     def _blank_before(self, place: int) -> str:
         begin = place
