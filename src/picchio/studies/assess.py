@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
@@ -11,12 +10,11 @@ from typing import Literal
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
 from picchio.fatigue import (
     PAPER_SN_CURVE,
     SNCurve,
-    check_shaft,
     life,
     load_sn_curve,
     peak_damage,
@@ -25,16 +23,17 @@ from picchio.fatigue import (
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.rainflow import Residue
 from picchio.fatigue.reducer import Reducer
-from picchio.fatigue.reducer_library import load_reducer
 from picchio.fatigue.sn_curve import MinerRule
 from picchio.model import Model
-from picchio.robot import FlexibleRobot, Joint
+from picchio.robot import FlexibleRobot
+from picchio.studies.assess_checks import reducer_of, warn_about_shafts, warn_about_yield
 from picchio.studies.assessment import (
     Assessment,
     JointLife,
     OperationResult,
     SteadyStateCheck,
 )
+from picchio.studies.assumptions import assumptions_of
 from picchio.studies.curves import curves_of
 from picchio.studies.life_rules import LifeRule, PaperRule, RainflowRule, peak
 from picchio.studies.limits import warn_beyond_limits
@@ -43,8 +42,6 @@ from picchio.studies.task import Operation, Task
 
 Method = Literal["rainflow", "paper"]
 METHODS: tuple[Method, ...] = ("rainflow", "paper")
-# A shaft that disagrees with its joint's stiffness by more than this is worth a warning.
-_SHAFT_TOLERANCE = 0.05
 
 
 def assess(
@@ -96,10 +93,10 @@ def assess(
     if sn_curve is None and method == "paper":
         sn_curve = PAPER_SN_CURVE
     curves = curves_of(robot, sn_curve)
-    _warn_about_shafts(robot)
+    warn_about_shafts(robot)
     for operation in task.operations:
         warn_beyond_limits(robot, operation.poses, f"operation {operation.name!r}")
-    reducers = tuple(_reducer(joint) for joint in robot.flexible_joints)
+    reducers = tuple(reducer_of(joint) for joint in robot.flexible_joints)
     paper_curve = load_sn_curve(PAPER_SN_CURVE, quiet=True)
     job = _Job(Model(robot, gravity_stiffness), rule, curves, reducers, paper_curve)
     total = sum(len(operation.poses) for operation in task.operations)
@@ -119,7 +116,7 @@ def assess(
     joints = tuple(
         _joint_life(j, robot, task, results, curves, reducers[j]) for j in range(len(curves))
     )
-    _warn_about_yield(joints, curves)
+    warn_about_yield(joints, curves)
     limiting = _limiting(joints)
     used = [curve.name for curve in dict.fromkeys(c for c in curves if c is not None)]
     name = "paper, at the poses' mean stress" if paper_mean_stress else method
@@ -127,7 +124,7 @@ def assess(
         robot=robot.name,
         method=name,
         sn_curve=", ".join(dict.fromkeys(used)),
-        assumptions=_assumptions(rule, robot, gravity_stiffness, curves, reducers),
+        assumptions=assumptions_of(rule, robot, gravity_stiffness, curves, reducers),
         joints=joints,
         operations=tuple(results),
         limiting_joint=limiting.name if limiting else None,
@@ -192,62 +189,6 @@ class _Job:
         out["natural_frequencies"] = loads.natural_frequencies
         out["tool_position"] = loads.tool_position
         return out
-
-
-def _reducer(joint: Joint) -> Reducer | None:
-    """The joint's reducer; one that no catalogue has is told and left unchecked."""
-    if joint.reducer is None:
-        return None
-    try:
-        return load_reducer(joint.reducer)
-    except InputError as error:
-        warnings.warn(f"{joint.name}: {error}; it is left unchecked", PicchioWarning, stacklevel=3)
-        return None
-
-
-def _warn_about_shafts(robot: FlexibleRobot) -> None:
-    bare = [joint.name for joint in robot.flexible_joints if joint.shaft is None]
-    if bare:
-        warnings.warn(
-            f"no shaft is given for {', '.join(bare)}: deflection and torque can be told, stress "
-            "and life can't",
-            PicchioWarning,
-            stacklevel=3,
-        )
-    for joint in robot.flexible_joints:
-        if joint.shaft is None:
-            continue
-        ratio = 1.0 + check_shaft(joint.stiffness, joint.shaft)
-        if ratio < 1.0 - _SHAFT_TOLERANCE:
-            problem = (
-                f"is {1.0 / ratio:.3g} times softer than the joint it is a part of, which cannot "
-                "be: radius, length or stiffness is wrong"
-            )
-        elif ratio > 1.0 + _SHAFT_TOLERANCE:
-            problem = (
-                f"is {ratio:.3g} times stiffer than the joint: something else yields as well, and "
-                "the stress by the paper's formula (from the deflection) is too high by as much"
-            )
-        else:
-            continue
-        warnings.warn(
-            f"{joint.name}: the shaft, by G Jp / l, {problem}", PicchioWarning, stacklevel=3
-        )
-
-
-def _warn_about_yield(joints: tuple[JointLife, ...], curves: tuple[SNCurve | None, ...]) -> None:
-    for joint, curve in zip(joints, curves, strict=True):
-        if curve is None:
-            continue
-        strength = curve.yield_shear or curve.ultimate_shear
-        if strength is not None and joint.peak_total_stress >= strength:
-            warnings.warn(
-                f"{joint.name}: gravity and blows together reach "
-                f"{joint.peak_total_stress / 1e6:.4g} MPa in shear, and {curve.name} yields at "
-                f"{strength / 1e6:.4g} MPa: no fatigue life holds there",
-                PicchioWarning,
-                stacklevel=3,
-            )
 
 
 def _operation_result(operation: Operation, rows: list[dict[str, FloatArray]]) -> OperationResult:
@@ -343,50 +284,3 @@ def _steady_state_checks(
             )
         )
     return tuple(found)
-
-
-def _assumptions(
-    rule: LifeRule,
-    robot: FlexibleRobot,
-    gravity_stiffness: bool,
-    curves: tuple[SNCurve | None, ...],
-    reducers: tuple[Reducer | None, ...],
-) -> tuple[str, ...]:
-    described = [curve.describe() for curve in dict.fromkeys(c for c in curves if c is not None)]
-    named = [r for r in dict.fromkeys(reducers) if r is not None]
-    unchecked = [
-        joint.name
-        for joint, reducer in zip(robot.flexible_joints, reducers, strict=True)
-        if reducer is None
-    ]
-    lines = [
-        f"gravity stiffness {'on' if gravity_stiffness else 'off'}",
-        "the motor side of every joint stands still while the tool hits",
-        *_estimates(robot),
-        *(rule.assumptions() if described else ("each rivet starts from rest and rings down",)),
-        *(f"S-N curve {text}" for text in described),
-    ]
-    if named:
-        lines += [
-            "reducers: the peak torque of gravity and blows against the catalogue's limits for "
-            "repeated and momentary peaks, gravity's torque against the rated torque; a joint that "
-            "stands still under blows risks false brinelling, which no catalogue covers",
-            *(f"reducer {r.name}: {r.manufacturer}, {r.kind}; {r.source}" for r in named),
-        ]
-    if unchecked:
-        lines.append(f"no reducer is checked in {', '.join(unchecked)}: none is named or known")
-    return tuple(lines)
-
-
-def _estimates(robot: FlexibleRobot) -> list[str]:
-    """What of the robot is an estimate or a default, one line a source."""
-    said: dict[str, list[str]] = {}
-    for joint in robot.flexible_joints:
-        if joint.estimated:
-            source = robot.origins.get(f"{joint.name}.stiffness", "marked as an estimate")
-            said.setdefault(f"stiffness is an estimate ({source})", []).append(joint.name)
-        damping = robot.origins.get(f"{joint.name}.damping_ratio", "")
-        if "default" in damping:
-            text = f"damping ratio {joint.damping_ratio:g} is assumed ({damping})"
-            said.setdefault(text, []).append(joint.name)
-    return [f"{', '.join(names)}: {text}" for text, names in said.items()]
