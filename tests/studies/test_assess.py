@@ -204,3 +204,17 @@ def test_a_shaft_that_yields_is_told_whatever_its_fatigue_life(robot):
     torque = np.abs(swing - robot.state(POSE_A).gravity_torque[1]).max()
     stress = 2 * torque / (math.pi * 0.0132**3)
     assert found.joint("joint_2").peak_total_stress == pytest.approx(stress, rel=1e-5)
+
+
+def test_balanced_gravity_leaves_no_stress_and_the_vibration_as_it_is(robot):
+    work = task(robot, ([0, 0, 1], [POSE_A], {}), force=3000.0)
+    options = {"mean_stress": "goodman"}
+    held = quiet_assess(robot, work, **options).joint("joint_2")
+    balanced = quiet_assess(robot, work, gravity_balanced=True, **options).joint("joint_2")
+    plain = quiet_assess(robot, work).joint("joint_2")
+    assert held.gravity_shear_stress > 0
+    assert balanced.gravity_shear_stress == 0
+    assert balanced.gravity_torque == 0
+    assert balanced.peak_shear_stress == held.peak_shear_stress
+    # Goodman raises the amplitude by the mean: less of it without gravity.
+    assert plain.utilisation < balanced.utilisation < held.utilisation

@@ -74,6 +74,10 @@ def assess(
         typer.Option("--compare-methods", help="The paper's method against this one, by terms."),
     ] = False,
     gravity_stiffness: GravityStiffnessOption = False,
+    gravity_balanced: Annotated[
+        bool,
+        typer.Option("--gravity-balanced", help="Gravity leaves no torque in the joints."),
+    ] = False,
     report: Annotated[
         Path | None,
         typer.Option("--report", metavar="OUT.html", help="A report to print and to mail."),
@@ -127,6 +131,7 @@ def assess(
             mean_stress=mean_stress,  # type: ignore[arg-type]
             paper_mean_stress=paper_mean_stress,
             gravity_stiffness=gravity_stiffness,
+            gravity_balanced=gravity_balanced,
             progress=tick,
         )
     content = found.to_dict()
@@ -135,7 +140,11 @@ def assess(
     terms = _terms(loaded, work, found) if compare_methods or report is not None else ()
     if terms:
         content["method_terms"] = [term.to_dict() for term in terms]
-    options: dict[str, Any] = {"residue": residue, "mean_stress": mean_stress}
+    options: dict[str, Any] = {
+        "residue": residue,
+        "mean_stress": mean_stress,
+        "gravity_balanced": gravity_balanced,
+    }
     allowed = spread = None
     if for_life is not None:
         allowed = allowable(loaded, work, named, for_life, survival=survival, **options)

@@ -11,7 +11,7 @@ from picchio.core.arrays import FloatArray
 from picchio.model.linear_system import LinearSystem, modal_damping_matrix
 
 if TYPE_CHECKING:
-    from picchio.robot import FlexibleRobot
+    from picchio.robot import FlexibleRobot, RobotState
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,10 +23,20 @@ class Model:
         gravity_stiffness: whether the springs' stiffness is joined by gravity's, dg/dq: about
             the loaded equilibrium the stiffness is K + dg/dq. Small for life (below 1 % on
             the 3-DoF arm), decisive when a simulation is held against a measurement.
+        gravity_balanced: whether something beside the drives (a spring, a cylinder, a second
+            arm) carries all of gravity, so that it leaves no torque in shaft and reducer. A
+            balancer that is known belongs into the sidecar instead.
     """
 
     robot: FlexibleRobot
     gravity_stiffness: bool = False
+    gravity_balanced: bool = False
+
+    def holding_torque(self, state: RobotState) -> FloatArray:
+        """Torque (n,) that the joints hold against gravity at a state, N m (N)."""
+        return (
+            np.zeros_like(state.gravity_torque) if self.gravity_balanced else state.gravity_torque
+        )
 
     def linear_system(self, pose: FloatArray) -> LinearSystem:
         """The linear equations of motion at a pose.

@@ -55,6 +55,7 @@ def assess(
     miner: MinerRule | None = None,
     paper_mean_stress: bool = False,
     gravity_stiffness: bool = False,
+    gravity_balanced: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Assessment:
     """Life of every joint of a robot on a riveting task (paper section 3.4, eqs. 18-22).
@@ -70,6 +71,7 @@ def assess(
         miner: what cycles below the endurance limit do.
         paper_mean_stress: the paper's life at the mean of the poses' peak stresses (Table 2).
         gravity_stiffness: add dg/dq to the springs.
+        gravity_balanced: gravity leaves no torque in the joints; see `Model`.
         progress: called with (poses done, poses in all).
 
     Returns:
@@ -98,7 +100,8 @@ def assess(
         warn_beyond_limits(robot, operation.poses, f"operation {operation.name!r}")
     reducers = tuple(reducer_of(joint) for joint in robot.flexible_joints)
     paper_curve = load_sn_curve(PAPER_SN_CURVE, quiet=True)
-    job = _Job(Model(robot, gravity_stiffness), rule, curves, reducers, paper_curve)
+    model = Model(robot, gravity_stiffness, gravity_balanced)
+    job = _Job(model, rule, curves, reducers, paper_curve)
     total = sum(len(operation.poses) for operation in task.operations)
     results, checks = [], []
     done = 0
@@ -124,7 +127,7 @@ def assess(
         robot=robot.name,
         method=name,
         sn_curve=", ".join(dict.fromkeys(used)),
-        assumptions=assumptions_of(rule, robot, gravity_stiffness, curves, reducers),
+        assumptions=assumptions_of(rule, model, curves, reducers),
         joints=joints,
         operations=tuple(results),
         limiting_joint=limiting.name if limiting else None,

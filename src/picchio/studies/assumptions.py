@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from picchio.fatigue import SNCurve
 from picchio.fatigue.reducer import Reducer
+from picchio.model import Model
 from picchio.robot import FlexibleRobot
 from picchio.studies.life_rules import LifeRule
 
 
 def assumptions_of(
     rule: LifeRule,
-    robot: FlexibleRobot,
-    gravity_stiffness: bool,
+    model: Model,
     curves: tuple[SNCurve | None, ...],
     reducers: tuple[Reducer | None, ...],
 ) -> tuple[str, ...]:
@@ -20,13 +20,18 @@ def assumptions_of(
     named = [r for r in dict.fromkeys(reducers) if r is not None]
     unchecked = [
         joint.name
-        for joint, reducer in zip(robot.flexible_joints, reducers, strict=True)
+        for joint, reducer in zip(model.robot.flexible_joints, reducers, strict=True)
         if reducer is None
     ]
     lines = [
-        f"gravity stiffness {'on' if gravity_stiffness else 'off'}",
+        f"gravity stiffness {'on' if model.gravity_stiffness else 'off'}",
+        *(
+            ("gravity is balanced: it leaves no torque in the joints",)
+            if model.gravity_balanced
+            else ()
+        ),
         "the motor side of every joint stands still while the tool hits",
-        *_estimates(robot),
+        *_estimates(model.robot),
         *(rule.assumptions() if described else ("each rivet starts from rest and rings down",)),
         *(f"S-N curve {text}" for text in described),
     ]

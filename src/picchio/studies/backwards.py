@@ -64,6 +64,7 @@ def allowable(
     survival: float | None = None,
     residue: Residue = "half-cycles",
     mean_stress: Rule = "none",
+    gravity_balanced: bool = False,
 ) -> tuple[Allowable, ...]:
     """Allowable force, hits and shaft radius of every joint for a wanted life.
 
@@ -79,6 +80,7 @@ def allowable(
         survival: move each curve to this probability; None leaves it.
         residue: as in `assess`.
         mean_stress: as in `assess`.
+        gravity_balanced: as in `assess`.
 
     Raises:
         InputError: no joint with shaft and curve, a life that is not positive, a curve without
@@ -93,7 +95,7 @@ def allowable(
             for j in joints]  # fmt: skip
     columns = [robot.flexible_names.index(joint.name) for joint in joints]
     job = LifeJob(joints, columns, used, residue, mean_stress)
-    model = Model(robot)
+    model = Model(robot, gravity_balanced=gravity_balanced)
     places = [place_of(model, op, pose) for op in task.operations for pose in op.poses]
     loads = _loads(job, places)
     limit = task.rivets_per_pass / rivets

@@ -60,7 +60,7 @@ class PoseLoads:
         joints: n loads.
         natural_frequencies: (n,) Hz.
         tool_position: (3,) m.
-        gravity_torque: (n,) N m.
+        gravity_torque: (n,) N m, that the joints hold.
         stiffness: (n,) N m/rad.
     """
 
@@ -99,7 +99,8 @@ def loads_at(
         response = steady_state(modes, operation.excitation)
         steady = [value for _, value in response.turning_points(operation.direction)]
     feed = operation.excitation.preload * (state.jacobian.T @ operation.direction)
-    static = (feed - state.gravity_torque) / state.stiffness
+    held = model.holding_torque(state)
+    static = (feed - held) / state.stiffness
     joints = tuple(
         JointLoad(steady[j], rest[j], float(static[j]), float(state.stiffness[j])) for j in range(n)
     )
@@ -107,6 +108,6 @@ def loads_at(
         joints,
         modes.natural_frequencies,
         state.tool_position,
-        state.gravity_torque,
+        held,
         state.stiffness,
     )

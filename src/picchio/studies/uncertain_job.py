@@ -153,7 +153,7 @@ def place_of(model: Model, operation: Operation, pose: FloatArray) -> Place:
         hits=operation.hits_per_rivet,
         rivets=operation.rivets,
         stiffness=state.stiffness,
-        static_torque=feed - state.gravity_torque,
+        static_torque=feed - model.holding_torque(state),
     )
 
 

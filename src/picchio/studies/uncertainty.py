@@ -68,6 +68,7 @@ def uncertain_life(
     poses: int = 2,
     residue: Residue = "half-cycles",
     mean_stress: Rule = "none",
+    gravity_balanced: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> UncertainLife:
     """P10, P50 and P90 of every joint's life, and what makes them uncertain.
@@ -88,6 +89,7 @@ def uncertain_life(
             rest keep their nominal share of the damage.
         residue: as in `assess`.
         mean_stress: as in `assess`.
+        gravity_balanced: as in `assess`.
         progress: called with (runs done, runs in all).
 
     Raises:
@@ -101,7 +103,7 @@ def uncertain_life(
             raise InputError("unknown input", key="inputs", value=name, choices=DEFAULT_INPUTS)
     columns = [robot.flexible_names.index(joint.name) for joint in joints]
     job = LifeJob(joints, columns, [curves[j.name] for j in joints], residue, mean_stress)
-    model = Model(robot)
+    model = Model(robot, gravity_balanced=gravity_balanced)
     places = [place_of(model, op, pose) for op in task.operations for pose in op.poses]
     kept, left_out = job.worst(places, [len(op.poses) for op in task.operations], poses)
     varied = dict(inputs)
