@@ -74,6 +74,8 @@ def main(arguments: list[str] | None = None) -> None:
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line and return the exit code."""
     given = sys.argv[1:] if arguments is None else arguments
+    if given and given[-1] == "--version":  # of every subcommand, too
+        given = ["--version"]
     try:
         code = app(args=given or ["--help"], prog_name="picchio", standalone_mode=False)
         sys.stdout.flush()

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from picchio.cli.envelope import ForceOption, PeriodOption, WidthOption, choose_blows
-from picchio.cli.options import FlexOption, RobotArgument, ToolOption
+from picchio.cli.options import FlexOption, JsonOption, RobotArgument, ToolOption
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
     from picchio.robot import FlexibleRobot
     from picchio.studies.places import Places
 
+_SLICE = 1_000_000
 EPILOG = "Example: picchio map fanuc_like_3dof --plane xz --spacing 0.1 --out map.nc"
 
 
@@ -68,13 +69,15 @@ def map_(
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A dask scheduler to use instead.")
     ] = None,
+    json: JsonOption = None,
 ) -> None:
     """Map the workspace; stopped and started again, it goes on where it was."""
-    from picchio.cli.output import check_numbers, check_target, progress
+    from picchio.cli.output import check_numbers, check_target, progress, write_json
     from picchio.robot import load_robot
     from picchio.studies.map import workspace_map
 
-    check_target(out, [robot, flex, points])
+    for target in (out, json):
+        check_target(target, [robot, flex, points])
     check_numbers(at=at, spacing=spacing)
     for key, number, least in (
         ("--chunk", chunk, 1),
@@ -94,7 +97,11 @@ def map_(
             workers=workers, scheduler=scheduler, restart=restart, progress=report,
         )  # fmt: skip
     with found:
-        _show(found, out)
+        summary = _summary(found, out)
+    if json is not None:
+        write_json(summary, json)
+    if json != "-":
+        _show(summary)
 
 
 def _places(
@@ -133,17 +140,42 @@ def _numbers(text: str, key: str) -> list[float]:
         raise InputError("must be numbers separated by commas", key=key, value=text) from None
 
 
-def _show(found: Any, out: Path) -> None:
+def _summary(found: Any, out: Path) -> dict[str, Any]:
+    """The largest deflection of every joint and where it is, read a slice at a time."""
+    count = int(found.sizes["point"])
+    names = [str(name) for name in found["joint"].values]
+    best: dict[str, dict[str, Any]] = {}
+    for first in range(0, count, _SLICE):
+        part = found.isel(point=slice(first, first + _SLICE))
+        peaks = part["peak_deflection"].values
+        for j, name in enumerate(names):
+            k = int(peaks[:, j].argmax())
+            if name not in best or peaks[k, j] > best[name]["peak_deflection"]:
+                row = part.isel(point=k)
+                best[name] = {
+                    "name": name,
+                    "peak_deflection": float(peaks[k, j]),
+                    "position": row["position"].values,
+                    "pose": row["pose"].values,
+                    "worst_direction": row["worst_direction"].values[j],
+                }
+    return {
+        "format": "picchio-map/1",
+        "robot": found.attrs["robot"],
+        "file": str(out),
+        "poses": count,
+        "joints": list(best.values()),
+    }
+
+
+def _show(summary: dict[str, Any]) -> None:
     from picchio.cli.output import console
 
     screen = console()
-    count = found.sizes["point"]
-    places = len(set(found["place"].values.tolist()))
-    screen.print(f"[bold]{found.attrs['robot']}[/bold]: {count} poses at {places} places, in {out}")
-    peaks = found["peak_deflection"].values
-    for j, joint in enumerate(found["joint"].values):
-        k = int(peaks[:, j].argmax())
-        x, y, z = found["position"].values[k]
+    screen.print(f"[bold]{summary['robot']}[/bold]: {summary['poses']} poses in {summary['file']}")
+    for joint in summary["joints"]:
+        x, y, z = joint["position"] + 0.0
         screen.print(
-            f"  {joint}: up to {1e3 * peaks[k, j]:.4g} mrad, at ({x:.3f}, {y:.3f}, {z:.3f}) m"
+            f"  {joint['name']}: up to {1e3 * joint['peak_deflection']:.4g} mrad, at "
+            f"({x:.3f}, {y:.3f}, {z:.3f}) m"
         )

@@ -1,0 +1,74 @@
+"""`picchio map` and `picchio annotate` as programs meet them; --version of every command."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+
+def picchio(*arguments, cwd=None):
+    return subprocess.run(
+        [sys.executable, "-c", "from picchio.cli.main import main; main()", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        timeout=120,
+    )
+
+
+def test_a_map_as_json(tmp_path):
+    done = picchio(
+        "map", "fanuc_like_3dof", "--joint-grid", "1,4,4", "--out", "m.nc", "--json", "-",
+        cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["poses"] == 16
+    assert [joint["name"] for joint in found["joints"]] == ["joint_1", "joint_2", "joint_3"]
+    for joint in found["joints"]:
+        one = picchio(
+            "envelope", "fanuc_like_3dof", "--json", "-",
+            "--pose=" + ",".join(map(str, joint["pose"])),
+        )  # fmt: skip
+        same = {j["name"]: j for j in json.loads(one.stdout)["joints"]}[joint["name"]]
+        assert same["peak_deflection"] == pytest.approx(joint["peak_deflection"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["--spacing", "nan"], "--spacing"),
+        (["--spacing", "1e-9"], "too many"),
+        (["--joint-grid", "100000"], "more than"),
+        (["--workers", "-1"], "--workers"),
+        (["--hits", "0"], "--hits"),
+        (["--plane", "xa"], "plane"),
+        (["--plane", "xz", "--box"], "choose one"),
+        (["--force", "nan"], "--force"),
+    ],
+)
+def test_a_bad_map_is_one_line_and_leaves_nothing(tmp_path, arguments, part):
+    done = picchio("map", "fanuc_like_3dof", *arguments, "--out", "m.nc", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert len(done.stderr.splitlines()) == 1, done.stderr
+    assert part in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_annotate_does_not_overwrite_what_it_reads(tmp_path, repository):
+    arm = tmp_path / "arm.urdf"
+    arm.write_bytes((repository / "robots" / "fanuc_like_3dof" / "robot.urdf").read_bytes())
+    flex = repository / "robots" / "fanuc_like_3dof" / "flex.toml"
+    before = arm.read_bytes()
+    done = picchio("annotate", arm, "--flex", flex, "--out", arm)
+    assert done.returncode == 2
+    assert "would overwrite an input" in done.stderr
+    assert arm.read_bytes() == before
+
+
+@pytest.mark.parametrize("command", ["assess", "map", "robots", "annotate", "fit-sn"])
+def test_every_command_tells_version_and_shows_an_example(command):
+    assert picchio(command, "--version").stdout.startswith("picchio 0.")
+    assert "Example: picchio" in picchio(command, "--help").stdout
