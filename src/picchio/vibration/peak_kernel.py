@@ -9,9 +9,9 @@ from picchio.core.arrays import ComplexArray, FloatArray
 from picchio.vibration.modal_kernel import modes_of
 from picchio.vibration.oscillator_kernel import coefficients
 from picchio.vibration.refine_kernel import refine
-from picchio.vibration.sample_kernel import CUTS, cut, joint_norms, sample, steps_of
+from picchio.vibration.sample_kernel import joint_norms, sample, steps_of
 
-# Of the largest |g|^2 so far: a top below this cannot win, wherever it lies between its samples.
+# Of the largest |g|^2: a sample below this cannot be beside the top.
 _CANDIDATE = 0.95
 _BLOCK = 64
 
@@ -35,7 +35,6 @@ def _pose_peaks(
     direction: FloatArray,
 ) -> None:
     n, dims = push.shape
-    pieces = duration.shape[0]
     for i in range(n):
         poles[i] = complex(-ratio[i] * omega[i], omega[i] * np.sqrt(1.0 - ratio[i] ** 2))
     coefficients(poles, duration, constant, slope, amplitude, wave, periodic, rows)
@@ -43,95 +42,67 @@ def _pose_peaks(
     length = duration.copy()
     if endless:
         length[-1] = 2.0 * np.pi / omega[0]
-    fine = np.empty((n, pieces), dtype=np.complex128)
-    bend = np.empty((n, pieces))
-    size = np.empty(n)
-    for i in range(n):
-        size[i] = 0.0
-        for d in range(dims):
-            size[i] += push[i, d] * push[i, d]
-        size[i] = np.sqrt(size[i])
     while True:
         count, total = 0, 0.0
-        for p in range(pieces):
+        for p in range(length.shape[0]):
             count += steps_of(length[p], max(omega[n - 1], wave[p]))
             total += length[p]
-        free = np.empty((n, count), dtype=np.complex128)
         eta = np.empty((n, count))
         time = np.empty(count)
-        owner = np.empty(count, dtype=np.int64)
         norm = np.empty((n, count))
-        sample(poles, rows, length, wave, omega[n - 1], free, eta, time, owner, fine, bend)
+        sample(poles, rows, length, wave, omega[n - 1], eta, time)
         done = True
         for j in range(n):
             peak[j] = joint_norms(j, count, eta, shapes, push, norm[j])
             if endless and done:
                 # Nothing after the samples can be larger than what is left of the modes.
                 left = 0.0
-                for i in range(n):
-                    z = rows[i, -1, 0] * np.exp(poles[i] * length[-1])
-                    left += abs(shapes[j, i]) * size[i] * abs(z) / poles[i].imag
-                done = left * left <= peak[j]
+                for d in range(dims):
+                    most = 0.0
+                    for i in range(n):
+                        z = rows[i, -1, 0] * np.exp(poles[i] * length[-1])
+                        most += abs(shapes[j, i] * push[i, d]) * abs(z) / poles[i].imag
+                    left += most * most
+                done = left <= peak[j]
         if done or length[-1] > 1e3 * np.pi / (ratio[0] * omega[0]):
             break
         length[-1] *= 2.0
     g, speed, change = np.empty(dims), np.empty(dims), np.empty(dims)
-    cuts = np.empty(CUTS + 1)
-    room = np.empty(pieces)
-    tops = np.empty(count * (CUTS + 1))
-    times = np.empty(count * (CUTS + 1))
-    reach = np.empty(count * (CUTS + 1))
     for j in range(n):
-        largest = peak[j]
+        largest, best = peak[j], -1.0
         for d in range(dims):
             direction[j, d] = 1.0 if d == dims - 1 else 0.0
         peak[j] = 0.0
         if largest <= 0.0:
             continue
-        for p in range(pieces):
-            room[p] = 0.0
-            for i in range(n):
-                room[p] += abs(shapes[j, i]) * size[i] * bend[i, p]
-        found = 0
         for k in range(count):
-            p = owner[k]
-            after = norm[j, k + 1] if k + 1 < count else norm[j, 0 if periodic else k]
-            bound = np.sqrt(max(norm[j, k], after)) + room[p]
-            if bound * bound < largest:
+            here = norm[j, k]
+            if here < _CANDIDATE * largest:
                 continue
-            end = time[k + 1] if k + 1 < count else total
-            h = (end - time[k]) / CUTS
-            cuts[0] = norm[j, k]
-            cut(j, k, p, time[k] - start[p], h, poles, rows, wave, free, fine, shapes, push, cuts)
-            for c in range(CUTS + 1):
-                largest = max(largest, cuts[c])
-                # A cut's end is the next interval's start; both may claim it.
-                if (c == 0 or cuts[c] >= cuts[c - 1]) and (c == CUTS or cuts[c] >= cuts[c + 1]):
-                    tops[found], times[found], reach[found] = cuts[c], time[k] + c * h, h
-                    if 0 < c < CUTS:
-                        # Begin at the top of the parabola through three samples.
-                        rise, fall = cuts[c] - cuts[c - 1], cuts[c] - cuts[c + 1]
-                        if rise + fall > 0.0:
-                            times[found] += 0.5 * h * (rise - fall) / (rise + fall)
-                    found += 1
-        best = -1.0
-        for m in range(found):
-            if tops[m] < _CANDIDATE * largest:
+            before = k - 1 if k > 0 else (count - 1 if periodic else 0)
+            after = k + 1 if k + 1 < count else (0 if periodic else count - 1)
+            if here < norm[j, before] or here < norm[j, after]:
                 continue
-            low, high = times[m] - 1.5 * reach[m], times[m] + 1.5 * reach[m]
-            if not periodic:
-                low, high = max(low, 0.0), min(high, total)
+            a, t, b = time[before], time[k], time[after]
+            if a > t:
+                a -= total
+            if b < t:
+                b += total
+            # Begin at the top of the parabola through the three samples.
+            h, rise, fall = b - t, here - norm[j, before], here - norm[j, after]
+            if abs(h - (t - a)) < 1e-9 * h and rise + fall > 0.0:
+                t += 0.5 * h * (rise - fall) / (rise + fall)
             value = refine(
-                j, low, times[m], high, total if periodic else np.inf, start, poles, rows,
-                constant, slope, amplitude, wave, shapes, push, g, speed, change,
+                j, a, t, b, total if periodic else np.inf, start, poles, rows, constant, slope,
+                amplitude, wave, shapes, push, g, speed, change,
             )  # fmt: skip
             if value > best:
                 best = value
-                length_g = 0.0
+                size = 0.0
                 for d in range(dims):
-                    length_g += g[d] * g[d]
+                    size += g[d] * g[d]
                 for d in range(dims):
-                    direction[j, d] = g[d] / np.sqrt(length_g)
+                    direction[j, d] = g[d] / np.sqrt(size)
         peak[j] = np.sqrt(best)
 
 
