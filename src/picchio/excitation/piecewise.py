@@ -140,17 +140,6 @@ class PiecewiseForce:
             end = np.inf
         return PiecewiseForce(end=end, **pieces)
 
-    def scaled(self, factor: float) -> PiecewiseForce:
-        """The same history, `factor` times as strong."""
-        return PiecewiseForce(
-            self.start,
-            self.end,
-            self.constant * factor,
-            self.slope * factor,
-            self.amplitude * factor,
-            self.angular_frequency,
-        )
-
 
 _PER_PIECE = ("start", "constant", "slope", "amplitude", "angular_frequency")
 

@@ -62,7 +62,20 @@ def _check_train(force: float, period: float, width: float, preload: float) -> N
 
 
 @dataclass(frozen=True)
-class PulseTrain(Excitation):
+class _Train(Excitation):
+    """Equal blows, one a period: what every train states and how it is checked."""
+
+    force: float
+    period: float
+    width: float
+    preload: float = 0.0
+
+    def __post_init__(self) -> None:
+        _check_train(self.force, self.period, self.width, self.preload)
+
+
+@dataclass(frozen=True)
+class PulseTrain(_Train):
     """Rectangular pulses, the paper's Fig. 4 and eq. 12.
 
     Attributes:
@@ -75,14 +88,6 @@ class PulseTrain(Excitation):
         InputError: a number that is not finite, a period or width that is not positive, a
             width that is not less than the period.
     """
-
-    force: float
-    period: float
-    width: float
-    preload: float = 0.0
-
-    def __post_init__(self) -> None:
-        _check_train(self.force, self.period, self.width, self.preload)
 
     def one_period(self) -> PiecewiseForce:
         """The pulse, then silence until the period ends."""
@@ -100,19 +105,11 @@ class PulseTrain(Excitation):
 
 
 @dataclass(frozen=True)
-class HalfSineTrain(Excitation):
+class HalfSineTrain(_Train):
     """Half-sine blows: F0 sin(pi t / T_d) for 0 <= t < T_d, once a period.
 
     Attributes and errors: as `PulseTrain`; `force` is the peak.
     """
-
-    force: float
-    period: float
-    width: float
-    preload: float = 0.0
-
-    def __post_init__(self) -> None:
-        _check_train(self.force, self.period, self.width, self.preload)
 
     def one_period(self) -> PiecewiseForce:
         """The half sine, then silence until the period ends."""
