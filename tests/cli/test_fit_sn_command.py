@@ -76,3 +76,20 @@ def test_bad_tables(tmp_path, text, part):
     assert done.stdout == ""
     assert len(done.stderr.splitlines()) == 1
     assert part in done.stderr.lower()
+
+
+def test_a_picture_of_real_tests(measured_data, tmp_path):
+    source = measured_data / "sn-tests" / "fatigue-data-fractures.csv"
+    for name, start in (("fit.png", b"\x89PNG"), ("fit.svg", b"<?xml"), ("fit.PDF", b"%PDF")):
+        done = picchio("fit-sn", source, "--plot", tmp_path / name)
+        assert done.returncode == 0, done.stderr
+        assert (tmp_path / name).read_bytes().startswith(start)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["fit.PDF", "fit.png", "fit.svg"]
+
+
+def test_a_picture_of_no_known_kind(tests_file, tmp_path):
+    done = picchio("fit-sn", tests_file, "--plot", tmp_path / "fit.docx")
+    assert done.returncode == 2
+    assert "--plot" in done.stderr
+    assert ".png" in done.stderr
+    assert not (tmp_path / "fit.docx").exists()

@@ -42,7 +42,8 @@ def test_blocks_by_hand() -> None:
 
 def test_shigley_worked_example_of_miner() -> None:
     # Shigley's, 9th ed., section 6-15: S_ut = 80, S_e = 40 kpsi, f = 0.9: at 60 kpsi a part lives
-    # N_1 = 8520 cycles; after 3000 of them it has 5520 left.
+    # N_1 = 8520 cycles; after 3000 of them it has 5520 left. Cited from memory: no copy was found
+    # that can be opened.
     slope = 3.0 / math.log10(0.9 * 80.0 / 40.0)
     sn = SNCurve(name="s", strength=40.0, cycles=1e6, slopes=(slope,), knees=(1e6,))
     spent = damage(cycles_of([60.0], [3000.0]), sn)

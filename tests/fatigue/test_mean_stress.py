@@ -39,6 +39,7 @@ def test_khurmi_worked_example(name: str, ultimate: float) -> None:
     # Khurmi and Gupta, A Textbook of Machine Design, ch. 6: stress between +300 and -150 MPa,
     # yield 0.55 S_u, endurance 0.5 S_u, factor of safety 2: S_u = 924.35 (Gerber), 1050 (modified
     # Goodman), 1172.72 MPa (Soderberg). At that S_u, twice the load reaches the endurance limit.
+    # Cited from memory: no copy was found that can be opened. The arithmetic is the book's rules.
     strength = ultimate * 1e6
     sn = curve(ultimate_shear=strength, yield_shear=0.55 * strength)
     assert equivalent(name, 450e6, 150e6, sn) == pytest.approx(0.5 * strength, rel=1e-4)
@@ -47,7 +48,9 @@ def test_khurmi_worked_example(name: str, ultimate: float) -> None:
 def test_shigley_worked_examples() -> None:
     # Shigley's, 9th ed., problem 6-20: S_e = 40, S_ut = 80 kpsi, amplitude 25, mean (von Mises)
     # 25.98 kpsi: n = 1.05 (Goodman), 1.31 (Gerber). Example 6-10: S_e = 33.9, S_ut = 100,
-    # amplitude = mean = 8.38 kpsi: n = 3.66 (Gerber).
+    # amplitude = mean = 8.38 kpsi: n = 3.66 (Gerber). The problem and its answers can be opened
+    # at solutioninn.com/repeat-prob-620-but-with-an-alternating-torsional-stress-of-177929 and
+    # qammunity.org/7853173; example 6-10 is cited from memory.
     for name, limit, ultimate, a, m, n in (
         ("goodman", 40.0, 80.0, 25.0, 25.98, 1.05), ("gerber", 40.0, 80.0, 25.0, 25.98, 1.31),
         ("gerber", 33.9, 100.0, 8.38, 8.38, 3.66),
@@ -59,7 +62,7 @@ def test_shigley_worked_examples() -> None:
 def test_dowling_worked_example() -> None:
     # Dowling, Mechanical Behavior of Materials, 4th ed., section 9.7, AISI 4340 (aircraft quality):
     # sigma_f' = 1758 MPa, gamma = 0.65; 450 MPa about a mean of 200 MPa counts as 507.8 (Morrow),
-    # 540.8 (SWT), 511.8 MPa (Walker).
+    # 540.8 (SWT), 511.8 MPa (Walker). Cited from memory: no copy was found that can be opened.
     morrow = MeanStress("morrow", fatigue_strength_coefficient=1758e6)
     assert morrow.equivalent_amplitude(450e6, 200e6, curve()) == pytest.approx(507.8e6, rel=1e-4)
     assert equivalent("swt", 450e6, 200e6) == pytest.approx(540.8e6, rel=1e-4)

@@ -97,6 +97,9 @@ def test_blows_are_duty_not_an_emergency() -> None:
     ratchet = strain_wave(ratcheting_torque=500.0).check_blows(550.0)
     assert ratchet.governed_by == "ratcheting torque"
     assert ratchet.to_dict()["passed"] is False
+    assert any("teeth skip (1.10 times)" in line for line in ratchet.warnings)
+    loaded = strain_wave().check_blows(310.0, -300.0)
+    assert any("gravity's torque exceeds the rated" in line for line in loaded.warnings)
 
 
 def test_catalogue_agrees_with_the_makers_product_pages() -> None:
@@ -117,7 +120,7 @@ def test_every_entry_is_ordered_and_sourced(name: str) -> None:
     if reducer.average_torque is not None:
         assert reducer.rated_torque <= reducer.average_torque < reducer.repeated_peak_torque
     assert len(reducer.source) > 40
-    expected = {"CSG": 10_000, "SHG": 10_000, "CSF": 7_000, "RV-": 6_000}[name[:3]]
+    expected = {"CSG": 10_000, "SHG": 10_000, "CSF": 7_000, "HFU": 7_000, "RV-": 6_000}[name[:3]]
     assert reducer.rated_life == expected * 3600.0
     if reducer.kind == "strain-wave":
         assert reducer.ratio == float(name.split("-")[2])
@@ -126,6 +129,15 @@ def test_every_entry_is_ordered_and_sourced(name: str) -> None:
 def test_a_cycloidal_name_may_carry_its_ratio() -> None:
     reducer = load_reducer("RV-42N-126")
     assert (reducer.name, reducer.ratio, reducer.rated_torque) == ("RV-42N-126", 126.0, 412.0)
+    ours = load_reducer("RV-80E-121")
+    assert (ours.name, ours.ratio, ours.rated_torque) == ("RV-80E-121", 121.0, 784.0)
+    # What was not read of it is told, and agrees with the sizes that were.
+    assert "not read for this size" in ours.source
+    for name in ("RV-20E", "RV-40E", "RV-42N"):
+        known = load_reducer(name)
+        for key in ("repeated_peak_torque", "momentary_peak_torque"):
+            ratio = getattr(known, key) / known.rated_torque
+            assert getattr(ours, key) / ours.rated_torque == pytest.approx(ratio, rel=0.015)
     with pytest.raises(InputError, match="no such reducer"):
         load_reducer("CSG-32-101-2UH")
 

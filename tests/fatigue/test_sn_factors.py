@@ -9,10 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pylife.strength.failure_probability import FailureProbability
+from pylife.strength.fkm_linear.constants import consts_fkm, fw_t
 
 from picchio.core.errors import InputError
 from picchio.fatigue import Cycles, MeanStress, SNCurve, damage, load_sn_curve
 from picchio.fatigue.allowable import allowable_factor, allowable_radius
+from picchio.fatigue.mean_stress import fkm_sensitivity
 from picchio.fatigue.sn_curve import MinerRule
 from picchio.fatigue.sn_factors import (
     fkm_shear_strength,
@@ -106,6 +108,19 @@ def test_keyed_and_splined_curves_are_the_plain_one_times_a_factor(
     assert notched.slopes == plain.slopes
     # beta_tau by hand: 0.56 * 3 + 0.1 = 1.78; exp(0.42) = 1.522.
     assert 1.0 / factor == pytest.approx({"keyed": 1.78, "splined": 1.52196}[name], rel=1e-5)
+
+
+def test_fkm_constants_are_those_of_pylife() -> None:
+    # pyLife's tables of the guideline's constants, of "Steel".
+    steel = consts_fkm["Steel"]
+    expected = fw_t["Steel"]["shear"] * steel["fw_s"]
+    assert fkm_shear_strength(1000e6) / 1000e6 == pytest.approx(expected, rel=1e-12)
+    rough = 1.0 - fw_t["Steel"]["shear"] * steel["aR_s"] * math.log10(16.0) * math.log10(
+        2.0 * 800.0 / steel["RmNmin"]
+    )
+    assert fkm_surface_factor(16e-6, 800e6) == pytest.approx(rough, rel=1e-12)
+    tension = steel["a_M"] * 1e-3 * 800.0 + steel["b_M"]
+    assert fkm_sensitivity(800e6) == pytest.approx(fw_t["Steel"]["shear"] * tension, rel=1e-12)
 
 
 def test_factors_are_printed_with_the_curve() -> None:

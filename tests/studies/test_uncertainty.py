@@ -12,6 +12,7 @@ from picchio.fatigue.sampling import Uncertain
 from picchio.model import Model
 from picchio.robot import FlexibleRobot, load_robot
 from picchio.studies import Task, assess, task_from_dict
+from picchio.studies.loads import loads_at
 from picchio.studies.uncertain_job import LifeJob, place_of
 from picchio.studies.uncertainty import DEFAULT_INPUTS, uncertain_life
 
@@ -112,6 +113,52 @@ def test_a_perturbed_system_is_the_perturbed_robot(robot: FlexibleRobot, task: T
     for (a, _), (b, _) in zip(ours, theirs, strict=True):
         big = b.range > 1.0  # Pa; an upward force does not move joint_1
         np.testing.assert_allclose(a.range[: len(b)][big], b.range[big], rtol=1e-6)
+
+
+@pytest.mark.parametrize("factors", [(1.0, 1.0, 1.0), (0.8, 1.6, 1.3), (1.3, 0.4, 0.7)])
+def test_the_compiled_path_is_the_exact_one(
+    robot: FlexibleRobot, task: Task, factors: tuple[float, float, float]
+) -> None:
+    # Damage goes with the fifth power of the range, so every cycle must be there, and right.
+    job = LifeJob(list(robot.flexible_joints), [0, 1, 2], [STRAIGHT] * 3, "half-cycles", "none")
+    for operation in task.operations:
+        for pose in operation.poses:
+            place = place_of(Model(robot), operation, pose)
+            assert place.fast is not None
+            exact, ours = job.cycles(place, *factors), job.cycles(place, *factors, compiled=True)
+            for k, ((a, steady), (b, other)) in enumerate(zip(ours, exact, strict=True)):
+                assert steady == pytest.approx(other, rel=1e-12)
+                if not len(b) or b.range.max() < 1.0:  # Pa; an upward force does not move joint_1
+                    continue
+                assert a.range.max() == pytest.approx(b.range.max(), rel=1e-6)
+                for old, new in zip(job.spend(k, b, other, 1.0), job.spend(k, a, steady, 1.0),
+                                    strict=True):  # fmt: skip
+                    assert new == pytest.approx(old, rel=1e-5)
+
+
+def test_damping_beyond_critical_takes_the_exact_path(robot: FlexibleRobot, task: Task) -> None:
+    job = LifeJob(list(robot.flexible_joints), [0, 1, 2], [STRAIGHT] * 3, "half-cycles", "none")
+    operation = task.operations[0]
+    place = place_of(Model(robot), operation, operation.poses[0])
+    assert place.fast is not None
+    assert place.fast.turns(1.0, 100.0, operation.excitation.burst(3)) is None
+    exact = job.cycles(place, 1.0, 100.0, 1.0)
+    ours = job.cycles(place, 1.0, 100.0, 1.0, compiled=True)
+    np.testing.assert_array_equal(ours[1][0].range, exact[1][0].range)
+
+
+def test_it_starts_from_the_same_load_as_assess(robot: FlexibleRobot, task: Task) -> None:
+    operation = task.operations[0]
+    pose = operation.poses[0]
+    loads = loads_at(Model(robot), operation, pose, need="rest")
+    place = place_of(Model(robot), operation, pose)
+    ours = place.loads(need="rest", both=False)
+    for mine, theirs in zip(ours, loads.joints, strict=True):
+        assert mine.rest is not None
+        assert theirs.rest is not None
+        np.testing.assert_array_equal(mine.rest, theirs.rest)
+        assert (mine.static, mine.stiffness) == (theirs.static, theirs.stiffness)
+        assert mine.steady is None
 
 
 def test_one_seed_one_result(robot: FlexibleRobot, task: Task) -> None:

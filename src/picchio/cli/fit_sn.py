@@ -12,13 +12,15 @@ from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
     from picchio.fatigue.sn_fit import Estimate, SNFit
+    from picchio.fatigue.sn_tests import SNTests
 
 # Distortion energy: the shear strength of ductile steel is 1 / sqrt(3) of the normal one.
 _TO_SHEAR = {
     "shear": (1.0, "the tests' stresses are taken as shear (--kind)"),
     "normal": (3.0**-0.5, "normal stresses were divided by sqrt(3) to shear"),
 }
-EPILOG = "Example: picchio fit-sn tests.csv --survival 0.99 --out my-steel.toml"
+_PICTURES = (".png", ".svg", ".pdf")
+EPILOG = "Example: picchio fit-sn tests.csv --survival 0.99 --out my-steel.toml --plot fit.png"
 
 
 def register(app: typer.Typer) -> None:
@@ -47,6 +49,10 @@ def fit_sn_command(
         Path | None,
         typer.Option("--out", metavar="FILE", help="Write the curve as TOML, for --sn-curve."),
     ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option("--plot", metavar="FILE", help="Draw tests and curve: .png, .svg or .pdf."),
+    ] = None,
     json: JsonOption = None,
 ) -> None:
     """Fit slope, knee, endurance limit and scatter, each with its interval."""
@@ -55,8 +61,10 @@ def fit_sn_command(
     from picchio.fatigue.sn_fit import fit_sn
     from picchio.fatigue.sn_tests import read_sn_tests
 
-    for target in (out, json):
+    for target in (out, plot, json):
         check_target(target, [tests])
+    if plot is not None and plot.suffix.lower() not in _PICTURES:
+        raise InputError("unknown kind", key="--plot", value=plot.name, choices=_PICTURES)
     if run_out_cycles is not None and not 0.0 < run_out_cycles < float("inf"):
         raise InputError("must be positive", key="--run-out-cycles", value=run_out_cycles)
     if kind not in _TO_SHEAR:
@@ -71,6 +79,8 @@ def fit_sn_command(
     )
     if out is not None:
         _write_curve(found, survival, out, note)
+    if plot is not None:
+        _draw(found, data, factor, plot)
     if json is not None:
         content = found.to_dict()
         content["assumptions"] = [note, *content["assumptions"], *data.assumptions]
@@ -92,6 +102,20 @@ def _write_curve(found: SNFit, survival: float, out: Path, note: str) -> None:
     text = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
     with atomic_write(out) as stream:
         stream.write(tomlkit.dumps(text))
+
+
+def _draw(found: SNFit, data: SNTests, factor: float, plot: Path) -> None:
+    import dataclasses
+
+    from picchio.core.files import atomic_write
+    from picchio.view.plots import plot_sn_fit
+    from picchio.view.plots.style import PAPER, blank_figure
+
+    shear = dataclasses.replace(data, amplitude=factor * data.amplitude)
+    figure = plot_sn_fit(found, shear, blank_figure(height=3.8)).get_figure(root=True)
+    assert figure is not None
+    with atomic_write(plot, "wb") as stream:
+        figure.savefig(stream, format=plot.suffix[1:].lower(), dpi=160, facecolor=PAPER)
 
 
 def _show(found: SNFit, tests: Path, notes: tuple[str, ...]) -> None:

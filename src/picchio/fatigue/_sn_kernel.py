@@ -10,6 +10,7 @@ import numpy as np
 from picchio.fatigue._types import FloatArray
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(20)
+_FEW_NODES, _FEW_WEIGHTS = np.polynomial.legendre.leggauss(12)
 _HALF_LOG_2PI = 0.5 * math.log(2.0 * math.pi)
 
 
@@ -38,9 +39,10 @@ def bivariate_upper(h: float, k: float, r: float) -> float:
     hk, total = h * k, 0.0
     if abs(r) < 0.925:
         half, arc = 0.5 * (h * h + k * k), 0.5 * math.asin(r)
-        for i in range(_NODES.shape[0]):
-            sn = math.sin(arc * (1.0 + _NODES[i]))
-            total += _WEIGHTS[i] * math.exp((sn * hk - half) / (1.0 - sn * sn))
+        nodes, weights = (_FEW_NODES, _FEW_WEIGHTS) if abs(r) < 0.75 else (_NODES, _WEIGHTS)
+        for i in range(nodes.shape[0]):
+            sn = math.sin(arc * (1.0 + nodes[i]))
+            total += weights[i] * math.exp((sn * hk - half) / (1.0 - sn * sn))
         return total * arc / (2.0 * math.pi) + normal_cdf(-h) * normal_cdf(-k)
     if r < 0.0:
         k, hk = -k, -hk

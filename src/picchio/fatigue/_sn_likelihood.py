@@ -48,14 +48,13 @@ class Likelihood:
 
     def __call__(self, theta: FloatArray) -> tuple[float, FloatArray]:
         """Value and gradient (5,) at theta."""
-        from picchio.fatigue._sn_kernel import log_likelihood
+        from picchio.fatigue._sn_ascent import objective
 
         gradient = np.zeros(5)
-        value = log_likelihood(
+        value = objective(
             theta, self.stress, self.cycles, self.failed, float(self.z), self.limited, gradient
         )
-        gradient[4] -= theta[4]
-        return float(value) - 0.5 * float(theta[4]) ** 2, gradient
+        return float(value), gradient
 
     def hessian(self, theta: FloatArray) -> FloatArray:
         """(5, 5) second derivatives, by central differences of the gradient."""
@@ -76,31 +75,10 @@ def maximise(
     Returns:
         value and theta where it ended.
     """
-    theta = start.copy()
-    value, gradient = likelihood(theta)
-    damping = 1e-3
-    index = np.ix_(free, free)
-    for _ in range(steps):
-        curvature, g = -likelihood.hessian(theta)[index], gradient[free]
-        scale = np.sqrt(np.maximum(np.abs(np.diag(curvature)), 1e-6))
-        values, vectors = np.linalg.eigh(curvature / np.outer(scale, scale))
-        slope = vectors.T @ (g / scale)
-        moved = False
-        for _ in range(30):
-            # Absolute eigenvalues keep the step uphill where the surface is not concave.
-            step = (vectors @ (slope / (np.maximum(np.abs(values), 1e-8) + damping))) / scale
-            step *= min(1.0, 0.7 / float(np.abs(step).max() + 1e-300))
-            trial = theta.copy()
-            trial[free] += step
-            new_value, new_gradient = likelihood(trial)
-            if np.isfinite(new_value) and new_value >= value:
-                damping, moved = max(damping / 8.0, 1e-10), True
-                break
-            damping = max(4.0 * damping, 1e-6)
-        if not moved:
-            break
-        gain, reach = new_value - value, float(np.abs(trial - theta).max())
-        theta, value, gradient = trial, new_value, new_gradient
-        if gain < 1e-9 and reach < 1e-4:
-            break
-    return value, theta
+    from picchio.fatigue._sn_ascent import ascend
+
+    lk = likelihood
+    value, theta = ascend(
+        start, np.array(free), lk.stress, lk.cycles, lk.failed, float(lk.z), lk.limited, steps
+    )
+    return float(value), theta

@@ -13,6 +13,10 @@ from picchio.fatigue._types import FloatArray
 _FARTHEST = 12.0
 """Where an interval is called unbounded: a factor e^12 (1.6e5) from the estimate."""
 
+_LINE = 2
+"""Degrees of freedom that the line through the failures takes, as in a linear regression. The limit
+takes next to none: which specimens break tells it, not how their lives scatter."""
+
 _NEVER = -1e12
 """A log-likelihood that no data have; finite, so that searches can compute with it."""
 
@@ -29,6 +33,7 @@ class Profile:
     def __init__(
         self, likelihood: Likelihood, theta: FloatArray, free: list[int], level: float
     ) -> None:
+        """Find the maximum from a guess `theta` (5,), and the threshold for `level`."""
         from scipy.stats import chi2
         from scipy.stats import t as student
 
@@ -41,17 +46,25 @@ class Profile:
         median = self.theta.copy()
         median[0] += likelihood.z * np.exp(median[3])
         effective = max(-float(at_median.hessian(median)[3, 3]) / 2.0, 1.0)
-        freedom = max(effective - len(self._places), 1.0)
+        freedom = max(effective - _LINE, 1.0)
         quantile = float(student.ppf(0.5 + level / 2.0, freedom))
         self.threshold = effective / 2.0 * float(np.log1p(quantile**2 / freedom))
         self._plain = float(chi2.ppf(level, 1)) / 2.0
-        spread = np.linalg.pinv(information[np.ix_(free, free)])
-        steps = np.sqrt(np.clip(np.diag(spread), 1e-8, 1.0))
+        self._spread = np.linalg.pinv(information[np.ix_(free, free)])
+        steps = np.sqrt(np.clip(np.diag(self._spread), 1e-8, 1.0))
         self._step = dict(zip(free, steps, strict=True))
 
     def interval(self, index: int) -> tuple[float, float]:
         """Ends of the interval of one parameter (a logarithm); infinite where unbounded."""
         return self._ends(index, self.theta[index], self.value, self.threshold, self._at)
+
+    def covariance(self) -> tuple[tuple[float, ...], ...]:
+        """(3, 3) of the first three parameters, as wide as the threshold makes intervals."""
+        full = np.zeros((5, 5))
+        full[np.ix_(self.free, self.free)] = self._spread
+        values, vectors = np.linalg.eigh(full[:3, :3] * self.threshold / self._plain)
+        whole = (vectors * np.maximum(values, 0.0)) @ vectors.T
+        return tuple(tuple(float(v) for v in row) for row in whole)
 
     def scatter(self) -> tuple[float, float, float]:
         """Ln t by the adjusted profile: its maximum, and the ends of its interval."""

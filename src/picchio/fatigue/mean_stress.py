@@ -130,8 +130,8 @@ class MeanStress:
 def fkm_sensitivity(tensile_strength: float) -> float:
     """FKM's mean stress sensitivity of steel in shear, M_tau = 0.577 (0.35e-3 R_m / MPa - 0.1).
 
-    FKM guideline (Analytical Strength Assessment), mean stress sensitivity with a_M = 0.35 and
-    b_M = -0.1 for steel, and the shear fatigue factor f_W,tau = 0.577.
+    FKM guideline (2012), mean stress sensitivity with a_M = 0.35 and b_M = -0.1 for steel, and the
+    shear fatigue factor f_W,tau = 0.577: all three as in pyLife 2.3.1's `fkm_linear.constants`.
 
     Args:
         tensile_strength: R_m, Pa.
@@ -143,7 +143,10 @@ def fkm_sensitivity(tensile_strength: float) -> float:
 
 
 def _fkm(a: FloatArray, m: FloatArray, sensitivity: float) -> FloatArray:
-    """FKM's fields II (R <= 0), III (0 < R < 0.5) and IV (R >= 0.5), continuous in between."""
+    """FKM's fields II (R <= 0), III (0 < R < 0.5) and IV (R >= 0.5), continuous in between.
+
+    II and III are pyLife's `fkm_goodman`; that IV is constant is from memory, unverified.
+    """
     big = sensitivity
     alternating = a + big * m
     pulsating = (1.0 + big) * (a + big / 3.0 * m) / (1.0 + big / 3.0)

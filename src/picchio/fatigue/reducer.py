@@ -27,6 +27,14 @@ MOMENTARY_EVENTS = 1e4
 """Flexspline deformations that a strain-wave gear stands at momentary peaks (Harmonic Drive)."""
 
 
+_EXCEEDED = {
+    "repeated peak torque": "the blows' peak torque exceeds the limit for repeated peaks",
+    "momentary peak torque": "the peak torque exceeds even the limit for emergencies",
+    "ratcheting torque": "the peak torque exceeds that at which teeth skip",
+    "rated torque, held": "gravity's torque exceeds the rated torque, for which the life is stated",
+}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Reducer:
     """A reducer's ratings; every torque is at the output.
@@ -175,16 +183,9 @@ class Reducer:
             f"{self.name}: catalogue life presumes turning; a joint that stands still under blows "
             "risks false brinelling, which no catalogue covers"
         ]
-        if shares["repeated peak torque"] > 1.0:
-            lines.append(
-                f"{self.name}: the blows' peak torque exceeds the limit for repeated peaks "
-                f"({shares['repeated peak torque']:.2f} times)"
-            )
-        if shares["momentary peak torque"] > 1.0:
-            lines.append(
-                f"{self.name}: the peak torque exceeds even the limit for emergencies "
-                f"({shares['momentary peak torque']:.2f} times)"
-            )
+        for limit, text in _EXCEEDED.items():
+            if shares.get(limit, 0.0) > 1.0:
+                lines.append(f"{self.name}: {text} ({shares[limit]:.2f} times)")
         return tuple(lines)
 
 

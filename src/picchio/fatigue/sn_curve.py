@@ -192,6 +192,22 @@ class SNCurve:
         erf = np.vectorize(math.erf, otypes=[float])
         return np.asarray(0.5 * (1.0 + erf(score / math.sqrt(2.0))))
 
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        limit = self.endurance_limit
+        facts = {
+            "slopes": self.slopes,
+            "knees [cycles]": self.knees or None,
+            "endurance limit [MPa]": "none" if limit is None else 1e-6 * limit,
+            "Miner below it": None if limit is None else self.miner,
+            "survival": self.survival,
+            "scatter of log10 strength": self.scatter,
+            "source": self.source or None,
+            "assumed": "; ".join(self.assumptions) or None,
+        }
+        return sheet(f"S-N curve {self.name}, in shear", facts, note=self.warning)
+
     def describe(self) -> str:
         """One line for a report: the curve's numbers and what was assumed."""
         lines = ", ".join(f"{slope:g}" for slope in self.slopes)

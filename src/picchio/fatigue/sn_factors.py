@@ -30,7 +30,8 @@ FATIGUE_FACTOR = 0.45
 def fkm_shear_strength(tensile_strength: float) -> float:
     """FKM's fully reversed shear strength of a polished steel specimen, Pa.
 
-    tau_W = 0.577 * 0.45 * R_m; FKM guideline (Analytical Strength Assessment), survival 97.5 %.
+    tau_W = 0.577 * 0.45 * R_m; FKM guideline (2012), as in pyLife 2.3.1's `fkm_linear.constants`.
+    That it holds for survival 97.5 % is from memory, unverified.
 
     Args:
         tensile_strength: R_m of the part's own size class, Pa.
@@ -41,7 +42,8 @@ def fkm_shear_strength(tensile_strength: float) -> float:
 def fkm_surface_factor(roughness: float, tensile_strength: float) -> float:
     """FKM's roughness factor in shear, of steel.
 
-    K_R,tau = 1 - 0.577 * 0.22 lg(Rz / um) lg(2 R_m / 400 MPa); FKM guideline.
+    K_R,tau = 1 - 0.577 * 0.22 lg(Rz / um) lg(2 R_m / 400 MPa); FKM guideline (2012), constants as
+    in pyLife 2.3.1's `fkm_linear.constants`.
 
     Args:
         roughness: mean roughness depth Rz, m; below 1 um counts as polished.
@@ -129,7 +131,8 @@ def key_factor(tensile_strength: float) -> float:
     """Fatigue strength of a keyed shaft in torsion over that of the plain one.
 
     1 / beta_tau, beta_tau = 0.56 * 3 (sigma_B / 1000 MPa)^0.38 + 0.1; DIN 743-2, table 1, one
-    feather key with hub, reference diameter 40 mm.
+    feather key with hub, reference diameter 40 mm, as implemented in github.com/hanslhansl/din743
+    (commit 200ffd8). Two keys: 15 % more notch effect there, which is left out here.
 
     Args:
         tensile_strength: sigma_B of the shaft, Pa.
@@ -141,8 +144,10 @@ def key_factor(tensile_strength: float) -> float:
 def spline_factor(tensile_strength: float) -> float:
     """Fatigue strength of a splined shaft in torsion over that of the plain one.
 
-    1 / beta_tau, beta_tau = exp(4.2e-7 (sigma_B / MPa)^2); DIN 743-2, table 1, splined and
-    serrated shafts, on the root diameter, reference diameter 29 mm.
+    1 / beta_tau, beta_tau = exp(4.2e-7 (sigma_B / MPa)^2); DIN 743-2, table 1, straight-sided and
+    serrated splines, on the root diameter, reference diameter 29 mm, as implemented in
+    github.com/sydgtfzguhgfhtr/ME_Wellennachweis (commit 080e852). On the safe side for involute
+    splines, of which that has 1 + 0.75 (beta_tau - 1).
 
     Args:
         tensile_strength: sigma_B of the shaft, Pa.

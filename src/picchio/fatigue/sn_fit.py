@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,105 +13,9 @@ from picchio.core.errors import InputError, PicchioWarning
 from picchio.fatigue._sn_likelihood import Likelihood, maximise
 from picchio.fatigue._sn_profile import Profile
 from picchio.fatigue._types import FloatArray, as_floats
-from picchio.fatigue.sn_curve import SNCurve
+from picchio.fatigue.sn_fit_result import METHOD, Estimate, SNFit
 
-METHOD = (
-    "maximum likelihood; Basquin's line with an endurance limit; log-normal strength and "
-    "life; profile likelihood intervals with Student's t threshold, scatter by the Cox-Reid "
-    "adjusted profile"
-)
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A fitted value and its confidence interval; an end that the data do not bound is 0 or inf."""
-
-    value: float
-    low: float
-    high: float
-
-    def to_dict(self) -> dict[str, float | None]:
-        """For JSON; an infinite end is None."""
-        return {
-            name: (float(v) if np.isfinite(v) else None)
-            for name, v in (("value", self.value), ("low", self.low), ("high", self.high))
-        }
-
-
-@dataclass(frozen=True)
-class SNFit:
-    """A fitted S-N curve.
-
-    Attributes:
-        slope: k of N ~ amplitude^-k.
-        knee: cycles at the knee; None where no run-out shows one.
-        endurance_limit: Pa, median. Without a knee: the median strength at `reference_cycles`.
-        design: Pa, the same at `design_survival`.
-        scatter: standard deviation of log10 strength at a given life, free of the bias of maximum
-            likelihood. It holds the specimens' strength and the scatter of life by itself, so at
-            the endurance limit it is on the safe side.
-        strength_share: share of the scatter's variance that is the specimens' strength, which
-            alone counts at the endurance limit (maximum likelihood; few tests show it badly).
-        design_survival: the probability that `design` is for.
-        reference_cycles: where the strengths are given.
-        level: of the intervals, two-sided.
-        failures: number of failed specimens.
-        run_outs: number of survivors.
-        log_likelihood: at the maximum, natural, density in ln cycles, penalty included.
-        assumptions: what was assumed, in words.
-    """
-
-    slope: Estimate
-    knee: Estimate | None
-    endurance_limit: Estimate
-    design: Estimate
-    scatter: Estimate
-    strength_share: float
-    design_survival: float
-    reference_cycles: float
-    level: float
-    failures: int
-    run_outs: int
-    log_likelihood: float
-    assumptions: tuple[str, ...]
-
-    def curve(self, survival: float = 0.5, name: str = "fitted") -> SNCurve:
-        """The fitted curve as an `SNCurve`, moved to a probability of survival.
-
-        Args:
-            survival: of a specimen; the fit's own uncertainty is not in it (see `design.low`).
-            name: what to call it.
-        """
-        median = SNCurve(
-            name=name,
-            strength=self.endurance_limit.value,
-            cycles=self.reference_cycles,
-            slopes=(self.slope.value,),
-            knees=(self.reference_cycles,) if self.knee is not None else (),
-            survival=0.5,
-            scatter=self.scatter.value,
-            source=f"fitted to {self.failures} failures and {self.run_outs} run-outs by picchio",
-            assumptions=self.assumptions,
-        )
-        return median if survival == 0.5 else median.at_survival(survival)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The `picchio-sn/1` record."""
-        names = ("slope", "endurance_limit", "design", "scatter")
-        return {
-            "format": "picchio-sn/1",
-            "method": METHOD,
-            **{name: getattr(self, name).to_dict() for name in names},
-            "knee": None if self.knee is None else self.knee.to_dict(),
-            "strength_share": self.strength_share,
-            "design_survival": self.design_survival,
-            "reference_cycles": self.reference_cycles,
-            "level": self.level,
-            "failures": self.failures,
-            "run_outs": self.run_outs,
-            "log_likelihood": self.log_likelihood,
-            "assumptions": list(self.assumptions),
-        }
+__all__ = ["METHOD", "Estimate", "SNFit", "fit_sn"]
 
 
 def fit_sn(
@@ -127,9 +30,20 @@ def fit_sn(
     """Fit slope, knee, endurance limit and scatter by maximum likelihood.
 
     The model is `picchio.fatigue._sn_likelihood`'s. Intervals invert the profile likelihood with
-    the threshold n ln(1 + t^2 / (n - p)) that is exact for a normal linear model, n being the
-    number of failures that would inform the scatter as much as these tests do; the scatter's
-    inverts the adjusted profile likelihood of Cox and Reid (J. R. Statist. Soc. B 49, 1987).
+    the threshold n ln(1 + t^2 / (n - 2)) that is exact for a regression line, n being the number
+    of failures that would inform the scatter as much as these tests do; the scatter's inverts the
+    adjusted profile likelihood of Cox and Reid (J. R. Statist. Soc. B 49, 1987).
+
+    How often 90 % intervals held the truth in 2,000 sets of 30 tests, and of 100, with about a
+    quarter of run-outs (slope, knee, limit, design, scatter; standard error 0.7 points):
+
+    - scatter half strength, half life: 90, 91, 89, 89, 89 %; and 92, 92, 90, 90, 91 %
+    - a quarter strength: 89, 89, 94, 89, 88 %; and 90, 90, 92, 90, 89 %
+    - all strength: 87, 89, 89, 90, 88 %; and 83, 80, 88, 89, 91 %
+    - all life, the limit the same for all: 84, 85, 100, 87, 83 %; and 87, 81, 63, 79, 83 %
+
+    So where the scatter is all of one kind the intervals are too narrow, the more so with many
+    tests, and `assumptions` says so where the tests show it.
 
     Args:
         amplitude: (n,) stress amplitudes, Pa.
@@ -169,6 +83,11 @@ def fit_sn(
     at_quantile[0] -= z * np.exp(theta[3])
     design = Profile(dataclasses.replace(tests, z=z), at_quantile, free, level)
 
+    share = float(1.0 / (1.0 + np.exp(-median.theta[4])))
+    if with_knee and not 0.2 < share < 0.8:
+        kind = "strength" if share > 0.5 else "life by itself"
+        notes.append(f"the scatter is nearly all of {kind}: the intervals are too narrow then")
+
     def estimate(profile: Profile, index: int) -> Estimate:
         low, high = profile.interval(index)
         return Estimate(*(float(np.exp(v)) for v in (profile.theta[index], low, high)))
@@ -185,7 +104,7 @@ def fit_sn(
             value=float(np.exp(median.theta[0])) * 10.0 ** (-z * spread),
         ),
         scatter=scatter,
-        strength_share=float(1.0 / (1.0 + np.exp(-median.theta[4]))),
+        strength_share=share,
         design_survival=survival,
         reference_cycles=float(f"{np.exp(median.theta[1]):.12g}"),
         level=level,
@@ -193,6 +112,7 @@ def fit_sn(
         run_outs=run_outs,
         log_likelihood=median.value,
         assumptions=tuple(notes),
+        covariance=median.covariance(),
     )
 
 

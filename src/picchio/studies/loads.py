@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Self
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.excitation import Excitation
 from picchio.fatigue import Cycles, rainflow, shear_stress
 from picchio.fatigue.rainflow import Residue
-from picchio.model import Model
-from picchio.robot import Joint
+from picchio.model import LinearSystem, Model
+from picchio.robot import Joint, RobotState
 from picchio.studies.task import Operation
-from picchio.vibration import modal_analysis, response_from_rest, steady_state
+from picchio.vibration import Modes, modal_analysis, response_from_rest, steady_state
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +75,99 @@ class PoseLoads:
     stiffness: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class Rivet:
+    """A rivet about to be set at a pose: all that its loads follow from.
+
+    Attributes:
+        system: M, C, K and where force goes in.
+        excitation: the blows.
+        direction: (3,) unit vector of the force.
+        hits: blows of the rivet.
+        static_torque: (n,) N m, through the springs before the first blow: gravity and feed force.
+        stiffness: (n,) N m/rad, of the joints' springs.
+    """
+
+    system: LinearSystem
+    excitation: Excitation
+    direction: FloatArray
+    hits: int
+    static_torque: FloatArray
+    stiffness: FloatArray
+
+    @classmethod
+    def at(
+        cls, model: Model, operation: Operation, state: RobotState, pose: FloatArray, **more: Any
+    ) -> Self:
+        """The rivet of an operation at a pose, (nv,) rad or m, whose state is known."""
+        feed = operation.excitation.preload * (state.jacobian.T @ operation.direction)
+        return cls(
+            system=model.linear_system(pose),
+            excitation=operation.excitation,
+            direction=operation.direction,
+            hits=operation.hits_per_rivet,
+            static_torque=feed - model.holding_torque(state),
+            stiffness=state.stiffness,
+            **more,
+        )
+
+    def perturbed(self, stiffness: float, damping: float, excitation: Excitation) -> Self:
+        """The same with all stiffnesses and damping ratios times a factor, and other blows.
+
+        The torque before the first blow stays.
+        """
+        system = replace(
+            self.system,
+            stiffness_matrix=stiffness * self.system.stiffness_matrix,
+            # Modal damping with the same mode shapes: C goes with zeta omega.
+            damping_matrix=damping * math.sqrt(stiffness) * self.system.damping_matrix,
+        )
+        springs = stiffness * self.stiffness
+        return replace(self, system=system, excitation=excitation, stiffness=springs)
+
+    def loads(
+        self, modes: Modes | None = None, *, need: str | None = None, both: bool = True
+    ) -> tuple[JointLoad, ...]:
+        """Every joint's load.
+
+        Args:
+            modes: of the system, if they are known.
+            need: "rest" or "steady", whichever must be there; see `loads_at`.
+            both: False: leave out what is not needed, damped or not.
+        """
+        modes = modal_analysis(self.system) if modes is None else modes
+        also = both and bool((modes.poles.real < 0.0).all())
+        rest: list[FloatArray] | None = None
+        steady: list[FloatArray] | None = None
+        if also or need == "rest":
+            response = response_from_rest(modes, self.excitation, self.hits)
+            rest = [value for _, value in response.turning_points(self.direction)]
+        if also or need == "steady":
+            response = steady_state(modes, self.excitation)
+            steady = [value for _, value in response.turning_points(self.direction)]
+        return self.joint_loads(rest, steady)
+
+    def joint_loads(
+        self,
+        rest: list[FloatArray] | None,
+        steady: list[FloatArray] | None = None,
+        *,
+        stiffness: FloatArray | None = None,
+    ) -> tuple[JointLoad, ...]:
+        """The joints' loads from their turning points, rad; with other springs, (n,) N m/rad."""
+        springs = self.stiffness if stiffness is None else stiffness
+        static = self.static_torque / springs
+        return tuple(
+            JointLoad(
+                None if steady is None else steady[j],
+                None if rest is None else rest[j],
+                float(static[j]),
+                float(spring),
+            )
+            for j, spring in enumerate(springs)
+        )
+
+
 def loads_at(
     model: Model, operation: Operation, pose: FloatArray, *, need: str | None = None
 ) -> PoseLoads:
@@ -87,27 +184,50 @@ def loads_at(
         InputError: a resonance without damping, a ring-down without end.
     """
     state = model.robot.state(pose)
-    modes = modal_analysis(model.linear_system(pose))
-    n = len(model.robot.flexible_joints)
-    damped = bool((modes.poles.real < 0.0).all())
-    rest: list[FloatArray | None] = [None] * n
-    steady: list[FloatArray | None] = [None] * n
-    if damped or need == "rest":
-        response = response_from_rest(modes, operation.excitation, operation.hits_per_rivet)
-        rest = [value for _, value in response.turning_points(operation.direction)]
-    if damped or need == "steady":
-        response = steady_state(modes, operation.excitation)
-        steady = [value for _, value in response.turning_points(operation.direction)]
-    feed = operation.excitation.preload * (state.jacobian.T @ operation.direction)
+    if model.moving:
+        return _extended_loads(model, operation, pose, state, need)
+    rivet = Rivet.at(model, operation, state, pose)
+    modes = modal_analysis(rivet.system)
+    return PoseLoads(
+        rivet.loads(modes, need=need),
+        modes.natural_frequencies,
+        state.tool_position,
+        model.holding_torque(state),
+        state.stiffness,
+    )
+
+
+def _extended_loads(
+    model: Model, operation: Operation, pose: FloatArray, state: RobotState, need: str | None
+) -> PoseLoads:
+    """As `loads_at`, by a model whose effects change the motion."""
+    from picchio.studies.extended_loads import ExtendedRivet
+
+    extended = ExtendedRivet(model, operation, pose)
+    found: dict[str, list[FloatArray] | None] = {}
+    for name in ("rest", "steady"):
+        try:
+            found[name] = extended.turning_points(steady=name == "steady")
+        except InputError:
+            if need in (None, name):
+                raise
+            found[name] = None
     held = model.holding_torque(state)
-    static = (feed - held) / state.stiffness
+    feed = operation.excitation.preload * (state.jacobian.T @ operation.direction)
+    static = (feed - held) / extended.stiffness
     joints = tuple(
-        JointLoad(steady[j], rest[j], float(static[j]), float(state.stiffness[j])) for j in range(n)
+        JointLoad(
+            None if found["steady"] is None else found["steady"][j],
+            None if found["rest"] is None else found["rest"][j],
+            float(static[j]),
+            float(spring),
+        )
+        for j, spring in enumerate(extended.stiffness)
     )
     return PoseLoads(
         joints,
-        modes.natural_frequencies,
+        extended.natural_frequencies[: len(joints)],
         state.tool_position,
         held,
-        state.stiffness,
+        extended.stiffness,
     )

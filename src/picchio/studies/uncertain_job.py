@@ -3,38 +3,49 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from statistics import NormalDist
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.excitation import Excitation, HalfSineTrain, PulseTrain
-from picchio.fatigue import Cycles, SNCurve, damage, life, rainflow, shear_stress, utilisation
+from picchio.excitation import Excitation, HalfSineTrain, PiecewiseForce, PulseTrain
+from picchio.fatigue import Cycles, SNCurve, damage, life, utilisation
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.rainflow import Residue
-from picchio.model import LinearSystem, Model
+from picchio.model import Model
 from picchio.robot import Joint
+from picchio.studies.loads import Rivet
 from picchio.studies.task import Operation
-from picchio.vibration import modal_analysis, response_from_rest
+from picchio.vibration import modal_analysis
+
+if TYPE_CHECKING:
+    from picchio.studies.fast_rest import FastRest
 
 _DYNAMIC = ("stiffness", "damping_ratio", "width")
 
 
-@dataclass(frozen=True)
-class Place:
-    """One pose of one operation, ready to be perturbed."""
+@dataclass(frozen=True, eq=False)
+class Place(Rivet):
+    """One pose of one operation, ready to be perturbed.
 
-    system: LinearSystem
-    excitation: Excitation
-    direction: FloatArray
-    hits: int
-    rivets: float
-    stiffness: FloatArray
-    static_torque: FloatArray
+    Attributes:
+        rivets: set there in a pass of the task.
+    """
+
+    rivets: float = 1.0
+
+    @cached_property
+    def fast(self) -> FastRest | None:
+        """The compiled path; None where the modes need the exact one."""
+        from picchio.studies.fast_rest import FastRest
+
+        modes = modal_analysis(self.system)
+        return FastRest(modes, self.direction) if FastRest.suits(modes) else None
 
 
 @dataclass(frozen=True)
@@ -48,32 +59,65 @@ class LifeJob:
     mean_stress: Rule
 
     def cycles(
-        self, place: Place, stiffness: float, damping: float, width: float
+        self,
+        place: Place,
+        stiffness: float,
+        damping: float,
+        width: float,
+        *,
+        compiled: bool = False,
     ) -> list[tuple[Cycles, float]]:
-        """Each joint's stress cycles at nominal force, Pa, and its steady stress."""
-        system = place.system
-        perturbed = dataclasses.replace(
-            system,
-            stiffness_matrix=stiffness * system.stiffness_matrix,
-            # Modal damping with the same mode shapes: C goes with zeta omega.
-            damping_matrix=damping * math.sqrt(stiffness) * system.damping_matrix,
-        )
-        response = response_from_rest(
-            modal_analysis(perturbed), _wider(place.excitation, width), place.hits
-        )
-        points = response.turning_points(place.direction)
-        found = []
-        for joint, column in zip(self.joints, self.columns, strict=True):
-            assert joint.shaft is not None
-            spring = stiffness * place.stiffness[column]
-            stress = shear_stress(spring * points[column][1], joint.shaft)
-            steady = float(shear_stress(place.static_torque[column], joint.shaft))
-            found.append((rainflow(stress, self.residue), steady))
-        return found
+        """Each joint's stress cycles at nominal force, Pa, and its steady stress.
 
-    def spend(self, k: int, cycles: Cycles, steady: float, factor: float) -> tuple[float, float]:
+        Args:
+            place: pose and blows.
+            stiffness: factor on all stiffnesses.
+            damping: factor on all damping ratios.
+            width: factor on the width of the blows.
+            compiled: turning points to 1e-7, many times faster than those of `loads_at`.
+        """
+        blows, turns = _wider(place.excitation, width), None
+        if compiled and place.fast is not None:
+            turns = place.fast.turns(stiffness, damping, _burst(blows, place.hits))
+        if turns is None:
+            rivet = place.perturbed(stiffness, damping, blows)
+            loads = rivet.loads(need="rest", both=False)
+        else:
+            loads = place.joint_loads(turns, stiffness=stiffness * place.stiffness)
+        return [
+            (loads[column].stress_cycles(joint, self.residue), loads[column].static_stress(joint))
+            for joint, column in zip(self.joints, self.columns, strict=True)
+        ]
+
+    def _per_pass(
+        self, places: list[Place], factors: tuple[float, ...]
+    ) -> list[tuple[Cycles, FloatArray]]:
+        """Each joint's cycles of all places, counted as often as rivets are set there.
+
+        Beside them the steady stress under each cycle, Pa.
+        """
+        found = [self.cycles(place, *factors, compiled=True) for place in places]
+        joined = []
+        for k in range(len(self.joints)):
+            parts = [pose[k] for pose in found]
+            counts = [c.count * p.rivets for (c, _), p in zip(parts, places, strict=True)]
+            joined.append(
+                (
+                    Cycles.trusted(
+                        np.concatenate([cycles.range for cycles, _ in parts]),
+                        np.concatenate([cycles.mean for cycles, _ in parts]),
+                        np.concatenate(counts),
+                    ),
+                    np.concatenate([np.full(len(cycles), steady) for cycles, steady in parts]),
+                )
+            )
+        return joined
+
+    def spend(
+        self, k: int, cycles: Cycles, steady: float | FloatArray, factor: float
+    ) -> tuple[float, float]:
         """Damage and utilisation of joint k with its stress times `factor`."""
-        load = cycles.scaled(factor).shifted(steady)
+        load = Cycles.trusted(factor * cycles.range, factor * cycles.mean + steady, cycles.count)
         return (
             damage(load, self.curves[k], self.mean_stress),
             utilisation(load, self.curves[k], self.mean_stress),
@@ -86,12 +130,8 @@ class LifeJob:
 
         The share is a factor, 1 or more, on the damage of the poses that are kept.
         """
-        spent = np.array(
-            [
-                [self.spend(k, *pair, 1.0) for k, pair in enumerate(self.cycles(p, 1.0, 1.0, 1.0))]
-                for p in places
-            ]
-        )
+        found = [self.cycles(place, 1.0, 1.0, 1.0, compiled=True) for place in places]
+        spent = np.array([[self.spend(k, *p, 1.0) for k, p in enumerate(pose)] for pose in found])
         rivets = np.array([place.rivets for place in places])
         kept: set[int] = set()
         start = 0
@@ -118,18 +158,17 @@ class LifeJob:
         score = np.log(values["strength"]) if "strength" in values else np.zeros(runs)
         lives = np.empty((len(self.joints), runs))
         used = np.empty_like(lives)
-        known: dict[tuple[float, ...], list[list[tuple[Cycles, float]]]] = {}
+        known: dict[tuple[float, ...], list[tuple[Cycles, FloatArray]]] = {}
         for m in range(runs):
             key = tuple(float(columns[name][m]) for name in _DYNAMIC)
             if key not in known:
-                known[key] = [self.cycles(places[i], *key) for i in kept]
+                known[key] = self._per_pass([places[i] for i in kept], key)
             load = columns["force"][m] * columns["model"][m]
             for k, curve in enumerate(self.curves):
                 factor = float(load / _strength(curve, score[m]))
-                spent = [self.spend(k, *pose[k], factor) for pose in known[key]]
-                per_pass = sum(places[i].rivets * d for i, (d, _) in zip(kept, spent, strict=True))
-                lives[k, m] = life(per_pass * left_out[k])
-                used[k, m] = max(u for _, u in spent)
+                cycles, steady = known[key][k]
+                spent, used[k, m] = self.spend(k, cycles, steady, factor)
+                lives[k, m] = life(spent * left_out[k])
             if progress is not None:
                 progress(m + 1, runs)
         return lives, used
@@ -144,17 +183,13 @@ def _strength(curve: SNCurve, score: float) -> float:
 
 def place_of(model: Model, operation: Operation, pose: FloatArray) -> Place:
     """A pose of an operation, ready to be perturbed."""
-    state = model.robot.state(pose)
-    feed = operation.excitation.preload * (state.jacobian.T @ operation.direction)
-    return Place(
-        system=model.linear_system(pose),
-        excitation=operation.excitation,
-        direction=operation.direction,
-        hits=operation.hits_per_rivet,
-        rivets=operation.rivets,
-        stiffness=state.stiffness,
-        static_torque=feed - model.holding_torque(state),
-    )
+    return Place.at(model, operation, model.robot.state(pose), pose, rivets=operation.rivets)
+
+
+@lru_cache(maxsize=256)
+def _burst(excitation: Excitation, hits: int) -> PiecewiseForce:
+    """The blows as a force history: the same for many poses."""
+    return excitation.burst(hits)
 
 
 def _wider(excitation: Excitation, factor: float) -> Excitation:

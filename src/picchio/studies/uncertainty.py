@@ -46,6 +46,17 @@ class UncertainLife:
     assumptions: tuple[str, ...]
     seed: int
 
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+        from picchio.studies.verdict import format_count
+
+        rows = [
+            (name, *map(format_count, (s.p10, s.p50, s.p90)), 100 * s.endless)
+            for name, s in {**self.joints, "robot": self.robot}.items()
+        ]
+        columns = ("rivets to failure", "P10", "P50", "P90", "without end [%]")
+        return sheet("How sure the life is", {"varied": ", ".join(self.inputs)}, columns, rows)
+
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {

@@ -1,17 +1,31 @@
-"""The S-N curve, and where the task's poses stand on it."""
+"""The S-N curve, where the task's poses stand on it, and a curve fitted to tests."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from statistics import NormalDist
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from picchio.fatigue import SNCurve
-from picchio.view.plots.style import COLOURS, GREY, INK, MUTED, axes_or_new, plain, styled
+from picchio.fatigue.sn_fit_result import SNFit
+from picchio.fatigue.sn_tests import SNTests
+from picchio.view.plots.style import (
+    BLUE,
+    COLOURS,
+    GREY,
+    INK,
+    MUTED,
+    ORANGE,
+    VERMILION,
+    axes_or_new,
+    plain,
+    styled,
+)
 
 _MARKERS = "osD^vP*X"
 _LEFT, _RIGHT = 1e3, 1e9
@@ -75,6 +89,95 @@ def plot_sn_curve(
                 fontsize=8, color=MUTED)  # fmt: skip
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax
+
+
+@styled
+def plot_sn_fit(fit: SNFit, tests: SNTests | None = None, ax: Axes | None = None) -> Axes:
+    """A fitted S-N curve (MPa over cycles): median, P10 and P90, and how sure they are.
+
+    P10 is the life that 90 % of specimens exceed. The band is where the median itself may lie, at
+    the fit's level; the bar at the knee is the knee's interval.
+
+    Args:
+        fit: the fit.
+        tests: what it was fitted to, in the same kind of stress: failures are dots, run-outs
+            rings with an arrow.
+        ax: where to draw.
+    """
+    ax = axes_or_new(ax, height=3.8)
+    ends = [fit.reference_cycles, *(tests.cycles if tests is not None else ())]
+    if fit.knee is not None:
+        # A knee that the tests do not bound may lie anywhere: its bar then runs to the edges.
+        near = np.clip([fit.knee.low, fit.knee.high], 0.1 * min(ends), 10.0 * max(ends))
+        ends += near.tolist()
+    left, right = 0.4 * min(ends), 4.0 * max(ends)
+    cycles = np.union1d(np.geomspace(left, right, 200), [fit.reference_cycles])
+    low, high = fit.band(cycles)
+    ax.fill_between(cycles, low / 1e6, high / 1e6, color=BLUE, alpha=0.16, linewidth=0,
+                    label=f"{100 * fit.level:g} % confidence of the median")  # fmt: skip
+    for survival, dashes, label in ((0.5, "-", "median"), (0.9, (0, (5, 1.6)), "P10 and P90"),
+                                    (0.1, (0, (5, 1.6)), "_P90")):  # fmt: skip
+        strength = fit.curve(survival).amplitude(cycles) / 1e6
+        width = 1.8 if survival == 0.5 else 1.2
+        ax.loglog(cycles, strength, color=BLUE, linestyle=dashes, linewidth=width, label=label)
+    if fit.knee is not None:
+        limit = fit.endurance_limit.value / 1e6
+        reach = np.clip([fit.knee.low, fit.knee.high], left, right)
+        ax.plot(reach, [limit, limit], "|-", color=INK, linewidth=1.4, markersize=9, zorder=5,
+                label=f"knee, {100 * fit.level:g} % interval")  # fmt: skip
+        ax.plot(fit.knee.value, limit, "o", color=INK, markersize=4, zorder=5, label="_knee")
+    if tests is not None:
+        stress, broken = tests.amplitude / 1e6, tests.failed
+        dot: dict[str, Any] = {
+            "markersize": 5,
+            "markeredgecolor": "white",
+            "markeredgewidth": 0.6,
+            "zorder": 4,
+        }
+        ring: dict[str, Any] = {
+            "markersize": 5.5,
+            "markerfacecolor": "none",
+            "markeredgewidth": 1.3,
+            "zorder": 4,
+        }
+        ax.plot(tests.cycles[broken], stress[broken], "o", color=VERMILION, label="failure", **dot)
+        if not broken.all():
+            ax.plot(
+                tests.cycles[~broken], stress[~broken], "o", color=ORANGE, label="run-out", **ring
+            )
+        for place, many in _together(tests.cycles[~broken], stress[~broken]).items():
+            ax.annotate("", (1.75 * place[0], place[1]), xytext=(1.12 * place[0], place[1]),
+                        arrowprops={"arrowstyle": "->", "color": ORANGE, "lw": 1.2})  # fmt: skip
+            if many > 1:
+                ax.annotate(f"{many}", (1.75 * place[0], place[1]), xytext=(-2, 3),
+                            textcoords="offset points", fontsize=8, color=MUTED)  # fmt: skip
+    ax.set_xlim(left, right)
+    _few_stress_ticks(ax)
+    ax.set(xlabel="cycles to failure [\N{EN DASH}]", ylabel="shear stress amplitude [MPa]",
+           title=f"S-N fit: {fit.failures} failures, {fit.run_outs} run-outs")  # fmt: skip
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return ax
+
+
+def _together(cycles: np.ndarray, stress: np.ndarray) -> dict[tuple[float, float], int]:
+    """How many tests lie on one another, by place."""
+    count: dict[tuple[float, float], int] = {}
+    for place in zip(cycles.tolist(), stress.tolist(), strict=True):
+        count[place] = count.get(place, 0) + 1
+    return count
+
+
+def _few_stress_ticks(ax: Axes) -> None:
+    """Round ticks within less than a decade, where a logarithmic axis has next to none."""
+    from matplotlib.ticker import FixedLocator, MaxNLocator, NullFormatter, ScalarFormatter
+
+    bottom, top = ax.get_ylim()
+    if top / bottom > 15.0:
+        return
+    ticks = [t for t in MaxNLocator(6).tick_values(bottom, top) if bottom <= t <= top]
+    ax.yaxis.set_major_locator(FixedLocator(ticks))
+    ax.yaxis.set_major_formatter(ScalarFormatter())
+    ax.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _finite(values: ArrayLike) -> np.ndarray:
