@@ -23,7 +23,7 @@ SOFTWARE_GL = [
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
-    "--host-resolver-rules=MAP * ~NOTFOUND",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
 ]
 
 
@@ -76,6 +76,19 @@ def hostile_urdf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("hostile") / "arm.urdf"
     tree.write(str(path))
     return path
+
+
+@pytest.fixture(scope="session")
+def recoiling(tmp_path_factory: pytest.TempPathFactory) -> picchio.FlexibleRobot:
+    """The 3-DoF arm with a gun on a recoil spring."""
+    from picchio.robot.find import find_robot
+
+    path = tmp_path_factory.mktemp("gun") / "gun.toml"
+    path.write_text(
+        'format = "picchio-sidecar/1"\n[tool]\nframe = "tool"\naxis = [1.0, 0.0, 0.0]\n'
+        "[gun]\nmass = 3.0\nrecoil_stiffness = 3e4\ndamping_ratio = 0.1\n"
+    )
+    return picchio.load_robot(find_robot("fanuc_like_3dof").urdf, flex=path)
 
 
 @pytest.fixture(scope="session")

@@ -16,7 +16,7 @@ from PIL import Image
 import picchio
 from picchio.excitation import PulseTrain
 from picchio.view.report import assessment_report
-from picchio.view.scene import build_scene
+from picchio.view.scene import build_scene, compare_scene
 
 pytestmark = pytest.mark.slow
 
@@ -261,3 +261,124 @@ def test_report_prints_on_two_pages(open_page, tmp_path, arm, pictures) -> None:
         "[...document.querySelectorAll('table')].filter(t => t.offsetParent !== null)"
         ".every(t => t.scrollWidth <= 688)"
     )
+
+
+def test_the_map_follows_the_joint(open_page, tmp_path, pictures, arm) -> None:
+    from picchio.studies.map import workspace_map
+    from picchio.studies.places import plane
+
+    blows = arm.worst.operation.excitation
+    workspace = workspace_map(arm.robot, plane(arm.robot, "xz", spacing=0.15), blows,
+                              tmp_path / "map.nc")  # fmt: skip
+    path = tmp_path / "map.html"
+    path.write_text(build_scene(arm.robot, arm.worst.pose, blows, workspace=workspace).html())
+    page = opened(open_page, path)
+    hide_labels(page)
+    for layer in ("robot", "envelope", "worst", "tool", "joints"):
+        page.locator(f"#layer-{layer}").set_checked(False)
+    seen, bars = [], []
+    for joint in arm.robot.flexible_names:
+        page.locator("#joint").select_option(label=joint)
+        seen.append(picture(page, pictures / f"scene-map-{joint}.png"))
+        bars.append(page.locator("#layers .bar b").last.inner_text())
+    page.locator("#layer-map").set_checked(False)
+    empty = picture(page)
+    assert all(changed(one, empty) > 2_000 for one in seen)
+    assert changed(seen[0], seen[1]) > 1_000 and changed(seen[1], seen[2]) > 500
+    assert len(set(bars)) == 3
+
+
+def test_two_ghosts_play_two_histories(open_page, tmp_path, pictures, arm) -> None:
+    operation = arm.worst.operation
+    time = np.linspace(0.0, 1.0, 800)
+    simulated = arm.worst.response.deflection(time, operation.direction)
+    measured = {"joint_2": 1.6 * simulated[1]}
+    path = tmp_path / "ghosts.html"
+    path.write_text(compare_scene(arm.robot, arm.worst.pose, operation.excitation, time, simulated,
+                                  measured, hits=12).html())  # fmt: skip
+    page = opened(open_page, path)
+    hide_labels(page)
+    for layer in ("envelope", "worst", "tool", "joints"):
+        page.locator(f"#layer-{layer}").set_checked(False)
+    peak = float(np.abs(simulated[1]).argmax() / time.size)
+    set_range(page, "time", peak)
+    both = picture(page, pictures / "scene-ghosts.png")
+    page.locator("#layer-measured").set_checked(False)
+    one = picture(page)
+    assert changed(both, one) > 1_500
+    page.locator("#layer-simulated").set_checked(False)
+    assert changed(one, picture(page)) > 1_500
+    # Each ghost's second joint stands where its own history has it, exaggerated.
+    factor, moment = page.evaluate("[picchio.state.factor, picchio.state.time]")
+    turned = page.evaluate(
+        """() => picchio.data.motion.tracks.map((t) => {
+          const f = picchio.data.frames.find((f) => f.follows && f.follows[1]);
+          const node = picchio.viewer.scene_tree.find(["picchio", t.layer, ...f.path.split("/")]);
+          const rest = picchio.viewer.scene_tree.find(["picchio", "robot", ...f.path.split("/")]);
+          return rest.object.quaternion.angleTo(node.object.quaternion);
+        })"""
+    )
+    at = np.interp(moment, time, simulated[1])
+    np.testing.assert_allclose(turned, np.abs([at, 1.6 * at]) * factor, rtol=0.02)
+    assert page.locator("#direction").is_hidden()
+
+
+def test_a_recoiling_gun_slides(open_page, tmp_path, pictures, recoiling) -> None:
+    scene = build_scene(recoiling, [-0.3, 1.1, -1.0], BLOWS, hits=3, joint="gun_recoil")
+    path = tmp_path / "gun.html"
+    path.write_text(scene.html())
+    page = opened(open_page, path)
+    hide_labels(page)
+    first = picture(page, pictures / "scene-gun.png")
+    for layer in ("envelope", "worst", "tool", "joints"):
+        page.locator(f"#layer-{layer}").set_checked(False)
+    frame = next(k for k, f in enumerate(scene.frames) if f.joint == "gun_recoil")
+    where = f"""() => {{
+      const path = picchio.data.frames[{frame}].path.split("/");
+      const node = picchio.viewer.scene_tree.find(["picchio", "robot", ...path]);
+      return node.object.position.toArray();
+    }}"""
+    set_range(page, "time", 0.0)
+    rest = np.array(page.evaluate(where))
+    set_range(page, "time", 0.03)
+    moved = np.array(page.evaluate(where)) - rest
+    assert np.abs(moved[1:]).max() < 1e-9 < abs(moved[0])  # along the tool's axis
+    assert changed(first, picture(page)) > 500
+
+
+def test_a_live_viewer_has_sliders(chromium, hostile_urdf, pictures) -> None:
+    """Meshcat's own server and page; names that would be markup are none there either."""
+    meshcat = pytest.importorskip("meshcat")
+    robot = picchio.load_robot(hostile_urdf)
+    viewer = meshcat.Visualizer()
+    page = chromium.new_page(viewport={"width": 1100, "height": 700})
+    said: list[str] = []
+    page.on("pageerror", lambda e: said.append(str(e)))
+    page.on("dialog", lambda d: (said.append(d.message), d.dismiss()))
+
+    def look(keep: str = "live.png") -> np.ndarray:
+        page.wait_for_timeout(500)
+        content = page.screenshot(path=str(pictures / keep))
+        return np.asarray(Image.open(io.BytesIO(content)).convert("RGB")).astype(int)
+
+    try:
+        build_scene(robot, [0.3, 1.1, -1.0], BLOWS, hits=3, subdivisions=3).show(viewer)
+        page.goto(viewer.url())
+        page.wait_for_function("window.picchio_live", timeout=60_000)
+        page.evaluate("viewer.set_control_value('moment', 0)")
+        page.wait_for_timeout(1000)
+        seen = look()
+        names = page.locator(".property-name").all_inner_texts()
+        assert names[-5:] == ["joint", "size", "exaggerated", "moment", "play"]
+        for control, value in (("joint", 1), ("size", 2.0), ("moment", 0.05), ("exaggerated", 0.8)):
+            page.evaluate(f"viewer.set_control_value('{control}', {value})")
+            now = look(f"live-{control}.png")
+            assert changed(seen, now) > 500, control
+            seen = now
+        told = page.locator("#picchio-told").inner_text()
+        assert told.startswith(robot.flexible_names[0])
+    finally:
+        page.close()
+        viewer.window.server_proc.kill()
+        viewer.window.server_proc.wait()
+    assert said == []

@@ -13,6 +13,8 @@ from matplotlib.figure import Figure
 import picchio
 from picchio.excitation import HalfSineTrain, PulseTrain
 from picchio.fatigue import rainflow
+from picchio.fatigue.sn_fit import fit_sn
+from picchio.fatigue.sn_tests import SNTests
 from picchio.studies.envelope import direction_envelope
 from picchio.view import plots
 from picchio.view.plots.polar import cut_directions
@@ -268,3 +270,53 @@ def test_life_spread_draws_the_percentiles() -> None:
     endless = SimpleNamespace(p10=np.inf, p50=np.inf, p90=np.inf, endless=1.0)
     ax = plots.plot_life_spread(SimpleNamespace(joints={"a": endless}, robot=endless))
     assert any("no life has an end" in text.get_text() for text in ax.texts)
+
+
+def test_sn_fit_shows_tests_lines_band_and_knee() -> None:
+    rng = np.random.default_rng(11)
+    stress = np.repeat([280e6, 300e6, 320e6, 360e6, 420e6], 6)
+    strength = 300e6 * 10 ** (0.03 * rng.standard_normal(30))
+    broken = stress > strength
+    life = np.where(broken, 1e6 * (stress / strength) ** -8.0, 1e7)
+    tests = SNTests(stress, life * 10 ** (0.1 * rng.standard_normal(30) * broken), broken)
+    fit = fit_sn(tests.amplitude, tests.cycles, tests.failed)
+    ax = plots.plot_sn_fit(fit, tests)
+    assert len(line(ax, "failure")[0]) == tests.failed.sum()
+    np.testing.assert_allclose(sorted(line(ax, "run-out")[1]), sorted(stress[~tests.failed] / 1e6))
+    arrows = [text for text in ax.texts if text.arrow_patch is not None]
+    assert len(arrows) == len(set(stress[~tests.failed]))
+    cycles, median = line(ax, "median")
+    expected = np.maximum(cycles / fit.reference_cycles, 0.0) ** (-1.0 / fit.slope.value)
+    limit = fit.endurance_limit.value / 1e6
+    np.testing.assert_allclose(median, limit * np.maximum(expected, 1.0), rtol=1e-9)
+    spread = 10.0 ** (1.2815516 * fit.scatter.value)
+    np.testing.assert_allclose(line(ax, "P10 and P90")[1], median / spread, rtol=1e-6)
+    np.testing.assert_allclose(line(ax, "_P90")[1], median * spread, rtol=1e-6)
+    assert fit.knee is not None
+    np.testing.assert_allclose(
+        line(ax, "knee, 90 % interval")[0],
+        np.clip([fit.knee.low, fit.knee.high], *ax.get_xlim()),
+    )
+    edge = ax.collections[0].get_paths()[0].vertices
+    last = edge[np.isclose(edge[:, 0], cycles[-1], rtol=1e-6), 1]
+    known = np.array([fit.endurance_limit.low, fit.endurance_limit.high]) / 1e6
+    np.testing.assert_allclose([last.min(), last.max()], known, rtol=0.02)
+    drawn(ax)
+    drawn(plots.plot_sn_fit(fit))
+
+
+def test_sn_fit_shows_a_knee_that_the_tests_do_not_bound() -> None:
+    rng = np.random.default_rng(11)
+    stress = np.repeat([280e6, 300e6, 320e6, 360e6, 420e6], 6)
+    life = 1e6 * (stress / (300e6 * 10 ** (0.03 * rng.standard_normal(30)))) ** -8.0
+    tests = SNTests(stress, np.minimum(life, 2e6), life < 2e6)
+    fit = fit_sn(tests.amplitude, tests.cycles, tests.failed)
+    assert fit.knee is not None
+    assert fit.knee.high > 1e9
+    ax = plots.plot_sn_fit(fit, tests)
+    left, right = ax.get_xlim()
+    assert left > 1e3
+    assert right < 1e9
+    ends = line(ax, "knee, 90 % interval")[0]
+    np.testing.assert_allclose(ends, np.clip([fit.knee.low, fit.knee.high], left, right))
+    drawn(ax)

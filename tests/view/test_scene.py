@@ -19,8 +19,9 @@ from lxml import html as lxml_html
 import picchio
 from picchio.excitation import HalfSineTrain, PulseTrain
 from picchio.studies.envelope import direction_envelope, icosphere
-from picchio.view.scene import build_scene
+from picchio.view.scene import build_scene, compare_scene
 from picchio.view.scene.kinematics import frames, world
+from picchio.view.scene.live import controls
 from picchio.view.scene.mesh import arrow, turned_to
 from picchio.view.scene.overlay import envelope_surfaces
 from picchio.view.scene.pack import script_json
@@ -60,7 +61,9 @@ def test_surface_is_the_support_function(name: str, hits: int | None, blows) -> 
     directions, _ = icosphere(3)
     radius = np.linalg.norm(vertices, axis=2)
     rows = np.random.default_rng(0).choice(len(directions), 25, replace=False)
-    exact = envelope.support(directions[rows])
+    # One direction after the other, by another way than the surface's own.
+    peaks = [envelope.response.peaks(n) for n in directions[rows]]
+    exact = np.array([[abs(peak.value) for peak in row] for row in peaks]).T
     moving = envelope.peak_deflection > 1e-12
     np.testing.assert_allclose(radius[moving][:, rows], exact[moving], rtol=1e-6, atol=1e-15)
     np.testing.assert_allclose(vertices, directions * radius[..., None], atol=1e-15)
@@ -85,9 +88,13 @@ def test_page_holds_the_same_surface(scene) -> None:
         np.testing.assert_allclose(matrix[:3, 3], scene.envelope.tool_position, atol=1e-8)
 
 
-def test_every_mesh_is_in_it_once_and_used(scene) -> None:
-    data, _ = unpack(scene.html())
-    assert len({str(mesh["vertices"]) for mesh in data["meshes"]}) == len(data["meshes"])
+def test_every_array_is_in_it_once_and_every_mesh_used(scene) -> None:
+    data, array = unpack(scene.html())
+    keys = ("vertices", "faces", "colours")
+    references = {tuple(mesh[key]) for mesh in data["meshes"] for key in keys if key in mesh}
+    assert len({(kind, array((kind, *at)).tobytes()) for kind, *at in references}) == len(
+        references
+    )
     assert {item["mesh"] for item in data["items"]} == set(range(len(data["meshes"])))
 
 
@@ -230,3 +237,60 @@ def test_json_in_a_script_can_never_end_it(value: dict[str, str]) -> None:
     text = script_json(value)
     assert json.loads(text) == value
     assert not set(text) & set("<>&\u2028\u2029")
+
+
+def test_the_gun_is_a_frame_of_its_own(recoiling) -> None:
+    assert recoiling.flexible_names[-1] == "gun_recoil"
+    for recoil in (0.0, 0.02):
+        pose = recoiling.pose(
+            {"joint_1": 0.4, "joint_2": 0.9, "joint_3": -1.1, "gun_recoil": recoil}
+        )
+        tree = frames(recoiling, pose)
+        place = world(tree)[recoiling.tool_point]
+        np.testing.assert_allclose(place[:3, 3], recoiling.state(pose).tool_position, atol=1e-12)
+    gun = tree[-1]
+    assert gun.prismatic and gun.follows.tolist() == [0.0, 0.0, 0.0, 1.0]
+    scene = build_scene(recoiling, pose, BLOWS, hits=2, subdivisions=1)
+    drawn = [item for item in scene.items if item.node == gun.path]
+    assert {item.layer for item in drawn} == {"robot", "joints"}
+    assert any("gun_recoil" in label["text"] for label in scene.labels)
+
+
+def test_two_histories_are_played_as_given(arm: SimpleNamespace) -> None:
+    time = np.linspace(0.0, 0.5, 200)
+    simulated = arm.worst.response.deflection(time, [0, 0, 1])
+    measured = {"joint_3": np.where(time < 0.4, simulated[2], np.nan)}
+    scene = compare_scene(arm.robot, arm.worst.pose, BLOWS, time, simulated, measured,
+                          hits=12, subdivisions=1)  # fmt: skip
+    data, array = unpack(scene.html())
+    first, second = (array(t["samples"]).reshape(3, -1) for t in data["motion"]["tracks"])
+    np.testing.assert_allclose(first, simulated, rtol=1e-6, atol=1e-12)
+    assert not second[:2].any()
+    np.testing.assert_allclose(second[2], np.nan_to_num(measured["joint_3"]), rtol=1e-6, atol=1e-12)
+    assert {"simulated", "measured"} <= {layer["id"] for layer in data["layers"]}
+    for wrong in ({"elbow": simulated[0]}, simulated[:2], {"joint_1": time[:5]}):
+        with pytest.raises(picchio.InputError, match="measured"):
+            compare_scene(arm.robot, arm.worst.pose, BLOWS, time, simulated, wrong)
+    with pytest.raises(picchio.InputError, match="time"):
+        compare_scene(arm.robot, arm.worst.pose, BLOWS, time[::-1], simulated, measured)
+
+
+def test_live_controls_carry_names_as_data_only(hostile_urdf: Path) -> None:
+    robot = picchio.load_robot(hostile_urdf)
+    scene = build_scene(robot, [0.3] * len(robot.joint_names), BLOWS, subdivisions=1)
+    first, *others = controls(scene)
+    assert [c["name"] for c in (first, *others)] == [
+        "joint",
+        "size",
+        "exaggerated",
+        "moment",
+        "play",
+    ]
+    text = first["callback"].partition("JSON.parse(")[2].partition(");\n")[0]
+    data = json.loads(json.loads(text))
+    assert data["told"][0].startswith(robot.flexible_names[0])
+    assert {item["joint"] for item in data["items"]} == {0, 1, 2}
+    samples = np.frombuffer(base64.b64decode(data["motion"]["samples"]), "<f4").reshape(3, -1)
+    along = scene.motion["directions"][0]["along"]
+    expected = np.einsum("ndk,d->nk", scene.motion["samples"], along)
+    np.testing.assert_allclose(samples, expected, rtol=1e-6, atol=1e-12)

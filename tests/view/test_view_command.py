@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -48,3 +49,39 @@ def test_bad_input_is_one_line_and_no_file(
     assert told in said.err.strip().splitlines()[-1] or told == "--pose"
     assert len([line for line in said.err.splitlines() if "error" in line]) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_no_file_and_no_viewer_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["view", "fanuc_like_3dof"]) == 2
+    assert "--out" in capsys.readouterr().err
+
+
+def test_an_input_is_not_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    task = tmp_path / "task.toml"
+    task.write_text("format = 1")
+    assert run(["view", "fanuc_like_3dof", "--task", str(task), "--out", str(task)]) == 2
+    assert "overwrite" in capsys.readouterr().err
+    assert task.read_text() == "format = 1"
+
+
+def test_a_live_viewer_runs_until_it_is_interrupted(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    calls: list[str] = []
+
+    class Server:
+        def wait(self) -> None:
+            calls.append("wait")
+            raise KeyboardInterrupt
+
+        def kill(self) -> None:
+            calls.append("kill")
+
+    def show(scene: object) -> SimpleNamespace:
+        print("a greeting")
+        return SimpleNamespace(window=SimpleNamespace(server_proc=Server()))
+
+    monkeypatch.setattr("picchio.view.scene.Scene.show", show)
+    assert run(["view", "fanuc_like_3dof", "--pose=-0.3,1.1,-1.0", "--live", "--json", "-"]) == 0
+    assert calls == ["wait", "kill"]
+    assert json.loads(capsys.readouterr().out)["file"] is None

@@ -115,6 +115,18 @@ class Campaign:
         raise InputError("no such record", file=self.folder, value=file,
                          choices=[record.file for record in self.records])  # fmt: skip
 
+    def __repr__(self) -> str:
+        return f"Campaign({len(self.records)} records, robot={self.table.robot!r})"
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        facts = {"robot": self.table.robot, "tool frame": self.tool, "folder": self.folder and
+                 self.folder.name}  # fmt: skip
+        rows = [(r.file, r.kind, r.direction, ", ".join(r.channels)) for r in self.records]
+        columns = ("record", "kind", "force along", "channels")
+        return sheet(f"Campaign of {len(rows)} records", facts, columns, rows)
+
     def check_samples(self) -> None:
         """Read every sample once, in constant memory.
 

@@ -87,6 +87,14 @@ class Record:
         found = [parse_channel(name, (units or {}).get(name))[0] for name in names]
         return cls(_table(file, table), MemorySource(found, read, file))
 
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        facts = {"kind": self.kind, "pose [rad, m]": str(self.pose), "force along": self.direction,
+                 "hits": self.hits, "temperature [degC]": self.temperature}  # fmt: skip
+        rows = [(self.channel(name).name, self.channel(name).unit) for name in self.channels]
+        return sheet(f"Record {self.file}", facts, ("channel", "unit"), rows)
+
     @property
     def file(self) -> str:
         """The file's name within the campaign: what the record is called."""

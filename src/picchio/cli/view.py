@@ -40,9 +40,13 @@ def register(app: typer.Typer) -> None:
 def view(
     robot: RobotArgument,
     out: Annotated[
-        Path,
+        Path | None,
         typer.Option("--out", metavar="FILE", help="Where the HTML goes.", show_default=False),
-    ],
+    ] = None,
+    live: Annotated[
+        bool,
+        typer.Option("--live", help="Show it in a live meshcat viewer, until it is interrupted."),
+    ] = False,
     task: Annotated[
         Path | None,
         typer.Option("--task", metavar="FILE", help="Task (TOML); the robot's own if not given."),
@@ -77,12 +81,15 @@ def view(
 
     The file needs no network. Without --pose the task is assessed and shown at its worst rivet.
     """
-    from picchio.cli.output import write_json
+    from picchio.cli.output import check_target, write_json
     from picchio.core.files import atomic_write
     from picchio.model import Model
     from picchio.robot import load_robot
     from picchio.view.scene import build_scene
 
+    if out is None and not live:
+        raise InputError("needs a file", key="--out", hint="--out scene.html, or --live")
+    check_target(out, [flex, task, map_])
     loaded = load_robot(robot, flex=flex, tool=tool)
     workspace = None
     if map_ is not None:
@@ -108,13 +115,17 @@ def view(
             gravity_stiffness=gravity_stiffness,
             workspace=workspace,
         )
-    page = scene.html()
-    with atomic_write(out) as stream:
-        stream.write(page)
+    size = 0
+    if out is not None:
+        page = scene.html()
+        size = len(page.encode())
+        with atomic_write(out) as stream:
+            stream.write(page)
+        typer.echo(f"{out}: {scene.title}, {size / 1e6:.1f} MB; open it in a browser", err=True)
     if json is not None:
-        write_json(_summary(scene, out, len(page.encode())), json)
-    typer.echo(f"{out}: {scene.title}, {len(page.encode()) / 1e6:.1f} MB; open it in a browser",
-               err=True)  # fmt: skip
+        write_json(_summary(scene, out, size), json)
+    if live:
+        _show_live(scene)
 
 
 def _of_task(
@@ -151,11 +162,30 @@ def _of_task(
     )
 
 
-def _summary(scene: Scene, out: Path, size: int) -> dict[str, Any]:
+def _show_live(scene: Scene) -> None:
+    """Serve the scene until somebody has seen enough."""
+    import contextlib
+    import sys
+    import warnings
+
+    # What meshcat uses and leaves open is nobody's concern here.
+    for kind in (DeprecationWarning, ResourceWarning):
+        warnings.simplefilter("ignore", kind)
+    # Meshcat greets on stdout, which is for JSON alone.
+    with contextlib.redirect_stdout(sys.stderr):
+        viewer = scene.show()
+    typer.echo("Ctrl-C ends it", err=True)
+    try:
+        viewer.window.server_proc.wait()
+    except KeyboardInterrupt:
+        viewer.window.server_proc.kill()
+
+
+def _summary(scene: Scene, out: Path | None, size: int) -> dict[str, Any]:
     """What `--json` writes."""
     return {
         "format": "picchio-scene/1",
-        "file": str(out),
+        "file": None if out is None else str(out),
         "bytes": size,
         "layers": [{"id": name, "text": text} for name, text, _ in scene.layers],
         "envelope": scene.envelope.to_dict(),

@@ -196,6 +196,34 @@ class Assessment:
         """The entry of one joint."""
         return next(joint for joint in self.joints if joint.name == name)
 
+    def __repr__(self) -> str:
+        from picchio.studies.verdict import verdict
+
+        return f"Assessment({self.robot!r}, method={self.method!r}): {verdict(self)}"
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+        from picchio.studies.verdict import format_count, verdict
+
+        joints = self.joints
+        table: dict[str, list[Any]] = {
+            "joint": [j.name for j in joints],
+            "peak deflection [mrad, mm]": [1e3 * j.peak_deflection for j in joints],
+            "peak torque [N m, N]": [j.peak_torque for j in joints],
+        }
+        if any(j.sn_curve for j in joints):
+            table |= {
+                "peak stress [MPa]": [1e-6 * j.peak_shear_stress for j in joints],
+                "utilisation [%]": [100 * j.utilisation for j in joints],
+                "damage a rivet": [j.damage_per_rivet for j in joints],
+                "rivets to failure": [format_count(j.rivets_to_failure) for j in joints],
+            }
+        if any(j.reducer for j in joints):
+            table["reducer used [%]"] = [100 * j.reducer_utilisation for j in joints]
+        facts = {"method": self.method, "S-N curve": self.sn_curve or None}
+        rows = zip(*table.values(), strict=True)
+        return sheet(f"Assessment of {self.robot}", facts, list(table), rows, verdict(self))
+
     def to_dict(self) -> dict[str, Any]:
         """The content of `picchio-assessment/1`; infinite lives are left as inf."""
         return {

@@ -15,6 +15,7 @@ from picchio.core.provenance import provenance
 from picchio.excitation import Excitation
 from picchio.model import Model
 from picchio.vibration import Response, modal_analysis, response_from_rest, steady_state
+from picchio.vibration.many_directions import peak_deflections
 
 FORMAT = "picchio-envelope/1"
 Quantity = Literal["deflection", "torque", "stress"]
@@ -86,9 +87,7 @@ class DirectionEnvelope:
         Returns:
             (n, d).
         """
-        wanted = np.atleast_2d(np.asarray(directions, dtype=float))
-        peaks = [[abs(p.value) for p in self.response.peaks(n)] for n in wanted]
-        return np.array(peaks).T * self._factor(quantity)[:, None]
+        return peak_deflections(self.response, directions) * self._factor(quantity)[:, None]
 
     def surface(
         self, joint: str | int, subdivisions: int = 3, quantity: Quantity = "deflection"
@@ -113,6 +112,25 @@ class DirectionEnvelope:
         for i in np.flatnonzero(~half):
             radius[i] = radius[mirror[tuple(np.round(-directions[i], 9) + 0.0)]]
         return directions * radius[:, None], faces
+
+    def __repr__(self) -> str:
+        peaks = dict(zip(self.joint_names, self.peak_deflection.tolist(), strict=True))
+        return f"DirectionEnvelope({self.robot!r}, peak_deflection={peaks})"
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        columns = ("joint", "peak deflection [mrad, mm]", "worst direction", "peak torque [N m, N]",
+                   "peak stress [MPa]")  # fmt: skip
+        rows = zip(self.joint_names, 1e3 * self.peak_deflection, self.worst_direction.round(3),
+                   self.peak("torque"), 1e-6 * self.peak("stress"), strict=True)  # fmt: skip
+        facts = {
+            "pose [rad, m]": self.pose,
+            "blows": self.excitation.describe(),
+            "response": "steady state" if self.hits is None else f"{self.hits} hits from rest",
+            "natural frequencies [Hz]": self.natural_frequencies,
+        }
+        return sheet(f"Direction envelope of {self.robot}", facts, columns, rows)
 
     def to_dict(self) -> dict[str, Any]:
         """The content of `picchio-envelope/1`."""

@@ -97,6 +97,21 @@ class Task:
     operations: tuple[Operation, ...]
     files: tuple[Path, ...] = ()
 
+    def __repr__(self) -> str:
+        names = [op.name for op in self.operations]
+        return f"Task(operations={names}, rivets_per_pass={self.rivets_per_pass:g})"
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        rows = [
+            (op.name, op.direction, len(op.poses), op.rivets, op.hits_per_rivet,
+             op.excitation.describe())
+            for op in self.operations
+        ]  # fmt: skip
+        columns = ("operation", "force along", "poses", "rivets a pose", "hits a rivet", "blows")
+        return sheet(f"Task: {self.rivets_per_pass:g} rivets a pass", None, columns, rows)
+
     @property
     def rivets_per_pass(self) -> float:
         """Rivets set in one pass of the task."""

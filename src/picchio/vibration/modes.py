@@ -45,6 +45,17 @@ class Modes:
     decoupled: bool
     output_names: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        return f"Modes(natural_frequencies={self.natural_frequencies.round(3).tolist()} Hz)"
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        rows = zip(range(1, 1 + len(self.natural_frequencies)), self.natural_frequencies,
+                   100 * self.damping_ratios, strict=True)  # fmt: skip
+        columns = ("mode", "natural frequency [Hz]", "damping ratio [%]")
+        return sheet(f"Modes of {', '.join(self.output_names)}", None, columns, rows)
+
     def frequency_response(self, angular_frequency: FloatArray) -> ComplexArray:
         """Deflection per newton at angular frequencies (k,) rad/s: (m, 3, k) complex, rad/N."""
         s = 1j * np.asarray(angular_frequency, dtype=float)

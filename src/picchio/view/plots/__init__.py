@@ -9,7 +9,7 @@ from picchio.view.plots.life_spread import plot_life_spread
 from picchio.view.plots.modes import plot_mode_shapes, plot_natural_frequencies
 from picchio.view.plots.polar import plot_polar_envelope
 from picchio.view.plots.response import plot_response
-from picchio.view.plots.sn import plot_sn_curve
+from picchio.view.plots.sn import plot_sn_curve, plot_sn_fit
 from picchio.view.plots.stress import plot_counted_cycles, plot_stress_history
 from picchio.view.plots.workspace import plot_workspace_map
 
@@ -25,6 +25,7 @@ __all__ = [
     "plot_polar_envelope",
     "plot_response",
     "plot_sn_curve",
+    "plot_sn_fit",
     "plot_stress_history",
     "plot_utilisation",
     "plot_workspace_map",

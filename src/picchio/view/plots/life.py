@@ -108,7 +108,7 @@ def _bars(
         y = rows + (k - (len(operations) - 1) / 2) * height
         known = np.isfinite(row)
         ax.barh(y[known], row[known], 0.86 * height, color=COLOURS[k % len(COLOURS)],
-                label=plain(name))  # fmt: skip
+                label=plain(name) if known.any() else None)  # fmt: skip
         for at, value in zip(y[known], row[known], strict=True):
             ax.annotate(f"{value:.3g}", (value, at), xytext=(3, 0), textcoords="offset points",
                         va="center", fontsize=7.5, color=MUTED)  # fmt: skip

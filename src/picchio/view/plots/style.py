@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import functools
 import math
+import sys
 from collections.abc import Callable, Iterable
 from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.rcsetup import cycler
 
 INK = "#20262e"
 """Text and axes; the report swaps it for the page's own text colour."""
@@ -46,6 +48,7 @@ STYLE: Any = {
     "axes.spines.right": False,
     "axes.grid": True,
     "axes.axisbelow": True,
+    "axes.prop_cycle": cycler(color=COLOURS),
     "grid.color": MUTED,
     "grid.alpha": 0.22,
     "grid.linewidth": 0.6,
@@ -80,10 +83,20 @@ def styled(plot: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(plot)
     def inner(*args: P.args, **kwargs: P.kwargs) -> R:
+        if "IPython" in sys.modules:
+            _wake_notebook()
         with mpl.rc_context(STYLE):
             return plot(*args, **kwargs)
 
     return inner
+
+
+@functools.cache
+def _wake_notebook() -> None:
+    """Load a notebook's backend now: within the context what it sets would be undone."""
+    from matplotlib.backends import backend_registry
+
+    backend_registry.load_backend_module(mpl.get_backend())
 
 
 def axes_or_new(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from picchio.view.scene.build import build_scene
+from picchio.view.scene.compare import compare_scene
 from picchio.view.scene.scene import Scene
 
-__all__ = ["Scene", "build_scene"]
+__all__ = ["Scene", "build_scene", "compare_scene"]

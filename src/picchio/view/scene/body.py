@@ -12,12 +12,13 @@ from picchio.core.errors import InputError, PicchioWarning
 from picchio.robot import FlexibleRobot
 from picchio.view.scene.decimate import decimate
 from picchio.view.scene.kinematics import Frame
-from picchio.view.scene.mesh import Mesh, merged, rgb, rod, sphere
+from picchio.view.scene.mesh import Mesh, merged, rgb, rod, sphere, turned_to
 from picchio.view.scene.visuals import Visual, load_mesh, read_visuals
 
 MOST_FACES = 60_000
 """Triangles of the whole robot."""
 _BONE = "#9aa6b2"
+_GUN = "#3f4a57"
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +66,12 @@ def build_body(robot: FlexibleRobot, frames: list[Frame], places: dict[str, Floa
             known[key] = len(shapes)
             shapes.append(shape)
         parts.append((visual.link, known[key], visual.matrix))
+    if robot.gun is not None and parts:
+        # Without meshes it gets bones like every link.
+        parts.append(
+            (robot.tool_point, len(shapes), turned_to(np.array(robot.tool.axis), np.zeros(3)))
+        )
+        shapes.append(_gun(reach))
     shapes = _slim(shapes, parts)
     seen = {link for link, _, _ in parts}
     bare = set(broken) - seen if parts else {frame.link for frame in frames}
@@ -106,6 +113,16 @@ def _slim(shapes: list[Mesh], parts: list[tuple[str, int, FloatArray]]) -> list[
         ]
         cell *= 1.4
     return slim
+
+
+def _gun(reach: float) -> Mesh:
+    """The body of a gun, its striking end at the origin, the rest along -z."""
+    long = 0.13 * reach
+    barrel = rod(
+        np.array([0.0, 0.0, -long]), np.array([0.0, 0.0, -0.25 * long]), 0.021 * reach, _GUN
+    )
+    nose = rod(np.array([0.0, 0.0, -0.25 * long]), np.zeros(3), 0.008 * reach, _BONE)
+    return merged([barrel, nose])
 
 
 def _bones(robot: FlexibleRobot, frames: list[Frame], link: str, radius: float) -> Mesh:

@@ -55,7 +55,7 @@ def build_scene(
         direction: (3,) of the force, for the vibration; the worst one if not given.
         assessment: of a task, for the rivets and the joints' colours.
         joint: whose envelope is shown first; the limiting one if not given.
-        workspace: a map of `picchio.studies.map`, coloured by that joint's peak.
+        workspace: a map of `picchio.studies.map`, coloured by the peak of the joint shown.
         gravity_stiffness: add dg/dq to the springs.
         subdivisions: fineness of the envelopes.
 
@@ -70,10 +70,10 @@ def build_scene(
     where = ", ".join(f"{q:.3g}" for q in checked)
     how = "steady state" if hits is None else f"{hits} hits from rest"
     scene = Scene(robot.name, f"pose ({where}); {excitation.describe()}; {how}", envelope, tree)
-    scene.chosen = _first(envelope, assessment, joint)
+    scene.chosen, scene.reach = _first(envelope, assessment, joint), body.reach
     _add_body(scene, body)
-    _add_rings(scene, body, assessment)
     units = ["mm" if j.kind == "prismatic" else "mrad" for j in robot.flexible_joints]
+    _add_rings(scene, body, assessment, units)
     _add_envelopes(scene, body, units, subdivisions)
     blow = unit_vector(direction) if direction is not None else None
     _add_tool(scene, body, blow)
@@ -108,20 +108,24 @@ def _add_body(scene: Scene, body: Body) -> None:
         scene.items.append(Item(own[index], "robot", path[link], matrix))
 
 
-def _add_rings(scene: Scene, body: Body, assessment: Assessment | None) -> None:
-    values, scale = joint_values(assessment, scene.envelope)
+def _add_rings(scene: Scene, body: Body, assessment: Assessment | None, units: list[str]) -> None:
+    slides = np.array([unit == "mm" for unit in units])
+    values, scale = joint_values(assessment, scene.envelope, slides)
     scene.layers.append(("joints", scale.title, True))
     scene.scales["joints"] = scale
     by_joint = {frame.joint: frame for frame in scene.frames if frame.joint}
     for k, (name, value) in enumerate(zip(scene.envelope.joint_names, values, strict=True)):
         frame = by_joint.get(name)
         if frame is None or frame.axis is None:
-            continue  # the gun's recoil is no joint of the URDF
+            continue
         radius = ring_radius(frame, body)
-        mesh = scene.add(ring(radius, 0.012 * body.reach, scale.colour(float(value))))
+        # A force has no place on a scale of torques.
+        alone = slides[k] and scale.unit == "N m"
+        colour = scale.colour(np.nan if alone else float(value))
+        mesh = scene.add(ring(radius, 0.012 * body.reach, colour))
         matrix = turned_to(frame.axis, np.zeros(3))
         scene.items.append(Item(mesh, "joints", frame.path, matrix, joint=k))
-        told = _told(float(value), scale)
+        told = f"{value:.3g} N" if alone else _told(float(value), scale)
         scene.labels.append({"text": f"{name}: {told}", "layer": "joints", "node": frame.path})
 
 
@@ -154,7 +158,7 @@ def _add_envelopes(scene: Scene, body: Body, units: list[str], subdivisions: int
         tip = envelope.tool_position + 1.2 * size * along
         scene.labels.append({"text": text, "layer": "worst", "at": tip.tolist(), "joint": k})
         scene.joints.append(
-            {"name": envelope.joint_names[k], "scale": scale.to_dict(), "peak": peak}
+            {"name": envelope.joint_names[k], "scale": scale.to_dict(), "peak": peak, "text": text}
         )
 
 
@@ -192,27 +196,36 @@ def _add_rivets(scene: Scene, body: Body, assessment: Assessment) -> None:
 def _add_workspace(scene: Scene, workspace: xarray.Dataset, units: list[str]) -> None:
     from picchio.view.workspace import best_branch, spacing
 
-    name = scene.envelope.joint_names[scene.chosen]
-    places, peak = best_branch(workspace, name)
-    unit = units[scene.chosen]
-    scale = Scale(f"workspace: peak of {name}, best branch", unit, 1e3 * float(peak.max()))
-    grain = sphere(0.28 * spacing(places), subdivisions=0)
-    count = len(grain.vertices)
-    cloud = Mesh(
-        (places[:, None] + grain.vertices[None]).reshape(-1, 3),
-        (np.arange(len(places))[:, None, None] * count + grain.faces[None]).reshape(-1, 3),
-        np.repeat(scale.colours(1e3 * peak), count, axis=0),
-    )
-    scene.layers.append(("map", scale.title, True))
-    scene.scales["map"] = scale
-    scene.items.append(Item(scene.add(cloud), "map", "", np.eye(4)))
+    mapped = [str(name) for name in workspace["joint"].values]
+    for k, name in enumerate(scene.envelope.joint_names):
+        if name not in mapped and k != scene.chosen:
+            continue
+        places, peak = best_branch(workspace, name)
+        scale = Scale(f"workspace: peak of {name}", units[k], 1e3 * float(peak.max()))
+        grain = sphere(0.4 * spacing(places), subdivisions=0)
+        count = len(grain.vertices)
+        cloud = Mesh(
+            (places[:, None] + grain.vertices[None]).reshape(-1, 3),
+            (np.arange(len(places))[:, None, None] * count + grain.faces[None]).reshape(-1, 3),
+            np.repeat(scale.colours(1e3 * peak), count, axis=0),
+        )
+        scene.joints[k]["map"] = scale.to_dict()
+        scene.items.append(Item(scene.add(cloud), "map", "", np.eye(4), joint=k))
+        if k == scene.chosen:
+            scene.scales["map"] = scale
+    scene.layers.append(("map", "workspace map: peak of the joint, best branch", True))
 
 
 def _aim(scene: Scene, body: Body, places: dict[str, FloatArray]) -> None:
     points = np.array([*(p[:3, 3] for p in places.values()), scene.envelope.tool_position])
-    low, high = points.min(axis=0), points.max(axis=0)
+    # The envelope that is shown at first, and the map, shall be in the picture.
+    along = 0.3 * body.reach * scene.envelope.worst_direction[scene.chosen]
+    balls = scene.envelope.tool_position + np.stack([along, -along])
+    mapped = [scene.meshes[item.mesh].vertices for item in scene.items if item.layer == "map"]
+    seen = np.concatenate([points, balls, *mapped[:1]])
+    low, high = seen.min(axis=0), seen.max(axis=0)
     centre = 0.5 * (low + high)
-    span = float(np.linalg.norm(high - low)) + 0.3 * body.reach
+    span = float(np.linalg.norm(high - low)) * (0.85 if mapped else 1.0) + 0.2 * body.reach
     # From the side of the arm, a little from above: the plane it moves in is seen face on.
     outward = scene.envelope.tool_position[:2] - points[0][:2]
     heading = np.arctan2(outward[1], outward[0]) if np.linalg.norm(outward) > 1e-6 else 0.0

@@ -73,7 +73,24 @@ def frames(robot: FlexibleRobot, pose: FloatArray) -> list[Frame]:
                 Frame(joint.child, path, placement(joint.xyz, joint.rpy), axis,
                       joint.type == "prismatic", position, follows, joint.name)
             )  # fmt: skip
+    if robot.gun is not None:
+        found.append(_gun(robot, pose, found))
     return found
+
+
+def _gun(robot: FlexibleRobot, pose: FloatArray, found: list[Frame]) -> Frame:
+    """The gun's body, which no URDF has: at the tool point, sliding on its recoil spring if any."""
+    holder = next(frame for frame in found if frame.link == robot.tool.frame)
+    path = f"{holder.path}/{len(found)}"
+    at = placement(robot.tool.xyz, np.zeros(3))
+    follows = np.zeros(len(robot.flexible_joints))
+    recoil = next((name for name in robot.joint_names if name not in robot.tree.joints), None)
+    if recoil is None:
+        return Frame(robot.tool_point, path, at, None, False, 0.0, follows, None)
+    follows[robot.flexible_names.index(recoil)] = 1.0
+    axis = np.array(robot.tool.axis) / np.linalg.norm(robot.tool.axis)
+    position = float(pose[robot.joint_names.index(recoil)])
+    return Frame(robot.tool_point, path, at, axis, True, position, follows, recoil)
 
 
 def joint_motion(frame: Frame) -> FloatArray:

@@ -63,11 +63,15 @@ def vibration(
     first = np.asarray(directions[0]["along"])
     jacobian = robot.state(envelope.pose).jacobian
     tool = np.linalg.norm(jacobian @ np.einsum("ndk,d->nk", samples, first), axis=0).max()
-    wanted = _SHOWN_SHARE * reach / tool if tool > 0 else 1.0
     # The slowest mode at about one cycle a second.
     slow = float(np.clip(float(np.abs(poles).min()) / (2.0 * np.pi), 1.0, 200.0))
     return {"samples": samples, "step": step, "directions": directions,
-            "factor": _round(float(wanted)), "slow": _round(slow)}  # fmt: skip
+            "factor": exaggeration(float(tool), reach), "slow": _round(slow)}  # fmt: skip
+
+
+def exaggeration(tool: float, reach: float) -> float:
+    """How much to exaggerate a motion that moves the tool by so many metres."""
+    return _round(_SHOWN_SHARE * reach / tool) if tool > 0.0 else 1.0
 
 
 def _round(value: float) -> float:

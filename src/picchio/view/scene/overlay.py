@@ -7,14 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from picchio.core.arrays import FloatArray, IndexArray
+from picchio.core.arrays import BoolArray, FloatArray, IndexArray
 from picchio.studies import Assessment
 from picchio.studies.envelope import DirectionEnvelope, icosphere
 from picchio.view.plots.style import CMAP
 from picchio.view.scene.body import Body
 from picchio.view.scene.kinematics import Frame
 from picchio.view.scene.mesh import Mesh
-from picchio.view.scene.support import peaks
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ def envelope_surfaces(
     # Both ends of a line have the same peak: one of each pair is solved.
     half = np.arange(len(directions)) < mirror
     peak = np.empty((len(envelope.joint_names), len(directions)))
-    peak[:, half] = peaks(envelope.response, directions[half])
+    peak[:, half] = envelope.support(directions[half])
     peak[:, ~half] = peak[:, mirror[~half]]
     return directions[None] * peak[:, :, None], faces
 
@@ -88,12 +87,15 @@ def envelope_meshes(
 
 
 def joint_values(
-    assessment: Assessment | None, envelope: DirectionEnvelope
+    assessment: Assessment | None, envelope: DirectionEnvelope, slides: BoolArray
 ) -> tuple[FloatArray, Scale]:
-    """(n,) what the joints are coloured by: damage, else utilisation, else torque share."""
+    """(n,) what the joints are coloured by: damage, else utilisation, else torque.
+
+    `slides` (n,) says which joints are prismatic: theirs are forces, N, and on no scale of torques.
+    """
     if assessment is None:
         torque = envelope.peak("torque")
-        return torque, Scale("peak torque, worst direction", "N m", float(torque.max()))
+        return torque, Scale("peak torque, worst direction", "N m", _largest(torque, ~slides))
     joints = assessment.joints
     damage = np.array([joint.damage_per_rivet for joint in joints])
     if np.nansum(damage) > 0.0:
@@ -106,7 +108,11 @@ def joint_values(
     if np.isfinite(utilisation).any():
         return utilisation, Scale("utilisation of the joints", "%", float(np.nanmax(utilisation)))
     torque = np.array([joint.peak_torque for joint in joints])
-    return torque, Scale("peak torque of the joints", "N m", float(torque.max()))
+    return torque, Scale("peak torque of the joints", "N m", _largest(torque, ~slides))
+
+
+def _largest(values: FloatArray, among: BoolArray) -> float:
+    return float(values[among].max(initial=0.0))
 
 
 def rivet_values(assessment: Assessment) -> tuple[list[FloatArray], Scale]:
@@ -122,7 +128,8 @@ def rivet_values(assessment: Assessment) -> tuple[list[FloatArray], Scale]:
             )
         use = [100 * np.nanmax(op.utilisation, axis=1) for op in operations]
         return use, Scale("utilisation by a rivet", "%", max(float(u.max()) for u in use))
-    torque = [op.peak_torque.max(axis=1) for op in operations]
+    turning = [joint.kind != "prismatic" for joint in assessment.joints]
+    torque = [op.peak_torque[:, turning].max(axis=1, initial=0.0) for op in operations]
     return torque, Scale(
         "largest joint torque in a rivet", "N m", max(float(t.max()) for t in torque)
     )

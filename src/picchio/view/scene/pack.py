@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import hashlib
 import json
 import zlib
 from typing import Any
@@ -19,12 +20,16 @@ class Packer:
     def __init__(self) -> None:
         self._parts: list[bytes] = []
         self._size = 0
+        self._known: dict[tuple[str, bytes], list[Any]] = {}
 
     def add(self, values: ArrayLike, kind: str) -> list[Any]:
-        """Put an array in; `kind` is "f4", "u4", "u2" or "u1"."""
+        """Put an array in, once however often it comes; `kind` is "f4", "u4", "u2" or "u1"."""
         array = np.ascontiguousarray(np.asarray(values), dtype=f"<{kind}")
-        reference = [kind, self._size, int(array.size)]
         content = array.tobytes()
+        fingerprint = (kind, hashlib.sha256(content).digest())
+        if fingerprint in self._known:
+            return self._known[fingerprint]
+        reference = self._known[fingerprint] = [kind, self._size, int(array.size)]
         content += b"\0" * (-len(content) % 4)  # typed arrays must start on their own size
         self._parts.append(content)
         self._size += len(content)

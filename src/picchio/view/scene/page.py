@@ -65,6 +65,9 @@ def scene_data(scene: Scene, packer: Packer) -> dict[str, Any]:
             "samples": packer.add(samples, "f4"),
             "count": samples.shape[2],
             **{key: motion[key] for key in ("step", "directions", "factor", "slow")},
+            "tracks": [
+                {**track, "samples": packer.add(track["samples"], "f4")} for track in scene.tracks
+            ],
         },
         "camera": scene.camera.tolist(),
         "floor": scene.floor,

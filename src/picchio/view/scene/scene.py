@@ -39,12 +39,15 @@ class Scene:
         items: what is placed where.
         layers: (id, words, shown at first).
         labels: text at a place: {"text", "layer", "node" or "at", "joint"}.
-        joints: the flexible joints: {"name", "scale", "peak", "text"}.
+        joints: the flexible joints: {"name", "scale", "peak", "text", and "map" its colour bar}.
         scales: colour bars by layer.
         motion: the vibration, see `picchio.view.scene.motion`.
+        tracks: recorded motions to play as ghosts in its place: {"layer", "text", "colour",
+            "samples" (n, k) rad}, see `picchio.view.scene.compare`.
         camera: position and target, (2, 3) m.
         floor: "cell" m, "squares" along a side, "at" the middle (3,) m.
         chosen: index of the joint whose envelope is shown at first.
+        reach: m, size of the robot.
         envelope: what the double balls are of.
     """
 
@@ -59,9 +62,11 @@ class Scene:
     joints: list[dict[str, Any]] = field(default_factory=list)
     scales: dict[str, Scale] = field(default_factory=dict)
     motion: dict[str, Any] = field(default_factory=dict)
+    tracks: list[dict[str, Any]] = field(default_factory=list)
     camera: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
     floor: dict[str, Any] = field(default_factory=dict)
     chosen: int = 0
+    reach: float = 1.0
     version: str = field(default_factory=package_version)
 
     def html(self) -> str:
@@ -80,6 +85,9 @@ class Scene:
             viewer = meshcat.Visualizer()
         send(self, viewer)
         return viewer
+
+    def __repr__(self) -> str:
+        return f"Scene({self.title!r}, {self.subtitle!r}, layers={[i for i, _, _ in self.layers]})"
 
     def _repr_html_(self) -> str:
         from html import escape

@@ -18,7 +18,7 @@ function place(layer, frame, moved) {
 }
 
 const moving = data.frames.filter((frame) => frame.axis && frame.follows);
-const layersOfRobot = ["robot", "ghost", "joints"];
+const layersOfRobot = ["robot", "ghost", "joints", ...data.motion.tracks.map((t) => t.layer)];
 // Rings sit on the same tree as the links; the ghost stays where it is.
 for (const layer of layersOfRobot) for (const frame of data.frames) place(layer, frame, 0);
 
@@ -42,13 +42,27 @@ function deflections(time) {
   return x;
 }
 
-function drawMotion() {
-  const x = deflections(state.time);
+// A recorded history plays as it is, whatever the direction.
+function recorded(track, time) {
+  const at = Math.min(time / motion.step, motion.count - 1), i = Math.floor(at), part = at - i;
+  const next = Math.min(i + 1, motion.count - 1);
+  return data.joints.map((_, j) => {
+    const row = j * motion.count;
+    return (1 - part) * track.array[row + i] + part * track.array[row + next];
+  });
+}
+
+function bend(layers, x) {
   for (const frame of moving) {
     const moved = frame.follows.reduce((sum, f, j) => sum + f * x[j], 0) * state.factor;
-    place("robot", frame, moved);
-    place("joints", frame, moved);
+    for (const layer of layers) place(layer, frame, moved);
   }
+}
+
+function drawMotion() {
+  if (motion.tracks.length)
+    motion.tracks.forEach((track, k) => bend(k ? [track.layer] : [track.layer, "joints"], recorded(track, state.time)));
+  else bend(["robot", "joints"], deflections(state.time));
   byId("clock").textContent = `${(1e3 * state.time).toFixed(0)} ms of ` +
     `${(1e3 * duration).toFixed(0)}, ${motion.slow}\u00d7 slow`;
   byId("time").value = state.time / duration;

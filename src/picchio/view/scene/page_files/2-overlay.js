@@ -1,6 +1,7 @@
 // --- layers, joint, size ----------------------------------------------------------------
 const shown = (layer, joint) =>
   state.on[layer] && (joint === null || joint === undefined || layer === "joints" || joint === state.joint);
+const bars = {};
 const base = new THREE.Matrix4(), grow = new THREE.Matrix4();
 
 function drawOverlay() {
@@ -16,6 +17,7 @@ function drawOverlay() {
   byId("size-out").textContent = `${state.size.toFixed(2)}\u00d7`;
   const scale = data.joints[state.joint].scale;
   fillBar(byId("bar-envelope"), scale);
+  if (bars.map) fillBar(bars.map, data.joints[state.joint].map || data.scales.map);
   viewer.set_dirty();
 }
 

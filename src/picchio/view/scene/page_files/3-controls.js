@@ -15,6 +15,7 @@ function controls() {
   byId("size").oninput = (e) => { state.size = Number(e.target.value); drawOverlay(); };
   options(byId("direction"), motion.directions.map((d) => d.text), 0);
   byId("direction").onchange = (e) => { state.direction = Number(e.target.value); drawMotion(); };
+  for (const id of ["direction", "direction-label"]) byId(id).hidden = motion.tracks.length > 0;
   const tellFactor = () => {
     byId("factor-out").textContent = `${Number(state.factor.toPrecision(2))}\u00d7`;
   };
@@ -37,8 +38,15 @@ function controls() {
     box.onchange = () => { state.on[layer.id] = box.checked; drawOverlay(); };
     text.textContent = layer.text;
     line.append(box, text);
+    const track = motion.tracks.find((t) => t.layer === layer.id);
+    if (track) {
+      const swatch = document.createElement("i");
+      swatch.className = "swatch";
+      swatch.style.background = track.colour;
+      line.append(swatch);
+    }
     byId("layers").append(line);
-    if (data.scales[layer.id]) addBar(data.scales[layer.id]);
+    if (data.scales[layer.id]) bars[layer.id] = addBar(data.scales[layer.id]);
   }
   if (data.scales.rivets) {
     const title = document.createElement("label");
@@ -53,6 +61,7 @@ function addBar(scale) {
   bar.className = "bar";
   fillBar(bar, scale);
   byId("layers").append(bar);
+  return bar;
 }
 
 function play(on) {

@@ -38,10 +38,13 @@ function addItems(array) {
   const shapes = data.meshes.map((mesh) => geometry(mesh, array));
   const ghost = new THREE.MeshPhongMaterial({ color: dark ? 0xffffff : 0x334155, opacity: 0.16,
     transparent: true, depthWrite: false });
+  const paints = { ghost };
+  for (const { layer, colour } of motion.tracks)
+    paints[layer] = new THREE.MeshPhongMaterial({ color: colour, opacity: 0.5, transparent: true });
   data.items.forEach((item, k) => {
-    const layers = item.layer === "robot" ? ["robot", "ghost"] : [item.layer];
+    const layers = item.layer === "robot" ? ["robot", ...Object.keys(paints)] : [item.layer];
     for (const layer of layers) {
-      const paint = layer === "ghost" ? ghost : material(data.meshes[item.mesh], item, item.layer === "robot" ? k : 0);
+      const paint = paints[layer] || material(data.meshes[item.mesh], item, item.layer === "robot" ? k : 0);
       const object = new THREE.Mesh(shapes[item.mesh], paint);
       base.fromArray(item.matrix);
       base.decompose(object.position, object.quaternion, object.scale);
@@ -71,6 +74,7 @@ function tick(now) {
 
 unpack().then((array) => {
   samples = array(motion.samples);
+  for (const track of motion.tracks) track.array = array(track.samples);
   addItems(array);
   controls();
   stage();

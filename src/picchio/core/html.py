@@ -1,0 +1,67 @@
+"""Small tables for notebooks: what an object shows as the last line of a cell."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import Any
+
+MOST_ROWS = 30
+"""More rows than this are cut off, and the table says how many."""
+
+
+def sheet(
+    title: str,
+    facts: Mapping[str, Any] | None = None,
+    columns: Sequence[str] = (),
+    rows: Iterable[Sequence[Any]] = (),
+    note: str = "",
+) -> str:
+    """A heading, facts a line each, a table, a note; every text is escaped.
+
+    Args:
+        title: what it is.
+        facts: {name with unit: value}; None is left out.
+        columns: headers, units included.
+        rows: cells; numbers get four digits.
+        note: a sentence below.
+    """
+    parts = [f"<div><strong>{escape(title)}</strong>"]
+    known = {name: value for name, value in (facts or {}).items() if value is not None}
+    if known:
+        parts.append("<table>")
+        for name, value in known.items():
+            parts.append(
+                f'<tr><th scope="row" style="text-align:left;white-space:nowrap">'
+                f'{escape(name)}</th><td style="text-align:left">{cell(value)}</td></tr>'
+            )
+        parts.append("</table>")
+    if columns:
+        shown = list(rows)
+        head = "".join(f'<th scope="col">{escape(name)}</th>' for name in columns)
+        parts.append(f"<table><thead><tr>{head}</tr></thead><tbody>")
+        for row in shown[:MOST_ROWS]:
+            parts.append("<tr>" + "".join(f"<td>{cell(value)}</td>" for value in row) + "</tr>")
+        parts.append("</tbody></table>")
+        if len(shown) > MOST_ROWS:
+            parts.append(f"<p>and {len(shown) - MOST_ROWS} more</p>")
+    if note:
+        parts.append(f"<p>{escape(note)}</p>")
+    return "".join([*parts, "</div>"])
+
+
+def cell(value: Any) -> str:
+    """One value, escaped: numbers to four digits, a dash where there is none."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        if math.isnan(value):
+            return "–"
+        return "∞" if value == math.inf else f"{value:.4g}"
+    if isinstance(value, (list, tuple)):
+        text = ", ".join(cell(part) for part in value)
+        return text if len(value) == 1 else f"({text})"
+    return escape("–" if value is None else str(value))

@@ -1,0 +1,100 @@
+"""The notebooks: stripped in git, run top to bottom in a fresh kernel, and show what they say."""
+
+from __future__ import annotations
+
+import re
+import resource
+import time
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import pytest
+
+FOLDER = Path(__file__).resolve().parents[2] / "notebooks"
+NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
+MOST_SECONDS = 90.0
+MOST_LINES = 16
+"""Of a code cell."""
+MACHINE = re.compile(r"(?<![\w.])/(?:work|home|root|tmp|Users|opt|mnt)/|[A-Z]:\\\\|file://")
+
+every_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+
+
+def test_the_subjects_are_there() -> None:
+    assert [path.stem[3:] for path in NOTEBOOKS][:5] == [
+        "quick_start", "the_papers_method", "any_robot", "envelopes_and_maps", "fatigue",
+    ]  # fmt: skip
+
+
+@every_notebook
+def test_outputs_are_stripped_and_nothing_tells_of_a_machine(path: Path) -> None:
+    notebook = nbformat.read(path, as_version=4)
+    nbformat.validate(notebook)
+    for cell in notebook.cells:
+        assert not cell.metadata
+        if cell.cell_type == "code":
+            assert cell.outputs == []
+            assert cell.execution_count is None
+    assert set(notebook.metadata) == {"kernelspec", "language_info"}
+    assert not MACHINE.search(path.read_text("utf-8"))
+
+
+@every_notebook
+def test_it_teaches_in_small_steps(path: Path) -> None:
+    cells = nbformat.read(path, as_version=4).cells
+    code = [cell.source for cell in cells if cell.cell_type == "code"]
+    text = [cell.source for cell in cells if cell.cell_type == "markdown"]
+    assert cells[0].cell_type == "markdown" and cells[0].source.startswith("# ")
+    assert len(text) >= 0.6 * len(code)
+    assert sum(map(len, text)) > 0.6 * sum(map(len, code))
+    assert max(source.count("\n") + 1 for source in code if '"""' not in source) <= MOST_LINES
+    for other in re.findall(r"`(\d\d_\w+)`", "\n".join(text)):
+        assert (FOLDER / f"{other}.ipynb").is_file(), other
+
+
+def plots(source: str) -> bool:
+    """Whether a cell draws with matplotlib."""
+    return "plots.plot_" in source or "plt.subplots" in source
+
+
+@pytest.mark.slow
+@every_notebook
+def test_it_runs_in_a_fresh_kernel(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from nbclient import NotebookClient
+
+    notebook = nbformat.read(path, as_version=4)
+    # Threads of BLAS would add up to more seconds than there are.
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    began, used = time.monotonic(), cpu_of_children()
+    NotebookClient(
+        notebook,
+        timeout=5 * int(MOST_SECONDS),
+        kernel_name="python3",
+        resources={"metadata": {"path": str(tmp_path)}},
+    ).execute()
+    # On a machine that others use, too, the kernel's own seconds count.
+    assert min(time.monotonic() - began, cpu_of_children() - used) < MOST_SECONDS
+    for cell in notebook.cells:
+        if cell.cell_type != "code":
+            continue
+        kinds = {kind for output in cell.outputs for kind in output.get("data", {})}
+        if plots(cell.source):
+            assert "image/png" in kinds, cell.source
+        if re.search(r"^build_scene\(", cell.source, re.MULTILINE):
+            assert "<iframe" in html_of(cell), cell.source
+        if re.fullmatch(r"[a-z_0-9]+", cell.source.rstrip().splitlines()[-1]):
+            assert kinds, cell.source  # a name as the last line shows something
+    assert list(tmp_path.iterdir()) == []
+
+
+def cpu_of_children() -> float:
+    """Seconds that processes started from here, and ended, have computed."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def html_of(cell: Any) -> str:
+    return "".join(output.get("data", {}).get("text/html", "") for output in cell.outputs)
