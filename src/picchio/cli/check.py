@@ -1,0 +1,108 @@
+"""`picchio check`: what is in measured data, and what is wrong with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from picchio.cli.options import FlexOption, JsonOption, ToolOption
+
+if TYPE_CHECKING:
+    from picchio.campaign import Campaign
+    from picchio.prediction.quality import Finding
+    from picchio.robot import FlexibleRobot
+
+EPILOG = "Example: picchio check measurements/ --robot fanuc_like_3dof --json check.json"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the subcommand."""
+    app.command(epilog=EPILOG)(check)
+
+
+def check(
+    campaign: Annotated[
+        Path,
+        typer.Argument(metavar="CAMPAIGN", help="Folder with a campaign.toml.", show_default=False),
+    ],
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            "--robot", metavar="ROBOT", help="A name or a URDF; the campaign's own if not given."
+        ),
+    ] = None,
+    no_robot: Annotated[
+        bool, typer.Option("--no-robot", help="Leave out what needs a robot.")
+    ] = False,
+    flex: FlexOption = None,
+    tool: ToolOption = None,
+    keep_going: Annotated[
+        bool,
+        typer.Option("--keep-going", help="List records that cannot be read, check the others."),
+    ] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Every record, and every finding on its own.")
+    ] = False,
+    json: JsonOption = None,
+) -> None:
+    """Check measured data: what is in a campaign, and what is wrong with it.
+
+    Clipping, dropouts, spikes, drift, uneven clocks, swapped or flipped axes, hum, high-passes,
+    delays, records that are too short, aliasing, repeats, and the noise of every channel.
+    """
+    import dataclasses
+    import math
+
+    from picchio.campaign import load_campaign
+    from picchio.cli.check_tables import show, warning_lines
+    from picchio.cli.output import check_target, progress, say_warning, write_json
+    from picchio.core.errors import InputError
+    from picchio.prediction.quality import check_campaign
+
+    if no_robot and (robot is not None or flex is not None or tool is not None):
+        raise InputError("stands against --robot, --flex and --tool", key="--no-robot")
+    check_target(json, [robot, flex])
+    loaded = load_campaign(campaign, clock_tolerance=math.inf)
+    check_target(json, loaded.files)
+    found, problem = (None, None) if no_robot else _robot(loaded, robot, flex, tool)
+    with progress("records") as report:
+        result = check_campaign(loaded, found, keep_going=keep_going, progress=report)
+    if problem is not None:
+        result = dataclasses.replace(result, findings=(problem, *result.findings))
+    if json is not None:
+        write_json(result.to_dict(), json)
+    if json != "-":
+        show(result, verbose=verbose)
+    else:
+        for line in warning_lines(result):
+            say_warning(line)
+
+
+def _robot(
+    campaign: Campaign, robot: str | None, flex: Path | None, tool: str | None
+) -> tuple[FlexibleRobot | None, Finding | None]:
+    """The robot asked for, or else the campaign's; what is wrong with the campaign's own."""
+    from picchio.core.errors import InputError
+    from picchio.prediction.quality import Finding
+    from picchio.robot import load_robot
+
+    name = robot or campaign.robot
+    if name is None:
+        if flex is not None or tool is not None:
+            raise InputError("needs a robot", key="--flex" if flex is not None else "--tool",
+                             hint="name it with --robot")  # fmt: skip
+        return None, None
+    try:
+        return load_robot(name, flex=flex, tool=tool or campaign.tool), None
+    except InputError as error:
+        if robot is not None or flex is not None or tool is not None:
+            raise
+        return None, Finding(
+            "robot",
+            "error",
+            f"the campaign's robot cannot be used: {error}",
+            "correct `robot` or `tool` in campaign.toml, or give another with --robot; what needs "
+            "a robot was not checked",
+        )
