@@ -10,3 +10,4 @@ import numpy.typing as npt
 FloatArray: TypeAlias = npt.NDArray[Any]
 ComplexArray: TypeAlias = npt.NDArray[Any]
 IndexArray: TypeAlias = npt.NDArray[Any]
+BoolArray: TypeAlias = npt.NDArray[Any]

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.model.conditions import Conditions
+from picchio.model.effects.effect import Effect
+from picchio.model.effects.registry import from_dict
 from picchio.model.linear_system import LinearSystem, modal_damping_matrix
 
 if TYPE_CHECKING:
+    from picchio.model.blows import Blows
+    from picchio.model.geometry import Geometry
+    from picchio.model.plant import Plant
+    from picchio.model.sensing import Sensors
     from picchio.robot import FlexibleRobot, RobotState
+
+# In which order effects are applied: what a later one reads, an earlier one has changed.
+_ORDER = ("structure", "over-time", "nonlinear", "blows", "sensor", "motion")
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +37,34 @@ class Model:
         gravity_balanced: whether something beside the drives (a spring, a cylinder, a second
             arm) carries all of gravity, so that it leaves no torque in shaft and reducer. A
             balancer that is known belongs into the sidecar instead.
+        effects: how the world departs from the robot's files; those of a saved model come first.
     """
 
     robot: FlexibleRobot
     gravity_stiffness: bool = False
     gravity_balanced: bool = False
+    effects: tuple[Effect, ...] = ()
+    own: tuple[Effect, ...] = field(default=(), repr=False)
+
+    def __post_init__(self) -> None:
+        if self.robot.effect_tables and not self.own:
+            own = tuple(from_dict(table) for table in self.robot.effect_tables)
+            object.__setattr__(self, "own", own)
+            object.__setattr__(self, "effects", (*own, *self.effects))
+
+    def with_effects(self, effects: Iterable[Effect]) -> Model:
+        """The same robot, and the effects it was saved with, with these effects."""
+        return replace(self, effects=(*self.own, *effects))
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        facts = {
+            "gravity stiffness": self.gravity_stiffness,
+            "gravity balanced": self.gravity_balanced,
+            "effects": "; ".join(map(repr, self.effects)) or "none",
+        }
+        return sheet(f"Model of {self.robot.name}", facts) + self.robot._repr_html_()
 
     def holding_torque(self, state: RobotState) -> FloatArray:
         """Torque (n,) that the joints hold against gravity at a state, N m (N)."""
@@ -38,8 +72,53 @@ class Model:
             np.zeros_like(state.gravity_torque) if self.gravity_balanced else state.gravity_torque
         )
 
+    @property
+    def ordered(self) -> list[Effect]:
+        """The effects in the order in which they are applied."""
+        return sorted(self.effects, key=lambda effect: _ORDER.index(effect.where))
+
+    @property
+    def moving(self) -> bool:
+        """Whether any effect changes the motion, and not only what a sensor reads of it."""
+        return any(e.where not in ("sensor", "motion") for e in self.effects)
+
+    @property
+    def nonlinear(self) -> bool:
+        """Whether the response is not proportional to the force."""
+        return any(effect.where == "nonlinear" for effect in self.effects)
+
+    def plant(self, geometry: Geometry, conditions: Conditions | None = None) -> Plant:
+        """The equations of motion about a pose, with the effects in them.
+
+        Raises:
+            InputError: an effect whose target the robot does not have.
+        """
+        from picchio.model.plant import Plant
+
+        plant = Plant(geometry, self.gravity_stiffness, conditions or Conditions())
+        for effect in self.ordered:
+            effect.structure(plant)
+        return plant
+
+    def blows(self, blows: Blows, conditions: Conditions | None = None) -> Blows:
+        """The blows with the effects in them."""
+        for effect in self.ordered:
+            blows = effect.blows(blows, conditions or Conditions())
+        return blows
+
+    def sensors(self, conditions: Conditions | None = None) -> Sensors:
+        """The sensors with the effects in them."""
+        from picchio.model.sensing import Sensors
+
+        sensors = Sensors()
+        for effect in self.ordered:
+            effect.sense(sensors, conditions or Conditions())
+        return sensors
+
     def linear_system(self, pose: FloatArray) -> LinearSystem:
         """The linear equations of motion at a pose.
+
+        Nonlinear effects are left out of it: `picchio.vibration.integrate` has them.
 
         Args:
             pose: (nv,) rad or m.
@@ -47,6 +126,11 @@ class Model:
         Raises:
             InputError: wrong length, a singular mass matrix.
         """
+        if any(effect.where in ("structure", "over-time") for effect in self.effects):
+            from picchio.model.geometry import Geometry
+
+            geometry = Geometry.of(self.robot, pose)
+            return self.plant(geometry).build(np.array([0.0, 0.0, 1.0])).linear()
         state = self.robot.state(pose)
         springs = state.stiffness
         damping = modal_damping_matrix(state.mass_matrix, springs, self.robot.damping_ratio)

@@ -47,6 +47,8 @@ class FlexibleRobot:
         named_poses: poses by name, from the SRDF.
         rigid: the rigid robot's dynamics.
         tool_point: the link at whose origin the force acts.
+        effect_tables: of a saved model: how the world departs from the robot's files, as
+            `picchio.model.effects.from_dict` reads it.
     """
 
     name: str
@@ -62,6 +64,7 @@ class FlexibleRobot:
     named_poses: dict[str, tuple[float, ...]]
     rigid: RigidModel
     tool_point: str
+    effect_tables: tuple[Mapping[str, Any], ...] = ()
     lower: Array = field(init=False)
     upper: Array = field(init=False)
     stiffness: Array = field(init=False)
@@ -89,6 +92,24 @@ class FlexibleRobot:
         return (
             f"FlexibleRobot({self.name!r}, joints={list(self.joint_names)}, "
             f"flexible={list(self.flexible_names)}, tool_frame={self.tool_frame!r})"
+        )
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        columns = ("joint", "kind", "stiffness [N m/rad, N/m]", "damping ratio", "shaft", "reducer")
+        rows = [
+            (j.name, j.kind, j.stiffness, j.damping_ratio,
+             f"radius {1e3 * j.shaft.radius:.4g} mm" if j.shaft else None, j.reducer)
+            for j in self.flexible_joints
+        ]  # fmt: skip
+        guess = any(j.estimated for j in self.flexible_joints)
+        return sheet(
+            f"{self.name}: {len(self.joint_names)} joints, {len(rows)} flexible",
+            {"tool frame": self.tool_frame},
+            columns,
+            rows,
+            "Some stiffnesses are estimates; see .origins." if guess else "",
         )
 
     @property
@@ -158,10 +179,8 @@ class FlexibleRobot:
         """Only M (p, n, n) and J (p, 3, n) at many poses (p, nv), which are taken unchecked."""
         index = self.flexible_index
         point = self.rigid.frame(self.tool_point)
-        mass, jacobian = self.rigid.mass_and_jacobian(poses, point)
-        if len(index) == self.rigid.nv:
-            return mass, np.ascontiguousarray(jacobian)
-        return mass[:, index[:, None], index], jacobian[:, :, index]
+        mass, jacobian = self.rigid.mass_and_jacobian(poses, point, index)
+        return np.ascontiguousarray(mass), np.ascontiguousarray(jacobian)
 
     def tool_position(self, pose: Array) -> Array:
         """Only the point (3,) in m where the force acts; the pose is taken unchecked."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from lxml import etree
@@ -19,6 +20,7 @@ from picchio.robot.mass_check import check_masses
 from picchio.robot.normalised import normalise
 from picchio.robot.other_tags import read_drake
 from picchio.robot.rigid_model import RigidModel
+from picchio.robot.saved_model import read_saved_model
 from picchio.robot.sidecar import FORMAT, Sidecar, read_sidecar
 from picchio.robot.srdf import Srdf, find_srdf
 from picchio.robot.tool import Gun
@@ -39,8 +41,8 @@ def load_robot(
     """Load a robot by name or path.
 
     Args:
-        robot: a name from `picchio robots`, a path to a URDF or to a robot's folder, or a
-            `package://` address.
+        robot: a name from `picchio robots`, a path to a URDF or to a robot's folder, a
+            `package://` address, or a saved model (`picchio-model/1`, a .toml file).
         flex: a sidecar `picchio-sidecar/1`.
         tool: the frame that carries the tool.
         values: values that win over every file, by joint and key, as in a sidecar:
@@ -50,6 +52,8 @@ def load_robot(
     Raises:
         InputError: with the file, the key, the value and the valid choices.
     """
+    if str(robot).endswith(".toml"):
+        return _load_saved(Path(robot), flex=flex, tool=tool, values=values)
     found = find_robot(robot)
     root = parse_urdf(read_urdf_bytes(found.urdf), found.urdf)
     tree = read_tree(root, found.urdf)
@@ -91,6 +95,20 @@ def load_robot(
     )
     check_masses(result)
     return result
+
+
+def _load_saved(
+    path: Path,
+    *,
+    flex: str | Path | None,
+    tool: str | None,
+    values: Mapping[str, Mapping[str, object]] | None,
+) -> FlexibleRobot:
+    """The robot of a saved model, its effects with it."""
+    saved = read_saved_model(path)
+    robot = load_robot(saved.robot, flex=flex or saved.flex, tool=tool or saved.tool, values=values)
+    tables = tuple(table.model_dump() for table in saved.effect)
+    return replace(robot, effect_tables=tables, files=(*robot.files, path))
 
 
 def _sources(

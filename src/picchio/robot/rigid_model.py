@@ -121,30 +121,41 @@ class RigidModel:
         full = np.array(matrix).reshape(6, self._all)
         return full if self._plain else full @ self._follow
 
-    def mass_and_jacobian(self, poses: Array, frame: int) -> tuple[Array, Array]:
-        """Mass matrices (p, nv, nv) and a frame's linear Jacobians (p, 3, nv) at many poses.
+    def mass_and_jacobian(
+        self, poses: Array, frame: int, index: NDArray[np.intp] | None = None
+    ) -> tuple[Array, Array]:
+        """Mass matrices (p, n, n) and a frame's linear Jacobians (p, 3, n) at many poses.
 
         Two Pinocchio calls a pose and nothing else: the floor under the cost of a map.
+
+        Args:
+            poses: (p, nv).
+            frame: of `frame`.
+            index: (n,) which coordinates are wanted; all if not given.
         """
         self._check_frame(frame)
         if poses.ndim != 2 or poses.shape[1] != self.nv:
             raise InputError("poses of the wrong shape", key="poses", value=poses.shape,
                              choices=[f"(p, {self.nv})"])  # fmt: skip
-        if not len(poses):
-            return np.empty((0, self.nv, self.nv)), np.empty((0, 3, self.nv))
         model, data, size = self._model, self._data(), self._all
         crba, frame_jacobian, world = pin.crba, pin.computeFrameJacobian, pin.LOCAL_WORLD_ALIGNED
-        masses, jacobians = [], []
-        every = poses if self._plain else poses @ self._follow.T + self._offset
-        for q in np.ascontiguousarray(every):
-            masses.append(crba(model, data, q))  # a copy of its own
-            jacobians.append(frame_jacobian(model, data, q, frame, world))
         # The bindings flatten matrices of one row or column.
-        mass = np.concatenate(masses, axis=None).reshape(-1, size, size)
-        jacobian = np.concatenate(jacobians, axis=None).reshape(-1, 6, size)[:, :3]
-        if self._plain:
+        flat = size == 1
+        mass = np.empty((len(poses), size * size) if flat else (len(poses), size, size))
+        jacobian = np.empty((len(poses), 6) if flat else (len(poses), 6, size))
+        every = poses if self._plain else poses @ self._follow.T + self._offset
+        for k, q in enumerate(np.ascontiguousarray(every)):
+            mass[k] = crba(model, data, q)
+            jacobian[k] = frame_jacobian(model, data, q, frame, world)
+        mass = mass.reshape(len(poses), size, size)
+        jacobian = jacobian.reshape(len(poses), 6, size)[:, :3]
+        follow = self._follow if index is None else self._follow[:, index]
+        if self._plain and follow.shape[1] == size and (follow == np.eye(size)).all():
             return mass, jacobian
-        return self._follow.T @ mass @ self._follow, jacobian @ self._follow
+        if ((follow != 0.0).sum(axis=0) == 1).all() and (follow.max(axis=0) == 1.0).all():
+            rows = follow.argmax(axis=0)  # picking is many times faster than multiplying
+            return mass[:, rows[:, None], rows], jacobian[:, :, rows]
+        return follow.T @ mass @ follow, jacobian @ follow
 
     def gravity_torque(self, pose: Array) -> Array:
         """Torque (nv,) that holds the arm against gravity, N m (N)."""
@@ -156,6 +167,38 @@ class RigidModel:
         """Its derivative (nv, nv) by the pose, N m/rad."""
         matrix = pin.computeGeneralizedGravityDerivatives(self._model, self._data(), self._q(pose))
         return self._reduce(matrix)
+
+    def inverse_dynamics(self, poses: Array, velocities: Array, accelerations: Array) -> Array:
+        """Torques (m, nv) that the bodies' motion takes, N m (N); arguments (m, nv) each."""
+        model, data = self._model, self._data()
+        offset, zero = self._offset, np.zeros(self._all)
+        full = [
+            np.ascontiguousarray(x if self._plain else x @ self._follow.T + shift)
+            for x, shift in ((poses, offset), (velocities, zero), (accelerations, zero))
+        ]
+        every = [np.array(pin.rnea(model, data, *state)) for state in zip(*full, strict=True)]
+        torque = np.array(every).reshape(len(poses), self._all)
+        return torque if self._plain else torque @ self._follow
+
+    def point_load(
+        self, poses: Array, velocities: Array, accelerations: Array, frame: int
+    ) -> Array:
+        """Torques (m, nv) for each kg at a frame's origin: J^T (acceleration less gravity)."""
+        self._check_frame(frame)
+        model, data = self._model, self._data()
+        world, gravity = pin.LOCAL_WORLD_ALIGNED, self._model.gravity.linear
+        found = np.empty((len(poses), self.nv))
+        for i, pose in enumerate(poses):
+            q = self._q(pose)
+            v, a = velocities[i], accelerations[i]
+            if not self._plain:
+                v, a = self._follow @ v, self._follow @ a
+            pin.forwardKinematics(model, data, q, v, a)
+            linear = pin.getFrameClassicalAcceleration(model, data, frame, world).linear - gravity
+            jacobian = np.array(pin.computeFrameJacobian(model, data, q, frame, world))
+            torque = linear @ jacobian.reshape(6, self._all)[:3]
+            found[i] = torque if self._plain else torque @ self._follow
+        return found
 
     def placement(self, pose: Array, frame: int) -> tuple[Array, Array]:
         """World position (3,) in m and rotation (3, 3) of a frame."""

@@ -1,0 +1,277 @@
+"""`picchio diagnose`: what the simulation gets wrong, why, the extended model, the gain."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from picchio.cli.options import FlexOption, JsonOption, RobotArgument, ToolOption
+from picchio.core.errors import InputError
+
+if TYPE_CHECKING:
+    from picchio.campaign import Campaign
+    from picchio.diagnosis.percussion.diagnose import PercussionDiagnosis
+    from picchio.diagnosis.result import Diagnosis
+    from picchio.model import Effect
+    from picchio.robot import FlexibleRobot
+
+EPILOG = "Example: picchio diagnose fanuc_like_3dof --data measurements/ --report why.html"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the subcommand."""
+    app.command(epilog=EPILOG)(diagnose)
+
+
+def diagnose(
+    robot: RobotArgument,
+    data: Annotated[
+        Path,
+        typer.Option(
+            "--data", metavar="CAMPAIGN", help="Folder with a campaign.toml.", show_default=False
+        ),
+    ],
+    task: Annotated[
+        Path | None,
+        typer.Option("--task", metavar="FILE", help="For the life; the robot's own if not given."),
+    ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option("--without", metavar="EFFECT", help="Leave an effect out of consideration."),
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option("--model", metavar="OUT.toml", help="The extended model, for any ROBOT."),
+    ] = None,
+    report: Annotated[
+        Path | None, typer.Option("--report", metavar="OUT.html", help="One page to read.")
+    ] = None,
+    flex: FlexOption = None,
+    tool: ToolOption = None,
+    gravity_stiffness: Annotated[
+        bool,
+        typer.Option(
+            "--gravity-stiffness/--no-gravity-stiffness",
+            help="Gravity's stiffness dg/dq beside the springs'.",
+        ),
+    ] = True,
+    json: JsonOption = None,
+) -> None:
+    """What the simulation gets wrong about measured data, the cause, and what that does to life.
+
+    The nominal model is fitted within the campaign's tolerance; what it cannot explain is held
+    against every effect picchio knows; whole poses are held out to judge the gain. What cannot
+    be known is said, and what to measure to know it.
+    """
+    from picchio.campaign import load_campaign
+    from picchio.cli.output import check_target, said_warnings, write_json
+    from picchio.core.files import atomic_write
+    from picchio.core.provenance import provenance
+    from picchio.model.effects import effect_class
+    from picchio.robot import load_robot
+
+    for target in (json, report, model):
+        check_target(target, [robot, flex, task])
+    for name in without or ():
+        effect_class(name)
+    loaded = load_robot(robot, flex=flex, tool=tool)
+    campaign = load_campaign(data)
+    for target in (json, report, model):
+        check_target(target, [*loaded.files, *campaign.files])
+    kinds = {record.kind for record in campaign}
+    if kinds == {"motion"}:
+        found = _motion(loaded, campaign, without or ())
+        percussion = None
+        effects: tuple[Effect, ...] = ()
+    else:
+        with _telling() as say:
+            percussion = _percussion(loaded, campaign, without or (), gravity_stiffness, say)
+        found = percussion.diagnosis
+        effects = percussion.extended.hypothesis.effects
+    life: Mapping[str, Any] | None = found.life
+    if percussion is not None:
+        life = _life(loaded, task, effects, found)
+    text = ""
+    if percussion is not None:
+        text = _model_text(robot, flex, tool, effects, model, [*loaded.files, *campaign.files])
+    content = found.to_dict() | {"life": life}
+    content["scores"] = [dict(row) for row in found.scores]
+    content["provenance"] = provenance([*loaded.files, *campaign.files])
+    if model is not None:
+        if percussion is None:
+            raise InputError("is for percussion records; see picchio identify", key="--model")
+        with atomic_write(model) as stream:
+            stream.write(text)
+    if report is not None:
+        if percussion is None:
+            raise InputError("is for percussion records", key="--report")
+        from picchio.view.report.diagnosis import diagnosis_report
+
+        page = diagnosis_report(
+            percussion,
+            model_toml=text,
+            command=" ".join(["picchio", *map(shlex.quote, sys.argv[1:])]),
+            life=life,
+            warnings=said_warnings(),
+        )
+        with atomic_write(report) as stream:
+            stream.write(page)
+    if json is not None:
+        write_json(content, json)
+    if json != "-":
+        _show(found, life)
+
+
+def _percussion(
+    robot: FlexibleRobot,
+    campaign: Campaign,
+    without: list[str] | tuple[str, ...],
+    gravity_stiffness: bool,
+    say: Callable[[str], None],
+) -> PercussionDiagnosis:
+    from picchio.diagnosis.percussion.diagnose import diagnose_percussion
+
+    return diagnose_percussion(
+        robot, campaign, without=without, gravity_stiffness=gravity_stiffness, progress=say
+    )
+
+
+def _motion(
+    robot: FlexibleRobot, campaign: Campaign, without: list[str] | tuple[str, ...]
+) -> Diagnosis:
+    from picchio.diagnosis.motion import diagnose_motion
+
+    return diagnose_motion(robot, campaign, without=without)
+
+
+@contextmanager
+def _telling() -> Iterator[Callable[[str], None]]:
+    """What is being done, on stderr, where that is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda text: None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status("") as status:
+        yield status.update
+
+
+def _life(
+    robot: FlexibleRobot, task: Path | None, effects: tuple[Effect, ...], found: Diagnosis
+) -> dict[str, Any] | None:
+    """Life before and after; None where there is no task or nothing was found."""
+    from picchio.cli.output import say_warning
+    from picchio.diagnosis.life import life_before_and_after
+    from picchio.studies import load_task
+
+    path = task or robot.task_path
+    if path is None or found.verdict in ("nothing-wrong", "unexplained"):
+        return None
+    try:
+        return life_before_and_after(robot, load_task(path, robot), effects)
+    except InputError as error:
+        if task is not None:
+            raise
+        say_warning(f"the life could not be computed: {error}")
+        return None
+
+
+def _model_text(
+    robot: str,
+    flex: Path | None,
+    tool: str | None,
+    effects: tuple[Effect, ...],
+    model: Path | None,
+    files: list[Path],
+) -> str:
+    from picchio.core.provenance import provenance
+    from picchio.robot.saved_model import saved_model_text
+
+    tables = [e.to_dict() for e in effects if e.values != type(e)(e.target).values or e.hidden]
+    stamp = provenance(files)
+    return saved_model_text(
+        robot,
+        tables,
+        flex=flex,
+        tool=tool,
+        folder=model.parent if model is not None else None,
+        notes="found by picchio diagnose",
+        provenance={"picchio": str(stamp.get("picchio", stamp.get("version", "")))},
+    )
+
+
+def _show(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
+    from rich.table import Table
+
+    from picchio.cli.output import console
+    from picchio.diagnosis.result import VERDICTS
+    from picchio.model.effects import effect_class
+
+    out = console()
+    out.print(f"[bold]{found.verdict}[/bold]: {VERDICTS[found.verdict]}.")
+    if found.causes:
+        table = Table(box=None, pad_edge=False, header_style="dim")
+        for name in ("cause", "where", "confidence", "value", "std", "unit"):
+            table.add_column(name, justify="right" if name in ("value", "std") else "left")
+        for cause in found.causes:
+            if not cause.parameters:
+                table.add_row(cause.effect, cause.target, f"{cause.confidence:.3f}")
+            for i, (name, value) in enumerate(cause.parameters.items()):
+                head = (
+                    (cause.effect, cause.target, f"{cause.confidence:.3f}") if i == 0 else ("",) * 3
+                )
+                unit = "" if value.unit == "1" else value.unit
+                table.add_row(*head, f"{name} {value.value:.5g}", f"{value.std:.2g}", unit)
+        out.print(table)
+        for cause in found.causes:
+            out.print(f"  {cause.effect}: {effect_class(cause.effect).meaning}")
+    for each in found.alternatives:
+        names = ", ".join(f"{effect} of {target}" for effect, target in each)
+        out.print(f"  these data cannot tell it from: {names}")
+    for effect, target in found.leads:
+        out.print(f"  helped, but is not the cause: {effect} of {target}")
+    gain = found.gain
+    if gain is not None:
+        share = "" if gain.explained is None else f"; {100 * gain.explained:.1f} % explained"
+        out.print(
+            f"On {len(gain.held_out_records)} records held out the residual falls from "
+            f"{100 * gain.baseline_nrmse:.3g} % to {100 * gain.extended_nrmse:.3g} % of the "
+            f"signal; noise alone is {100 * gain.noise_floor_nrmse:.3g} %{share}."
+        )
+    if life is not None:
+        _show_life(life)
+    ask = found.next_measurement
+    if ask:
+        direction = ", ".join(f"{c:.2f}" for c in ask.get("direction", ()))
+        pose = ", ".join(f"{name} {value:.2f}" for name, value in ask.get("pose", {}).items())
+        out.print(f"Measure next: {ask['why']}")
+        if pose:
+            out.print(f"  pose {pose}; force along ({direction}), {ask.get('force', 0):g} N")
+
+
+def _show_life(life: Mapping[str, Any]) -> None:
+    from rich.table import Table
+
+    from picchio.cli.output import console
+    from picchio.studies.verdict import format_count
+
+    table = Table(box=None, pad_edge=False, header_style="dim", title="Life", title_justify="left")
+    for name in ("joint", "rivets before", "after", "utilisation before %", "after %"):
+        table.add_column(name, justify="left" if name == "joint" else "right")
+    before, after = life["baseline"]["joints"], life["extended"]["joints"]
+    for name, old in before.items():
+        new = after[name]
+        table.add_row(
+            name,
+            format_count(old["rivets_to_failure"]),
+            format_count(new["rivets_to_failure"]),
+            f"{100 * old['utilisation']:.4g}",
+            f"{100 * new['utilisation']:.4g}",
+        )
+    console().print(table)

@@ -1,0 +1,1 @@
+"""Diagnosis of percussion records: the robot stands, the tool hits, sensors read."""

@@ -1,0 +1,318 @@
+"""From percussion records to a verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from picchio.campaign import Campaign
+from picchio.core.arrays import FloatArray
+from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.evidence import Evidence, weigh
+from picchio.diagnosis.percussion.fit import Fit, fit, fit_growing
+from picchio.diagnosis.percussion.gain import held_out, measure_gain
+from picchio.diagnosis.percussion.latent import LATENT, hum_lines
+from picchio.diagnosis.percussion.next_measurement import next_measurement
+from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.select import (
+    LEAST_GAIN,
+    Search,
+    Trial,
+    alternatives,
+    refit,
+    score,
+    search,
+)
+from picchio.diagnosis.percussion.unknowns import NUISANCE_KEYS, TOLERATED, Hypothesis
+from picchio.diagnosis.result import Cause, Diagnosis, Value, Verdict
+from picchio.model import Effect
+from picchio.model.effects import Scales
+from picchio.prediction.noise_level import Noise
+from picchio.robot import FlexibleRobot
+
+# A cause claimed though more than noise is left must explain most of what there is.
+MOSTLY = 0.8
+BEYOND_DOUBT = 0.99
+_DECISIVE = 60.0
+
+
+@dataclass(frozen=True, eq=False)
+class PercussionDiagnosis:
+    """A diagnosis with all that led to it, for reports and tests.
+
+    Attributes:
+        diagnosis: the answer.
+        problem: data and noise.
+        baseline: nuisances alone, fitted to all records.
+        extended: with the causes, fitted to all records.
+        search: the way there.
+        before, after: tests of what the two leave.
+        scales: sizes in this campaign.
+    """
+
+    diagnosis: Diagnosis
+    problem: Problem
+    baseline: Fit
+    extended: Fit
+    search: Search
+    before: Evidence
+    after: Evidence
+    scales: Scales
+
+
+def diagnose_percussion(
+    robot: FlexibleRobot,
+    campaign: Campaign,
+    *,
+    without: Iterable[str] = (),
+    noise: Mapping[str, Noise] | None = None,
+    gravity_stiffness: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> PercussionDiagnosis:
+    """What the simulation of these percussion records gets wrong, and why.
+
+    Args:
+        robot: as its files have it.
+        campaign: the records; motion records are left out.
+        without: names of effects that must not be considered.
+        noise: channel -> noise; estimated where None.
+        gravity_stiffness: whether gravity's change with the deflection counts.
+        progress: told what is being done.
+
+    Raises:
+        InputError: records that can't be predicted for this robot.
+    """
+    say = progress or (lambda text: None)
+    say("reading the records and their noise")
+    problem = Problem(robot, campaign, noise, gravity_stiffness=gravity_stiffness)
+    train, kept = held_out(problem)
+    start = Hypothesis.baseline(robot, campaign.tolerance)
+    say("fitting the nominal model within its tolerance")
+    baseline = fit_growing(problem, start, train)
+    effects = baseline.hypothesis.effects
+    scales = measure_scales(problem, effects, problem.predictions(effects))
+    candidates = all_candidates(problem, without)
+
+    def confirmed(before: Fit, after: Fit) -> bool:
+        names = {e.name for e in after.hypothesis.causes}
+        if not kept or names & set(LATENT):
+            return True
+        old = _chi_square(problem, before.hypothesis, kept)
+        return _chi_square(problem, after.hypothesis, kept) < old
+
+    found = search(
+        problem, candidates, scales, train, baseline, confirmed=confirmed, progress=progress
+    )
+    say("fitting what was found to all records")
+    whole = refit(problem, found.best.hypothesis, problem.records)
+    if not found.best.hypothesis.labels:
+        nominal = whole
+    else:
+        nominal = fit(problem, baseline.hypothesis, problem.records, None, iterations=3)
+    before = weigh(problem, nominal.residuals)
+    after = weigh(problem, whole.residuals)
+    same: list[tuple[frozenset[str], float]] = []
+    rivals: list[Trial] = []
+    if whole.hypothesis.labels:
+        say("looking for other causes that would do as well")
+        same, rivals = alternatives(problem, found, candidates, scales, train)
+    causes = _causes(problem, whole, found, rivals, train)
+    gain = measure_gain(problem, baseline.hypothesis, found.best.hypothesis, train, kept)
+    verdict = _verdict(whole, causes, before, after, same, gain.explained)
+    if any(e.name == "mains_hum" for e in whole.hypothesis.effects):
+        causes = _with_hum(causes, hum_lines(problem, whole))
+    others = tuple(
+        tuple(sorted(_pair(label) for label in labels))
+        for labels, _ in same
+        if labels != whole.hypothesis.labels
+    )
+    leads = () if verdict != "unexplained" else tuple(_leads(found))
+    ask = None
+    if verdict in ("ambiguous", "unexplained", "partial"):
+        say("looking for the measurement that would tell most")
+        ask = next_measurement(problem, whole, rivals, same)
+    claimed = verdict in ("named", "ambiguous", "partial")
+    diagnosis = Diagnosis(
+        verdict=verdict,
+        causes=causes if claimed else (),
+        alternatives=tuple(dict.fromkeys(others)) if claimed else (),
+        leads=leads,
+        nuisances=_nuisances(whole if claimed or verdict == "nothing-wrong" else nominal),
+        gain=gain,
+        next_measurement=ask,
+        scores=tuple(_scores(found)),
+    )
+    return PercussionDiagnosis(diagnosis, problem, nominal, whole, found, before, after, scales)
+
+
+def _pair(label: str) -> tuple[str, str]:
+    name, _, target = label.partition(":")
+    return name, target
+
+
+def _chi_square(
+    problem: Problem, hypothesis: Hypothesis, records: Sequence[MeasuredRecord]
+) -> float:
+    return float(sum((r * r).sum() for r in problem.residuals(hypothesis.effects, records)))
+
+
+def _verdict(
+    whole: Fit,
+    causes: Sequence[Cause],
+    before: Evidence,
+    after: Evidence,
+    same: Sequence[object],
+    explained: float | None,
+) -> Verdict:
+    if not whole.hypothesis.labels:
+        return "nothing-wrong" if before.is_noise else "unexplained"
+    if after.is_noise:
+        return "ambiguous" if same else "named"
+    sure = all(cause.confidence >= BEYOND_DOUBT for cause in causes)
+    if sure and explained is not None and explained >= MOSTLY and not same:
+        return "partial"
+    return "unexplained"
+
+
+def _causes(
+    problem: Problem,
+    whole: Fit,
+    found: Search,
+    rivals: Sequence[Trial],
+    train: Sequence[MeasuredRecord],
+) -> tuple[Cause, ...]:
+    """The causes with their values, spreads and confidence."""
+    covariance = whole.covariance()
+    unknowns, vector = whole.hypothesis.unknowns(), whole.hypothesis.vector()
+    inflate = max(1.0, math.sqrt(whole.chi_square / max(whole.samples, 1)))
+    result = []
+    for effect in whole.hypothesis.causes:
+        index = whole.hypothesis.effects.index(effect)
+        values = {}
+        for p in effect.parameters:
+            std = 0.0
+            for k, unknown in enumerate(unknowns):
+                if unknown.effect == index and unknown.name == p.name:
+                    std = abs(unknown.slope(vector[k])) * math.sqrt(max(covariance[k, k], 0.0))
+            values[p.name] = Value(effect.values[p.name], std * inflate, p.unit)
+        result.append(
+            Cause(
+                effect.name,
+                effect.target,
+                _confidence(problem, found, rivals, effect, train),
+                values,
+            )
+        )
+    return tuple(result)
+
+
+def _confidence(
+    problem: Problem,
+    found: Search,
+    rivals: Sequence[Trial],
+    effect: Effect,
+    train: Sequence[MeasuredRecord],
+) -> float:
+    """From the poses' score differences to the best rival, and their spread (Student's t)."""
+    from scipy.stats import t as student
+
+    best = found.best
+    others = [r for r in rivals if effect.label not in r.fit.hypothesis.labels]
+    rival = min((r.fit for r in others), key=score, default=None)
+    if rival is None or len(rival.records) != len(best.records):
+        return 0.5 if len(train) < 3 else 1.0
+    poses = sorted({r.pose for r in best.records})
+    difference = np.zeros(len(poses))
+    for record, a, b in zip(best.records, best.residuals, rival.residuals, strict=True):
+        difference[poses.index(record.pose)] += float((b * b).sum() - (a * a).sum())
+    if len(poses) < 2:
+        return 1.0 if difference.sum() > 2.0 * LEAST_GAIN else 0.5
+    # A pose that decides beyond doubt on its own counts as one: how far beyond says nothing.
+    difference = np.clip(difference, -_DECISIVE, _DECISIVE)
+    total, spread = difference.mean(), difference.std(ddof=1) / math.sqrt(len(poses))
+    # What chance alone moves a pose's score by: that of log-likelihoods a few units apart.
+    spread = math.hypot(spread, 2.0 / math.sqrt(len(poses)))
+    return float(student.cdf(total / spread, len(poses) - 1))
+
+
+def _nuisances(found: Fit) -> dict[str, Value]:
+    """Fitted nuisances, in their own units."""
+    if found.jacobians is None:
+        return {}
+    covariance = found.covariance()
+    unknowns, vector = found.hypothesis.unknowns(), found.hypothesis.vector()
+    robot = found.records[0].setup.geometry.robot
+    nominal = dict(zip(robot.flexible_names, robot.stiffness, strict=True))
+    ratio = float(np.mean(robot.damping_ratio))
+    force = float(np.abs(found.records[0].setup.blows.height).max())
+    result = {}
+    for k, unknown in enumerate(unknowns):
+        effect = found.hypothesis.effects[unknown.effect]
+        if unknown.effect >= found.hypothesis.n_nuisances:
+            continue
+        key = NUISANCE_KEYS[effect.name]
+        scale, std = math.exp(vector[k]), math.exp(vector[k]) * math.sqrt(covariance[k, k])
+        if key == "stiffness":
+            prismatic = robot.tree.joints.get(effect.target)
+            unit = "N/m" if prismatic is not None and prismatic.type == "prismatic" else "N*m/rad"
+            size, name = float(nominal[effect.target]), f"stiffness.{effect.target}"
+        else:
+            size, unit = (ratio, "1") if key == "damping_ratio" else (force, "N")
+            name = key
+        result[name] = Value(scale * size, std * size, unit)
+    return result
+
+
+def _with_hum(causes: Sequence[Cause], lines: Hypothesis) -> tuple[Cause, ...]:
+    amplitude = {e.target: e.values["amplitude"] for e in lines.effects if e.name == "mains_hum"}
+    return tuple(
+        Cause(
+            c.effect,
+            c.target,
+            c.confidence,
+            {**c.parameters, "amplitude": Value(amplitude[c.target], 0.0, "1")},
+        )
+        if c.effect == "mains_hum"
+        else c
+        for c in causes
+    )
+
+
+def _leads(found: Search) -> list[tuple[str, str]]:
+    """What helped, though nothing may be claimed."""
+    if not found.steps:
+        return []
+    reference = score(found.baseline)
+    helpful = [t for t in found.steps[0] if reference - t.score > LEAST_GAIN]
+    return [_pair(t.label) for t in helpful[:3]]
+
+
+def _scores(found: Search) -> list[dict[str, object]]:
+    rows = []
+    for number, step in enumerate(found.steps):
+        for trial in step:
+            name, target = _pair(trial.label)
+            rows.append(
+                {
+                    "step": number + 1,
+                    "effect": name,
+                    "target": target,
+                    "bic": trial.score,
+                    "screened_gain": trial.promise,
+                    "chi_square_per_sample": trial.fit.chi_square / max(trial.fit.samples, 1),
+                }
+            )
+    return rows
+
+
+def within_tolerance(value: float, sigma: float) -> bool:
+    """Whether a relative difference is a nuisance, not a cause."""
+    return abs(value) <= TOLERATED * sigma
+
+
+def signal(problem: Problem, records: Sequence[MeasuredRecord]) -> list[FloatArray]:
+    """The measured channels in units of their noise, (channels, m) a record."""
+    return [np.stack([v / r.noise[name].std for name, v in r.values.items()]) for r in records]

@@ -1,0 +1,233 @@
+"""Measured records beside their prediction: residuals in units of their noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from picchio.campaign import Campaign
+from picchio.core.arrays import BoolArray, FloatArray
+from picchio.core.errors import InputError
+from picchio.model import Effect, Model
+from picchio.prediction.noise_level import Noise
+from picchio.prediction.percussion import POSITION_KINDS, PercussionSetup, percussion_setups
+from picchio.robot import FlexibleRobot
+
+_JUMPING = ("force", "acceleration", "accelerometer")
+# A sample this near a jump of the force, but not on it, holds neither side for sure.
+_NEAR_EDGE = 1.2e-4
+_ON_EDGE = 1e-7
+_WORKERS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredRecord:
+    """One record to be explained.
+
+    Attributes:
+        setup: what is needed to predict it.
+        values: channel -> (m,) SI.
+        noise: channel -> its noise at the record's rate.
+        pose: number of its pose among the campaign's.
+    """
+
+    setup: PercussionSetup
+    values: Mapping[str, FloatArray]
+    noise: Mapping[str, Noise]
+    pose: int
+    _cuts: dict[float, PercussionSetup] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Its file."""
+        return self.setup.name
+
+    def until(self, end: float | None) -> PercussionSetup:
+        """The setup up to a time, s."""
+        if end is None or end >= self.setup.samples.times[-1]:
+            return self.setup
+        if end not in self._cuts:
+            self._cuts[end] = self.setup.cut(end)
+        return self._cuts[end]
+
+
+class Problem:
+    """A campaign's percussion records, a robot, and the noise between them.
+
+    Args:
+        robot: the robot as its files have it.
+        campaign: the records.
+        noise: channel -> noise; estimated from the campaign where None.
+        gravity_stiffness: whether gravity's change with the deflection counts.
+
+    Raises:
+        InputError: no percussion record, or none with a channel that can be predicted.
+    """
+
+    def __init__(
+        self,
+        robot: FlexibleRobot,
+        campaign: Campaign,
+        noise: Mapping[str, Noise] | None = None,
+        *,
+        gravity_stiffness: bool = True,
+    ) -> None:
+        self.robot, self.campaign = robot, campaign
+        self.model = Model(robot, gravity_stiffness)
+        setups = percussion_setups(robot, campaign)
+        values = [campaign[s.name].read([c.name for c in s.channels]) for s in setups]
+        noise = dict(noise) if noise is not None else _noise(campaign, setups, values)
+        self.noise = noise
+        poses: dict[bytes, int] = {}
+        self.records: list[MeasuredRecord] = []
+        for setup, data in zip(setups, values, strict=True):
+            names = [c.name for c in setup.channels if noise[c.name].std > 0.0]
+            if not names:
+                continue
+            rate = 1.0 / setup.samples.step
+            self.records.append(
+                MeasuredRecord(
+                    setup,
+                    {name: data[name] for name in names},
+                    {name: noise[name].at(rate) for name in names},
+                    poses.setdefault(setup.geometry.pose.tobytes(), len(poses)),
+                )
+            )
+        if not self.records:
+            raise InputError(
+                "no percussion record with a channel that can be predicted",
+                file=campaign.folder,
+                hint="percussion records need pose, direction and accelerations or deflections",
+            )
+        self.n_poses = len(poses)
+        self._pool = ThreadPoolExecutor(_WORKERS)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """All channel groups."""
+        return tuple(dict.fromkeys(g for r in self.records for g in r.setup.groups))
+
+    def residuals(
+        self,
+        effects: Iterable[Effect],
+        records: Sequence[MeasuredRecord] | None = None,
+        end: float | None = None,
+    ) -> list[FloatArray]:
+        """Whitened residuals of every record, (channels, m): unit variance where all is noise.
+
+        Args:
+            effects: of the model.
+            records: all where None.
+            end: s, look no further.
+        """
+        model = self.model.with_effects(effects)
+        chosen = self.records if records is None else records
+        return list(self._pool.map(lambda r: residual(r, model, end), chosen))
+
+    def predictions(
+        self, effects: Iterable[Effect], records: Sequence[MeasuredRecord] | None = None
+    ) -> list[dict[str, FloatArray]]:
+        """What every channel would read."""
+        model = self.model.with_effects(effects)
+        chosen = self.records if records is None else records
+        return list(self._pool.map(lambda r: r.setup.predict(model), chosen))
+
+
+def _noise(
+    campaign: Campaign,
+    setups: Sequence[PercussionSetup],
+    values: Sequence[Mapping[str, FloatArray]],
+) -> dict[str, Noise]:
+    """From the quiet time where there is enough of it, else from all that can be used."""
+    from picchio.diagnosis.percussion.quiet_noise import quiet_noise
+
+    found = quiet_noise(setups, values)
+    if any(c.name not in found for s in setups for c in s.channels):
+        from picchio.prediction.noise import noise_levels
+
+        found = {**noise_levels(campaign), **found}
+    return found
+
+
+def residual(record: MeasuredRecord, model: Model, end: float | None = None) -> FloatArray:
+    """One record's whitened residual (channels, m) up to a time."""
+    setup = record.until(end)
+    predicted = setup.predict(model)
+    count = setup.samples.count
+    rows = {name: values[:count] - predicted[name] for name, values in record.values.items()}
+    steady = setup.steady
+    for channel in setup.channels:
+        if channel.name in rows and (steady or channel.kind.name in POSITION_KINDS):
+            rows[channel.name] = rows[channel.name] - rows[channel.name].mean()
+    hums = [e for e in model.effects if e.name == "mains_hum" and setup.name not in e.hidden]
+    for hum in hums:
+        take_out_line(rows, setup, hum.target, hum.values["frequency"])
+    masked = _near_edges(setup, model)
+    out = np.empty((len(rows), count))
+    kinds = {c.name: c for c in setup.channels}
+    for i, (name, row) in enumerate(rows.items()):
+        white = _whiten(record.noise[name], row)
+        if masked is not None and kinds[name].kind.name in _JUMPING:
+            white[masked[kinds[name].group]] = 0.0
+        out[i] = white
+    return out
+
+
+def _whiten(noise: Noise, row: FloatArray) -> FloatArray:
+    """As `Noise.whiten`; compiled from the sample on where the filter has all its past."""
+    from scipy.signal import lfilter
+
+    model = noise.model
+    if model.order == 0:
+        return row / np.sqrt(model.variance)
+    p = model.order
+    out = np.empty_like(row)
+    out[:p] = model.whiten(row[:p])
+    taps = np.concatenate([[1.0], -model.predictors[p]])
+    out[p:] = lfilter(taps, 1.0, row)[p:] / np.sqrt(model.variances[p])
+    return out
+
+
+def take_out_line(
+    rows: dict[str, FloatArray], setup: PercussionSetup, group: str, frequency: float
+) -> tuple[float, float]:
+    """Subtract the best sine of one frequency, common to a group's channels.
+
+    Returns:
+        its cosine and sine amplitude.
+    """
+    names = [c.name for c in setup.channels if c.group == group and c.name in rows]
+    if not names:
+        return 0.0, 0.0
+    phase = 2.0 * np.pi * frequency * setup.samples.times
+    basis = np.stack([np.cos(phase), np.sin(phase)])
+    mean = np.mean([rows[name] for name in names], axis=0)
+    found = np.linalg.lstsq(basis.T, mean, rcond=None)[0]
+    for name in names:
+        rows[name] = rows[name] - found @ basis
+    return float(found[0]), float(found[1])
+
+
+def _near_edges(setup: PercussionSetup, model: Model) -> dict[str, BoolArray] | None:
+    """Which samples of each group stand so near a jump that either side may be meant."""
+    _, force = setup.struck(model)
+    edges = force.start
+    if edges.size > 400:  # a measured history has no jumps
+        return None
+    if np.isfinite(force.end):
+        last = setup.samples.times[-1]
+        edges = (edges + force.end * np.arange(int(last / force.end) + 2)[:, None]).ravel()
+    sensors = model.sensors(setup.conditions)
+    found = {}
+    for group in setup.groups:
+        delay, rate = sensors.get(group).timing
+        times = setup.samples.times * (1.0 + rate) - delay
+        place = np.searchsorted(edges, times)
+        before = np.abs(times - edges[np.clip(place - 1, 0, edges.size - 1)])
+        after = np.abs(times - edges[np.clip(place, 0, edges.size - 1)])
+        distance = np.minimum(before, after)
+        found[group] = (distance < _NEAR_EDGE) & (distance > _ON_EDGE)
+    return found

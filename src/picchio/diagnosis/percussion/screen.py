@@ -1,0 +1,206 @@
+"""Screening: how much of what is left could each effect explain, at a size that matters?
+
+Each effect is really put into the model, at a finite size, and the change it makes is compared
+with the residual after the nuisances' own changes are taken out of both: no derivative, which
+misses what only acts beyond a threshold.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.fit import Fit, prior_weights
+from picchio.diagnosis.percussion.latent import LATENT, latent_gain
+from picchio.diagnosis.percussion.problem import Problem
+from picchio.model import Effect
+from picchio.model.effects import Scales
+
+
+@dataclass(frozen=True, eq=False)
+class Suspect:
+    """An effect and how much of the residual it could explain.
+
+    Attributes:
+        effect: at the size it was tried.
+        gain: fall of chi-square that the screening promises.
+        numbers: how many free numbers the effect has.
+        starts: other sizes to start the fit from, the best first.
+    """
+
+    effect: Effect
+    gain: float
+    numbers: int
+    starts: tuple[Effect, ...]
+
+    @property
+    def label(self) -> str:
+        """Effect and target."""
+        return self.effect.label
+
+
+class Projector:
+    """Takes what the nuisances and the causes found so far can do out of a change."""
+
+    def __init__(self, fit: Fit) -> None:
+        assert fit.jacobians is not None
+        weights = prior_weights(fit.hypothesis)
+        jacobian = np.concatenate([*fit.jacobians, np.diag(weights)])
+        norms = np.linalg.norm(jacobian, axis=0)
+        # What stands at its bound is no longer free to explain anything.
+        vector = fit.hypothesis.vector()
+        inside = [
+            u.lower + 1e-6 < x < u.upper - 1e-6
+            for u, x in zip(fit.hypothesis.unknowns(), vector, strict=True)
+        ]
+        keep = (norms > 0.0) & np.array(inside, dtype=bool)
+        q, r = np.linalg.qr(jacobian[:, keep] / norms[keep])
+        good = np.abs(r.diagonal()) > 1e-8
+        self.basis = q[:, good]
+        self.extra = weights.size
+
+    def __call__(self, flat: FloatArray) -> FloatArray:
+        """(samples,) or (samples, k) made orthogonal to the nuisances."""
+        pad = np.zeros((self.extra, *flat.shape[1:]))
+        full = np.concatenate([flat, pad])
+        return np.asarray(full - self.basis @ (self.basis.T @ full))
+
+
+def flat(parts: Sequence[FloatArray]) -> FloatArray:
+    """All records' residuals in one row."""
+    return np.concatenate([part.ravel() for part in parts])
+
+
+def screen(
+    problem: Problem,
+    fit: Fit,
+    candidates: Iterable[tuple[type[Effect], str]],
+    scales: Scales,
+) -> list[Suspect]:
+    """Every candidate's promise, the largest first.
+
+    Args:
+        problem: data and noise.
+        fit: of what is known so far, with its Jacobian; the same records and time are used.
+        candidates: effects and targets.
+        scales: sizes that matter.
+    """
+    project = Projector(fit)
+    left = project(flat(fit.residuals))
+    known = fit.hypothesis
+    found = []
+    for kind, target in candidates:
+        label = f"{kind.name}:{target}"
+        if label in known.labels:
+            continue
+        if kind.name in LATENT:
+            found.append(latent_gain(problem, fit, kind, target, project, left))
+            continue
+        if kind.discrete and fit.end is None:
+            continue  # what has no small size would have been seen before
+        trials = [kind(target, **values) for values in kind(target).trials(scales)]
+        suspect = _suspect(problem, fit, trials, project, left)
+        if suspect is not None:
+            found.append(suspect)
+    return sorted(found, key=lambda s: -(s.gain - s.numbers * math.log(left.size)))
+
+
+def _suspect(
+    problem: Problem,
+    fit: Fit,
+    trials: Sequence[Effect],
+    project: Projector,
+    left: FloatArray,
+) -> Suspect | None:
+    base, columns, kept = flat(fit.residuals), [], []
+    for trial in trials:
+        changed = fit.hypothesis.plus(trial)
+        try:
+            there = flat(problem.residuals(changed.effects, fit.records, fit.end))
+        except InputError:  # at this size the model is none
+            continue
+        columns.append(project((there - base)[:, None])[:, 0])
+        kept.append(trial)
+    if not kept:
+        return None
+    moves = np.stack(columns, axis=1)
+    size = np.linalg.norm(moves, axis=0)
+    alive = size > 1e-6
+    if not alive.any():
+        return None
+    moves, size = moves[:, alive], size[alive]
+    kept = [t for t, a in zip(kept, alive, strict=True) if a]
+    # the residual falls by the part of it that the change (of either size) can undo
+    alone = (moves.T @ -left) / size**2
+    gains = np.where(alone > 0.0, (alone * size) ** 2, 0.0)
+    linear = all(p.neutral == 0.0 and p.lower < 0.0 for p in kept[0].parameters)
+    if linear:
+        gains = (alone * size) ** 2
+    numbers = len(kept[0].parameters)
+    if kept[0].discrete:
+        # nothing lies between its sizes: the residual as it would be
+        totals = np.array([((left + m) ** 2).sum() for m in moves.T])
+        gains = (left**2).sum() - totals
+        order = np.argsort(-gains)
+        starts = tuple(kept[i] for i in order[:2])
+        return Suspect(starts[0], float(gains[order[0]]), 4, starts)
+    if _vector(kept):
+        weights = np.linalg.lstsq(moves, -left, rcond=None)[0]
+        total = float(left @ left - ((left + moves @ weights) ** 2).sum())
+        values: dict[str, float] = {}
+        for trial, weight in zip(kept, weights, strict=True):
+            for p in trial.parameters:
+                if trial.values[p.name] != p.neutral:
+                    values[p.name] = float(np.clip(weight, -6.0, 6.0)) * trial.values[p.name]
+        start = _bounded(kept[0], values)
+        return Suspect(start, total, numbers, (start,))
+    order = np.argsort(-gains)
+    starts = tuple(_scaled(kept[i], float(alone[i]), linear) for i in order[:2])
+    span = float(left @ left - _leave(moves, left))
+    return Suspect(starts[0], max(float(gains[order[0]]), 0.7 * span), numbers, starts)
+
+
+def _leave(moves: FloatArray, left: FloatArray) -> float:
+    weights = np.linalg.lstsq(moves, -left, rcond=None)[0]
+    return float(((left + moves @ weights) ** 2).sum())
+
+
+def _vector(trials: Sequence[Effect]) -> bool:
+    """Whether the trials move one parameter each, as a vector's components."""
+    moved = [tuple(p.name for p in t.parameters if t.values[p.name] != p.neutral) for t in trials]
+    return len(trials) > 1 and len(set(moved)) == len(moved) and all(len(m) == 1 for m in moved)
+
+
+def _scaled(trial: Effect, weight: float, signed: bool) -> Effect:
+    """The trial made larger or smaller as the residual asks."""
+    size = float(np.clip(abs(weight), 0.05, 8.0))
+    if signed:
+        size = math.copysign(size, weight)
+    values = dict(trial.values)
+    for p in trial.parameters:
+        value = values[p.name]
+        if value == p.neutral or not math.isfinite(value):
+            continue
+        if p.neutral == 0.0 and not p.logarithmic:
+            new = value * size
+        elif p.neutral == 1.0 and p.logarithmic:
+            new = math.exp(math.log(value) * float(np.clip(size, -3.0, 3.0)))
+        elif math.isinf(p.neutral) and p.name in ("stiffness", "limit"):
+            new = value / size if p.name == "stiffness" else value
+        else:
+            continue
+        values[p.name] = min(max(new, p.lower), p.upper)
+    kept = {p.name: values[p.name] for p in trial.parameters if values[p.name] != p.neutral}
+    return _bounded(trial, kept)
+
+
+def _bounded(trial: Effect, values: dict[str, float]) -> Effect:
+    """The effect with values brought within their bounds."""
+    bounds = {p.name: (p.lower, p.upper) for p in trial.parameters}
+    inside = {k: min(max(v, bounds[k][0]), bounds[k][1]) for k, v in values.items()}
+    return type(trial)(trial.target, **inside)

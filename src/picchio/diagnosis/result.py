@@ -1,0 +1,138 @@
+"""What a diagnosis says: `picchio-diagnosis/1`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+FORMAT = "picchio-diagnosis/1"
+Verdict = Literal["nothing-wrong", "named", "ambiguous", "partial", "unexplained"]
+VERDICTS: dict[str, str] = {
+    "nothing-wrong": "the residual is noise",
+    "named": "the causes leave noise",
+    "ambiguous": "two or more sets of causes leave noise and these data cannot tell them apart",
+    "partial": "the causes hold beyond doubt and explain most of it, but more than noise is left",
+    "unexplained": "more than noise is left and no cause may be claimed",
+}
+
+
+@dataclass(frozen=True)
+class Value:
+    """A fitted number: value and standard deviation, in `unit` (SI)."""
+
+    value: float
+    std: float
+    unit: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in JSON."""
+        return {"value": self.value, "std": self.std, "unit": self.unit}
+
+
+@dataclass(frozen=True)
+class Cause:
+    """An effect that is held to be there.
+
+    Attributes:
+        effect: its name.
+        target: the joint, link, axis, channel group, "tool" or "robot".
+        confidence: 0 to 1, from score differences with one pose (or record) left out at a time.
+        parameters: name -> value.
+    """
+
+    effect: str
+    target: str
+    confidence: float
+    parameters: Mapping[str, Value] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in JSON."""
+        return {
+            "effect": self.effect,
+            "target": self.target,
+            "confidence": self.confidence,
+            "parameters": {name: value.to_dict() for name, value in self.parameters.items()},
+        }
+
+
+@dataclass(frozen=True)
+class Gain:
+    """How much better the extended model predicts records that it has not seen.
+
+    Attributes:
+        train_records: files that the model was fitted to.
+        held_out_records: files that it was judged on.
+        baseline_nrmse: of the nominal model with its nuisances fitted.
+        extended_nrmse: of the extended model.
+        noise_floor_nrmse: what noise alone leaves.
+    """
+
+    train_records: tuple[str, ...]
+    held_out_records: tuple[str, ...]
+    baseline_nrmse: float
+    extended_nrmse: float
+    noise_floor_nrmse: float
+
+    @property
+    def explained(self) -> float | None:
+        """(baseline^2 - extended^2) / (baseline^2 - floor^2); None where nothing is to explain."""
+        to_explain = self.baseline_nrmse**2 - self.noise_floor_nrmse**2
+        if to_explain <= 0.0:
+            return None
+        return (self.baseline_nrmse**2 - self.extended_nrmse**2) / to_explain
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in JSON."""
+        return {
+            "train_records": list(self.train_records),
+            "held_out_records": list(self.held_out_records),
+            "baseline_nrmse": self.baseline_nrmse,
+            "extended_nrmse": self.extended_nrmse,
+            "noise_floor_nrmse": self.noise_floor_nrmse,
+            "explained": self.explained,
+        }
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer.
+
+    Attributes:
+        verdict: see `VERDICTS`.
+        causes: those claimed; empty for "nothing-wrong" and "unexplained".
+        alternatives: other sets of (effect, target) that these data cannot tell from the causes.
+        leads: what helped a little though nothing may be claimed.
+        nuisances: fitted values that are within tolerance: "stiffness.joint_1" -> value.
+        gain: on held-out records; None where nothing was fitted.
+        life: {"baseline": {...}, "extended": {...}}; None where it can't be known.
+        next_measurement: what to measure to know more; None where there is nothing to ask.
+        scores: every candidate's score, for the report: dicts with effect, target, numbers.
+        details: anything else that the report shows; not part of the JSON contract.
+    """
+
+    verdict: Verdict
+    causes: tuple[Cause, ...] = ()
+    alternatives: tuple[tuple[tuple[str, str], ...], ...] = ()
+    leads: tuple[tuple[str, str], ...] = ()
+    nuisances: Mapping[str, Value] = field(default_factory=dict)
+    gain: Gain | None = None
+    life: Mapping[str, Any] | None = None
+    next_measurement: Mapping[str, Any] | None = None
+    scores: tuple[Mapping[str, Any], ...] = ()
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in JSON."""
+        named = lambda pair: {"effect": pair[0], "target": pair[1]}  # noqa: E731
+        return {
+            "format": FORMAT,
+            "verdict": self.verdict,
+            "causes": [cause.to_dict() for cause in self.causes],
+            "alternatives": [[named(pair) for pair in each] for each in self.alternatives],
+            "leads": [named(pair) for pair in self.leads],
+            "nuisances": {name: value.to_dict() for name, value in self.nuisances.items()},
+            "gain": self.gain.to_dict() if self.gain else None,
+            "life": self.life,
+            "next_measurement": self.next_measurement,
+        }

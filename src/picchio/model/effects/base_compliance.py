@@ -1,0 +1,50 @@
+"""The base yields."""
+
+from __future__ import annotations
+
+from picchio.model.effects.effect import MODAL_SHARE, Effect, parameter
+from picchio.model.effects.scales import Scales
+from picchio.model.plant import Plant
+
+
+class BaseCompliance(Effect):
+    """The whole robot moves along or turns about one world axis through its root link's origin."""
+
+    name = "base_compliance"
+    where = "structure"
+    target_kind = "axis"
+    parameters = (
+        parameter(
+            "stiffness",
+            "N*m/rad",
+            neutral=float("inf"),
+            lower=1e-3,
+            upper=1e13,
+            log=True,
+            meaning="of the foundation (N/m along an axis)",
+        ),
+        parameter(
+            "damping",
+            "N*m*s/rad",
+            neutral=0.0,
+            lower=1e-9,
+            upper=1e9,
+            log=True,
+            meaning="of the foundation (N s/m along an axis)",
+        ),
+        MODAL_SHARE,
+    )
+    meaning = "pedestal, floor or bolts yield under the whole robot"
+
+    def structure(self, plant: Plant) -> None:
+        """Let the base's coordinate move."""
+        plant.modal_share = self.values["modal_share"]
+        plant.add_coordinate(
+            f"base.{self.target}", self.values["stiffness"], self.values["damping"]
+        )
+
+    def trials(self, scales: Scales) -> list[dict[str, float]]:
+        """A foundation on which the robot alone has 12 or 25 Hz."""
+        turns = self.target.startswith("r")
+        mass = max(scales.inertia.values()) if turns else scales.mass
+        return [{"stiffness": mass * w * w, "damping": 0.08 * mass * w} for w in (70.0, 160.0)]

@@ -1,0 +1,46 @@
+"""Dry friction in a joint."""
+
+from __future__ import annotations
+
+from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.scales import Scales
+from picchio.model.elements import Element, ElementKind
+from picchio.model.motion import Motion
+from picchio.model.plant import Plant
+
+
+class CoulombFriction(Effect):
+    """A torque against the deflection's rate, whatever its size; the joint sticks below it."""
+
+    name = "coulomb_friction"
+    where = "nonlinear"
+    target_kind = "joint"
+    parameters = (
+        parameter(
+            "torque", "N*m", lower=0.0, upper=1e6, meaning="friction (N for a prismatic joint)"
+        ),
+        parameter("smoothing", "rad/s", lower=0.0, upper=5e-3, meaning="rate below which it fades"),
+    )
+    meaning = "dry friction between link and motor side"
+
+    def structure(self, plant: Plant) -> None:
+        """Add the friction."""
+        plant.add_element(
+            self.target,
+            Element(ElementKind.COULOMB, (self.values["torque"], self.values["smoothing"])),
+        )
+
+    def trials(self, scales: Scales) -> list[dict[str, float]]:
+        """A twentieth of the spring's largest torque, and a fifth of that; ideal and smoothed."""
+        torque = scales.stiffness[self.target] * scales.deflection[self.target]
+        smooth = min(0.2 * scales.rate[self.target], 5e-4)
+        return [
+            {"torque": 0.05 * torque},
+            {"torque": 0.01 * torque},
+            {"torque": 0.05 * torque, "smoothing": smooth},
+        ]
+
+    def motion(self, motion: Motion) -> None:
+        """Add it to the drive's torque, against the velocity."""
+        friction = self.values["torque"] * motion.direction(self.target)
+        motion.add_drive_torque(self.target, friction)

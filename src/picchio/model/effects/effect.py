@@ -1,0 +1,188 @@
+"""The base of everything that can be wrong with a simulation: an effect on the model.
+
+An effect is a small immutable object: a name, a target, parameters with units and bounds, and how
+it changes the robot's equations, its blows, its sensors or its motion. To add one, write a class
+in a file of its own in this folder, or anywhere and name it in the entry-point group
+`picchio.effects`.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
+
+from picchio.core.errors import InputError
+from picchio.model.conditions import Conditions
+
+if TYPE_CHECKING:
+    from picchio.model.blows import Blows
+    from picchio.model.effects.scales import Scales
+    from picchio.model.motion import Motion
+    from picchio.model.plant import Plant
+    from picchio.model.sensing import Sensors
+
+Where = Literal["structure", "nonlinear", "blows", "over-time", "sensor", "motion"]
+TargetKind = Literal["joint", "link", "joint or link", "tool", "robot", "axis", "channel group"]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number that says how strong an effect is.
+
+    Attributes:
+        name: as in JSON.
+        unit: SI.
+        neutral: the value at which nothing changes (may be infinite).
+        lower: smallest value allowed.
+        upper: largest.
+        logarithmic: whether steps are ratios rather than differences.
+        meaning: one line.
+    """
+
+    name: str
+    unit: str
+    neutral: float
+    lower: float = -math.inf
+    upper: float = math.inf
+    logarithmic: bool = False
+    meaning: str = ""
+
+
+class Effect(ABC):
+    """One departure of the world from the simulation.
+
+    Args:
+        target: the joint, link, axis, channel group, "tool" or "robot" that it is about.
+        **values: its parameters, SI; those left out are neutral.
+
+    Attributes:
+        values: its parameters.
+        hidden: record -> numbers that are drawn anew in every record (`latent` says what).
+
+    Raises:
+        InputError: an unknown parameter, a value out of bounds.
+    """
+
+    name: ClassVar[str]
+    where: ClassVar[Where]
+    target_kind: ClassVar[TargetKind]
+    parameters: ClassVar[tuple[Parameter, ...]]
+    meaning: ClassVar[str]
+    source: ClassVar[str] = ""
+    latent: ClassVar[str | None] = None
+    discrete: ClassVar[bool] = False
+
+    def __init__(self, target: str, **values: float) -> None:
+        known = {p.name: p for p in self.parameters}
+        for key, value in values.items():
+            if key not in known:
+                raise InputError(
+                    "no such parameter", key=f"{self.name}.{key}", value=value, choices=known
+                )
+            bounds = known[key]
+            inside = bounds.lower <= value <= bounds.upper or value == bounds.neutral
+            if math.isnan(value) or not inside:
+                raise InputError(
+                    f"must lie between {bounds.lower:g} and {bounds.upper:g} {bounds.unit}",
+                    key=f"{self.name}.{key}",
+                    value=value,
+                )
+        self.target = target
+        self.values: Mapping[str, float] = {
+            p.name: float(values.get(p.name, p.neutral)) for p in self.parameters
+        }
+        self.hidden: Mapping[str, tuple[float, ...]] = {}
+
+    def __repr__(self) -> str:
+        numbers = ", ".join(f"{k}={v:.6g}" for k, v in self.values.items())
+        return f"{type(self).__name__}({self.target!r}{', ' if numbers else ''}{numbers})"
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is type(self) and self.key == other.key  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """What tells this effect from another."""
+        return (self.name, self.target, *self.values.items(), *self.hidden.items())
+
+    @property
+    def label(self) -> str:
+        """Name and target, for people."""
+        return f"{self.name}:{self.target}"
+
+    def with_values(self, **values: float) -> Self:
+        """The same effect with other values."""
+        neutral = {p.name: p.neutral for p in self.parameters}
+        kept = {k: v for k, v in self.values.items() if v != neutral[k]}
+        return type(self)(self.target, **{**kept, **values}).with_hidden(self.hidden)
+
+    def with_hidden(self, hidden: Mapping[str, tuple[float, ...]]) -> Self:
+        """The same effect with other numbers drawn anew in every record."""
+        other = type(self).__new__(type(self))
+        other.target, other.values = self.target, self.values
+        other.hidden = {k: tuple(float(x) for x in v) for k, v in hidden.items()}
+        return other
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in a model file."""
+        table = {"effect": self.name, "target": self.target, "parameters": dict(self.values)}
+        if self.hidden:
+            table["hidden"] = {record: list(numbers) for record, numbers in self.hidden.items()}
+        return table
+
+    def trials(self, scales: Scales) -> list[dict[str, float]]:
+        """Values of typical size, to see what the effect would do to these data.
+
+        Args:
+            scales: sizes of deflections, torques and readings in the campaign.
+        """
+        return []
+
+    # Hooks: an effect overrides those that concern it ----------------------------------------
+
+    def structure(self, plant: Plant) -> None:  # noqa: B027
+        """Change the robot's equations of motion."""
+
+    def blows(self, blows: Blows, conditions: Conditions) -> Blows:
+        """Change the blows."""
+        return blows
+
+    def sense(self, sensors: Sensors, conditions: Conditions) -> None:  # noqa: B027
+        """Change how channels read."""
+
+    def motion(self, motion: Motion) -> None:  # noqa: B027
+        """Change what drives and encoders read while the robot moves."""
+
+    def motion_trials(self, motion: Motion) -> list[dict[str, float]]:
+        """Values to try of what enters a motion record nonlinearly; the rest is solved for."""
+        return [{}]
+
+
+def parameter(
+    name: str,
+    unit: str = "1",
+    *,
+    neutral: float = 0.0,
+    lower: float = -math.inf,
+    upper: float = math.inf,
+    log: bool = False,
+    meaning: str = "",
+) -> Parameter:
+    """A parameter, in few words."""
+    return Parameter(name, unit, neutral, lower, upper, log, meaning)
+
+
+# Of effects that let something beside the joints yield; see `Plant.modal_share`.
+MODAL_SHARE = parameter(
+    "modal_share",
+    neutral=1.0,
+    lower=0.0,
+    upper=1.0,
+    meaning="1: the stated damping is that of the modes with this effect; 0: of the joints alone",
+)

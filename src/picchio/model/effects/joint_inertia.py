@@ -1,0 +1,39 @@
+"""Inertia that turns with a joint and is in no link."""
+
+from __future__ import annotations
+
+from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.scales import Scales
+from picchio.model.motion import Motion
+from picchio.model.plant import Plant
+
+
+class JointInertia(Effect):
+    """A constant inertia about the joint's axis that turns with the link side."""
+
+    name = "joint_inertia"
+    where = "structure"
+    target_kind = "joint"
+    parameters = (
+        parameter(
+            "inertia", "kg*m^2", lower=-1e4, upper=1e5, meaning="added inertia about the joint"
+        ),
+    )
+    meaning = "something unmodelled turns with the joint's link side"
+
+    def structure(self, plant: Plant) -> None:
+        """Add it to the mass matrix's diagonal."""
+        plant.add_inertia(self.target, self.values["inertia"])
+
+    def trials(self, scales: Scales) -> list[dict[str, float]]:
+        """A tenth of what the joint turns."""
+        return [{"inertia": 0.1 * scales.inertia[self.target]}]
+
+    def motion(self, motion: Motion) -> None:
+        """Add what it takes to accelerate it.
+
+        What is missing while a robot moves is most often the rotor's, times the ratio squared,
+        which turns before the gear: it is not taken to wind the gear up.
+        """
+        torque = self.values["inertia"] * motion.acceleration[self.target]
+        motion.add_rotor_torque(self.target, torque)

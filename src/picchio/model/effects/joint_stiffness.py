@@ -1,0 +1,41 @@
+"""A joint softer or stiffer than it is taken to be."""
+
+from __future__ import annotations
+
+from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.scales import Scales
+from picchio.model.motion import Motion
+from picchio.model.plant import Plant
+
+
+class JointStiffness(Effect):
+    """The joint's spring is `scale` times as stiff as stated."""
+
+    name = "joint_stiffness"
+    where = "structure"
+    target_kind = "joint"
+    parameters = (
+        parameter(
+            "scale",
+            neutral=1.0,
+            lower=0.02,
+            upper=50.0,
+            log=True,
+            meaning="true stiffness over stated",
+        ),
+    )
+    meaning = "the joint's spring is softer or stiffer than stated"
+    source = "Nie et al. 2016, eq. 5: K"
+
+    def structure(self, plant: Plant) -> None:
+        """Scale the spring."""
+        plant.springs[plant.check_joint(self.target)] *= self.values["scale"]
+
+    def trials(self, scales: Scales) -> list[dict[str, float]]:
+        """A fifth softer, a quarter stiffer."""
+        return [{"scale": 0.8}, {"scale": 1.25}]
+
+    def motion(self, motion: Motion) -> None:
+        """Let the link side yield; a motion's baseline takes the drive as rigid."""
+        compliance = 1.0 / (self.values["scale"] * motion.stiffness[self.target])
+        motion.add_windup(self.target, -compliance * motion.body[self.target])

@@ -1,0 +1,34 @@
+"""A link heavier or lighter than the URDF says."""
+
+from __future__ import annotations
+
+from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.scales import Scales
+from picchio.model.plant import Plant
+
+
+class LinkMass(Effect):
+    """Mass and inertia of one link are `scale` times the URDF's; its centre of mass is kept."""
+
+    name = "link_mass"
+    where = "structure"
+    target_kind = "link"
+    parameters = (
+        parameter(
+            "scale",
+            neutral=1.0,
+            lower=0.05,
+            upper=20.0,
+            log=True,
+            meaning="true mass over the URDF's",
+        ),
+    )
+    meaning = "the link's mass and inertia are not the URDF's"
+
+    def structure(self, plant: Plant) -> None:
+        """Add the link's own inertia `scale` - 1 times."""
+        plant.add_mass(self.values["scale"] - 1.0, self.target)
+
+    def trials(self, scales: Scales) -> list[dict[str, float]]:
+        """An eighth heavier."""
+        return [{"scale": 1.12}]

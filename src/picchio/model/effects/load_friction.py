@@ -1,0 +1,27 @@
+"""Friction that grows with the load on the gear."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from picchio.model.effects.effect import Effect, parameter
+from picchio.model.motion import Motion
+
+
+class LoadFriction(Effect):
+    """Dry friction in proportion to the torque that the gear transmits."""
+
+    name = "load_friction"
+    where = "motion"
+    target_kind = "joint"
+    parameters = (
+        parameter("coefficient", lower=0.0, upper=1.0, meaning="friction over transmitted torque"),
+    )
+    meaning = "teeth and bearings rub more under load: the gear's efficiency"
+    source = "Hamon, Gautier, Garrec, IROS 2010"
+
+    def motion(self, motion: Motion) -> None:
+        """Add it to the drive's torque."""
+        load = np.abs(motion.body[self.target])
+        friction = self.values["coefficient"] * load * motion.direction(self.target)
+        motion.add_drive_torque(self.target, friction)

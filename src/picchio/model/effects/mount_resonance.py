@@ -1,0 +1,39 @@
+"""A sensor on a soft mount."""
+
+from __future__ import annotations
+
+from picchio.model.conditions import Conditions
+from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.scales import Scales
+from picchio.model.sensing import Sensors
+
+
+class MountResonance(Effect):
+    """Each axis passes w^2 / (s^2 + 2 zeta w s + w^2)."""
+
+    name = "mount_resonance"
+    where = "sensor"
+    target_kind = "channel group"
+    parameters = (
+        parameter(
+            "frequency",
+            "Hz",
+            neutral=float("inf"),
+            lower=1.0,
+            upper=1e5,
+            log=True,
+            meaning="of the mount",
+        ),
+        parameter(
+            "damping_ratio", neutral=0.05, lower=1e-3, upper=2.0, log=True, meaning="of the mount"
+        ),
+    )
+    meaning = "the sensor swings on its magnet, wax or bracket"
+
+    def sense(self, sensors: Sensors, conditions: Conditions) -> None:
+        """Change the group's chain."""
+        sensors.chain(self.target).mount = (self.values["frequency"], self.values["damping_ratio"])
+
+    def trials(self, scales: Scales) -> list[dict[str, float]]:
+        """All over the frequencies where mounts are."""
+        return [{"frequency": f, "damping_ratio": 0.06} for f in (50.0, 70.0, 100.0, 140.0, 200.0)]

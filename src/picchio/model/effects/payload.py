@@ -1,0 +1,32 @@
+"""A mass at the tool that the model does not have."""
+
+from __future__ import annotations
+
+from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.scales import Scales
+from picchio.model.motion import Motion
+from picchio.model.plant import Plant
+
+
+class Payload(Effect):
+    """A point mass at the origin of the tool frame, over what the tool is taken to weigh."""
+
+    name = "payload"
+    where = "structure"
+    target_kind = "tool"
+    parameters = (parameter("mass", "kg", lower=-500.0, upper=5000.0, meaning="added mass"),)
+    meaning = "the tool is heavier (or lighter) than stated"
+
+    def structure(self, plant: Plant) -> None:
+        """Add the mass; its weight only changes gravity's stiffness, since the pose is given."""
+        plant.add_mass(self.values["mass"], plant.geometry.robot.tool_frame, (0.0, 0.0, 0.0))
+
+    def trials(self, scales: Scales) -> list[dict[str, float]]:
+        """Two hundredths of what moves."""
+        return [{"mass": 0.02 * scales.mass}]
+
+    def motion(self, motion: Motion) -> None:
+        """Add its weight and inertia to every joint's torque."""
+        if self.values["mass"] != 0.0:
+            for joint, torque in motion.tool_load().items():
+                motion.add_body_torque(joint, self.values["mass"] * torque)

@@ -1,0 +1,33 @@
+"""Blows rounder than programmed."""
+
+from __future__ import annotations
+
+from picchio.model.blows import Blows
+from picchio.model.conditions import Conditions
+from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.scales import Scales
+
+
+class PulseShape(Effect):
+    """Blows are half-sines, or on the way there, instead of rectangles of the same peak and width.
+
+    `blend` is counted from the programmed shape: 1 turns a rectangle into a half-sine, and a
+    half-sine into a rectangle.
+    """
+
+    name = "pulse_shape"
+    where = "blows"
+    target_kind = "tool"
+    parameters = (
+        parameter("blend", lower=-0.2, upper=1.2, meaning="0 as programmed, 1 the other shape"),
+    )
+    meaning = "the blows have another shape than programmed"
+
+    def blows(self, blows: Blows, conditions: Conditions) -> Blows:
+        """Blend the shapes."""
+        blend = self.values["blend"]
+        return blows.change(blend=blows.blend + blend * (1.0 - 2.0 * blows.blend))
+
+    def trials(self, scales: Scales) -> list[dict[str, float]]:
+        """All the way."""
+        return [{"blend": 1.0}]

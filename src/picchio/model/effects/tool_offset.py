@@ -1,0 +1,28 @@
+"""The force acts beside the tool frame's origin."""
+
+from __future__ import annotations
+
+from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.scales import Scales
+from picchio.model.plant import Plant
+
+
+class ToolOffset(Effect):
+    """The force's point is offset in the tool frame; the frame, and its sensors, stay."""
+
+    name = "tool_offset"
+    where = "structure"
+    target_kind = "tool"
+    parameters = tuple(
+        parameter(axis, "m", lower=-2.0, upper=2.0, meaning=f"offset along the tool's {axis}")
+        for axis in "xyz"
+    )
+    meaning = "the tool's tip is not where the model has it"
+
+    def structure(self, plant: Plant) -> None:
+        """Move the force's point."""
+        plant.force_offset = plant.force_offset + [self.values[axis] for axis in "xyz"]
+
+    def trials(self, scales: Scales) -> list[dict[str, float]]:
+        """3 cm along each axis: the fit takes all three."""
+        return [{axis: 0.03} for axis in "xyz"]

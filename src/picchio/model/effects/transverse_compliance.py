@@ -1,0 +1,52 @@
+"""A joint's bearing yields sideways."""
+
+from __future__ import annotations
+
+from picchio.model.effects.effect import MODAL_SHARE, Effect, parameter
+from picchio.model.effects.scales import Scales
+from picchio.model.plant import Plant
+
+
+class TransverseCompliance(Effect):
+    """The joint's frame tilts about the two axes perpendicular to its own, isotropically."""
+
+    name = "transverse_compliance"
+    where = "structure"
+    target_kind = "joint or link"
+    parameters = (
+        parameter(
+            "stiffness",
+            "N*m/rad",
+            neutral=float("inf"),
+            lower=1e-3,
+            upper=1e12,
+            log=True,
+            meaning="tilting stiffness of the bearing",
+        ),
+        parameter(
+            "damping",
+            "N*m*s/rad",
+            neutral=0.0,
+            lower=1e-9,
+            upper=1e8,
+            log=True,
+            meaning="tilting damping of the bearing",
+        ),
+        MODAL_SHARE,
+    )
+    meaning = "bearing or link bends across the joint's axis"
+    source = "Klimchik et al., Robotics and CIM 30 (2014) 488 (models of more than axial springs)"
+
+    def structure(self, plant: Plant) -> None:
+        """Let the two hinges at the joint move."""
+        plant.modal_share = self.values["modal_share"]
+        joint = plant.check_joint(self.target)
+        for i in (1, 2):
+            plant.add_coordinate(
+                f"hinge.{joint}.{i}", self.values["stiffness"], self.values["damping"]
+            )
+
+    def trials(self, scales: Scales) -> list[dict[str, float]]:
+        """Four times as stiff as the joint."""
+        k, m = 4.0 * scales.stiffness[self.target], scales.inertia[self.target]
+        return [{"stiffness": k, "damping": 0.04 * (k * m) ** 0.5}]

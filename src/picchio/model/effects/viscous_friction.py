@@ -1,0 +1,25 @@
+"""Friction that grows with speed."""
+
+from __future__ import annotations
+
+from picchio.model.effects.effect import Effect, parameter
+from picchio.model.motion import Motion
+
+
+class ViscousFriction(Effect):
+    """A torque against the joint's velocity, in proportion to it."""
+
+    name = "viscous_friction"
+    where = "motion"
+    target_kind = "joint"
+    parameters = (
+        parameter("coefficient", "N*m*s/rad", lower=0.0, upper=1e7, meaning="torque over velocity"),
+    )
+    meaning = "lubricant and seals resist in proportion to the speed"
+    source = "Swevers, Verdonck, De Schutter, IEEE Control Systems 27(5), 2007"
+
+    def motion(self, motion: Motion) -> None:
+        """Add it to the drive's torque."""
+        motion.add_drive_torque(
+            self.target, self.values["coefficient"] * motion.velocity[self.target]
+        )

@@ -1,0 +1,258 @@
+"""The robot's equations of motion at a pose, before and after effects have changed them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.model.conditions import Conditions
+from picchio.model.elements import Element
+from picchio.model.geometry import Geometry
+from picchio.model.linear_system import undamped_modes
+from picchio.model.system import VibratingSystem
+
+Row = dict[str, float]
+
+
+@dataclass
+class _Spring:
+    """A linear spring and damper of one coordinate, or of a joint's deflection."""
+
+    of: str
+    stiffness: float
+    damping: float
+    deflection: bool = False
+
+
+@dataclass
+class _Anchor:
+    """An isotropic spring and damper from a link's origin to the world."""
+
+    link: str
+    stiffness: float
+    damping: float
+
+
+@dataclass
+class Plant:
+    """What effects change: coordinates, masses, springs, dampers, nonlinear elements.
+
+    Args:
+        geometry: the robot's masses and kinematics at the pose.
+        gravity_stiffness: whether gravity's change with the deflection counts.
+        conditions: when and how warm.
+
+    Attributes:
+        springs: stiffness of every flexible joint, N m/rad.
+        damping_scale: factor on all modal damping ratios.
+        modal_share: whether the stated modal damping is that of the modes with all coordinates
+            and springs (1, the convention of linear effects in `docs`), or acts between link
+            and motor side alone, as if nothing else moved (0), or in between: where an effect
+            lets something else yield, the two differ, and data can tell.
+        force_offset: (3,) m, in the tool frame, from where the force is taken to act.
+        coordinates: those of the wide chain that move, then those that effects add.
+    """
+
+    geometry: Geometry
+    gravity_stiffness: bool = True
+    conditions: Conditions = field(default_factory=Conditions)
+
+    def __post_init__(self) -> None:
+        robot = self.geometry.robot
+        self.springs = dict(zip(robot.flexible_names, self.geometry.stiffness, strict=True))
+        self.gravity_torque = dict(
+            zip(robot.flexible_names, self.geometry.gravity_torque, strict=True)
+        )
+        self.damping_scale = 1.0
+        self.modal_share = 1.0
+        self.force_offset = np.zeros(3)
+        self.coordinates: list[str] = list(robot.flexible_names)
+        self._motors: dict[str, str] = {}
+        self._masses: list[tuple[float, str, tuple[float, ...] | None]] = [(1.0, "robot", None)]
+        self._added_inertia: list[tuple[Row, float]] = []
+        self._springs: list[_Spring] = []
+        self._anchors: list[_Anchor] = []
+        self._elements: list[tuple[Element, str]] = []
+        self._contacts: list[Element] = []
+
+    # What effects may do ---------------------------------------------------------------------
+
+    def check_joint(self, joint: str) -> str:
+        """The name, if it is a flexible joint's.
+
+        Raises:
+            InputError: it is none.
+        """
+        if joint not in self.springs:
+            raise InputError("no flexible joint", key="target", value=joint, choices=self.springs)
+        return joint
+
+    def add_mass(self, weight: float, link: str, point: tuple[float, ...] | None = None) -> None:
+        """Add `weight` times a link's own inertia, or kg at a point (3,) m of it."""
+        self._masses.append((weight, link, point))
+
+    def add_inertia(self, joint: str, inertia: float) -> None:
+        """Add a constant inertia that turns with the link side, kg m^2."""
+        self._added_inertia.append(({self.check_joint(joint): 1.0}, inertia))
+
+    def add_coordinate(
+        self, name: str, stiffness: float, damping: float, inertia: float = 0.0
+    ) -> None:
+        """Let a coordinate of the wide chain move, or add one of `inertia` kg m^2 of its own."""
+        if name not in self.coordinates:
+            self.coordinates.append(name)
+        self._springs.append(_Spring(name, stiffness, damping))
+        if inertia:
+            self._added_inertia.append(({name: 1.0}, inertia))
+
+    def add_motor(self, joint: str, inertia: float, stiffness: float, damping: float) -> None:
+        """Let the motor side of a joint yield against its servo."""
+        self._motors[self.check_joint(joint)] = name = f"motor.{joint}"
+        self.add_coordinate(name, stiffness, damping, inertia)
+
+    def add_damper(self, joint: str, damping: float) -> None:
+        """Add a viscous damper beside a joint's spring, N m s/rad."""
+        self._springs.append(_Spring(self.check_joint(joint), 0.0, damping, deflection=True))
+
+    def add_anchor(self, link: str, stiffness: float, damping: float) -> None:
+        """Tie a link's origin to the world with a spring (N/m) and damper (N s/m)."""
+        self._anchors.append(_Anchor(link, stiffness, damping))
+
+    def add_element(self, joint: str, element: Element) -> None:
+        """Add a nonlinear torque between a joint's link and motor side."""
+        self._elements.append((element, self.check_joint(joint)))
+
+    def add_contact(self, element: Element) -> None:
+        """Add a nonlinear force between the tool and the workpiece, along the blow."""
+        self._contacts.append(element)
+
+    def deflection(self, joint: str) -> Row:
+        """The coordinates that make a joint's deflection: link side minus motor side."""
+        row = {self.check_joint(joint): 1.0}
+        if joint in self._motors:
+            row[self._motors[joint]] = -1.0
+        return row
+
+    # What comes of it ------------------------------------------------------------------------
+
+    def build(self, direction: FloatArray) -> VibratingSystem:
+        """The equations of motion.
+
+        Args:
+            direction: (3,) unit vector of the force, world.
+
+        Raises:
+            InputError: a mass matrix that is not positive definite, an unknown link.
+        """
+        geometry, names = self.geometry, self.coordinates
+        size = len(names)
+        wide = [i for i, name in enumerate(names) if name in geometry.chain.coordinates]
+        taken = [geometry.chain.index(names[i]) for i in wide]
+        at = np.ix_(wide, wide)
+        at3 = np.ix_(wide, wide, wide)
+        taken2, taken3 = np.ix_(taken, taken), np.ix_(taken, taken, taken)
+        mass, gradient = np.zeros((size, size)), np.zeros((size, size, size))
+        gravity, curvature = np.zeros((size, size)), np.zeros((size, size, size))
+        for weight, what, point in self._masses:
+            inertia = geometry.inertia(what, point)
+            mass[at] += weight * inertia.mass[taken2]
+            gradient[at3] += weight * inertia.mass_gradient[taken3]
+            if self.gravity_stiffness:
+                gravity[at] += weight * inertia.gravity_gradient[taken2]
+                curvature[at3] += weight * inertia.gravity_curvature[taken3]
+        for row, value in self._added_inertia:
+            vector = self._vector(row)
+            mass += value * np.outer(vector, vector)
+
+        deflections = np.array([self._vector(self.deflection(j)) for j in self.springs])
+        joints = np.array(list(self.springs.values()))
+        springs = deflections.T @ (joints[:, None] * deflections)
+        stiffness = springs.copy()
+        dampers = np.zeros((size, size))
+        for spring in self._springs:
+            row = self.deflection(spring.of) if spring.deflection else {spring.of: 1.0}
+            vector = self._vector(row)
+            stiffness += spring.stiffness * np.outer(vector, vector)
+            dampers += spring.damping * np.outer(vector, vector)
+        for anchor in self._anchors:
+            jacobian = np.zeros((3, size))
+            jacobian[:, wide] = geometry.motion(anchor.link).jacobian[:3, taken]
+            stiffness += anchor.stiffness * jacobian.T @ jacobian
+            dampers += anchor.damping * jacobian.T @ jacobian
+        damping = self._modal_damping(mass, stiffness, deflections, joints, springs) + dampers
+
+        robot = geometry.robot
+        # The force acts at the tool point; an offset is given in the tool frame.
+        motion = geometry.motion(robot.tool_point)
+        if self.force_offset.any():
+            turn = motion.rotation.T @ geometry.motion(robot.tool_frame).rotation
+            motion = motion.at(turn @ self.force_offset)
+        force_gradient = np.zeros((size, size))
+        jacobian = np.zeros((3, size))
+        jacobian[:, wide] = motion.jacobian[:3, taken]
+        force = jacobian.T @ direction
+        force_gradient[at] = np.einsum("kri,r->ik", motion.gradient[:, :3], direction)[taken2]
+
+        elements = [(e, self._vector(self.deflection(joint))) for e, joint in self._elements]
+        elements += [(e, force) for e in self._contacts]
+        return VibratingSystem(
+            coordinates=tuple(names),
+            mass=mass,
+            mass_gradient=gradient,
+            damping=damping,
+            stiffness=stiffness + 0.5 * (gravity + gravity.T),
+            gravity_curvature=curvature,
+            force_jacobian=jacobian,
+            force=force,
+            force_gradient=force_gradient,
+            deflections=deflections,
+            wide=tuple(wide),
+            taken=tuple(taken),
+            elements=tuple(element for element, _ in elements),
+            rows=np.array([row for _, row in elements]).reshape(len(elements), size),
+            geometry=geometry,
+        )
+
+    def _vector(self, row: Row) -> FloatArray:
+        vector = np.zeros(len(self.coordinates))
+        for name, value in row.items():
+            vector[self.coordinates.index(name)] = value
+        return vector
+
+    def _modal_damping(
+        self,
+        mass: FloatArray,
+        stiffness: FloatArray,
+        deflections: FloatArray,
+        joints: FloatArray,
+        springs: FloatArray,
+    ) -> FloatArray:
+        """C = M S diag(2 zeta omega) S^T M, ratios weighted by the joints' strain energy."""
+        n = len(joints)
+        whole = np.zeros_like(mass)
+        share = self.modal_share if not np.array_equal(stiffness, springs) else 0.0
+        if share > 0.0:
+            whole = self._damping_of(mass, stiffness, deflections, joints)
+        if share == 1.0:
+            return whole
+        eye = np.eye(n)
+        alone = self._damping_of(mass[:n, :n], np.diag(joints), eye, joints)
+        damping: FloatArray = share * whole + (1.0 - share) * deflections.T @ alone @ deflections
+        return damping
+
+    def _damping_of(
+        self,
+        mass: FloatArray,
+        stiffness: FloatArray,
+        deflections: FloatArray,
+        joints: FloatArray,
+    ) -> FloatArray:
+        omega, shapes = undamped_modes(mass, stiffness)
+        energy = joints[:, None] * (deflections @ shapes) ** 2 + 1e-300
+        ratio = self.geometry.robot.damping_ratio @ energy / energy.sum(axis=0)
+        weighted = mass @ shapes
+        damping: FloatArray = (weighted * (2.0 * self.damping_scale * ratio * omega)) @ weighted.T
+        return damping

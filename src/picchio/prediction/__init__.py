@@ -1,0 +1,1 @@
+"""What each sensor would have read; residual; noise floor."""

@@ -1,0 +1,298 @@
+"""Effects: neutral ones change nothing, real ones what a closed form or another solver says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import picchio
+from picchio.core.errors import InputError
+from picchio.model import Model
+from picchio.model.blows import Blows
+from picchio.model.effects import catalogue, effect_class, from_dict
+from picchio.model.geometry import Geometry
+from picchio.vibration.integrate import Samples, integrate
+
+BLOWS = picchio.PulseTrain(force=300.0, period=0.040, width=0.004)
+CLOCK = Samples(0.0005, 0.001, 500)
+DIRECTION = np.array([0.6, 0.5, -0.6244997998])
+CONTRACT = {
+    "structure": "joint_stiffness modal_damping joint_damping payload link_mass joint_inertia "
+    "servo_compliance base_compliance transverse_compliance tool_offset cable",
+    "nonlinear": "backlash hardening hysteresis coulomb_friction workpiece_contact",
+    "blows": "force_amplitude force_drift pulse_width pulse_shape pulse_rate pulse_jitter "
+    "missed_hits rebound force_direction",
+    "over-time": "stiffness_drift thermal_stiffness",
+    "sensor": "sensor_gain sensor_axes sensor_misalignment sensor_delay clock_drift "
+    "sensor_highpass sensor_lowpass sensor_clipping mount_resonance mains_hum",
+}
+TARGETS = {
+    "joint": "joint_2",
+    "joint or link": "joint_2",
+    "link": "link_3",
+    "tool": "tool",
+    "robot": "robot",
+    "axis": "ry",
+    "channel group": "accelerometer.tool",
+}
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return picchio.load_robot("fanuc_like_3dof")
+
+
+@pytest.fixture(scope="module")
+def geometry(arm):
+    return Geometry.of(arm, arm.pose([0.3, 0.5, -0.8]))
+
+
+def motion(arm, geometry, effects=(), clock=CLOCK):
+    model = Model(arm, True).with_effects(effects)
+    blows = Blows.of(BLOWS, 6, DIRECTION)
+    blows = model.blows(blows.change(tool_rotation=geometry.motion("tool").rotation))
+    system = model.plant(geometry).build(blows.direction)
+    return system, integrate(system, blows.force(), clock)
+
+
+@pytest.mark.parametrize("where", CONTRACT)
+def test_the_contracts_names_are_all_there(where):
+    for name in CONTRACT[where].split():
+        assert effect_class(name).where == where
+        assert effect_class(name).meaning
+
+
+# An endless stiffness is approached, not reached: those have a test of their own.
+FINITE = [
+    name
+    for where, names in CONTRACT.items()
+    for name in names.split()
+    if where != "sensor" and not any(np.isinf(p.neutral) for p in effect_class(name).parameters)
+]
+
+
+@pytest.mark.parametrize("name", FINITE)
+def test_a_neutral_effect_changes_nothing(arm, geometry, name):
+    kind = effect_class(name)
+    _, plain = motion(arm, geometry)
+    _, changed = motion(arm, geometry, [kind(TARGETS[kind.target_kind])])
+    scale = np.abs(plain.position).max()
+    assert np.abs(changed.position - plain.position).max() < 2e-4 * scale
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("base_compliance", {"stiffness": 1e12, "damping": 1e6}),
+        ("transverse_compliance", {"stiffness": 1e11, "damping": 1e5}),
+        ("servo_compliance", {"stiffness": 1e11, "rotor_inertia": 0.5, "damping": 1e3}),
+    ],
+)
+def test_what_hardly_yields_hardly_matters(arm, geometry, name, values):
+    kind = effect_class(name)
+    _, plain = motion(arm, geometry)
+    effect = kind(TARGETS[kind.target_kind], **values, modal_share=0.0)
+    system, changed = motion(arm, geometry, [effect])
+    there = system.deflections @ changed.position.T
+    scale = np.abs(plain.position).max()
+    assert np.abs(there.T - plain.position).max() < 1e-3 * scale
+
+
+def test_a_payload_is_a_point_mass_in_the_mass_matrix(arm, geometry):
+    system, _ = motion(arm, geometry, [effect_class("payload")("tool", mass=3.0)])
+    plain, _ = motion(arm, geometry)
+    jacobian = arm.state(geometry.pose).jacobian
+    assert np.allclose(system.mass - plain.mass, 3.0 * jacobian.T @ jacobian, atol=1e-9)
+
+
+def _reference(system, force, times, extra):
+    """The same linear matrices under scipy, with an extra torque: another integrator."""
+    n = len(system.coordinates)
+    inverse = np.linalg.inv(system.mass)
+
+    def rate(t, y):
+        x, v = y[:n], y[n : 2 * n]
+        torque, inner = extra(x, v, y[2 * n :])
+        right = system.force * force(t) + torque - system.damping @ v - system.stiffness @ x
+        return np.concatenate([v, inverse @ right, inner])
+
+    out, y = [], np.zeros(2 * n + extra.states)
+    edges = [*force.start, times[-1] + 1e-9]
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        here = times[(times >= a) & (times < b)]
+        solved = solve_ivp(
+            rate, (a + 1e-12, b), y, t_eval=np.append(here, b), rtol=1e-9, atol=1e-13,
+            max_step=2e-4,
+        )  # fmt: skip
+        out.append(solved.y[:n, :-1])
+        y = solved.y[:, -1]
+    return np.concatenate(out, axis=1)
+
+
+class _Extra:
+    def __init__(self, function, states=0):
+        self.function, self.states = function, states
+
+    def __call__(self, x, v, z):
+        return self.function(x, v, z)
+
+
+@pytest.mark.parametrize("name", ["hardening", "backlash", "hysteresis", "workpiece_contact"])
+def test_nonlinear_elements_against_scipy(arm, geometry, name):
+    import dataclasses
+
+    unit = np.array([0.0, 1.0, 0.0])
+    if name == "hardening":
+        effect = effect_class(name)("joint_2", cubic=8e10)
+        extra = _Extra(lambda x, v, z: (-8e10 * x[1] ** 3 * unit, np.zeros(0)))
+    elif name == "backlash":
+        # joint_1 carries no gravity: it starts centred, and crosses the gap at once
+        gap, k = 2e-4, arm.stiffness[0]
+        assert abs(arm.gravity_torque(geometry.pose)[0]) < 1e-9
+        effect = effect_class(name)("joint_1", gap=gap)
+
+        def dead_zone(x, v, z):
+            beyond = x[0] - np.clip(x[0], -gap / 2, gap / 2)
+            return (k * x[0] - k * beyond) * np.array([1.0, 0.0, 0.0]), np.zeros(0)
+
+        extra = _Extra(dead_zone)
+    elif name == "hysteresis":
+        effect = effect_class(name)("joint_2", torque=6.0, deflection=1e-4)
+
+        def bouc_wen(x, v, z):
+            rate = (v[1] - 0.5 * (abs(v[1]) * z[0] + v[1] * abs(z[0]))) / 1e-4
+            return -6.0 * z[0] * unit, np.array([rate])
+
+        extra = _Extra(bouc_wen, states=1)
+    else:
+        effect = effect_class(name)("tool", stiffness=1e5, damping=80.0, preload=30.0)
+
+    system, found = motion(arm, geometry, [effect])
+    if name == "workpiece_contact":
+        b = system.force
+
+        def contact(x, v, z):
+            push = max(30.0 - 1e5 * (b @ x) - 80.0 * (b @ v), 0.0) - 30.0
+            return push * b, np.zeros(0)
+
+        extra = _Extra(contact)
+    # Geometry's second order is left out on both sides: the elements are what is tested.
+    flat = dataclasses.replace(
+        system,
+        mass_gradient=0.0 * system.mass_gradient,
+        gravity_curvature=0.0 * system.gravity_curvature,
+        force_gradient=0.0 * system.force_gradient,
+    )
+    force = Blows.of(BLOWS, 6, DIRECTION).force()
+    ours = integrate(flat, force, CLOCK).position.T
+    reference = _reference(flat, force, CLOCK.times, extra)
+    plain = integrate(dataclasses.replace(flat, elements=(), rows=flat.rows[:0]), force, CLOCK)
+    scale = np.abs(reference).max()
+    assert np.abs(ours - reference).max() < 1e-4 * scale
+    assert np.abs(plain.position.T - reference).max() > 0.01 * scale  # it does matter
+    assert np.abs(found.position).max() > 0.0
+
+
+def test_friction_sticks(arm, geometry):
+    held = effect_class("coulomb_friction")("joint_2", torque=1e4)
+    system, found = motion(arm, geometry, [held])
+    _, free = motion(arm, geometry)
+    # Within a step the joint still moves a little; at its end it stands.
+    assert np.abs(found.position[:, 1]).max() < 1e-4 * np.abs(free.position[:, 1]).max()
+    assert np.abs(found.position[:, 2]).max() > 0.1 * np.abs(free.position[:, 2]).max()
+    assert system.coordinates == arm.flexible_names
+
+
+def test_steady_state_with_play_repeats(arm, geometry):
+    model = Model(arm, True).with_effects([effect_class("backlash")("joint_1", gap=2e-5)])
+    blows = Blows.of(BLOWS, None, DIRECTION)
+    system = model.plant(geometry).build(blows.direction)
+    two = integrate(system, blows.force(), Samples(0.0, 0.001, 81)).position
+    assert np.abs(two[:40] - two[40:80]).max() < 1e-4 * np.abs(two).max()
+
+
+def test_effects_go_through_files(tmp_path, arm):
+    from picchio.robot.saved_model import saved_model_text
+
+    effects = [
+        effect_class("joint_stiffness")("joint_2", scale=0.8),
+        effect_class("backlash")("joint_1", gap=1e-4),
+        effect_class("pulse_jitter")("tool", std=1e-3).with_hidden({"r01.csv": (0.0, 1e-3)}),
+    ]
+    file = tmp_path / "found.toml"
+    file.write_text(saved_model_text("fanuc_like_3dof", [e.to_dict() for e in effects]))
+    robot = picchio.load_robot(file)
+    assert Model(robot).effects == tuple(effects)
+    assert [from_dict(e.to_dict()) for e in effects] == effects
+
+
+def test_a_saved_model_is_assessed_as_any_robot(tmp_path, arm):
+    from picchio.robot.saved_model import saved_model_text
+
+    softer = effect_class("joint_stiffness")("joint_3", scale=0.8).to_dict()
+    file = tmp_path / "softer.toml"
+    file.write_text(saved_model_text("fanuc_like_3dof", [softer]))
+    robot = picchio.load_robot(file)
+    by_value = picchio.load_robot(
+        "fanuc_like_3dof", values={"joint_3": {"stiffness": 0.8 * arm.stiffness[2]}}
+    )
+    task = picchio.load_task(arm.task_path, arm)
+    one, other = picchio.assess(robot, task), picchio.assess(by_value, task)
+    for a, b in zip(one.joints, other.joints, strict=True):
+        assert a.peak_deflection == pytest.approx(b.peak_deflection, rel=1e-6)
+        assert a.utilisation == pytest.approx(b.utilisation, rel=1e-5)
+
+
+def test_a_nonlinear_model_is_assessed(tmp_path, arm):
+    from picchio.robot.saved_model import saved_model_text
+
+    task = picchio.load_task(arm.task_path, arm)
+    peaks = []
+    for gap in (1e-12, 2e-4):
+        file = tmp_path / f"gap{gap}.toml"
+        play = effect_class("backlash")("joint_1", gap=gap).to_dict()
+        file.write_text(saved_model_text("fanuc_like_3dof", [play]))
+        found = picchio.assess(picchio.load_robot(file), task)
+        peaks.append(found.joints[0].peak_deflection)
+    plain = picchio.assess(arm, task).joints[0].peak_deflection
+    assert peaks[0] == pytest.approx(plain, rel=5e-3)
+    assert abs(peaks[1] / plain - 1.0) > 0.02
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('effect = "payload"\ntarget = "tool"\nparameters = { weight = 1.0 }', "weight"),
+        ('effect = "backlsh"\ntarget = "joint_1"', "backlash"),
+        ('effect = "backlash"\ntarget = "joint_1"\nparameters = { gap = -1.0 }', "gap"),
+        ('effect = "backlash"\ntarget = "joint_9"\nparameters = { gap = 1e-4 }', "joint_9"),
+    ],
+)
+def test_a_wrong_model_file_is_one_clear_error(tmp_path, arm, text, said):
+    file = tmp_path / "wrong.toml"
+    file.write_text(f'format = "picchio-model/1"\nrobot = "fanuc_like_3dof"\n[[effect]]\n{text}\n')
+    with pytest.raises(InputError) as error:
+        robot = picchio.load_robot(file)
+        Model(robot).linear_system(robot.pose([0.0, 0.5, -0.8]))
+        Model(robot).plant(Geometry.of(robot, robot.pose([0.0, 0.5, -0.8])))
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_every_effect_has_a_size_to_try():
+    for name, kind in catalogue().items():
+        assert kind.parameters, name
+        assert kind.target_kind in TARGETS, name
+
+
+def test_a_loaded_joint_rests_at_the_edge_of_its_play(arm, geometry):
+    """Blows too weak to lift it off leave it as without play; gravity tells the edge."""
+    carried = arm.gravity_torque(geometry.pose)[1]
+    assert abs(carried) > 10.0
+    _, plain = motion(arm, geometry)
+    _, found = motion(arm, geometry, [effect_class("backlash")("joint_2", gap=1e-3)])
+    lifted = arm.stiffness[1] * np.abs(plain.position[:, 1]).max() / abs(carried)
+    assert lifted < 1.0
+    scale = np.abs(plain.position).max()
+    assert np.abs(found.position - plain.position).max() < 1e-5 * scale
