@@ -18,7 +18,7 @@ from picchio.model import Effect
 from picchio.model.effects import Scales, effect_class
 
 SCREEN_WINDOW = 0.3
-MOST_CAUSES = 4
+MOST_CAUSES = 3
 _LEAN = 6
 SHORT_LIST = 7
 LONG_FITS = 3

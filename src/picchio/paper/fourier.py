@@ -1,0 +1,130 @@
+"""Eqs. 12 and 13 as they are written, to hold against the exact solution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.excitation import PulseTrain
+from picchio.paper.series import printed_series
+from picchio.paper.world import World
+from picchio.vibration import Response, modal_analysis, steady_state
+
+_HARMONICS = 4000
+
+
+def printed_force(blows: PulseTrain, harmonics: int, time: FloatArray) -> FloatArray:
+    """Fig. 4 by eq. 12: the truncated series at times (k,) s, N."""
+    terms = printed_series(blows, harmonics)
+    wave = np.exp(2j * np.pi / blows.period * np.outer(np.arange(harmonics + 1), time))
+    return np.asarray((terms @ wave).real)
+
+
+def printed_response(
+    omega: FloatArray, ratio: float, blows: PulseTrain, time: FloatArray, *,
+    plain: bool, harmonics: int = _HARMONICS,
+) -> FloatArray:  # fmt: skip
+    """Eq. 13 for modes of unit mass and unit n_d: (modes, k).
+
+    Args:
+        omega: (modes,) rad/s.
+        ratio: damping ratio.
+        blows: the pulses.
+        time: (k,) s.
+        plain: the phase by a plain arctangent, as written; else by one of the full circle.
+        harmonics: N.
+    """
+    terms = printed_series(blows, harmonics)
+    j = np.arange(1, harmonics + 1)
+    a, b = terms[1:].real, -terms[1:].imag
+    wave = 2.0 * np.pi / blows.period
+    found = np.empty((len(omega), len(time)))
+    for i, own in enumerate(omega):
+        r = j * wave / own
+        stiffness = own**2
+        size = np.hypot(a, b) / stiffness / np.sqrt((1.0 - r**2) ** 2 + (2.0 * ratio * r) ** 2)
+        if plain:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                phase = np.arctan(2.0 * ratio * r / (1.0 - r**2)) + np.arctan(b / a)
+            phase = np.nan_to_num(phase)
+        else:
+            phase = np.arctan2(2.0 * ratio * r, 1.0 - r**2) + np.arctan2(b, a)
+        shift = j * wave
+        found[i] = terms[0].real / stiffness
+        for k in range(0, harmonics, 500):
+            part = slice(k, k + 500)
+            angle = np.outer(shift[part], time) - phase[part, None]
+            found[i] += size[part] @ np.cos(angle)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseCheck:
+    """Eq. 13 with two arctangents, on the most stressed rivet of a world.
+
+    Attributes:
+        time: (k,) s, one period.
+        exact: (k,) mrad; plain: (k,); right: (k,): the same joint by eq. 13.
+        joint: index; the figure's labels.
+        plain_error: of the peak, relative; right_error: likewise.
+        plain_history: largest error over the exact peak.
+    """
+
+    time: FloatArray
+    exact: FloatArray
+    plain: FloatArray
+    right: FloatArray
+    joint: int
+    plain_error: float
+    right_error: float
+    plain_history: float
+
+
+def amplitude_and_phase(world: World) -> PhaseCheck:
+    """Eq. 13's phase as written and as meant, against the exact steady state."""
+    direction, rivet, joint = worst_of(world)
+    n = world.printed.directions[direction]
+    pose = world.rivet_poses[rivet]
+    system = world.model.linear_system(pose)
+    modes = modal_analysis(system)
+    time = np.linspace(0.0, world.blows.period, 400, endpoint=False)
+    exact = 1e3 * steady_state(modes, world.blows).deflection(time, n)[joint]
+    push = modes.mode_shapes.T @ (system.input_matrix @ n)
+    omega = 2.0 * np.pi * modes.natural_frequencies
+    ours = {
+        plain: 1e3 * ((modes.mode_shapes[joint] * push) @ printed_response(
+            omega, world.given.damping_ratio, world.blows, time, plain=plain))
+        for plain in (True, False)
+    }  # fmt: skip
+    peak = np.abs(exact).max()
+    return PhaseCheck(
+        time, exact, ours[True], ours[False], joint,
+        abs(float(np.abs(ours[True]).max() / peak) - 1.0),
+        abs(float(np.abs(ours[False]).max() / peak) - 1.0),
+        float(np.abs(ours[True] - exact).max() / peak),
+    )  # fmt: skip
+
+
+def worst_of(world: World) -> tuple[int, int, int]:
+    """Direction, rivet and joint of the world's largest stress."""
+    d, k, j = np.unravel_index(int(world.rivet_stress.argmax()), world.rivet_stress.shape)
+    return int(d), int(k), int(j)
+
+
+def worst_responses(world: World, hits: int) -> tuple[Response, Response, FloatArray, int]:
+    """A rivet from rest and the steady state, the force's direction, and the joint, at the worst.
+
+    Fig. 8, and what becomes of the steady state.
+    """
+    from picchio.vibration import response_from_rest
+
+    direction, rivet, joint = worst_of(world)
+    modes = modal_analysis(world.model.linear_system(world.rivet_poses[rivet]))
+    return (
+        response_from_rest(modes, world.blows, hits),
+        steady_state(modes, world.blows),
+        world.printed.directions[direction],
+        joint,
+    )

@@ -1,0 +1,143 @@
+"""The whole reproduction: everything that the page shows and the JSON holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from picchio.core.provenance import provenance
+from picchio.paper.assumptions import INPUTS, Assumptions
+from picchio.paper.claims import Tried, try_claims
+from picchio.paper.conflicts import Conflict, conflicts
+from picchio.paper.equations import Equation, equations
+from picchio.paper.figures import PaperFigure, all_figures
+from picchio.paper.influence import Influence, influences
+from picchio.paper.printed import paper_file
+from picchio.paper.study import WORLDS, Study
+from picchio.paper.table2.answer import Answer, answer
+from picchio.paper.verdict import Verdict
+from picchio.paper.waterfall import Step, waterfall
+
+FORMAT = "picchio-reproduction/1"
+
+
+@dataclass(frozen=True, eq=False)
+class Reproduction:
+    """All that was found.
+
+    Attributes:
+        study: what it was found with.
+        claims: every claim with its verdict, as the paper makes them.
+        conflicts: what does not fit together.
+        equations: eqs. 1 to 22.
+        figures: by name.
+        steps: the life by each correction.
+        influences: of every unreported input.
+        answer: what explains Table 2.
+        origin: provenance.
+    """
+
+    study: Study
+    claims: tuple[Tried, ...]
+    conflicts: tuple[Conflict, ...]
+    equations: tuple[Equation, ...]
+    figures: dict[str, PaperFigure]
+    steps: tuple[Step, ...]
+    influences: tuple[Influence, ...]
+    answer: Answer
+    origin: dict[str, Any]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many claims got each verdict."""
+        return {str(v): sum(tried.finding.verdict is v for tried in self.claims) for v in Verdict}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of `picchio-reproduction/1`."""
+        printed = self.study.printed
+        return {
+            "format": FORMAT,
+            "paper": {"title": printed.title, "journal": printed.journal, "doi": printed.doi},
+            "assumptions": {
+                entry.name: {
+                    "value": getattr(self.study.given, entry.name),
+                    "unit": entry.unit,
+                    "low": entry.low,
+                    "high": entry.high,
+                    "choices": list(entry.choices) or None,
+                    "why": entry.why,
+                }
+                for entry in INPUTS
+            },
+            "worlds": len(self.study.worlds),
+            "counts": self.counts,
+            "claims": [tried.to_dict() for tried in self.claims],
+            "conflicts": [found.to_dict() for found in self.conflicts],
+            "slips": [slip.model_dump() for slip in printed.slips],
+            "equations": [equation.to_dict() for equation in self.equations],
+            "table1": {
+                "mass": printed.arm.masses,
+                "centre_of_gravity": printed.arm.centres_of_gravity,
+                "inertia": printed.arm.inertias,
+            },
+            "table2": self.answer.to_dict(),
+            "life": [step.to_dict() for step in self.steps],
+            "influence": {entry.name: entry.to_dict() for entry in self.influences},
+            "figures": [figure.to_dict() for figure in self.figures.values()],
+            "provenance": self.origin,
+        }
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Compiled code on one thread: the batches are small, and threads would wait for each other."""
+    import numba
+
+    before = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
+
+
+def reproduce(
+    given: Assumptions | None = None,
+    *,
+    worlds: int = WORLDS,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> Reproduction:
+    """Recompute every figure, table and claim of the paper.
+
+    Args:
+        given: the base world's assumptions.
+        worlds: how many other worlds claims are tried in.
+        seed: of their draw.
+        progress: called with (steps done, steps in all).
+
+    Raises:
+        InputError: assumptions that put the rivets out of reach.
+    """
+    with one_thread():
+        return _run(Study(given or Assumptions(), worlds, seed, progress))
+
+
+def _run(study: Study) -> Reproduction:
+    _ = study.base.rivet_poses, study.base.path_poses  # what is out of reach is said at once
+    steps = waterfall(study.base)
+    claims = try_claims(study)
+    figures = {figure.name: figure for figure in all_figures(study, steps)}
+    return Reproduction(
+        study=study,
+        claims=claims,
+        conflicts=conflicts(study, figures),
+        equations=equations(study),
+        figures=figures,
+        steps=steps,
+        influences=tuple(influences(study)),
+        answer=answer(study),
+        origin=provenance([paper_file()], seed=study.seed),
+    )

@@ -1,0 +1,1 @@
+"""Table 2: what its numbers follow from."""

@@ -1,0 +1,183 @@
+"""Verdicts: what may be said of a claim, and the number that decides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from picchio.paper.assumptions import INPUTS
+from picchio.paper.world import World
+
+BLOWS = ("period", "duty", "damping_ratio", "inertia_about", "elbow")
+PATH = (*BLOWS, "path_x")
+PANEL = (*BLOWS, "pitch", "panel_x", "panel_y", "panel_z")
+REACH = BLOWS
+"""The inputs that claims on the vertical path, on the rivets and on the reach depend on."""
+
+
+_TELLING, _RARE = 0.75, 8
+"""From this share of worlds told right an input counts as deciding; fewer worlds are rare."""
+
+
+class Verdict(StrEnum):
+    """The four answers."""
+
+    HOLDS = "holds"
+    CONDITIONAL = "holds only if"
+    FAILS = "does not hold"
+    UNKNOWN = "cannot be known"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What became of a claim.
+
+    Attributes:
+        verdict: one of four.
+        test: what was tried.
+        decides: the number that decides, in a sentence.
+        number: the same as a number; None where nothing can be computed.
+        condition: of "holds only if".
+    """
+
+    verdict: Verdict
+    test: str
+    decides: str
+    number: float | None = None
+    condition: str = ""
+
+    @property
+    def spoken(self) -> str:
+        """The verdict with its condition."""
+        return f"{self.verdict} {self.condition}".strip()
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "verdict": str(self.verdict),
+            "condition": self.condition or None,
+            "test": self.test,
+            "decides": self.decides,
+            "number": self.number,
+        }
+
+
+def decided(
+    true: bool, test: str, decides: str, number: float | None = None, condition: str = ""
+) -> Finding:
+    """A claim that no assumption touches; true under a condition where one is given."""
+    verdict = Verdict.FAILS if not true else Verdict.CONDITIONAL if condition else Verdict.HOLDS
+    return Finding(verdict, test, decides, number, condition if true else "")
+
+
+def unknown(test: str, decides: str) -> Finding:
+    """A claim that what the paper prints cannot decide."""
+    return Finding(Verdict.UNKNOWN, test, decides)
+
+
+def across(
+    worlds: Sequence[World],
+    holds: Callable[[World], tuple[bool, float]],
+    test: str,
+    says: str,
+    among: Sequence[str] = (),
+) -> Finding:
+    """Try a claim in every world: it holds in all, in none, or in some.
+
+    Args:
+        worlds: the first is the base.
+        holds: of a world: whether the claim is true there, and the number it rests on.
+        test: what is tried.
+        says: a sentence with fields {base}, {least}, {most} for the number, {share} for the
+            percentage of worlds in which it holds, and {worlds}, how many there were.
+        among: the inputs that the claim can depend on; all if none are named.
+    """
+    tried = [holds(world) for world in worlds]
+    true = np.array([bool(t) for t, _ in tried])
+    numbers = np.array([number for _, number in tried], dtype=float)
+    count = int(true.sum())
+    decides = says.format(
+        base=plainly(numbers[0]),
+        least=plainly(np.nanmin(numbers)),
+        most=plainly(np.nanmax(numbers)),
+        share=f"{100.0 * true.mean():.0f} %",
+        worlds=len(worlds),
+    )
+    if count == len(worlds):
+        return Finding(Verdict.HOLDS, test, decides, float(numbers[0]))
+    if count == 0:
+        return Finding(Verdict.FAILS, test, decides, float(numbers[0]))
+    words, right = best_split(worlds, true, among)
+    spoken = f"true in {count} of {len(worlds)} worlds"
+    if count < _RARE:
+        condition = (
+            f"several inputs suit each other as they rarely do: {spoken}, too few for a rule "
+            f"(nearest to one: {words})"
+        )
+    elif right >= _TELLING:
+        condition = f"{words} (tells {100 * right:.0f} % of the worlds right; {spoken})"
+    else:
+        condition = (
+            f"several inputs suit each other: {spoken}, and no single input decides "
+            f"(best: {words}, {100 * right:.0f} %)"
+        )
+    return Finding(Verdict.CONDITIONAL, test, decides, float(numbers[0]), condition)
+
+
+def plainly(value: float) -> str:
+    """Three digits; what is but rounding is nothing."""
+    return "0" if abs(value) < 1e-12 else f"{value:.3g}"
+
+
+def best_split(worlds: Sequence[World], true: Any, among: Sequence[str] = ()) -> tuple[str, float]:
+    """The one assumption that best tells where a claim holds.
+
+    Returns:
+        the condition in words, and the mean of the shares of true and of false worlds that it
+        tells right.
+    """
+    true = np.asarray(true, dtype=bool)
+    best = ("", 0.0)
+
+    def consider(words: str, chosen: Any) -> None:
+        nonlocal best
+        right = 0.5 * (chosen[true].mean() + (~chosen[~true]).mean())
+        if right > best[1] + 1e-12:
+            best = (words, float(right))
+
+    for entry in INPUTS:
+        if among and entry.name not in among:
+            continue
+        values = [getattr(world.given, entry.name) for world in worlds]
+        if entry.choices:
+            for choice in dict.fromkeys(values):
+                chosen = np.array([value == choice for value in values])
+                consider(f"{_NAMES.get(entry.name, entry.name)} is {choice}", chosen)
+            continue
+        array = np.array(values, dtype=float)
+        levels = np.unique(array)
+        for at in 0.5 * (levels[1:] + levels[:-1]):
+            words = f"{_NAMES.get(entry.name, entry.name)} is {{}} {at:.3g} {entry.unit}".rstrip(
+                " –"
+            )
+            consider(words.format("below"), array < at)
+            consider(words.format("above"), array > at)
+    return best
+
+
+_NAMES = {
+    "period": "the blows' period T",
+    "duty": "the duty T_d / T",
+    "damping_ratio": "the damping ratio",
+    "inertia_about": "the point of Table 1's inertias",
+    "path_x": "x of the vertical path",
+    "elbow": "the elbow",
+    "pitch": "the rivets' pitch",
+    "panel_x": "x of the panel",
+    "panel_y": "y of the panel",
+    "panel_z": "z of the panel",
+}

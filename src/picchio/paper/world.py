@@ -1,0 +1,139 @@
+"""A world: what the paper prints, with a value assumed for everything that it does not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.excitation import PulseTrain
+from picchio.model import Model
+from picchio.paper.arm import arm, poses_at
+from picchio.paper.assumptions import INPUTS, Assumptions, Input
+from picchio.paper.pattern import rivet_points
+from picchio.paper.printed import Printed, printed
+from picchio.robot import FlexibleRobot
+from picchio.studies.task import Operation
+from picchio.vibration.batch import BatchPeaks, batch_peaks
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """The paper's arm and blows under one set of assumptions."""
+
+    given: Assumptions
+
+    @property
+    def printed(self) -> Printed:
+        """What the paper prints."""
+        return printed()
+
+    @cached_property
+    def robot(self) -> FlexibleRobot:
+        """The arm."""
+        return arm(self.given)
+
+    @cached_property
+    def model(self) -> Model:
+        """The arm as a vibrating system, as the paper has it: no gravity stiffness."""
+        return Model(self.robot)
+
+    @cached_property
+    def blows(self) -> PulseTrain:
+        """The pulse train of eq. 12."""
+        return PulseTrain(self.printed.task.force, self.given.period, self.given.width)
+
+    def peaks(
+        self, poses: ArrayLike, direction: ArrayLike | None = None, hits: int | None = None
+    ) -> BatchPeaks:
+        """Peaks at poses (p, 3): the worst direction's, or along one; steady, or of a burst."""
+        rows = np.ascontiguousarray(poses, dtype=float)
+        mass, jacobian = self.robot.mass_and_jacobian(rows)
+        return batch_peaks(
+            mass, jacobian, self.robot.stiffness, self.given.damping_ratio, self.blows,
+            hits=hits, direction=direction,
+        )  # fmt: skip
+
+    def stress(self, deflection: FloatArray) -> FloatArray:
+        """Eqs. 14-17: MPa from rad."""
+        return np.asarray(deflection) * (self.given.stress_per_twist / 1e6)
+
+    @cached_property
+    def path_poses(self) -> FloatArray:
+        """(4, 3) rad, Fig. 9's vertical path."""
+        heights = self.printed.task.path_heights
+        points = [(self.given.path_x, 0.0, z) for z in heights]
+        return self._reached(poses_at(points, self.given.elbow), "path_x")
+
+    @cached_property
+    def rivet_poses(self) -> FloatArray:
+        """(15, 3) rad, Fig. 12's rivets."""
+        return self._reached(poses_at(rivet_points(self.given), self.given.elbow), "panel_x")
+
+    @cached_property
+    def path_peaks(self) -> BatchPeaks:
+        """Over all directions, on the vertical path."""
+        return self.peaks(self.path_poses)
+
+    @cached_property
+    def rivet_stress(self) -> FloatArray:
+        """(3 directions, 15 rivets, 3 joints) MPa: Figs. 13-15 (b)."""
+        found = [self.peaks(self.rivet_poses, n).peak_deflection for n in self.printed.directions]
+        return self.stress(np.array(found))
+
+    def operations(self) -> tuple[Operation, ...]:
+        """The three operations of section 4.3."""
+        return tuple(
+            Operation(row.direction, np.array(row.force_direction), self.blows,
+                      self.printed.task.hits_per_rivet, self.rivet_poses)
+            for row in self.printed.table2
+        )  # fmt: skip
+
+    def _reached(self, poses: FloatArray, key: str) -> FloatArray:
+        if np.isnan(poses).any():
+            raise InputError("puts rivets out of the arm's reach", key=f"--assume {key}",
+                             value=getattr(self.given, key))  # fmt: skip
+        return poses
+
+
+def random_worlds(count: int, seed: int = 0, base: Assumptions | None = None) -> list[World]:
+    """Worlds with every unreported input drawn from its range (a Latin hypercube).
+
+    Patterns that the arm cannot reach are drawn closer.
+
+    Args:
+        count: how many.
+        seed: of the draw.
+        base: gives what is not drawn: the shaft and the harmonics, which no peak depends on but
+            by a factor that is the same for all joints.
+    """
+    rng = np.random.default_rng(seed)
+    fixed = {"harmonics", "shear_modulus", "stress_per_twist", "rows", "columns"}
+    drawn = [entry for entry in INPUTS if entry.name not in fixed]
+    rank = np.argsort(rng.random((len(drawn), count)), axis=1)
+    share = (rank + rng.random(rank.shape)) / count
+    worlds = []
+    for row in share.T:
+        changes = {entry.name: _value(entry, u) for entry, u in zip(drawn, row, strict=True)}
+        given = (base or Assumptions()).but(**changes)
+        while np.isnan(poses_at(rivet_points(given))).any():
+            given = given.but(
+                panel_x=0.9 * given.panel_x, panel_y=0.9 * given.panel_y, pitch=0.9 * given.pitch
+            )
+        worlds.append(World(given))
+    return worlds
+
+
+def _value(entry: Input, share: float) -> Any:
+    if entry.choices:
+        return entry.choices[min(int(share * len(entry.choices)), len(entry.choices) - 1)]
+    assert entry.low is not None
+    assert entry.high is not None
+    if entry.log:
+        return float(entry.low * (entry.high / entry.low) ** share)
+    return float(entry.low + share * (entry.high - entry.low))
