@@ -72,3 +72,22 @@ def test_annotate_does_not_overwrite_what_it_reads(tmp_path, repository):
 def test_every_command_tells_version_and_shows_an_example(command):
     assert picchio(command, "--version").stdout.startswith("picchio 0.")
     assert "Example: picchio" in picchio(command, "--help").stdout
+
+
+def test_damage_on_a_mesh(tmp_path):
+    """A panel whose normals point at the robot: pushes along them, and the life they cost."""
+    (tmp_path / "panel.obj").write_text(
+        "v 1.3 -0.2 0.4\nv 1.3 0.2 0.4\nv 1.3 0.2 0.6\nv 1.3 -0.2 0.6\nf 1 3 2\nf 1 4 3\n"
+    )
+    common = ("map", "fanuc_like_3dof", "--surface", "panel.obj", "--out", "m.nc")
+    done = picchio(*common, "--spacing", "0.2", "--damage", "--force", "20000", "--json", "-",
+                   cwd=tmp_path)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    joints = json.loads(done.stdout)["joints"]
+    assert max(joint["damage_per_rivet"] for joint in joints) > 0.0
+    for joint in joints:
+        assert joint["worst_direction"] == pytest.approx([-1, 0, 0], abs=1e-9)
+    refused = picchio(*common, cwd=tmp_path)
+    assert refused.returncode == 2 and "--spacing" in refused.stderr
+    both = picchio(*common, "--plane", "xz", cwd=tmp_path)
+    assert both.returncode == 2 and "choose one" in both.stderr

@@ -38,6 +38,10 @@ def map_(
         Path | None,
         typer.Option(metavar="CSV", help="Points from x [m], y [m], z [m], and nx, ny, nz."),
     ] = None,
+    surface: Annotated[
+        Path | None,
+        typer.Option(metavar="MESH", help="Points on a mesh (STL, ...; m, world); see --spacing."),
+    ] = None,
     joint_grid: Annotated[
         str | None, typer.Option(metavar="N[,N...]", help="Poses on a grid in joint space.")
     ] = None,
@@ -46,14 +50,24 @@ def map_(
         str | None, typer.Option(metavar="LOW,HIGH,...", help="m, for each axis of plane or box.")
     ] = None,
     direction: Annotated[
-        str, typer.Option(help="x,y,z of the force; worst for each joint; normal of the surface.")
-    ] = "worst",
+        str | None,
+        typer.Option(
+            help="x,y,z of the force; worst for each joint; normal of the surface. By default "
+            "worst; of a --surface, normal."
+        ),
+    ] = None,
     branch: Annotated[
         str, typer.Option(help="all, any, elbow-up, elbow-down, or words such as joint_3+.")
     ] = "all",
     hits: Annotated[
         int | None, typer.Option(help="Blows of a burst from rest; steady state if not given.")
     ] = None,
+    damage: Annotated[
+        bool,
+        typer.Option(
+            "--damage", help="Count a rivet's damage as well: --hits blows, or the task's."
+        ),
+    ] = False,
     force: ForceOption = None,
     period: PeriodOption = None,
     width: WidthOption = None,
@@ -77,7 +91,7 @@ def map_(
     from picchio.studies.map import workspace_map
 
     for target in (out, json):
-        check_target(target, [robot, flex, points])
+        check_target(target, [robot, flex, points, surface])
     check_numbers(at=at, spacing=spacing)
     for key, number, least in (
         ("--chunk", chunk, 1),
@@ -88,12 +102,15 @@ def map_(
             raise InputError(f"must be at least {least}", key=key, value=number)
     loaded = load_robot(robot, flex=flex, tool=tool)
     check_target(out, loaded.files)
-    where = _places(loaded, plane, at, box, points, joint_grid, spacing, bounds)
+    where = _places(loaded, plane, at, box, points, surface, joint_grid, spacing, bounds)
+    if direction is None:
+        direction = "worst" if surface is None else "normal"
     along = direction if direction in ("worst", "normal") else _numbers(direction, "--direction")
     blows = choose_blows(loaded, force, period, width)
     with progress("places") as report:
         found = workspace_map(
-            loaded, where, blows, out, direction=along, branch=branch, hits=hits, chunk=chunk,
+            loaded, where, blows, out, direction=along, branch=branch, hits=hits,
+            damage=_hits_of(loaded, hits) if damage else None, chunk=chunk,
             workers=workers, scheduler=scheduler, restart=restart, progress=report,
         )  # fmt: skip
     with found:
@@ -110,19 +127,27 @@ def _places(
     at: float,
     box: bool,
     points: Path | None,
+    surface: Path | None,
     grid: str | None,
     spacing: float | None,
     bounds: str | None,
 ) -> Places:
     from picchio.studies import places
 
-    asked = {"--plane": plane, "--box": box or None, "--points": points, "--joint-grid": grid}
+    asked = {
+        "--plane": plane, "--box": box or None, "--points": points, "--surface": surface,
+        "--joint-grid": grid,
+    }  # fmt: skip
     given = [key for key, value in asked.items() if value is not None]
     if len(given) > 1:
         raise InputError("choose one", key=" ".join(given), choices=list(asked))
     limits = None if bounds is None else _numbers(bounds, "--bounds")
     if points is not None:
         return places.points_from_csv(points)
+    if surface is not None:
+        if spacing is None:
+            raise InputError("a surface needs it", key="--spacing")
+        return places.surface(surface, spacing=spacing)
     if grid is not None:
         counts = [int(n) for n in _numbers(grid, "--joint-grid")]
         return places.joint_grid(robot, counts[0] if len(counts) == 1 else counts)
@@ -131,6 +156,18 @@ def _places(
             raise InputError("a box needs it", key="--spacing")
         return places.box(robot, spacing=spacing, bounds=limits)
     return places.plane(robot, plane or "xz", at=at, spacing=spacing, bounds=limits)
+
+
+def _hits_of(robot: FlexibleRobot, hits: int | None) -> int:
+    """Blows of a rivet: as asked for, else as the robot's task has them, else a dozen."""
+    from picchio.core.toml import parse_toml
+    from picchio.studies.task import FORMAT, TaskTable
+
+    if hits is not None:
+        return hits
+    if robot.task_path is None:
+        return TaskTable.model_fields["hits_per_rivet"].get_default()  # type: ignore[no-any-return]
+    return parse_toml(robot.task_path, TaskTable, format=FORMAT).hits_per_rivet
 
 
 def _numbers(text: str, key: str) -> list[float]:
@@ -159,6 +196,8 @@ def _summary(found: Any, out: Path) -> dict[str, Any]:
                     "pose": row["pose"].values,
                     "worst_direction": row["worst_direction"].values[j],
                 }
+        if "damage_per_rivet" in part:
+            _most_damage(best, names, part["damage_per_rivet"].values)
     return {
         "format": "picchio-map/1",
         "robot": found.attrs["robot"],
@@ -166,6 +205,16 @@ def _summary(found: Any, out: Path) -> dict[str, Any]:
         "poses": count,
         "joints": list(best.values()),
     }
+
+
+def _most_damage(best: dict[str, dict[str, Any]], names: list[str], damage: Any) -> None:
+    import numpy as np
+
+    for j, name in enumerate(names):
+        known = damage[:, j][np.isfinite(damage[:, j])]
+        if len(known):
+            entry = best[name]
+            entry["damage_per_rivet"] = max(entry.get("damage_per_rivet", 0.0), float(known.max()))
 
 
 def _show(summary: dict[str, Any]) -> None:
@@ -177,5 +226,10 @@ def _show(summary: dict[str, Any]) -> None:
         x, y, z = joint["position"] + 0.0
         screen.print(
             f"  {joint['name']}: up to {1e3 * joint['peak_deflection']:.4g} mrad, at "
-            f"({x:.3f}, {y:.3f}, {z:.3f}) m"
+            f"({x:.3f}, {y:.3f}, {z:.3f}) m{_told(joint)}"
         )
+
+
+def _told(joint: dict[str, Any]) -> str:
+    damage = joint.get("damage_per_rivet")
+    return "" if damage is None else f"; a rivet costs up to {damage:.3g} of its life"

@@ -45,6 +45,7 @@ def workspace_map(
     direction: Any = "worst",
     branch: str = "all",
     hits: int | None = None,
+    damage: int | None = None,
     chunk: int = CHUNK,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -62,6 +63,8 @@ def workspace_map(
             the surface's normal.
         branch: "all" branches of the inverse kinematics, "any" one, or words that choose.
         hits: of a burst from rest; None for the steady state.
+        damage: count the damage of a rivet of so many hits, too, from rest with its ring-down; for
+            the worst direction it is searched, which takes many times as long.
         chunk: places at a time.
         workers: processes; as many as cores, or none for small maps, if not given.
         scheduler: address of a dask scheduler to use instead.
@@ -98,7 +101,11 @@ def workspace_map(
             key="places",
             hint="take a wider spacing or a coarser grid",
         )
-    job = MapJob(robot, excitation, places, direction, branch, hits)
+    if damage is not None and damage < 1:
+        raise InputError("must be at least 1", key="damage", value=damage)
+    if damage is not None and all(joint.shaft is None for joint in robot.flexible_joints):
+        raise InputError("no joint has a shaft, so no damage can be told", key="damage")
+    job = MapJob(robot, excitation, places, direction, branch, hits, damage)
     if restart:
         shutil.rmtree(_folder_of(target), ignore_errors=True)
     folder = _open_folder(target, job, chunk)
@@ -149,6 +156,7 @@ def _open_folder(target: Path, job: MapJob, chunk: int) -> Path:
         "direction": job.direction,
         "branch": job.branch,
         "hits": job.hits,
+        "damage": job.damage,
         "chunk": chunk,
         "picchio": provenance()["picchio"],
     }
@@ -232,5 +240,6 @@ def _attributes(job: MapJob) -> dict[str, Any]:
         "direction": str(job.direction),
         "branch": job.branch,
         "hits": job.hits or 0,
+        "hits_of_damage": job.damage or 0,
         "provenance": json.dumps(provenance(job.robot.files)),
     }

@@ -10,6 +10,8 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.excitation import Excitation
 from picchio.robot import FlexibleRobot
+from picchio.studies.batch_damage import stiffness_at
+from picchio.studies.map_damage import damage_of
 from picchio.studies.places import Listed, Places
 from picchio.vibration.batch import batch_peaks
 
@@ -27,6 +29,7 @@ class MapJob:
         direction: (3,) unit vector, "worst" for each joint's own, or "normal" for the surface's.
         branch: "all", or words that choose one branch (see `picchio.robot.branch`).
         hits: of a burst from rest; None for the steady state.
+        damage: of a rivet of so many hits, counted for every joint; None leaves it out.
     """
 
     robot: FlexibleRobot
@@ -35,6 +38,7 @@ class MapJob:
     direction: tuple[float, float, float] | str
     branch: str
     hits: int | None
+    damage: int | None = None
 
     def compute(self, first: int, last: int) -> Columns:
         """Rows of the places first to last - 1: one row a point and branch, none out of reach."""
@@ -46,10 +50,7 @@ class MapJob:
         else:
             poses, place = self._poses(rows, first)
         mass, jacobian = robot.mass_and_jacobian(poses)
-        stiffness = robot.stiffness
-        if any(joint.stiffness_curve is not None for joint in robot.flexible_joints):
-            stiffness = np.array([robot.stiffness_at(pose) for pose in poses])
-            stiffness = stiffness.reshape(len(poses), len(robot.flexible_joints))
+        stiffness = stiffness_at(robot, poses)
         found = batch_peaks(
             mass,
             jacobian,
@@ -61,14 +62,14 @@ class MapJob:
         )
         # The translation part of the Jacobian is cheap, the position itself is one more call.
         position = np.array([robot.tool_position(pose) for pose in poses]).reshape(-1, 3)
-        torque = np.broadcast_to(stiffness, found.peak_deflection.shape) * found.peak_deflection
+        torque = stiffness * found.peak_deflection
         factor = [
             joint.shaft.radius / joint.shaft.polar_moment if joint.shaft else np.nan
             for joint in robot.flexible_joints
         ]
         stress = torque * np.array(factor)
         rank = np.where(np.isfinite(stress).all(axis=1)[:, None], stress, torque)
-        return {
+        columns = {
             "place": place,
             "position": position,
             "pose": poses,
@@ -80,6 +81,12 @@ class MapJob:
             "worst_direction": found.direction,
             "limiting_joint": _argmax(rank),
         }
+        if self.damage is not None:
+            own = self._direction(place)
+            columns["damage_per_rivet"], columns["damage_direction"] = damage_of(
+                robot, poses, self.excitation, self.damage, own, found.direction
+            )
+        return columns
 
     def _direction(self, place: FloatArray) -> FloatArray | None:
         if self.direction == "worst":

@@ -28,6 +28,17 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "limiting_joint": (("point",), "1", "index of the joint with the largest stress or torque"),
 }
 
+# Only in maps that were asked for it.
+EXTRA: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "damage_per_rivet": (("point", "joint"), "1", "Miner's sum of a rivet, cycles by rainflow"),
+    "damage_direction": (("point", "joint", "xyz"), "1", "unit vector of the force for it"),
+}
+
+
+def variables_of(columns: Columns) -> dict[str, tuple[tuple[str, ...], str, str]]:
+    """The variables that a chunk holds."""
+    return VARIABLES | {name: entry for name, entry in EXTRA.items() if name in columns}
+
 
 def join_chunks(target: Path, chunks: Iterable[Columns], attributes: dict[str, Any]) -> None:
     """Write all rows to `target` in order, under another name until it is whole.
@@ -91,7 +102,7 @@ class _NetcdfWriter:
         for name, values in names.items():
             label = file.create_variable(name, (name,), dtype=h5py.string_dtype())
             label[:] = np.array(values, dtype=object)
-        for name, (dims, unit, meaning) in VARIABLES.items():
+        for name, (dims, unit, meaning) in variables_of(columns).items():
             variable = file.create_variable(name, dims, columns[name].dtype)
             variable.attrs["units"] = unit
             variable.attrs["long_name"] = meaning
@@ -105,7 +116,7 @@ class _NetcdfWriter:
             self._prepare(columns)
         first, self._rows = self._rows, self._rows + len(columns["place"])
         self._file.resize_dimension("point", self._rows)
-        for name in VARIABLES:
+        for name in variables_of(columns):
             self._file.variables[name][first : self._rows] = columns[name]
 
     def close(self) -> None:
@@ -121,7 +132,7 @@ class _ZarrWriter:
 
         data = {
             name: (dims, columns[name], {"units": unit, "long_name": meaning})
-            for name, (dims, unit, meaning) in VARIABLES.items()
+            for name, (dims, unit, meaning) in variables_of(columns).items()
         }
         names = _coordinates(self._attributes)
         others = {k: v for k, v in self._attributes.items() if k not in names}
@@ -129,11 +140,12 @@ class _ZarrWriter:
             texts = {name: np.array(values, dtype=object) for name, values in names.items()}
             chunk = xarray.Dataset(data, coords=texts, attrs=others)
             # Pieces of one size, whatever the first chunk of the map happened to hold.
-            rows = {name: {"chunks": (65536, *(columns[name].shape[1:]))} for name in VARIABLES}
+            rows = {name: {"chunks": (65536, *(columns[name].shape[1:]))} for name in data}
             chunk.to_zarr(self._path, mode="w", consolidated=False, encoding=rows)
             self._mode = "a"
         else:
-            xarray.Dataset(data).to_zarr(
+            # An append writes the attributes anew: without them they, and provenance, are gone.
+            xarray.Dataset(data, attrs=others).to_zarr(
                 self._path, mode="a", append_dim="point", consolidated=False
             )
 

@@ -177,6 +177,61 @@ def points_from_csv(path: str | Path) -> Listed:
     return Listed("point", table[:, :3], table[:, 3:] if with_normals else None)
 
 
+def surface(path: str | Path, *, spacing: float) -> Listed:
+    """Points on a mesh's surface, about `spacing` m apart, with the normals of its faces.
+
+    Each triangle is cut until its sides are no longer than the spacing, and its pieces' middles
+    are taken: the same points every time, and each face has at least one.
+
+    Args:
+        path: STL, OBJ, PLY or whatever else trimesh reads; coordinates in m, world.
+        spacing: m.
+
+    Raises:
+        InputError: no file, no mesh, more points than a map may have.
+    """
+    import trimesh
+
+    if not (math.isfinite(spacing) and spacing > 0.0):
+        raise InputError("must be positive", key="spacing", value=spacing)
+    if not Path(path).is_file():
+        raise InputError("no such file", file=path)
+    try:
+        mesh = trimesh.load_mesh(path)
+    except Exception as error:  # each format's reader raises what it likes
+        raise InputError(f"cannot be read as a mesh: {error}", file=path) from None
+    if not len(getattr(mesh, "faces", ())):
+        raise InputError("holds no surface", file=path)
+    if float(mesh.area) / spacing**2 > _MOST_STEPS:
+        raise InputError("too many points on this surface", key="spacing", value=spacing)
+    corners = np.asarray(mesh.triangles, dtype=float)
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).max(axis=1)
+    middles, normals = [], []
+    for triangle, normal, longest in zip(corners, mesh.face_normals, sides, strict=True):
+        if not np.linalg.norm(normal) > 0.5:  # a triangle without area has no normal
+            continue
+        # n^2 equal pieces, by the lattice of their barycentric coordinates.
+        n = max(1, math.ceil(longest / spacing))
+        i, j = np.mgrid[0:n, 0:n]
+        up = i + j < n
+        down = i + j < n - 1
+        share = (
+            np.concatenate(
+                [
+                    np.stack([i[up], j[up]], axis=1) + 1.0 / 3.0,
+                    np.stack([i[down], j[down]], 1) + 2 / 3,
+                ]
+            )
+            / n
+        )
+        first, second = triangle[1] - triangle[0], triangle[2] - triangle[0]
+        middles.append(triangle[0] + share[:, :1] * first + share[:, 1:] * second)
+        normals.append(np.tile(normal, (len(share), 1)))
+    if not middles:
+        raise InputError("holds no surface", file=path)
+    return Listed("point", np.concatenate(middles), np.concatenate(normals))
+
+
 def reach_box(robot: FlexibleRobot) -> tuple[FloatArray, FloatArray]:
     """Corners (3,), (3,) in m of a box that holds every point the tool can reach."""
     from picchio.robot.chain import tool_chain

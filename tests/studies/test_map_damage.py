@@ -1,0 +1,105 @@
+"""Damage in maps against `assess`, its worst direction against a dense sphere; mesh surfaces."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import trimesh
+
+import picchio
+from picchio.core.errors import InputError
+from picchio.studies import places
+from picchio.studies.batch_damage import batch_damage
+from picchio.studies.curves import curves_of
+from picchio.studies.envelope import icosphere
+from picchio.studies.map import workspace_map
+
+# Forty times the paper's blow: shafts of this steel then fail.
+BLOWS = picchio.PulseTrain(12000.0, 0.040, 0.004)
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return picchio.load_robot("fanuc_like_3dof")
+
+
+@pytest.mark.parametrize("ending", [".nc", ".zarr"])
+def test_damage_is_that_of_assess(tmp_path, robot, ending):
+    grid = places.joint_grid(robot, [1, 2, 3])
+    found = workspace_map(
+        robot, grid, BLOWS, tmp_path / f"map{ending}", direction=[0, 0, 1], damage=12, chunk=2
+    )
+    operation = picchio.studies.Operation("", np.array([0, 0, 1.0]), BLOWS, 12, grid.rows(0, 6))
+    told = picchio.assess(robot, picchio.Task((operation,))).operations[0]
+    assert told.damage_per_rivet.max() > 0.0
+    np.testing.assert_allclose(
+        found["damage_per_rivet"].values, told.damage_per_rivet, rtol=1e-5, atol=1e-30
+    )
+    np.testing.assert_array_equal(found["damage_direction"].values, np.tile([0, 0, 1.0], (6, 3, 1)))
+    assert found["damage_per_rivet"].attrs["units"] == "1"
+    assert found.attrs["hits_of_damage"] == 12
+    assert found.attrs["format"] == "picchio-map/1" and "sha256" in found.attrs["provenance"]
+
+
+def test_the_searched_direction_is_as_bad_as_any(tmp_path, robot):
+    poses = np.array([[0.3, 0.5, -0.8], [0.0, -0.4, 0.9]])
+    listed = places.Listed("pose", poses)
+    found = workspace_map(robot, listed, BLOWS, tmp_path / "map.nc", damage=12)
+    directions = icosphere(3)[0]
+    curves = curves_of(robot)
+    for k, pose in enumerate(poses):
+        every = np.tile(pose, (len(directions), 1))
+        brute = batch_damage(robot, every, directions, BLOWS, 12, curves).damage.max(axis=0)
+        own = found["damage_per_rivet"].values[k]
+        assert brute.max() > 0.0
+        assert (own >= brute * (1 - 2e-3)).all()
+        for j in range(3):  # and it is that direction's damage
+            there = found["damage_direction"].values[k, j]
+            again = batch_damage(robot, pose[None], there, BLOWS, 12, curves).damage[0, j]
+            assert own[j] == pytest.approx(again, rel=1e-9)
+
+
+def test_a_map_without_shafts_has_no_damage(tmp_path, robot):
+    bare = dataclasses.replace(
+        robot,
+        flexible_joints=tuple(dataclasses.replace(j, shaft=None) for j in robot.flexible_joints),
+    )
+    with pytest.raises(InputError, match="shaft"):
+        workspace_map(bare, places.joint_grid(robot, 2), BLOWS, tmp_path / "map.nc", damage=12)
+
+
+def test_points_of_a_mesh(tmp_path, robot):
+    # A panel of 0.4 m by 0.2 m, and a sphere whose normals point away from its middle.
+    panel = trimesh.Trimesh(
+        [[1.3, -0.2, 0.4], [1.3, 0.2, 0.4], [1.3, 0.2, 0.6], [1.3, -0.2, 0.6]],
+        [[0, 2, 1], [0, 3, 2]],
+    )
+    panel.export(tmp_path / "panel.stl")
+    found = places.surface(tmp_path / "panel.stl", spacing=0.05)
+    np.testing.assert_allclose(found.values[:, 0], 1.3, atol=1e-6)
+    np.testing.assert_allclose(found.values.mean(axis=0), [1.3, 0.0, 0.5], atol=1e-6)
+    np.testing.assert_allclose(found.normals, np.tile([-1.0, 0, 0], (len(found), 1)), atol=1e-6)
+    gaps = np.linalg.norm(found.values[:, None] - found.values, axis=-1)
+    np.fill_diagonal(gaps, np.inf)
+    assert gaps.min(axis=1).max() < 0.05
+    ball = trimesh.creation.icosphere(2, 0.1)
+    ball.export(tmp_path / "ball.ply")
+    found = places.surface(tmp_path / "ball.ply", spacing=1.0)
+    assert len(found) == len(ball.faces)
+    assert ((found.values * found.normals).sum(axis=1) > 0.09).all()
+    for name, spacing in (("panel.stl", 0.0), ("none.stl", 0.1), ("panel.stl", 1e-6)):
+        with pytest.raises(InputError):
+            places.surface(tmp_path / name, spacing=spacing)
+    (tmp_path / "text.stl").write_text("no mesh")
+    with pytest.raises(InputError, match=r"text\.stl"):
+        places.surface(tmp_path / "text.stl", spacing=0.1)
+
+
+def test_force_along_a_surfaces_normal(tmp_path, robot):
+    panel = trimesh.Trimesh([[1.3, -0.2, 0.4], [1.3, 0.2, 0.4], [1.3, 0.2, 0.6]], [[0, 2, 1]])
+    panel.export(tmp_path / "panel.stl")
+    listed = places.surface(tmp_path / "panel.stl", spacing=0.2)
+    normal = workspace_map(robot, listed, BLOWS, tmp_path / "a.nc", direction="normal", damage=12)
+    fixed = workspace_map(robot, listed, BLOWS, tmp_path / "b.nc", direction=[-1, 0, 0], damage=12)
+    for name in ("peak_deflection", "damage_per_rivet"):
+        np.testing.assert_allclose(normal[name].values, fixed[name].values, rtol=1e-6, atol=1e-30)

@@ -1,0 +1,241 @@
+"""Placement against brute-force grids whose inverse kinematics and lives are computed elsewhere."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+import picchio
+from picchio.core.errors import InputError, PicchioWarning
+from picchio.fatigue.reducer_library import load_reducer
+from picchio.studies.batch_damage import batch_damage
+from picchio.studies.curves import curves_of
+from picchio.studies.placement import place
+from picchio.studies.placement_loads import reducer_utilisation
+from picchio.studies.placement_work import Work
+
+SHAFT = picchio.robot.Shaft(0.008, 0.02, 79.3e9, "42CrMo4-QT-shaft")
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return picchio.load_robot("fanuc_like_3dof")
+
+
+@pytest.fixture(scope="module")
+def panel(arm):
+    """Five of the paper's fifteen rivets, two of its directions: quick to search."""
+    points = [
+        [1.35, y, z] for y, z in ((-0.5, 0.4), (0.5, 0.4), (0.0, 0.65), (-0.5, 0.9), (0.5, 0.9))
+    ]
+    operations = [
+        {"name": name, "direction": n, "branch": "elbow-down", "points": points}
+        for name, n in (("forward", [1, 0, 0]), ("upward", [0, 0, 1]))
+    ]
+    blows = {"force": 300.0, "period": 0.04, "width": 0.004}
+    return picchio.task_from_dict({"excitation": blows, "operation": operations}, arm)
+
+
+def with_shafts(robot, shaft=SHAFT):
+    joints = tuple(dataclasses.replace(j, shaft=shaft) for j in robot.flexible_joints)
+    return dataclasses.replace(robot, flexible_joints=joints)
+
+
+def within_limits(robot, found):
+    return not any(robot.limit_violations(pose) for pose in found.best.spot.poses)
+
+
+def tool_places(robot, poses):
+    return np.array([robot.state(pose).tool_position for pose in poses])
+
+
+def brute_force(robot, task, shifts, sn_curve=None):
+    """Best life and utilisation over shifts of the work: IK one by one, `assess` for the rest.
+
+    Every rivet takes the pose of least damage, then of least utilisation, of the weakest joint.
+    """
+    best = (math.inf, math.inf)
+    work = Work.of(robot, task)
+    for shift in shifts:
+        damage, used = 0.0, 0.0
+        try:
+            for k, point in enumerate(work.position + shift):
+                axis = None if work.axis is None else work.axis[k]
+                poses = np.array(robot.all_branches(point, axis=axis))
+                op = dataclasses.replace(
+                    task.operations[work.operation[k]], poses=poses, rivets=1.0
+                )
+                one = picchio.assess(robot, picchio.Task((op,)), sn_curve=sn_curve).operations[0]
+                spent = one.damage_per_rivet.max(axis=1)
+                worst = one.utilisation.max(axis=1)
+                c = np.lexsort((worst, spent))[0]
+                damage = damage + one.damage_per_rivet[c] * work.share[k]
+                used = max(used, worst[c])
+        except InputError:
+            continue
+        best = min(best, (float(np.max(damage)), float(used)))
+    return best
+
+
+def test_the_kernel_is_assess(arm):
+    rng = np.random.default_rng(3)
+    poses = rng.uniform(arm.lower, arm.upper, (5, 3))
+    directions = rng.normal(size=(5, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    steel = picchio.load_sn_curve("42CrMo4-QT-shaft")
+    for blows, curve in (
+        (picchio.PulseTrain(4000.0, 0.04, 0.004), steel),
+        (picchio.HalfSineTrain(300.0, 0.05, 0.02), steel.with_miner("haibach")),
+        (picchio.PulseTrain(300.0, 0.04, 0.004), picchio.load_sn_curve("nie-2016")),
+    ):
+        curves = curves_of(arm, curve)
+        fast = batch_damage(arm, poses, directions, blows, 12, curves)
+        slow = batch_damage(arm, poses, directions, blows, 12, curves, compiled=False)
+        assert slow.damage.max() > 0.0
+        np.testing.assert_allclose(fast.damage, slow.damage, rtol=1e-5, atol=1e-30)
+        scale = np.abs(slow.highest).max()
+        np.testing.assert_allclose(fast.amplitude, slow.amplitude, rtol=1e-6, atol=1e-6 * scale)
+        np.testing.assert_allclose(fast.lowest, slow.lowest, atol=1e-6 * scale)
+
+
+@pytest.mark.slow
+def test_better_than_a_brute_force_grid(arm, panel):
+    steps = np.linspace(-0.2, 0.2, 3)
+    shifts = [np.array([x, y, z]) for x in steps for y in (0.0,) for z in steps]
+    grid = brute_force(arm, panel, shifts)
+    assert math.isfinite(grid[1]) and grid[0] == 0.0
+    found = place(arm, panel, move=[0.2, 0.2, 0.2, 0.3], placements=60)
+    assert found.best.utilisation <= grid[1] * (1 + 1e-6)
+    assert found.best.utilisation < found.start.utilisation
+    assert within_limits(arm, found)
+
+
+@pytest.mark.slow
+def test_best_is_what_assess_says_and_stands_where_it_says(arm, panel):
+    found = place(arm, panel, move=[0.2, 0.2, 0.2, 0.5], placements=30, sn_curve="nie-2016")
+    work = Work.of(arm, panel)
+    turn = work.turn(found.best.spot.move[3])
+    moved = (work.position - work.centre) @ turn.T + work.centre + found.best.spot.move[:3]
+    np.testing.assert_allclose(tool_places(arm, found.best.spot.poses), moved, atol=1e-7)
+    ops, first = [], 0
+    for op in panel.operations:
+        poses = found.best.spot.poses[first : first + len(op.poses)]
+        first += len(op.poses)
+        ops.append(dataclasses.replace(op, poses=poses, direction=turn @ op.direction))
+    told = picchio.assess(arm, picchio.Task(tuple(ops)), sn_curve="nie-2016")
+    now = picchio.assess(arm, panel, sn_curve="nie-2016")
+    for joint, use in zip(told.joints, found.best.joints, strict=True):
+        assert use.rivets_to_failure == pytest.approx(joint.rivets_to_failure, rel=1e-9)
+        assert use.utilisation == pytest.approx(joint.utilisation, rel=1e-9)
+    assert found.start.rivets_to_failure == pytest.approx(now.rivets_to_failure, rel=1e-9)
+    assert found.life_gain == pytest.approx(told.rivets_to_failure / now.rivets_to_failure)
+    assert found.life_gain > 1.0
+    assert found.best.limiting_joint == told.limiting_joint
+    # Moving the base instead leaves everything as it stands to the arm.
+    base, heading = work.base_move(found.best.spot.move, np.zeros(3))
+    seen = (work.position - base) @ work.turn(heading)
+    np.testing.assert_allclose(seen, moved, atol=1e-9)
+
+
+def test_never_worse_and_poses_alone(arm, panel):
+    still = place(arm, panel, move=[0, 0, 0, 0], placements=10)
+    assert still.best.utilisation <= still.start.utilisation
+    np.testing.assert_array_equal(still.best.spot.move, 0.0)
+    np.testing.assert_allclose(
+        tool_places(arm, still.best.spot.poses), Work.of(arm, panel).position, atol=1e-7
+    )
+    # From its own optimum nothing is gained, and nothing lost.
+    ops = (dataclasses.replace(panel.operations[0], poses=still.best.spot.poses[:5]),
+           dataclasses.replace(panel.operations[1], poses=still.best.spot.poses[5:]))  # fmt: skip
+    again = place(arm, picchio.Task(ops), move=[0, 0, 0, 0], placements=10)
+    assert again.best.utilisation == pytest.approx(again.start.utilisation, rel=1e-6)
+    assert again.best.utilisation <= again.start.utilisation
+
+
+@pytest.mark.slow
+def test_margin_leaves_room_and_off_tells_what_is_lost(arm, panel):
+    found = place(arm, panel, move=[0.3, 0.3, 0.3, 0.3], placements=40, margin=0.05)
+    assert all(off.reached for off in found.off)
+    assert max(off.utilisation for off in found.off) > found.best.utilisation * (1 - 1e-6)
+    for off in found.off:
+        assert np.linalg.norm(off.shift) == pytest.approx(0.05)
+
+
+def test_hit_rate_within_the_guns_range(arm, panel):
+    own = place(arm, panel, move=[0, 0, 0, 0], placements=5, sn_curve="nie-2016")
+    found = place(
+        arm, panel, move=[0, 0, 0, 0], placements=5, sn_curve="nie-2016", period_range=(0.03, 0.06)
+    )
+    assert 0.03 <= found.best.spot.period <= 0.06
+    assert found.best.rivets_to_failure >= own.best.rivets_to_failure * (1 - 1e-9)
+    for bad in ((0.05, 0.04), (0.003, 0.04), (-1, 1)):
+        with pytest.raises(InputError):
+            place(arm, panel, period_range=bad)
+
+
+def test_a_start_beyond_the_limits_is_no_candidate(arm, panel):
+    beyond = panel.operations[0].poses + np.array([0.0, 0.0, 2.0 * np.pi])
+    far = picchio.Task((dataclasses.replace(panel.operations[0], poses=beyond),))
+    with pytest.warns(PicchioWarning, match="beyond their limits"):
+        found = place(arm, far, move=[0.1, 0.1, 0.1, 0], placements=5)
+    assert not found.start_valid
+    assert within_limits(arm, found)
+
+
+def test_reducers_as_the_catalogue_check_has_them():
+    rng = np.random.default_rng(0)
+    for name in ("RV-80E-121",):
+        reducer = load_reducer(name)
+        peak, held = rng.uniform(0, 3000, (2, 20))
+        told = [reducer.check_blows(p, h).utilisation for p, h in zip(peak, held, strict=True)]
+        np.testing.assert_allclose(reducer_utilisation(reducer, peak, held), told)
+
+
+def test_bad_input(arm, panel):
+    for options, part in (
+        ({"move": [1, 1, 1]}, "four numbers"),
+        ({"move": [1, -1, 1, 0]}, "four numbers"),
+        ({"placements": 0}, "at least 1"),
+        ({"off": 0.0}, "positive"),
+        ({"margin": -1.0}, "negative"),
+    ):
+        with pytest.raises(InputError, match=part):
+            place(arm, panel, **options)
+
+
+SMALL = {
+    "ur10": ([0.6, 0.2, 0.5], [0, 0, -1.0], [0, 0, 1.0]),
+    "panda": ([0.45, 0.0, 0.35], [0, 0, -1.0], [0, 0, 1.0]),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ur10", "panda"])
+def test_arms_of_six_and_seven_joints(name):
+    """A row of rivets; shafts assumed, so that there is a life. Grid: roll and null space too."""
+    robot = with_shafts(picchio.load_robot(name))
+    centre, _, push = SMALL[name]
+    points = [[centre[0], centre[1] + y, centre[2]] for y in (-0.1, 0.1)]
+    blows = {"force": 50.0, "period": 0.04, "width": 0.004}
+    operations = [{"name": "row", "direction": push, "points": points}]
+    task = picchio.task_from_dict({"excitation": blows, "operation": operations}, robot)
+    found = place(
+        robot, task, move=[0.1, 0.1, 0.1, 0.5], placements=40, sn_curve="nie-2016", margin=0.02
+    )
+    shifts = [np.array([x, 0.0, z]) for x in (-0.05, 0.05) for z in (-0.05, 0.05)]
+    grid = brute_force(robot, task, [np.zeros(3), *shifts], "nie-2016")
+    assert within_limits(robot, found)
+    assert found.life_gain > 1.0
+    assert 1.0 / found.best.rivets_to_failure <= grid[0] * (1 + 1e-6)
+    print(f"{name}: life x {found.life_gain:.4g}, utilisation / {found.utilisation_gain:.4g}")
+
+
+@pytest.mark.slow
+def test_without_shafts_effort_limits_rank_and_links_do_not_touch():
+    robot = picchio.load_robot("panda")
+    task = picchio.load_task(robot.task_path, robot)
+    found = place(robot, task, move=[0.2, 0.2, 0.2, 1.0], placements=30)
+    assert found.by_effort and found.utilisation_gain > 1.0
+    assert "pairs of links" in found.self_collision
+    assert "effort" in " ".join(found.assumptions)
