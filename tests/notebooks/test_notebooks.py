@@ -61,11 +61,17 @@ def plots(source: str) -> bool:
 @pytest.mark.slow
 @every_notebook
 def test_it_runs_in_a_fresh_kernel(
-    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    path: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
 ) -> None:
     from nbclient import NotebookClient
 
     notebook = nbformat.read(path, as_version=4)
+    if "datasets.load" in "".join(cell.source for cell in notebook.cells):
+        folder = request.getfixturevalue("measured_data")  # skips where there is none
+        monkeypatch.setenv("PICCHIO_DATA", str(folder))
     # Threads of BLAS would add up to more seconds than there are.
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     began, used = time.monotonic(), cpu_of_children()

@@ -18,6 +18,17 @@ def turns(values):
     return values[1:-1][rising[1:] != rising[:-1]]
 
 
+def lasting(values, least):
+    """Turning points without neighbours that differ by less than `least`."""
+    kept = []
+    for value in values:
+        if kept and abs(value - kept[-1]) <= least:
+            kept.pop()
+        else:
+            kept.append(value)
+    return np.array(kept)
+
+
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10_000), ratio=st.floats(0.01, 0.3), width=st.floats(0.001, 0.039))
 def test_turning_points_are_those_of_a_dense_sampling(tools, seed, ratio, width):
@@ -32,10 +43,11 @@ def test_turning_points_are_those_of_a_dense_sampling(tools, seed, ratio, width)
         # Between samples a curve rises by at most its second difference over eight.
         sagitta = 0.5 * np.abs(np.diff(samples, 2)).max()
         assert size * (1 - 1e-12) <= np.abs(values).max() <= size + sagitta
-        # Dense samples see the same turning points, in the same order, a little lower.
-        seen = turns(samples)
-        assert len(seen) == len(values) - 2
-        assert np.abs(seen - values[1:-1]).max() <= sagitta
+        # Dense samples see the same turning points, in the same order, a little lower; a wiggle
+        # smaller than what hides between two samples may be seen by one side alone.
+        seen, exact = lasting(turns(samples), sagitta), lasting(values[1:-1], sagitta)
+        assert len(seen) == len(exact)
+        assert np.abs(seen - exact).max() <= 2.0 * sagitta
 
 
 @pytest.mark.parametrize("train", [PulseTrain(300, 0.04, 0.004), HalfSineTrain(300, 0.04, 0.02)])

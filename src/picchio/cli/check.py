@@ -11,7 +11,7 @@ from picchio.cli.options import FlexOption, JsonOption, ToolOption
 
 if TYPE_CHECKING:
     from picchio.campaign import Campaign
-    from picchio.prediction.quality import Finding
+    from picchio.prediction.quality import Finding, QualityReport
     from picchio.robot import FlexibleRobot
 
 EPILOG = "Example: picchio check measurements/ --robot fanuc_like_3dof --json check.json"
@@ -45,6 +45,19 @@ def check(
     verbose: Annotated[
         bool, typer.Option("--verbose", "-v", help="Every record, and every finding on its own.")
     ] = False,
+    gravity_stiffness: Annotated[
+        bool,
+        typer.Option(
+            "--gravity-stiffness/--no-gravity-stiffness",
+            help="Of the report's simulation: add gravity's stiffness dg/dq to the springs'.",
+        ),
+    ] = True,
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            "--report", metavar="OUT.html", help="How the simulation differs, one page to read."
+        ),
+    ] = None,
     json: JsonOption = None,
 ) -> None:
     """Check measured data: what is in a campaign, and what is wrong with it.
@@ -63,14 +76,22 @@ def check(
 
     if no_robot and (robot is not None or flex is not None or tool is not None):
         raise InputError("stands against --robot, --flex and --tool", key="--no-robot")
-    check_target(json, [robot, flex])
+    if report is not None and no_robot:
+        raise InputError("needs a robot", key="--report")
+    for target in (json, report):
+        check_target(target, [robot, flex])
     loaded = load_campaign(campaign, clock_tolerance=math.inf)
-    check_target(json, loaded.files)
+    for target in (json, report):
+        check_target(target, loaded.files)
     found, problem = (None, None) if no_robot else _robot(loaded, robot, flex, tool)
-    with progress("records") as report:
-        result = check_campaign(loaded, found, keep_going=keep_going, progress=report)
+    if report is not None and found is None:
+        raise InputError("needs a robot", key="--report", hint="name one with --robot")
+    with progress("records") as tell:
+        result = check_campaign(loaded, found, keep_going=keep_going, progress=tell)
     if problem is not None:
         result = dataclasses.replace(result, findings=(problem, *result.findings))
+    if report is not None and found is not None:
+        _write_report(report, found, loaded, result, gravity_stiffness)
     if json is not None:
         write_json(result.to_dict(), json)
     if json != "-":
@@ -78,6 +99,33 @@ def check(
     else:
         for line in warning_lines(result):
             say_warning(line)
+
+
+def _write_report(
+    target: Path,
+    robot: FlexibleRobot,
+    campaign: Campaign,
+    result: QualityReport,
+    gravity_stiffness: bool,
+) -> None:
+    """The page of how the simulation differs."""
+    import shlex
+    import sys
+
+    from picchio.cli.output import said_warnings
+    from picchio.core.files import atomic_write
+    from picchio.view.report.residual import residual_report
+
+    page = residual_report(
+        robot,
+        campaign,
+        quality=result,
+        command=shlex.join(["picchio", *sys.argv[1:]]),
+        warnings=said_warnings(),
+        gravity_stiffness=gravity_stiffness,
+    )
+    with atomic_write(target) as stream:
+        stream.write(page)
 
 
 def _robot(

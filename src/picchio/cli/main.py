@@ -11,11 +11,17 @@ import typer
 
 import picchio.cli.annotate
 import picchio.cli.assess
+import picchio.cli.check
+import picchio.cli.diagnose
 import picchio.cli.envelope
 import picchio.cli.fit_sn
+import picchio.cli.identify
 import picchio.cli.import_
 import picchio.cli.map
+import picchio.cli.place
+import picchio.cli.reproduce
 import picchio.cli.robots
+import picchio.cli.simulate
 import picchio.cli.view
 from picchio.core.errors import PicchioError
 
@@ -30,11 +36,17 @@ app = typer.Typer(
 for register in (
     picchio.cli.annotate.register,
     picchio.cli.assess.register,
+    picchio.cli.check.register,
+    picchio.cli.diagnose.register,
     picchio.cli.envelope.register,
     picchio.cli.fit_sn.register,
+    picchio.cli.identify.register,
     picchio.cli.import_.register,
     picchio.cli.map.register,
+    picchio.cli.place.register,
+    picchio.cli.reproduce.register,
     picchio.cli.robots.register,
+    picchio.cli.simulate.register,
     picchio.cli.view.register,
 ):
     register(app)

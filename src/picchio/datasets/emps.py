@@ -84,7 +84,7 @@ def build(files: Mapping[str, Path]) -> Campaign:
             )
         )
     return Campaign.from_records(
-        records, controller=controller, notes=__doc__, provenance=DATASET.provenance()
+        records, robot="emps", controller=controller, notes=__doc__, provenance=DATASET.provenance()
     )
 
 

@@ -20,7 +20,7 @@ from picchio.robot.mass_check import check_masses
 from picchio.robot.normalised import normalise
 from picchio.robot.other_tags import read_drake
 from picchio.robot.rigid_model import RigidModel
-from picchio.robot.saved_model import read_saved_model
+from picchio.robot.saved_model import is_saved_model, read_saved_model
 from picchio.robot.sidecar import FORMAT, Sidecar, read_sidecar
 from picchio.robot.srdf import Srdf, find_srdf
 from picchio.robot.tool import Gun
@@ -52,7 +52,7 @@ def load_robot(
     Raises:
         InputError: with the file, the key, the value and the valid choices.
     """
-    if str(robot).endswith(".toml"):
+    if is_saved_model(robot):
         return _load_saved(Path(robot), flex=flex, tool=tool, values=values)
     found = find_robot(robot)
     root = parse_urdf(read_urdf_bytes(found.urdf), found.urdf)

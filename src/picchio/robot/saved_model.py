@@ -9,8 +9,9 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from picchio.core.errors import InputError
 from picchio.core.model import Finite, StrictModel
-from picchio.core.toml import parse_toml
+from picchio.core.toml import parse_toml, read_toml
 
 FORMAT = "picchio-model/1"
 
@@ -49,6 +50,17 @@ class SavedModel(StrictModel):
     notes: str | None = None
     provenance: dict[str, Any] | None = None
     effect: list[EffectTable] = Field(default_factory=list)
+
+
+def is_saved_model(robot: str | Path) -> bool:
+    """Whether a file says that it is a saved model, of whatever version."""
+    path = Path(robot)
+    if path.suffix != ".toml" or not path.is_file():
+        return False
+    try:
+        return str(read_toml(path).get("format", "")).startswith(FORMAT.partition("/")[0])
+    except InputError:  # what is wrong with it, others say
+        return False
 
 
 def read_saved_model(path: Path) -> SavedModel:

@@ -1,0 +1,150 @@
+"""Least squares stretch by stretch: each is judged by what the others say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.diagnosis.motion.fit import stable_solve
+from picchio.diagnosis.motion.system import Group, Segment
+
+_TINY = 1e-300
+
+
+@dataclass
+class Block:
+    """Normal equations of a group's rows in one stretch of a record."""
+
+    group: Group
+    block: int
+    rows: int
+    normal: FloatArray
+    right: FloatArray
+    power: float
+
+
+def per_stretch(
+    segments: list[Segment],
+    block: np.ndarray,
+    left: FloatArray,
+    added: FloatArray | None,
+    right: FloatArray,
+) -> list[Block]:
+    """The normal equations of some segments, stretch by stretch.
+
+    Args:
+        segments: which.
+        block: (rows,) the stretch of every row of the system.
+        left: (rows, k) columns.
+        added: (rows, c) more columns, or None.
+        right: (rows,) what they shall make up.
+    """
+    found = []
+    for s in segments:
+        part = left[s.rows] if added is None else np.hstack([left[s.rows], added[s.rows]])
+        target, number = right[s.rows], block[s.rows]
+        edges = np.flatnonzero(np.diff(number)) + 1
+        starts, ends = np.append(0, edges), np.append(edges, number.size)
+        for start, end in zip(starts, ends, strict=True):
+            x, y = part[start:end], target[start:end]
+            found.append(Block(s.group, int(number[start]), end - start, x.T @ x, x.T @ y,
+                                float(y @ y)))  # fmt: skip
+    return found
+
+
+@dataclass
+class Validated:
+    """A solution, and what it leaves.
+
+    Attributes:
+        solution: of all rows.
+        inside: group -> power that it leaves.
+        rows: group -> how many.
+        outside: (group, stretch) -> power left there by the solution of all other stretches.
+        count: (group, stretch) -> rows.
+        own: the largest part of an added column that the others can't make up.
+    """
+
+    solution: FloatArray
+    inside: Mapping[Group, float]
+    rows: Mapping[Group, int]
+    outside: Mapping[tuple[Group, int], float]
+    count: Mapping[tuple[Group, int], int]
+    own: float
+
+
+def cross_validate(
+    blocks: list[Block],
+    elsewhere: tuple[FloatArray, FloatArray],
+    prior: FloatArray,
+    pull: FloatArray,
+    base: int,
+) -> Validated:
+    """Solve with all stretches, and with each left out.
+
+    Args:
+        blocks: of at least one stretch.
+        elsewhere: normal equations that other groups add for the first `base` columns.
+        prior: (base,) precision of each.
+        pull: (base,) towards its centre.
+        base: how many columns are not added ones.
+    """
+    size = blocks[0].right.size
+    normal, right = np.zeros((size, size)), np.zeros(size)
+    normal[:base, :base] = elsewhere[0] + np.diag(prior)
+    right[:base] = elsewhere[1] + pull
+    for b in blocks:
+        normal += b.normal
+        right += b.right
+    solution = stable_solve(normal, right)
+    inside: dict[Group, float] = {}
+    rows: dict[Group, int] = {}
+    outside: dict[tuple[Group, int], float] = {}
+    for b in blocks:
+        inside[b.group] = inside.get(b.group, 0.0) + left_of(b, solution)
+        rows[b.group] = rows.get(b.group, 0) + b.rows
+    for number in dict.fromkeys(b.block for b in blocks):
+        held = [b for b in blocks if b.block == number]
+        fewer, less = normal.copy(), right.copy()
+        for b in held:
+            fewer -= b.normal
+            less -= b.right
+        other = stable_solve(fewer, less)
+        for b in held:
+            outside[b.group, number] = outside.get((b.group, number), 0.0) + left_of(b, other)
+    count: dict[tuple[Group, int], int] = {}
+    for b in blocks:
+        count[b.group, b.block] = count.get((b.group, b.block), 0) + b.rows
+    return Validated(solution, inside, rows, outside, count, _own(normal, base))
+
+
+def _own(normal: FloatArray, count: int) -> float:
+    """The largest part of an added column that the others can't make up: 0 where all can."""
+    if count == normal.shape[0]:
+        return 1.0
+    a, b, c = normal[:count, :count], normal[:count, count:], normal[count:, count:]
+    made = np.column_stack([stable_solve(a, column) for column in b.T]) if count else b
+    left = np.diag(c - b.T @ made) if count else np.diag(c)
+    return float(np.max(left / np.maximum(np.diag(c), _TINY)))
+
+
+def left_of(b: Block, solution: FloatArray) -> float:
+    """Power that a solution leaves in a stretch."""
+    return max(0.0, float(b.power - 2.0 * solution @ b.right + solution @ b.normal @ solution))
+
+
+def confidence(differences: FloatArray) -> float:
+    """That the mean of score differences is above zero (Student)."""
+    from scipy.stats import t
+
+    n = differences.size
+    if n < 2:
+        return 0.5
+    spread = float(differences.std(ddof=1)) / np.sqrt(n)
+    mean = float(differences.mean())
+    if spread == 0.0:
+        return 1.0 if mean > 0.0 else 0.0 if mean < 0.0 else 0.5
+    return float(t.cdf(mean / spread, n - 1))

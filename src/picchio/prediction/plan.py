@@ -1,0 +1,273 @@
+"""What a test plan holds: `picchio-plan/1`."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from picchio.campaign import CampaignExcitation, Channel, Tolerance, parse_channel
+from picchio.campaign.channels import AXES
+from picchio.campaign.tables import Direction, Hits, Pose
+from picchio.core.errors import InputError
+from picchio.core.model import Finite, NotNegative, Positive, StrictModel
+from picchio.core.toml import parse_toml
+from picchio.model.effects import Effect, from_dict
+from picchio.robot import FlexibleRobot
+
+FORMAT = "picchio-plan/1"
+MOST_SAMPLES = 50_000_000
+_GROUPS = ("force", "deflection", "accelerometer.tool", "acceleration.tool", "velocity.tool",
+           "displacement.tool")  # fmt: skip
+_FRAMED = ("accelerometer", "acceleration", "velocity", "displacement")
+
+
+class SensorTable(StrictModel):
+    """One `[[sensor]]`.
+
+    Attributes:
+        channels: a channel, or a group of them: "deflection" is every flexible joint's,
+            "accelerometer.tool" that frame's three axes, "accelerometer" the tool frame's.
+        noise: standard deviation of white noise, in `unit`.
+        unit: of `noise`; the channel's SI unit where absent.
+    """
+
+    channels: Annotated[str, Field(min_length=1)]
+    noise: NotNegative = 0.0
+    unit: str | None = None
+
+    def expand(self, robot: FlexibleRobot) -> list[tuple[Channel, float]]:
+        """Its channels on this robot, with their noise in SI.
+
+        Raises:
+            InputError: no such channel, joint or frame, or one that cannot be predicted.
+        """
+        kind, _, rest = self.channels.partition(".")
+        if kind == "deflection" and not rest:
+            names = [f"deflection.{joint}" for joint in robot.flexible_names]
+        elif kind in _FRAMED and (not rest or rest.rpartition(".")[2] not in AXES):
+            frame = rest or robot.tool_frame
+            robot.link_of(frame)
+            names = [f"{kind}.{frame}.{axis}" for axis in AXES]
+        else:
+            names = [self.channels]
+        found = []
+        for name in names:
+            try:
+                channel, convert = parse_channel(name, self.unit or _own_unit(name, robot))
+            except InputError as error:
+                raise InputError(error.problem, key="channels", value=self.channels,
+                                 choices=error.choices or _GROUPS) from None  # fmt: skip
+            joint = channel.kind.name == "deflection"
+            if joint and channel.subject not in robot.flexible_names:
+                raise InputError("no such flexible joint", key="channels", value=self.channels,
+                                 choices=robot.flexible_names)  # fmt: skip
+            if joint and channel.unit != _own_unit(name, robot):
+                raise InputError(f"must be a multiple of {_own_unit(name, robot)}", key="unit",
+                                 value=self.unit)  # fmt: skip
+            if channel.kind.name not in ("force", "deflection", *_FRAMED) or (
+                channel.kind.name in _FRAMED and channel.axis is None
+            ):
+                raise InputError("is nothing that a percussion record holds", key="channels",
+                                 value=self.channels, choices=_GROUPS)  # fmt: skip
+            if channel.kind.of == "frame":
+                robot.link_of(channel.subject or "")
+            found.append((channel, convert.scale * self.noise))
+        return found
+
+
+def _own_unit(name: str, robot: FlexibleRobot) -> str | None:
+    """A deflection's SI unit, which depends on the joint; None for other channels."""
+    kind, _, joint = name.partition(".")
+    kinds = {j.name: j.kind for j in robot.flexible_joints}
+    if kind != "deflection" or joint not in kinds:
+        return None
+    return "m" if kinds[joint] == "prismatic" else "rad"
+
+
+class EffectTable(StrictModel):
+    """One `[[effect]]`: a departure of the simulated world from the robot's files.
+
+    Attributes:
+        effect: its name.
+        target: the joint, link, axis, channel group, "tool" or "robot".
+        parameters: SI.
+    """
+
+    effect: str
+    target: str
+    parameters: dict[str, Finite] = Field(default_factory=dict)
+
+    def build(self) -> Effect:
+        """The effect.
+
+        Raises:
+            InputError: no such effect or parameter, a value out of bounds.
+        """
+        return from_dict(self.model_dump())
+
+
+@dataclass(frozen=True)
+class PlannedRecord:
+    """One record to be taken.
+
+    Attributes:
+        pose: as written.
+        direction: world.
+        level: N; None for the excitation's own force.
+        time, temperature: as in a campaign.
+    """
+
+    pose: dict[str, float] | list[float]
+    direction: list[float]
+    level: float | None
+    time: datetime | None = None
+    temperature: float | None = None
+
+
+class Plan(StrictModel):
+    """A plan as it is written.
+
+    Attributes:
+        poses: rad or m, by joint name or in the robot's order.
+        directions: world, of any length.
+        levels: N, heights of the blows; the excitation's own where absent.
+        combine: "all" takes every pose with every direction and level; "in-turn" takes the
+            directions and levels in turn, one record a pose.
+        repeats: how often each record is taken.
+        hits: blows of a burst from rest; steady state where absent.
+        sample_rate: Hz.
+        quiet: s before the first blow; none in a steady record.
+        length: s, from the first blow on.
+        times, temperatures: of the records in turn, as in a campaign; where given, as many.
+        excitation: the blows.
+        tolerance: of the nominal model, for the campaign.
+        sensor: what is measured, with what noise.
+        effect: what is different in the world from the robot's files.
+        seed: of the noise.
+        notes: for people.
+    """
+
+    poses: list[Pose] = Field(min_length=1)
+    directions: list[Direction] = Field(min_length=1)
+    levels: list[Positive] | None = Field(default=None, min_length=1)
+    combine: Literal["all", "in-turn"] = "all"
+    repeats: Annotated[int, Field(gt=0, strict=True)] = 1
+    hits: Hits | None = None
+    sample_rate: Positive
+    quiet: NotNegative = 0.15
+    length: Positive
+    times: list[datetime] | None = None
+    temperatures: list[Finite] | None = None
+    excitation: CampaignExcitation
+    tolerance: Tolerance = Tolerance()
+    sensor: list[SensorTable] = Field(min_length=1)
+    effect: list[EffectTable] = Field(default_factory=list)
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    notes: str | None = None
+
+    @property
+    def burst(self) -> int | None:
+        """Blows of a burst; None for a steady state."""
+        return self.hits if self.hits is not None else self.excitation.hits
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        """How many before t = 0, and from there on."""
+        before = 0 if self.burst is None else round(self.quiet * self.sample_rate)
+        return before, max(round(self.length * self.sample_rate), 2)
+
+    def records(self) -> Iterator[PlannedRecord]:
+        """What is to be taken, in order."""
+        levels: list[float | None] = [*self.levels] if self.levels else [None]
+        kinds = list(itertools.product(self.directions, levels))
+        number = 0
+        for turn, pose in enumerate(self.poses):
+            chosen = kinds if self.combine == "all" else [kinds[turn % len(kinds)]]
+            for direction, level in chosen:
+                for _ in range(self.repeats):
+                    yield PlannedRecord(
+                        pose,
+                        direction,
+                        level,
+                        self.times[number] if self.times else None,
+                        self.temperatures[number] if self.temperatures else None,
+                    )
+                    number += 1
+
+    @property
+    def count(self) -> int:
+        """How many records."""
+        kinds = len(self.directions) * (len(self.levels) if self.levels else 1)
+        return len(self.poses) * self.repeats * (kinds if self.combine == "all" else 1)
+
+    def check(self) -> None:
+        """Raise for what only shows in the whole.
+
+        Raises:
+            InputError: a measured excitation, a wrong number of times, too many samples.
+        """
+        if self.excitation.kind == "measured":
+            raise InputError("a plan's blows are not measured yet", key="excitation.kind",
+                             value="measured",
+                             choices=["pulse_train", "half_sine_train"])  # fmt: skip
+        if self.hits is not None and self.excitation.hits is not None:
+            raise InputError("is given twice, here and in [excitation]", key="hits",
+                             value=self.hits)  # fmt: skip
+        for key in ("times", "temperatures"):
+            given = getattr(self, key)
+            if given is not None and len(given) != self.count:
+                raise InputError(f"must be as many as records ({self.count})", key=key,
+                                 value=len(given))  # fmt: skip
+        total = self.count * sum(self.samples)
+        if total > MOST_SAMPLES:
+            raise InputError(f"that is {total} samples a channel; at most {MOST_SAMPLES}",
+                             key="sample_rate", value=self.sample_rate)  # fmt: skip
+        first = next(self.records())
+        self.excitation.overridden_by(CampaignExcitation(force=first.level)).blows.build()
+
+
+def read_plan(path: str | Path) -> Plan:
+    """A plan from its file.
+
+    Raises:
+        InputError: syntax, misspelt keys, wrong values; with file and key.
+    """
+    plan = parse_toml(path, Plan, format=FORMAT)
+    try:
+        plan.check()
+    except InputError as error:
+        raise _at(error, path) from None
+    return plan
+
+
+def _at(error: InputError, path: str | Path) -> InputError:
+    """The same error with the file's name."""
+    value: dict[str, Any] = {} if error.value is None else {"value": error.value}
+    return InputError(error.problem, file=path, key=error.key, choices=error.choices,
+                      hint=error.hint, **value)  # fmt: skip
+
+
+def plan_toml(plan: Plan) -> str:
+    """The plan as a file."""
+    import tomlkit
+
+    document = tomlkit.document()
+    document["format"] = FORMAT
+    content = plan.model_dump(exclude_none=True, exclude_defaults=True)
+    tables = ("excitation", "tolerance", "sensor", "effect")
+    for key in sorted(content, key=lambda name: (name in tables, name in ("sensor", "effect"))):
+        value = content[key]
+        if isinstance(value, list) and key in ("sensor", "effect"):
+            array = tomlkit.aot()
+            for entry in value:
+                array.append(tomlkit.item(entry))
+            document[key] = array
+        else:
+            document[key] = value
+    return tomlkit.dumps(document)

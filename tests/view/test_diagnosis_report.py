@@ -1,0 +1,236 @@
+"""The pages of a diagnosis and of a residual: whole, offline, escaped, and saying what was found.
+
+The search for causes has tests of its own; here its outcome is put together from fits of the true
+cause, which takes seconds instead of a minute.
+"""
+
+import re
+import sys
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+from lxml import html as lxml_html
+
+from picchio.campaign import Campaign
+from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.candidates import measure_scales
+from picchio.diagnosis.percussion.diagnose import PercussionDiagnosis
+from picchio.diagnosis.percussion.evidence import weigh
+from picchio.diagnosis.percussion.fit import fit, fit_growing
+from picchio.diagnosis.percussion.gain import held_out, measure_gain
+from picchio.diagnosis.percussion.problem import Problem
+from picchio.diagnosis.percussion.select import Search, Trial, score
+from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.diagnosis.result import Cause, Diagnosis, Value
+from picchio.model.effects import effect_class
+from picchio.robot import load_robot
+from picchio.view.report.diagnosis import diagnosis_report
+from picchio.view.report.page import number, spread
+from picchio.view.report.residual import residual_report
+
+OUTSIDE = re.compile(
+    r"""(?:src|href|action|data)\s*=\s*["']\s*(?:https?:)?//|url\(\s*["']?https?:|@import"""
+)
+HOSTILE = "<script>alert('$x_1$')</script>"
+LIFE = {
+    "baseline": {"rivets_to_failure": float("inf"), "utilisation": 0.1, "limiting_joint": None,
+                 "joints": {"joint_1": {"rivets_to_failure": float("inf"), "utilisation": 0.1,
+                                        "peak_deflection": 4e-4}}},
+    "extended": {"rivets_to_failure": 2.1e6, "utilisation": 0.14, "limiting_joint": "joint_1",
+                 "joints": {"joint_1": {"rivets_to_failure": 2.1e6, "utilisation": 0.14,
+                                        "peak_deflection": 6e-4}}},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def case(repository):
+    sys.path.insert(0, str(repository / "tests"))
+    try:
+        from worlds import campaign as worlds
+    finally:
+        sys.path.pop(0)
+    campaign, _ = worlds.make(
+        seed=2, causes=[("payload", "tool", {"mass": 4.0})], records=6,
+        sensors=("accelerometer.tool", "deflection", "force"),
+    )  # fmt: skip
+    robot = load_robot("fanuc_like_3dof")
+    problem = Problem(robot, campaign)
+    train, kept = held_out(problem)
+    start = Hypothesis.baseline(robot, campaign.tolerance)
+    baseline = fit_growing(problem, start, train)
+    best = fit(problem, baseline.hypothesis.plus(effect_class("payload")("tool", mass=3.0)), train)
+    whole = fit(problem, best.hypothesis, with_jacobian=True, iterations=2)
+    nominal = fit(problem, baseline.hypothesis, iterations=2)
+    rows = [
+        {"step": 1, "effect": "payload", "target": "tool", "bic": score(best),
+         "screened_gain": 1.0, "chi_square_per_sample": best.chi_square / best.samples},
+        {"step": 1, "effect": "cable", "target": "link_3", "bic": float("inf"),
+         "screened_gain": 1.0, "chi_square_per_sample": 40.0},
+        {"step": 2, "effect": "backlash", "target": "joint_2", "bic": score(best) + 3.0,
+         "screened_gain": 1.0, "chi_square_per_sample": 1.0},
+    ]  # fmt: skip
+    mass = next(e for e in whole.hypothesis.effects if e.name == "payload").values["mass"]
+    diagnosis = Diagnosis(
+        "named",
+        (Cause("payload", "tool", 0.99, {"mass": Value(mass, 0.004, "kg")}),),
+        nuisances={"stiffness.joint_1": Value(2.4e5, 31.0, "N*m/rad")},
+        gain=measure_gain(problem, baseline.hypothesis, best.hypothesis, train, kept),
+        scores=tuple(rows),
+    )
+    found = PercussionDiagnosis(
+        diagnosis, problem, nominal, whole,
+        Search(baseline, best, [[Trial("payload:tool", best, score(best), 1.0)]]),
+        weigh(problem, nominal.residuals), weigh(problem, whole.residuals),
+        measure_scales(problem, nominal.hypothesis.effects,
+                       problem.predictions(nominal.hypothesis.effects)),
+    )  # fmt: skip
+    return SimpleNamespace(found=found, robot=robot, campaign=campaign, mass=mass)
+
+
+@pytest.fixture(scope="module")
+def page(case):
+    return diagnosis_report(case.found, model_toml='format = "picchio-model/1"\n',
+                            command="picchio diagnose x", life=LIFE)  # fmt: skip
+
+
+def text(page, xpath="//body"):
+    return " ".join(" ".join(e.itertext()) for e in lxml_html.fromstring(page).xpath(xpath))
+
+
+def test_it_says_what_was_found(case, page):
+    verdict = text(page, "//*[@id='verdict']")
+    assert "payload" in verdict
+    assert f"{case.mass:.4f} ± 0.0040 kg" in verdict
+    everything = text(page)
+    for said in ("the tool is heavier", "at the tool", "99\N{NO-BREAK SPACE}%", "picchio-model/1",
+                 "picchio diagnose x", "2,100,000", "no end", "neither model",
+                 "peak deflection"):  # fmt: skip
+        assert said.lower() in everything.lower(), said
+    assert "cable of link_3" in page  # in words, beside the picture
+    gain = case.found.diagnosis.gain
+    assert f"{100 * gain.baseline_nrmse:.3g} %" in everything
+
+
+def test_the_pictures_are_there_and_described(page):
+    tree = lxml_html.fromstring(page)
+    pictures = tree.xpath("//figure/*[local-name()='svg']")
+    # Overlay, two residuals, place, held out, two steps, three channel groups.
+    assert len(pictures) == 10
+    for svg in pictures:
+        assert svg.get("aria-label")
+        assert svg.get("role") == "img"
+    assert len(set(tree.xpath("//@id"))) == len(tree.xpath("//@id"))
+    for target in tree.xpath("//a/@href"):
+        assert tree.xpath(f"//*[@id='{target[1:]}']"), target
+
+
+@pytest.mark.parametrize("which", ["diagnosis", "residual"])
+def test_nothing_comes_from_outside_and_it_can_be_mailed(case, page, which):
+    html = page if which == "diagnosis" else residual_report(case.robot, case.campaign)
+    assert OUTSIDE.search(html) is None
+    assert "default-src 'none'" in html
+    assert "<script" not in html
+    assert "prefers-color-scheme: dark" in html
+    assert len(html) < 4e6
+
+
+def test_every_name_is_escaped(case):
+    cause = Cause(HOSTILE, HOSTILE, 0.5, {HOSTILE: Value(1.0, 0.1, HOSTILE)})
+    hostile = replace(
+        case.found.diagnosis,
+        verdict="ambiguous",
+        causes=(cause,),
+        alternatives=(((HOSTILE, HOSTILE),),),
+        leads=((HOSTILE, HOSTILE),),
+        next_measurement={"why": HOSTILE, "pose": {HOSTILE: 0.1}, "direction": [0, 0, 1],
+                          "force": 300.0, "sensor": HOSTILE},
+        scores=({"step": 1, "effect": HOSTILE, "target": HOSTILE, "bic": 1.0,
+                 "screened_gain": 1.0, "chi_square_per_sample": 2.0},),
+    )  # fmt: skip
+    html = diagnosis_report(
+        replace(case.found, diagnosis=hostile), model_toml=HOSTILE, command=HOSTILE,
+        warnings=[HOSTILE], life={"baseline": {HOSTILE: HOSTILE}, "extended": {HOSTILE: 1.0}},
+    )  # fmt: skip
+    assert "<script" not in html
+    assert html.count("&lt;script&gt;") > 10
+
+
+@pytest.mark.parametrize("verdict", ["nothing-wrong", "unexplained", "partial", "ambiguous"])
+def test_every_verdict_has_its_page(case, verdict):
+    found = case.found
+    diagnosis = replace(found.diagnosis, verdict=verdict)
+    if verdict in ("nothing-wrong", "unexplained"):
+        diagnosis = replace(diagnosis, causes=(), leads=(("cable", "link_3"),))
+    if verdict == "nothing-wrong":
+        found = replace(found, extended=found.baseline, after=found.before)
+        diagnosis = replace(diagnosis, scores=(), leads=())
+    if verdict == "ambiguous":
+        diagnosis = replace(diagnosis, alternatives=((("cable", "link_3"),),))
+    html = diagnosis_report(replace(found, diagnosis=diagnosis))
+    said = text(html, "//*[@id='verdict']").lower()
+    assert {"nothing-wrong": "nothing wrong", "unexplained": "no known cause", "partial": "part of",
+            "ambiguous": "cannot tell"}[verdict] in said  # fmt: skip
+    assert ("payload" in said) == (verdict in ("partial", "ambiguous"))
+    assert ("cable" in text(html)) == (verdict in ("unexplained", "ambiguous"))
+    assert ("Candidates of step 1" in html) == (verdict != "nothing-wrong")
+
+
+def test_the_residual_page_names_no_cause_but_shows_where(case):
+    html = residual_report(case.robot, case.campaign, command="picchio check x")
+    said = text(html)
+    assert "payload" not in said.lower()
+    assert "picchio check x" in said
+    verdict = text(html, "//*[@id='verdict']")
+    share = float(re.search(r"leaves ([\d.]+) % of the signal", verdict).group(1))
+    floor = float(re.search(r"would leave ([\d.]+) %", verdict).group(1))
+    assert share > 3.0 * floor
+    # A row for every channel of every record.
+    rows = lxml_html.fromstring(html).xpath("//details[1]//tbody/tr")
+    assert len(rows) == sum(len(r.channels) for r in case.campaign)
+    for heading in ("By frequency", "By time", "The torque that the model lacks",
+                    "Frequency responses", "By pose", "By temperature",
+                    "By height of the blows"):  # fmt: skip
+        assert heading.lower() in said.lower(), heading
+
+
+def test_a_campaign_without_blows_is_refused(case):
+    import numpy as np
+
+    from picchio.campaign import Record
+
+    time = np.arange(50) / 100.0
+    motion = Record.from_arrays("m.csv", time, {"position.joint_1": time}, kind="motion")
+    with pytest.raises(InputError, match="neither blows"):
+        residual_report(case.robot, Campaign.from_records([motion], robot="fanuc_like_3dof"))
+
+
+def test_motion_records_have_a_page_too(measured_data):
+    """EMPS with inertia and the URDF's viscous friction alone: about 17 % of the force is left."""
+    from picchio.datasets import load
+
+    html = residual_report(load_robot("emps"), load("emps", measured_data / "emps"))
+    share = float(re.search(r"leaves ([\d.]+) %", text(html, "//*[@id='verdict']")).group(1))
+    assert 14.0 < share < 20.0
+    assert "friction" not in text(html, "//*[@id='verdict']")
+    assert OUTSIDE.search(html) is None
+    assert html.count("<svg") == 3
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "unit", "said"),
+    [
+        (2.99379, 0.0042, "kg", "2.9938 ± 0.0042 kg"),
+        (242439.2, 31.95, "N*m/rad", "242,439 ± 32 N m/rad"),
+        (-0.5, 0.0, "1", "\N{MINUS SIGN}0.5"),
+        (1.5e-7, 2e-9, "rad", "1.500 × 10^\N{MINUS SIGN}7 ± 2 × 10^\N{MINUS SIGN}9 rad"),
+    ],
+)
+def test_values_end_where_their_spread_begins(value, std, unit, said):
+    assert spread(value, std, unit).replace("1.5 ×", "1.500 ×") == said
+
+
+def test_numbers():
+    assert number(float("inf")) == "no end"
+    assert number(None) == "\N{EN DASH}"
+    assert number(6.49e4, 3) == "6.49 × 10^4"
