@@ -10,12 +10,13 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
-from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.diagnosis.percussion.unknowns import Hypothesis, Unknown
 
 # Windows that grow, s: a long one at once lets the fit skip cycles.
 WINDOWS = (0.06, 0.16, 0.4, None)
 _CONVERGED = 1e-5
 _INSIDE = 1e-9
+_LEAST_STEP = 1e-7
 _HOPELESS = 1.5
 
 
@@ -82,12 +83,22 @@ def jacobian(
     records: Sequence[MeasuredRecord],
     end: float | None,
     at: list[FloatArray],
+    steps: FloatArray | None = None,
 ) -> list[FloatArray]:
-    """D residual / d unknowns of every record by differences, (channels x m, unknowns)."""
+    """D residual / d unknowns of every record by differences, (channels x m, unknowns).
+
+    Args:
+        problem: data and noise.
+        hypothesis: where.
+        records: which.
+        end: s.
+        at: the residuals there.
+        steps: (unknowns,) of the differences; the unknowns' own where None.
+    """
     vector, unknowns = hypothesis.vector(), hypothesis.unknowns()
     columns: list[list[FloatArray]] = [[] for _ in records]
     for k, unknown in enumerate(unknowns):
-        step = unknown.step
+        step = unknown.step if steps is None else float(steps[k])
         if vector[k] + step > unknown.upper:
             step = -step
         moved = vector.copy()
@@ -128,13 +139,15 @@ def fit(
     cost = _square(residuals) + prior_cost(here)
     damping = 1e-3
     fresh: list[FloatArray] | None = None
+    steps: FloatArray | None = None
     for turn in range(iterations):
         if turn > 1 and cost > _HOPELESS * rival:
             break
         unknowns = here.unknowns()
         if not unknowns:
             break
-        fresh = jacobian(problem, here, chosen, end, residuals)
+        fresh = jacobian(problem, here, chosen, end, residuals, steps)
+        steps = _fine_steps(fresh, unknowns)
         weights = prior_weights(here)
         vector = here.vector()
         means = np.array([u.prior[0] if u.prior else 0.0 for u in unknowns])
@@ -167,8 +180,19 @@ def fit(
         if gained < _CONVERGED * cost + 1e-3:
             break
     if with_jacobian and fresh is None:
-        fresh = jacobian(problem, here, chosen, end, residuals)
+        fresh = jacobian(problem, here, chosen, end, residuals, steps)
     return Fit(here, residuals, fresh if with_jacobian else None, cost, chosen, end)
+
+
+def _fine_steps(parts: Sequence[FloatArray], unknowns: Sequence[Unknown]) -> FloatArray:
+    """Steps that change the residuals by about two standard deviations all in all.
+
+    The time of a blow's edge is known to a microsecond: a step of a thousandth would carry late
+    edges past samples, and its difference quotient would say nothing of the slope.
+    """
+    norms = np.sqrt(sum((part**2).sum(axis=0) for part in parts))
+    own = np.array([u.step for u in unknowns])
+    return np.asarray(np.clip(2.0 / np.maximum(norms, 1e-12), _LEAST_STEP, own))
 
 
 def _square(residuals: Sequence[FloatArray]) -> float:

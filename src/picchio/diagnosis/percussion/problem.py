@@ -20,6 +20,7 @@ _JUMPING = ("force", "acceleration", "accelerometer")
 # A sample this near a jump of the force, but not on it, holds neither side for sure.
 _NEAR_EDGE = 1.8e-4
 _ON_EDGE = 1e-7
+_SMALL_JUMP = 0.05
 _WORKERS = 2
 
 
@@ -187,6 +188,17 @@ def residual(record: MeasuredRecord, model: Model, end: float | None = None) -> 
     return out
 
 
+def signal_power(records: Sequence[MeasuredRecord]) -> float:
+    """Sum of squares of all that was measured, in units of the noise."""
+    return float(
+        sum(
+            ((values - values.mean()) ** 2).sum() / record.noise[name].std ** 2
+            for record in records
+            for name, values in record.values.items()
+        )
+    )
+
+
 def _whiten(noise: Noise, row: FloatArray) -> FloatArray:
     """As `Noise.whiten`; compiled from the sample on where the filter has all its past."""
     from scipy.signal import lfilter
@@ -227,6 +239,10 @@ def _near_edges(setup: PercussionSetup, model: Model) -> dict[str, BoolArray] | 
     _, force = setup.struck(model)
     edges = force.start
     if edges.size > 400:  # a measured history has no jumps
+        return None
+    jump = np.abs(force(edges + _ON_EDGE) - force(edges - _ON_EDGE))
+    edges = edges[jump > _SMALL_JUMP * max(float(jump.max()), 1e-300)]
+    if not edges.size:
         return None
     if np.isfinite(force.end):
         last = setup.samples.times[-1]

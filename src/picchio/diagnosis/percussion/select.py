@@ -11,7 +11,7 @@ from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.evidence import Evidence, weigh
 from picchio.diagnosis.percussion.fit import Fit, fit, fit_growing
 from picchio.diagnosis.percussion.latent import LATENT, fit_latent, hidden_numbers
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.screen import Suspect, screen
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model import Effect
@@ -25,6 +25,9 @@ LONG_FITS = 3
 # Fall of BIC below which nothing is claimed: with a hundred candidates tried, chance alone
 # reaches it in less than one of a thousand campaigns.
 LEAST_GAIN = 8.0
+# The forward model itself is exact to about this share of the signal (sensors smear jumps, second
+# order in the deflection): what gains less than that is no cause.
+EXACT = 3e-4
 # Sets whose BIC is within this cannot be told apart.
 SAME = 10.0
 
@@ -96,6 +99,7 @@ def search(
     """
     say = progress or (lambda text: None)
     found = Search(baseline, baseline)
+    least = max(LEAST_GAIN, EXACT**2 * signal_power(records))
     for number in range(MOST_CAUSES):
         here = found.best
         found.evidence = weigh(problem, here.residuals, here.records)
@@ -108,11 +112,11 @@ def search(
             break
         found.steps.append(trials)
         best = trials[0]
-        if score(here) - best.score < LEAST_GAIN:
+        if score(here) - best.score < least:
             break
         if confirmed is not None and not confirmed(here, best.fit):
             break
-        found.best = prune(problem, best.fit, records, newest=best.label)
+        found.best = prune(problem, best.fit, records, least, newest=best.label)
         if found.best.hypothesis.labels == here.hypothesis.labels:
             break
     found.evidence = weigh(problem, found.best.residuals, found.best.records)
@@ -233,14 +237,20 @@ def _fit_long(
     return fit(problem, short.hypothesis, records, None, iterations=6, rival=rival)
 
 
-def prune(problem: Problem, found: Fit, records: Sequence[MeasuredRecord], newest: str = "") -> Fit:
+def prune(
+    problem: Problem,
+    found: Fit,
+    records: Sequence[MeasuredRecord],
+    least: float = LEAST_GAIN,
+    newest: str = "",
+) -> Fit:
     """Take out every cause, the newest included, that the others do without."""
     best = found
     for label in sorted(found.hypothesis.labels, key=lambda text: text == newest):
         if len(best.hypothesis.labels) < 2:
             break
         without = fit(problem, best.hypothesis.minus(label), records, None, iterations=5)
-        if score(without) < score(best) + LEAST_GAIN:
+        if score(without) < score(best) + least:
             best = without
     return best
 
