@@ -214,6 +214,9 @@ FILES: dict[str, tuple[bytes, str, str | None]] = {
 
 def peak_memory(unit: int) -> int:
     """MB that this process has taken at most."""
+    import re
+    import resource
+
     status = Path("/proc/self/status")
     # ru_maxrss survives exec on Linux: it would tell of the parent.
     if status.exists() and (found := re.search(r"VmHWM:\s*(\d+)", status.read_text())):
@@ -223,8 +226,6 @@ def peak_memory(unit: int) -> int:
 
 def main(names: list[str], folder: Path) -> None:
     """Load each, one line of outcome each; the parent watches for a crash in between."""
-    import re
-import resource
     import socket
     import time
     import warnings
