@@ -80,11 +80,12 @@ def diagnose(
         check_target(target, [robot, flex, task])
     for name in without or ():
         effect_class(name)
-    loaded = load_robot(robot, flex=flex, tool=tool)
     campaign = load_campaign(data)
+    kinds = {record.kind for record in campaign}
+    # What a drive's torque tells needs no stiffness.
+    loaded = load_robot(robot, flex=flex, tool=tool, allow_rigid=kinds == {"motion"})
     for target in (json, report, model):
         check_target(target, [*loaded.files, *campaign.files])
-    kinds = {record.kind for record in campaign}
     if kinds == {"motion"}:
         found = _motion(loaded, campaign, without or ())
         percussion = None
