@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.robot import FlexibleRobot
 from picchio.robot.expansion import Inertia, Motion, WideChain
+
+Mass = tuple[float, str, tuple[float, ...] | None]
+# How many sums of inertias are kept: those of a robot with a few payloads tried in turn.
+_KEPT_TOTALS = 32
 
 
 class Geometry:
@@ -21,7 +27,8 @@ class Geometry:
         self.chain = chain
         self.pose = pose
         self._inertias: dict[object, Inertia] = {}
-        self._motions: dict[str, Motion] = {}
+        self._motions: dict[object, Motion] = {}
+        self._totals: dict[object, Inertia] = {}
         state = chain.robot.state(pose)
         self.stiffness = state.stiffness
         self.gravity_torque = state.gravity_torque
@@ -44,8 +51,43 @@ class Geometry:
             self._inertias[key] = self.chain.inertia(self.pose, given)
         return self._inertias[key]
 
-    def motion(self, frame: str) -> Motion:
-        """As `WideChain.motion`; a joint's name means the link that it carries."""
+    def total(
+        self,
+        masses: tuple[tuple[float, str, tuple[float, ...] | None], ...],
+        taken: tuple[int, ...],
+    ) -> Inertia:
+        """The weighted sum of inertias, of some of the coordinates.
+
+        Args:
+            masses: (weight, link or "robot", point) each.
+            taken: which coordinates of the chain.
+        """
+        key = (masses, taken)
+        found = self._totals.get(key)
+        if found is None:
+            parts = [(weight, self.inertia(what, point)) for weight, what, point in masses]
+
+            def add(name: str) -> FloatArray:
+                whole = np.asarray(sum(weight * getattr(part, name) for weight, part in parts))
+                return np.ascontiguousarray(whole[np.ix_(*[taken] * whole.ndim)])
+
+            found = Inertia(**{f.name: add(f.name) for f in fields(Inertia)})
+            if len(self._totals) >= _KEPT_TOTALS:
+                self._totals = {}
+            self._totals[key] = found
+        return found
+
+    def motion(self, frame: str, taken: tuple[int, ...] | None = None) -> Motion:
+        """As `WideChain.motion`; a joint's name means the link that it carries.
+
+        Args:
+            frame: of the robot.
+            taken: only these of the chain's coordinates.
+        """
+        if taken is not None:
+            if (frame, taken) not in self._motions:
+                self._motions[frame, taken] = self.motion(frame).take(list(taken))
+            return self._motions[frame, taken]
         link = frame if self.chain.has_frame(frame) else self.robot.link_of(frame)
         if link not in self._motions:
             self._motions[link] = self.chain.motion(self.pose, link)

@@ -153,16 +153,12 @@ class Plant:
         taken = [geometry.chain.index(names[i]) for i in wide]
         at = np.ix_(wide, wide)
         at3 = np.ix_(wide, wide, wide)
-        taken2, taken3 = np.ix_(taken, taken), np.ix_(taken, taken, taken)
         mass, gradient = np.zeros((size, size)), np.zeros((size, size, size))
         gravity, curvature = np.zeros((size, size)), np.zeros((size, size, size))
-        for weight, what, point in self._masses:
-            inertia = geometry.inertia(what, point)
-            mass[at] += weight * inertia.mass[taken2]
-            gradient[at3] += weight * inertia.mass_gradient[taken3]
-            if self.gravity_stiffness:
-                gravity[at] += weight * inertia.gravity_gradient[taken2]
-                curvature[at3] += weight * inertia.gravity_curvature[taken3]
+        inertia = geometry.total(tuple(self._masses), tuple(taken))
+        mass[at], gradient[at3] = inertia.mass, inertia.mass_gradient
+        if self.gravity_stiffness:
+            gravity[at], curvature[at3] = inertia.gravity_gradient, inertia.gravity_curvature
         for row, value in self._added_inertia:
             vector = self._vector(row)
             mass += value * np.outer(vector, vector)
@@ -194,7 +190,7 @@ class Plant:
         jacobian = np.zeros((3, size))
         jacobian[:, wide] = motion.jacobian[:3, taken]
         force = jacobian.T @ direction
-        force_gradient[at] = np.einsum("kri,r->ik", motion.gradient[:, :3], direction)[taken2]
+        force_gradient[at] = (direction @ motion.gradient[:, :3]).T[np.ix_(taken, taken)]
 
         elements = [(e, self._vector(self.deflection(joint))) for e, joint in self._elements]
         elements += [(e, force) for e in self._contacts]
@@ -250,9 +246,21 @@ class Plant:
         deflections: FloatArray,
         joints: FloatArray,
     ) -> FloatArray:
-        omega, shapes = undamped_modes(mass, stiffness)
+        omega, shapes = _modes(mass, stiffness)
         energy = joints[:, None] * (deflections @ shapes) ** 2 + 1e-300
         ratio = self.geometry.robot.damping_ratio @ energy / energy.sum(axis=0)
         weighted = mass @ shapes
         damping: FloatArray = (weighted * (2.0 * self.damping_scale * ratio * omega)) @ weighted.T
         return damping
+
+
+def _modes(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """As `undamped_modes`, by Cholesky's factor: small matrices, asked for many times."""
+    try:
+        inverse = np.linalg.inv(np.linalg.cholesky(mass))
+    except np.linalg.LinAlgError:
+        return undamped_modes(mass, stiffness)
+    squared, vectors = np.linalg.eigh(inverse @ stiffness @ inverse.T)
+    if not squared[0] > 0.0:
+        return undamped_modes(mass, stiffness)
+    return np.sqrt(squared), inverse.T @ vectors

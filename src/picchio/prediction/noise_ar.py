@@ -60,21 +60,26 @@ class AutoRegression:
         Args:
             series: (..., m).
         """
-        x = np.asarray(series, dtype=np.float64)
+        from picchio.prediction._whiten_kernel import whiten as kernel
+
+        x = np.ascontiguousarray(series, dtype=np.float64)
         if not self.variance > 0.0:
             raise InputError("noise without variance cannot whiten")
         out = np.empty_like(x)
-        p, m = self.order, x.shape[-1]
-        for i in range(min(p, m)):
-            a = self.predictors[i]
-            past = x[..., :i][..., ::-1] @ a if i else 0.0
-            out[..., i] = (x[..., i] - past) / np.sqrt(self.variances[i])
-        if m > p:
-            left = x[..., p:].copy()
-            for k, a_k in enumerate(self.predictors[p]):
-                left -= a_k * x[..., p - 1 - k : m - 1 - k]
-            out[..., p:] = left / np.sqrt(self.variances[p])
+        table, deviation = self._table
+        for row, clean in zip(
+            x.reshape(-1, x.shape[-1]), out.reshape(-1, x.shape[-1]), strict=True
+        ):
+            kernel(row, table, deviation, clean)
         return out
+
+    @cached_property
+    def _table(self) -> tuple[FloatArray, FloatArray]:
+        """(p + 1, p) predictors, a row for each number of samples known; (p + 1,) their errors."""
+        table = np.zeros((self.order + 1, self.order))
+        for row, predictor in zip(table, self.predictors, strict=True):
+            row[: predictor.size] = predictor
+        return table, np.sqrt(self.variances)
 
     def sample(self, samples: int, rng: np.random.Generator) -> FloatArray:
         """(samples,) noise like it, stationary from the first sample on."""

@@ -3,31 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from picchio.campaign import Campaign, Channel, Record
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.excitation import PiecewiseForce
 from picchio.model import Model
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects import Effect
 from picchio.model.geometry import Geometry
-from picchio.model.sensing import SensorChain
-from picchio.model.system import VibratingSystem
-from picchio.prediction.filters import apply_filters
-from picchio.prediction.readings import reading
+from picchio.prediction.percussion_setup import PercussionSetup
 from picchio.robot import FlexibleRobot
 from picchio.robot.expansion import WideChain
-from picchio.vibration.integrate import CoordinateMotion, Samples, integrate
+from picchio.vibration.integrate import Samples
 
-# Filters need the motion this finely, s.
-_FILTER_STEP = 1e-4
-_KEPT_MOTIONS = 6
 PREDICTED = (
     "force",
     "deflection",
@@ -38,154 +29,6 @@ PREDICTED = (
 )
 POSITION_KINDS = ("deflection", "displacement")
 _SECONDS_A_DAY = 86400.0
-
-
-@dataclass(frozen=True, eq=False)
-class PercussionSetup:
-    """What is known of a percussion record before anything is predicted.
-
-    Attributes:
-        name: the record's file.
-        geometry: of the robot at its pose.
-        blows: as programmed.
-        conditions: date and temperature.
-        samples: the record's clock.
-        channels: those that can be predicted.
-    """
-
-    name: str
-    geometry: Geometry
-    blows: Blows
-    conditions: Conditions
-    samples: Samples
-    channels: tuple[Channel, ...]
-    _motions: dict[object, tuple[VibratingSystem, CoordinateMotion]] = field(default_factory=dict)
-    _forces: dict[object, tuple[Blows, PiecewiseForce]] = field(default_factory=dict)
-    _systems: dict[object, VibratingSystem] = field(default_factory=dict)
-
-    @property
-    def steady(self) -> bool:
-        """Whether the record is of a steady state, its mean removed."""
-        return self.blows.period is not None
-
-    @property
-    def groups(self) -> tuple[str, ...]:
-        """Its channel groups."""
-        return tuple(dict.fromkeys(channel.group for channel in self.channels))
-
-    def cut(self, end: float) -> PercussionSetup:
-        """The same record up to a time, s."""
-        count = int(np.searchsorted(self.samples.times, end + 1e-9))
-        return PercussionSetup(
-            self.name,
-            self.geometry,
-            self.blows,
-            self.conditions,
-            Samples(self.samples.start, self.samples.step, min(count, self.samples.count)),
-            self.channels,
-        )
-
-    def predict(self, model: Model) -> dict[str, FloatArray]:
-        """Every channel at the record's samples, (count,) in its SI unit.
-
-        Args:
-            model: robot and effects; its robot must be the geometry's.
-
-        Raises:
-            InputError: an effect whose target the robot does not have, a frame that is none.
-        """
-        sensors = model.sensors(self.conditions)
-        out: dict[str, FloatArray] = {}
-        for group in self.groups:
-            chain = sensors.get(group)
-            members = [channel for channel in self.channels if channel.group == group]
-            out |= self._group(model, chain, members)
-        if self.steady:
-            out = {name: values - values.mean() for name, values in out.items()}
-        return out
-
-    def _group(
-        self, model: Model, chain: SensorChain, members: Sequence[Channel]
-    ) -> dict[str, FloatArray]:
-        samples = self._shifted(chain)
-        lead, factor = 0, 1
-        if chain.filters:
-            factor = max(1, int(np.ceil(samples.step / _FILTER_STEP - 1e-9)))
-            lead = self._lead(samples.step) if self.steady else 0
-            fine = samples.step / factor
-            samples = Samples(
-                samples.start - lead * samples.step, fine, factor * (samples.count + lead - 1) + 1
-            )
-        system, motion, force = self._motion(model, samples, middle=chain.filters)
-        kind = members[0].kind.name
-        values = reading(kind, members[0].subject, system, motion, force)
-        if chain.filters:
-            values = apply_filters(chain, values, samples.step)[:, factor * lead :: factor]
-        axes = "xyz"
-        if len(values) == 3 and members[0].axis is not None:
-            values = chain.gain * (chain.turn @ values)
-            rows = {c.name: values[axes.index(c.axis or "x")] for c in members}
-        elif kind == "deflection":
-            names = self.geometry.robot.flexible_names
-            values = chain.gain * values
-            rows = {c.name: values[names.index(c.subject or "")] for c in members}
-        else:
-            rows = {c.name: chain.gain * values[0] for c in members}
-        rows = {name: np.clip(row, -chain.limit, chain.limit) for name, row in rows.items()}
-        for frequency, cosine, sine in chain.hum:
-            phase = 2.0 * np.pi * frequency * self.samples.times
-            line = cosine * np.cos(phase) + sine * np.sin(phase)
-            rows = {name: row + line for name, row in rows.items()}
-        return rows
-
-    def struck(self, model: Model) -> tuple[Blows, PiecewiseForce]:
-        """The blows with the model's effects in them, and the force they make."""
-        key = tuple(e.key for e in model.effects if e.where == "blows")
-        if key not in self._forces:
-            blows = model.blows(self.blows, self.conditions)
-            _forget(self._forces)
-            self._forces[key] = (blows, blows.force())
-        return self._forces[key]
-
-    def _system(self, model: Model, blows: Blows) -> VibratingSystem:
-        inside = ("structure", "over-time", "nonlinear")
-        moving = tuple(e.key for e in model.effects if e.where in inside)
-        key = (moving, model.gravity_stiffness, blows.direction.tobytes())
-        if key not in self._systems:
-            _forget(self._systems)
-            plant = model.plant(self.geometry, self.conditions)
-            self._systems[key] = plant.build(blows.direction)
-        return self._systems[key]
-
-    def _shifted(self, chain: SensorChain) -> Samples:
-        rate = 1.0 + chain.clock_rate
-        mine = self.samples
-        return Samples(mine.start * rate - chain.delay, mine.step * rate, mine.count)
-
-    def _lead(self, step: float) -> int:
-        """Samples before a steady record, for filters to settle."""
-        return int(min(2.0 / step, 20000))
-
-    def _motion(
-        self, model: Model, samples: Samples, *, middle: bool
-    ) -> tuple[VibratingSystem, CoordinateMotion, FloatArray]:
-        moving = tuple(e.key for e in model.effects if e.where not in ("sensor", "motion"))
-        key = (moving, model.gravity_stiffness, samples, middle)
-        blows, force = self.struck(model)
-        if key not in self._motions:
-            system = self._system(model, blows)
-            _forget(self._motions)
-            self._motions[key] = (system, integrate(system, force, samples, middle=middle))
-        system, motion = self._motions[key]
-        times = samples.times
-        history = force(np.mod(times, force.end)) if np.isfinite(force.end) else force(times)
-        return system, motion, history
-
-
-def _forget(cache: dict[Any, Any]) -> None:
-    """Keep a cache small: the oldest goes first."""
-    while len(cache) >= _KEPT_MOTIONS:
-        cache.pop(next(iter(cache)), None)
 
 
 def percussion_setups(

@@ -16,48 +16,47 @@ def reading(
     subject: str | None,
     system: VibratingSystem,
     motion: CoordinateMotion,
-    force: FloatArray,
 ) -> FloatArray:
     """The readings of a kind of channel, to second order in the deflection.
 
     Args:
-        kind: "force", "deflection", or a frame's "displacement", "velocity", "acceleration"
+        kind: "deflection", or a frame's "displacement", "velocity", "acceleration"
             (world axes) or "accelerometer" (R^T (a - g), less its value at rest).
         subject: the frame, where the kind has one.
         system: gives the kinematics.
         motion: of the coordinates, (k, N) each.
-        force: (k,) N, of the tool.
 
     Returns:
-        (1, k), (n, k) for all joints, or (3, k) for a frame's axes; SI.
+        (n, k) for all joints, or (3, k) for a frame's axes; SI.
 
     Raises:
         InputError: a kind that is none of these, a frame that the robot does not have.
     """
-    if kind == "force":
-        return force[None]
     if kind == "deflection":
         return np.asarray(system.deflections @ motion.position.T)
-    frame = system.geometry.motion(subject or "").take(list(system.taken))
+    frame = system.geometry.motion(subject or "", system.taken)
     wide = list(system.wide)
-    x, v, a = (part[:, wide] for part in (motion.position, motion.velocity, motion.acceleration))
+    whole = (motion.position, motion.velocity, motion.acceleration)
+    x, v, a = (part if len(wide) == part.shape[1] else part[:, wide] for part in whole)
     if kind == "displacement":
         return _linear(frame, x) + 0.5 * _bilinear(frame, x, x)
     if kind == "velocity":
         return _linear(frame, v) + _bilinear(frame, x, v)
     if kind not in ("acceleration", "accelerometer"):
         raise InputError("cannot be predicted", key="channel", value=kind)
-    acceleration = _linear(frame, a) + _bilinear(frame, x, a) + _bilinear(frame, v, v)
+    from picchio.prediction._reading_kernel import felt, frame_acceleration
+
+    x, v, a = (np.ascontiguousarray(part) for part in (x, v, a))
+    jacobian, gradient = np.ascontiguousarray(frame.jacobian), frame.gradient
+    acceleration = np.empty((3, x.shape[0]))
+    frame_acceleration(jacobian, gradient, x, v, a, acceleration)
     if kind == "acceleration":
         return acceleration
-    gravity = np.asarray(system.geometry.robot.mounting.gravity, dtype=float)
-    # How the frame has turned since rest, as a rotation vector in the world.
-    turn = frame.jacobian[3:] @ x.T + 0.5 * _angular(frame, x)
-    felt = acceleration.T - gravity
-    once = np.cross(turn.T, felt)
-    # R^T f = R0^T exp(-[turn]) f, to second order; g has been felt at rest already.
-    seen = felt - once + 0.5 * np.cross(turn.T, once) + gravity
-    return np.asarray(frame.rotation.T @ seen.T)
+    gravity = np.array(system.geometry.robot.mounting.gravity, dtype=float)
+    rotation = np.ascontiguousarray(frame.rotation)
+    out = np.empty_like(acceleration)
+    felt(jacobian, gradient, rotation, gravity, x, acceleration, out)
+    return out
 
 
 def _linear(frame: Motion, values: FloatArray) -> FloatArray:
@@ -69,9 +68,3 @@ def _bilinear(frame: Motion, first: FloatArray, second: FloatArray) -> FloatArra
     n = first.shape[1]
     flat = frame.gradient[:, :3].transpose(1, 0, 2).reshape(3, n * n)
     return np.asarray(flat @ (first[:, :, None] * second[:, None, :]).reshape(-1, n * n).T)
-
-
-def _angular(frame: Motion, x: FloatArray) -> FloatArray:
-    n = x.shape[1]
-    flat = frame.gradient[:, 3:].transpose(1, 0, 2).reshape(3, n * n)
-    return np.asarray(flat @ (x[:, :, None] * x[:, None, :]).reshape(-1, n * n).T)

@@ -53,3 +53,37 @@ def advance_state(parameters, change, z):
     if left > 0.0:
         z = 1.0 - (1.0 - z) * math.exp(-left)
     return sign * z
+
+
+_POINTS = 16
+
+
+@njit(cache=True, nogil=True)
+def kink_correction(kind, parameters, d0, rate0, d1, rate1, length, out):
+    """What the best straight line through a force with a kink has above its two ends' values.
+
+    Over a step the force is taken as a straight line in time. Where the path from (d0, rate0) to
+    (d1, rate1), a cubic, crosses a kink, the line with the force's own mean and first moment is
+    better than the one through its ends. Into `out` (2,): to be added at start and end.
+    """
+    f0 = element_force(kind, parameters, d0, rate0, 0.0)
+    f1 = element_force(kind, parameters, d1, rate1, 0.0)
+    mean = 0.0
+    moment = 0.0
+    for i in range(_POINTS):
+        s = (i + 0.5) / _POINTS
+        a, b = (1.0 - s) * (1.0 - s), s * s
+        path = (
+            a * ((1.0 + 2.0 * s) * d0 + s * length * rate0)
+            + b * ((3.0 - 2.0 * s) * d1 - (1.0 - s) * length * rate1)
+        )  # fmt: skip
+        rate = (
+            6.0 * s * (1.0 - s) * (d1 - d0) / length
+            + (1.0 - s) * (1.0 - 3.0 * s) * rate0
+            + s * (3.0 * s - 2.0) * rate1
+        )
+        above = element_force(kind, parameters, path, rate, 0.0) - f0 - (f1 - f0) * s
+        mean += above / _POINTS
+        moment += above * s / _POINTS
+    out[0] = 4.0 * mean - 6.0 * moment
+    out[1] = 6.0 * moment - 2.0 * mean

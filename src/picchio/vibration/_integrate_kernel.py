@@ -12,107 +12,24 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from picchio.vibration._element_kernel import advance_state, element_force
+from picchio.vibration._element_kernel import advance_state, element_force, kink_correction
+from picchio.vibration._exponential_kernel import fastest_rate, step_matrices, taylor
+from picchio.vibration._friction_kernel import COULOMB, stick
 
-_COULOMB = 3
-_FRICTION_SWEEPS = 4
-_IDEAL = 2e-5  # rad/s, below which friction is taken as ideal
-_TAYLOR = 14
-_MOST_PARTS = 4000
-
-
-@njit(cache=True, nogil=True)
-def step_matrices(inverse, damping, stiffness, step):
-    """exp(A h) (2N, 2N) and what a pseudo-force at start and end of a step adds, (2N, N) each."""
-    n = inverse.shape[0]
-    size = 4 * n
-    a = np.zeros((size, size))
-    ik, ic = inverse @ stiffness, inverse @ damping
-    for i in range(n):
-        a[i, n + i] = step
-        a[2 * n + i, 3 * n + i] = 1.0
-        for j in range(n):
-            a[n + i, j] = -step * ik[i, j]
-            a[n + i, n + j] = -step * ic[i, j]
-            a[n + i, 2 * n + j] = step * inverse[i, j]
-    # Scaled as states are: the velocity's unit would make the norm large.
-    norm = 0.0
-    for i in range(n):
-        norm = max(norm, np.sqrt(step * step * np.abs(ik[i]).sum()) + step * np.abs(ic[i]).sum())
-    halvings = 0
-    while norm > 0.5:
-        norm *= 0.5
-        halvings += 1
-    a /= 2.0**halvings
-    total = np.eye(size)
-    term = np.eye(size)
-    for k in range(1, 18):
-        term = term @ a / k
-        total += term
-    for _ in range(halvings):
-        total = total @ total
-    exponential = total[: 2 * n, : 2 * n].copy()
-    constant = total[: 2 * n, 2 * n : 3 * n].copy()
-    slope = total[: 2 * n, 3 * n :].copy()
-    return exponential, constant - slope, slope
-
-
-@njit(cache=True, nogil=True)
-def _fastest(ik, ic):
-    """A bound of the system's rates, 1/s."""
-    most = 0.0
-    for i in range(ik.shape[0]):
-        most = max(most, np.sqrt(np.abs(ik[i]).sum()) + np.abs(ic[i]).sum())
-    return most
-
-
-@njit(cache=True, nogil=True)
-def _taylor(y, f0, f1, length, inverse, ik, ic, fastest, out):
-    """exp(A s) y plus the force that goes from f0 to f1 in a straight line over `length`."""
-    n = f0.size
-    parts = min(max(int(np.ceil(length * fastest)), 1), _MOST_PARTS)
-    short = length / parts
-    slope = (f1 - f0) / parts
-    term = np.empty(2 * n)
-    new = np.empty(2 * n)
-    for i in range(2 * n):
-        out[i] = y[i]
-    for part in range(parts):
-        for i in range(2 * n):
-            term[i] = out[i]  # the k-th derivative times length^k / k!
-        for k in range(1, _TAYLOR):
-            for i in range(n):
-                new[i] = term[n + i]
-                total = 0.0
-                for j in range(n):
-                    total -= ik[i, j] * term[j] + ic[i, j] * term[n + j]
-                    # The force is there in the first derivative; its slope comes in the second.
-                    if k == 1:
-                        total += inverse[i, j] * (f0[j] + part * slope[j])
-                    elif k == 2:
-                        total += inverse[i, j] * slope[j]
-                new[n + i] = total
-            for i in range(2 * n):
-                term[i] = new[i] * short / k
-                out[i] += term[i]
+_BACKLASH, _CONTACT = 0, 4
 
 
 @njit(cache=True, nogil=True)
 def _pseudo_force(
-    x, v, force, mass, gradient, curvature, inverse, damping, stiffness, b, b_gradient,
-    kinds, parameters, rows, states, friction, out,
+    y, force, mass, gradient, curvature, inverse, damping, stiffness, b, b_gradient,
+    kinds, parameters, rows, states, friction, square, line, out,
 ):  # fmt: skip
-    """What the linear equations lack: M x'' = b F + p - C x' - K x. Into `out` (N,)."""
-    n = x.size
-    rest = np.empty(n)
-    tilt = np.zeros((n, n))
-    rate = np.zeros((n, n))
-    for k in range(n):
-        for i in range(n):
-            for j in range(n):
-                tilt[i, j] += gradient[k, i, j] * x[k]
-                rate[i, j] += gradient[k, i, j] * v[k]
-    linear = np.empty(n)
+    """What the linear equations lack: M x'' = b F + p - C x' - K x. Into `out` (N,).
+
+    y is (2N,); square (N, N) and line (3, N) are room to work in. Returns x'' (N,), within line.
+    """
+    n = b.size
+    rest, linear, acceleration = line[0], line[1], line[2]
     for i in range(n):
         total = 0.0
         quadratic = 0.0
@@ -120,32 +37,36 @@ def _pseudo_force(
         push = 0.0
         held = 0.0
         for j in range(n):
-            total += rate[i, j] * v[j]
+            tilt = 0.0
+            rate = 0.0
             inner = 0.0
             bent = 0.0
             for k in range(n):
-                inner += gradient[i, j, k] * v[k]
-                bent += curvature[k, i, j] * x[k]
-            quadratic += inner * v[j]
-            curved += bent * x[j]
-            push += b_gradient[i, j] * x[j]
-            held += damping[i, j] * v[j] + stiffness[i, j] * x[j]
+                tilt += gradient[k, i, j] * y[k]
+                rate += gradient[k, i, j] * y[n + k]
+                inner += gradient[i, j, k] * y[n + k]
+                bent += curvature[k, i, j] * y[k]
+            square[i, j] = tilt
+            total += rate * y[n + j]
+            quadratic += inner * y[n + j]
+            curved += bent * y[j]
+            push += b_gradient[i, j] * y[j]
+            held += damping[i, j] * y[n + j] + stiffness[i, j] * y[j]
         rest[i] = push * force - total + 0.5 * quadratic - 0.5 * curved
         linear[i] = b[i] * force - held
     for e in range(kinds.size):
         d = 0.0
         dd = 0.0
         for j in range(n):
-            d += rows[e, j] * x[j]
-            dd += rows[e, j] * v[j]
-        if kinds[e] == _COULOMB:
+            d += rows[e, j] * y[j]
+            dd += rows[e, j] * y[n + j]
+        if kinds[e] == COULOMB:
             torque = -friction[e]
         else:
             torque = element_force(kinds[e], parameters[e], d, dd, states[e])
         for j in range(n):
             rest[j] += rows[e, j] * torque
     # x'' stands on both sides; two rounds leave (dM/M)^3.
-    acceleration = np.empty(n)
     for i in range(n):
         total = 0.0
         for j in range(n):
@@ -155,7 +76,7 @@ def _pseudo_force(
         for i in range(n):
             total = rest[i]
             for j in range(n):
-                total -= tilt[i, j] * acceleration[j]
+                total -= square[i, j] * acceleration[j]
             out[i] = total
         for i in range(n):
             total = 0.0
@@ -184,7 +105,7 @@ def integrate(
     n = b.size
     inverse = np.linalg.inv(mass)
     ik, ic = inverse @ stiffness, inverse @ damping
-    fastest = _fastest(ik, ic)
+    fastest = fastest_rate(ik, ic)
     exponential, from_start, from_end = step_matrices(inverse, damping, stiffness, step)
     elements = kinds.size
     y = start.copy()
@@ -192,20 +113,27 @@ def integrate(
     friction = np.zeros(elements)
     has_friction = False
     for e in range(elements):
-        has_friction = has_friction or kinds[e] == _COULOMB
+        has_friction = has_friction or kinds[e] == COULOMB
     p0, p1, f0, f1 = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     guess, new = np.empty(2 * n), np.empty(2 * n)
     new_states = states.copy()
     kick = np.empty((elements, 2 * n))
     zero = np.zeros(2 * n)
+    square, line, no_friction = np.empty((n, n)), np.empty((3, n)), np.zeros(elements)
+    known, bend = False, np.empty(2)
     for k in range(lengths.size):
         if has_friction:
             for e in range(elements):
                 friction[e] = 0.0
-        _pseudo_force(
-            y[:n], y[n:], force0[k], mass, gradient, curvature, inverse, damping, stiffness,
-            b, b_gradient, kinds, parameters, rows, states, friction, p0,
-        )  # fmt: skip
+        # Where the last sample was read at this very state and force, it is known.
+        if known and force0[k] == force_after[k - 1] and not has_friction:
+            for i in range(n):
+                p0[i] = p1[i]
+        else:
+            _pseudo_force(
+                y, force0[k], mass, gradient, curvature, inverse, damping, stiffness,
+                b, b_gradient, kinds, parameters, rows, states, friction, square, line, p0,
+            )  # fmt: skip
         for i in range(n):
             f0[i] = b[i] * force0[k] + p0[i]
             f1[i] = b[i] * force1[k] + p0[i]
@@ -219,9 +147,9 @@ def integrate(
                         total += from_start[i, j] * f0[j] + from_end[i, j] * f1[j]
                     new[i] = total
             else:
-                _taylor(y, f0, f1, lengths[k], inverse, ik, ic, fastest, new)
+                taylor(y, f0, f1, lengths[k], inverse, ik, ic, fastest, new)
             if has_friction:
-                _stick(new, n, rows, kinds, parameters, friction, kick, zero, lengths[k],
+                stick(new, n, rows, kinds, parameters, friction, kick, zero, lengths[k],
                        regular[k], from_start, from_end, inverse, ik, ic, fastest)  # fmt: skip
             for e in range(elements):
                 if kinds[e] == 2:
@@ -237,21 +165,25 @@ def integrate(
                 guess[i] = new[i]
             # friction is in the step already, so the pseudo-force must not count it again
             _pseudo_force(
-                guess[:n], guess[n:], force1[k], mass, gradient, curvature, inverse, damping,
+                guess, force1[k], mass, gradient, curvature, inverse, damping,
                 stiffness, b, b_gradient, kinds, parameters, rows, new_states,
-                np.zeros(elements), p1,
+                no_friction, square, line, p1,
             )  # fmt: skip
             for i in range(n):
                 f1[i] = b[i] * force1[k] + p1[i]
+            for e in range(elements):
+                if kinds[e] == _BACKLASH or kinds[e] == _CONTACT:
+                    _add_kink(y, guess, lengths[k], rows[e], kinds[e], parameters[e], bend, f0, f1)
         for i in range(2 * n):
             y[i] = new[i]
         for e in range(elements):
             states[e] = new_states[e]
-        if sample[k] >= 0:
+        known = sample[k] >= 0
+        if known:
             s = sample[k]
             acceleration = _pseudo_force(
-                y[:n], y[n:], force_after[k], mass, gradient, curvature, inverse, damping,
-                stiffness, b, b_gradient, kinds, parameters, rows, states, friction, p1,
+                y, force_after[k], mass, gradient, curvature, inverse, damping, stiffness,
+                b, b_gradient, kinds, parameters, rows, states, friction, square, line, p1,
             )  # fmt: skip
             for i in range(n):
                 x_out[s, i] = y[i]
@@ -264,61 +196,16 @@ def integrate(
 
 
 @njit(cache=True, nogil=True)
-def _smooth_friction(free, gain, limit, smooth):
-    """The f with f = limit tanh((free - gain f) / smooth), by bisection and Newton."""
-    low, high = -limit, limit
-    f = min(max(free / (gain + smooth / max(limit, 1e-300)), low), high)
-    for _ in range(60):
-        t = np.tanh((free - gain * f) / smooth)
-        wrong = f - limit * t
-        if wrong > 0.0:
-            high = f
-        else:
-            low = f
-        step = wrong / (1.0 + limit * (1.0 - t * t) * gain / smooth)
-        new = f - step
-        if not low < new < high:
-            new = 0.5 * (low + high)
-        if abs(new - f) <= 1e-9 * limit:
-            return new
-        f = new
-    return f
-
-
-@njit(cache=True, nogil=True)
-def _stick(
-    new, n, rows, kinds, parameters, friction, kick, zero, length, regular,
-    from_start, from_end, inverse, ik, ic, fastest,
-):  # fmt: skip
-    """Dry friction that holds a joint still at the step's end where it can, else its limit."""
-    for e in range(kinds.size):
-        if kinds[e] != _COULOMB:
-            continue
-        if regular:
-            for i in range(2 * n):
-                total = 0.0
-                for j in range(n):
-                    total += (from_start[i, j] + from_end[i, j]) * rows[e, j]
-                kick[e, i] = total
-        else:
-            _taylor(zero, rows[e], rows[e], length, inverse, ik, ic, fastest, kick[e])
-        friction[e] = 0.0
-    for _ in range(_FRICTION_SWEEPS):
-        for e in range(kinds.size):
-            if kinds[e] != _COULOMB:
-                continue
-            rate = 0.0
-            gain = 0.0
-            for j in range(n):
-                rate += rows[e, j] * new[n + j]
-                gain += rows[e, j] * kick[e, n + j]
-            free = rate + gain * friction[e]  # the rate without this friction
-            limit, smooth = parameters[e, 0], parameters[e, 1]
-            if smooth <= _IDEAL:
-                wanted = min(max(free / gain, -limit), limit)
-            else:
-                wanted = _smooth_friction(free, gain, limit, smooth)
-            change = wanted - friction[e]
-            friction[e] = wanted
-            for i in range(2 * n):
-                new[i] -= change * kick[e, i]
+def _add_kink(start, end, length, row, kind, parameters, bend, f0, f1):
+    """Put an element's kink within a step, from state start to end (2N,), into its line."""
+    n = row.size
+    d0, rate0, d1, rate1 = 0.0, 0.0, 0.0, 0.0
+    for j in range(n):
+        d0 += row[j] * start[j]
+        rate0 += row[j] * start[n + j]
+        d1 += row[j] * end[j]
+        rate1 += row[j] * end[n + j]
+    kink_correction(kind, parameters, d0, rate0, d1, rate1, length, bend)
+    for j in range(n):
+        f0[j] += row[j] * bend[0]
+        f1[j] += row[j] * bend[1]

@@ -9,11 +9,14 @@ import numpy as np
 from picchio.core.arrays import BoolArray, FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.excitation import PiecewiseForce
+from picchio.model.elements import ElementKind
 from picchio.model.system import VibratingSystem
 
 # Longest steps, s: the linear part is exact, so these resolve only what comes on top.
 SMOOTH_STEP = 1e-3
+KINKED_STEP = 4e-4
 ROUGH_STEP = 2e-4
+_ROUGH = (ElementKind.COULOMB, ElementKind.BOUC_WEN)
 _EDGE = 1e-10
 _GAUSS = 0.5 - np.sqrt(3.0) / 6.0
 _SHOOTING = 40
@@ -65,6 +68,7 @@ def integrate(
     *,
     longest_step: float | None = None,
     middle: bool = False,
+    plan: Plan | None = None,
 ) -> CoordinateMotion:
     """The system's motion from rest under a burst, or its steady motion under a periodic force.
 
@@ -74,6 +78,7 @@ def integrate(
         samples: when; before t = 0 a burst finds the system at rest.
         longest_step: s; by default fine enough for what the system holds.
         middle: at a jump give the mean acceleration of before and after, as a filter wants it.
+        plan: of a burst, where it was made before from the same force, samples and step.
 
     Returns:
         the motion at the samples; at a jump of the force the acceleration is that just after.
@@ -87,7 +92,7 @@ def integrate(
             return _periodic(system, force, samples, longest, middle)
         except np.linalg.LinAlgError:
             raise InputError(_MASSLESS) from None
-    plan = make_plan(force, samples, longest, middle=middle)
+    plan = plan or make_plan(force, samples, longest, middle=middle)
     try:
         return _run(system, plan, samples.count, _rest(system))[0]
     except np.linalg.LinAlgError:
@@ -96,7 +101,9 @@ def integrate(
 
 def default_step(system: VibratingSystem) -> float:
     """How fine the steps should be, s."""
-    return ROUGH_STEP if system.elements else SMOOTH_STEP
+    if any(element.kind in _ROUGH for element in system.elements):
+        return ROUGH_STEP
+    return KINKED_STEP if system.elements else SMOOTH_STEP
 
 
 def _rest(system: VibratingSystem) -> FloatArray:
@@ -194,7 +201,7 @@ def _periodic(
     system: VibratingSystem, force: PiecewiseForce, samples: Samples, longest: float, middle: bool
 ) -> CoordinateMotion:
     """Shooting for the state that repeats, with the linear system's own map as its Jacobian."""
-    from picchio.vibration._integrate_kernel import step_matrices
+    from picchio.vibration._exponential_kernel import step_matrices
 
     period, n = force.end, len(system.coordinates)
     parts = int(np.ceil(period / longest))

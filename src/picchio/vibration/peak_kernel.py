@@ -8,14 +8,10 @@ from numba import njit, prange
 from picchio.core.arrays import ComplexArray, FloatArray
 from picchio.vibration.modal_kernel import modes_of
 from picchio.vibration.oscillator_kernel import coefficients, exponential
-from picchio.vibration.refine_kernel import refine
-from picchio.vibration.sample_kernel import joint_norms, sample, steps_of
-from picchio.vibration.series_kernel import TERMS, series_top
+from picchio.vibration.sample_kernel import Samples, joint_norms, room_for, sample, steps_of
+from picchio.vibration.series_kernel import TERMS
+from picchio.vibration.top_kernel import highest
 
-# Of the largest |g|^2: a sample below the first, or a parabola's top below the second, cannot
-# belong to the top (see the samples a cycle).
-_CANDIDATE = 0.9
-_LIKELY = 0.96
 _BLOCK = 128
 
 
@@ -39,9 +35,9 @@ def _pose_peaks(
     dims: int,
     g: FloatArray,
     terms: FloatArray,
-    space: FloatArray,
-) -> FloatArray:
-    """Peaks of one pose; returns the scratch space, which may have grown."""
+    room: Samples,
+) -> Samples:
+    """Peaks of one pose; returns the room for samples, which may have grown."""
     n = push.shape[0]
     for i in range(n):
         poles[i] = complex(-ratio[i] * omega[i], omega[i] * np.sqrt(1.0 - ratio[i] ** 2))
@@ -56,14 +52,12 @@ def _pose_peaks(
         for p in range(length.shape[0]):
             count += steps_of(length[p], max(omega[n - 1], wave[p]))
             total += length[p]
-        if count > space.shape[1]:
-            space = np.empty((3 * n + 4, 2 * count))
-        eta, norm, rate = space[:n, :count], space[n : 2 * n, :count], space[2 * n : 3 * n, :count]
-        time, three = space[3 * n, :count], space[3 * n + 1 :, :count]
-        sample(poles, rows, length, wave, omega[n - 1], eta, rate, time)
+        if count > room.time.shape[0]:
+            room = room_for(n, 2 * count)
+        sample(poles, rows, length, wave, omega[n - 1], room.eta, room.rate, room.time)
         done = True
         for j in range(n):
-            peak[j] = joint_norms(j, eta, shapes, push, dims, three, norm)
+            peak[j] = joint_norms(j, count, room.eta, shapes, push, dims, room.g, room.norm)
             if endless and done:
                 # Nothing after the samples can be larger than what is left of the modes.
                 left = 0.0
@@ -80,103 +74,11 @@ def _pose_peaks(
     for j in range(n):
         direction[j, 0], direction[j, 1], direction[j, 2] = 0.0, 0.0, 1.0
         if peak[j] > 0.0:
-            peak[j] = _highest(
-                j, periodic, total, time, norm, eta, rate, start, poles, rows, constant, slope,
-                amplitude, wave, shapes, push, g, terms, direction,
+            peak[j] = highest(
+                j, count, periodic, total, room.time, room.norm, room.eta, room.rate, start, poles,
+                rows, constant, slope, amplitude, wave, shapes, push, g, terms, direction,
             )  # fmt: skip
-    return space
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _top(
-    joint: int, k: int, periodic: bool, total: float, time: FloatArray, norm: FloatArray
-) -> tuple[float, float, float, float]:
-    """Before a sampled maximum, at the parabola's top, after it, and how high that is."""
-    count = norm.shape[1]
-    before = k - 1 if k > 0 else (count - 1 if periodic else 0)
-    after = k + 1 if k + 1 < count else (0 if periodic else count - 1)
-    a, t, b = time[before], time[k], time[after]
-    if a > t:
-        a -= total
-    if b < t:
-        b += total
-    left, right, rise, fall = (
-        t - a,
-        b - t,
-        norm[joint, k] - norm[joint, before],
-        norm[joint, k] - norm[joint, after],
-    )
-    if left <= 0.0 or right <= 0.0:
-        return a, t, b, norm[joint, k]
-    bend = rise / left + fall / right
-    if bend <= 0.0:
-        return a, t, b, norm[joint, k]
-    slope = (rise * right / left - fall * left / right) / (left + right)
-    half = 0.5 * slope * (left + right) / bend
-    half = min(max(half, -0.5 * left), 0.5 * right)
-    return a, t + half, b, norm[joint, k] + 0.5 * max(slope * half, 0.0)
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _highest(
-    joint: int,
-    periodic: bool,
-    total: float,
-    time: FloatArray,
-    norm: FloatArray,
-    eta: FloatArray,
-    rate: FloatArray,
-    start: FloatArray,
-    poles: ComplexArray,
-    rows: ComplexArray,
-    constant: FloatArray,
-    slope: FloatArray,
-    amplitude: ComplexArray,
-    wave: FloatArray,
-    shapes: FloatArray,
-    push: FloatArray,
-    g: FloatArray,
-    terms: FloatArray,
-    direction: FloatArray,
-) -> float:
-    """The largest |g| of a joint; into `direction`, where it points."""
-    count = norm.shape[1]
-    likely = 0.0
-    for k in range(count):
-        if norm[joint, k] > likely:
-            likely = norm[joint, k]
-    best, floor = -1.0, _CANDIDATE * likely
-    for k in range(count):
-        here = norm[joint, k]
-        if here < floor or here < norm[joint, k - 1 if k > 0 else (count - 1 if periodic else 0)]:
-            continue
-        if here < norm[joint, k + 1 if k + 1 < count else (0 if periodic else count - 1)]:
-            continue
-        a, t, b, top = _top(joint, k, periodic, total, time, norm)
-        if top < _LIKELY * best:
-            continue
-        p = 0
-        while p + 1 < start.shape[0] and start[p + 1] <= time[k]:
-            p += 1
-        value = -1.0
-        if wave[p] == 0.0:
-            u = time[k] - start[p]
-            stop = start[p + 1] if p + 1 < start.shape[0] else total
-            value = series_top(
-                joint, k, t - time[k], -u, stop - time[k], constant[p] + slope[p] * u, slope[p],
-                poles, eta, rate, shapes, push, terms, g,
-            )  # fmt: skip
-        if value < 0.0:  # the top is in another piece, or not near
-            value = refine(
-                joint, a, t, b, total if periodic else np.inf, start, poles, rows, constant, slope,
-                amplitude, wave, shapes, push, g,
-            )  # fmt: skip
-        if value > best:
-            best = value
-            size = np.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
-            for d in range(3):
-                direction[joint, d] = g[d] / size
-    return np.sqrt(best)
+    return room
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
@@ -228,7 +130,7 @@ def peaks(
         found = np.empty((n, 3))
         g = np.empty(3)
         terms = np.empty((TERMS, 3))
-        space = np.empty((3 * n + 4, 256))
+        room = room_for(n, 256)
         poles = np.empty(n, dtype=np.complex128)
         rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
         for s in range(block * _BLOCK, min(poses, (block + 1) * _BLOCK)):
@@ -255,9 +157,9 @@ def peaks(
                         push[i, d] = moved
                     else:
                         push[i, 0] += moved * along[s, d]
-            space = _pose_peaks(
+            room = _pose_peaks(
                 periodic, start, duration, constant, slope, amplitude, wave, omega, ratio,
-                shapes, push, poles, rows, peak[s], found, dims, g, terms, space,
+                shapes, push, poles, rows, peak[s], found, dims, g, terms, room,
             )  # fmt: skip
             for j in range(n):
                 for d in range(3):

@@ -14,6 +14,15 @@ _NEWTON = 40
 _PRECISION = 2e-5
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def piece_at(time: float, start: FloatArray) -> int:
+    """The last piece of the force that has begun at a time, s."""
+    p = 0
+    while p + 1 < start.shape[0] and start[p + 1] <= time:
+        p += 1
+    return p
+
+
 @njit(cache=True, error_model="numpy")
 def refine(
     joint: int,
@@ -36,7 +45,7 @@ def refine(
 
     Everything is in scalars: views into arrays cost more than the arithmetic.
     """
-    n, pieces = poles.shape[0], start.shape[0]
+    n = poles.shape[0]
     width = b - a
     norm = 0.0
     for _ in range(_NEWTON):
@@ -45,9 +54,7 @@ def refine(
             inside += total
         elif inside >= total:
             inside -= total
-        p = 0
-        while p + 1 < pieces and start[p + 1] <= inside:
-            p += 1
+        p = piece_at(inside, start)
         u = inside - start[p]
         force = constant[p] + slope[p] * u
         turn, sway = 0.0, 0.0

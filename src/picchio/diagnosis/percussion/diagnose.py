@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ import numpy as np
 from picchio.campaign import Campaign
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.causes import told_causes, told_nuisances, with_hum
 from picchio.diagnosis.percussion.evidence import Evidence, weigh
 from picchio.diagnosis.percussion.fit import Fit, fit, fit_growing
 from picchio.diagnosis.percussion.gain import held_out, measure_gain
@@ -26,9 +26,8 @@ from picchio.diagnosis.percussion.select import (
     score,
     search,
 )
-from picchio.diagnosis.percussion.unknowns import NUISANCE_KEYS, TOLERATED, Hypothesis
-from picchio.diagnosis.result import Cause, Diagnosis, Value, Verdict
-from picchio.model import Effect
+from picchio.diagnosis.percussion.unknowns import TOLERATED, Hypothesis
+from picchio.diagnosis.result import Cause, Diagnosis, Verdict
 from picchio.model.effects import Scales
 from picchio.prediction.noise_level import Noise
 from picchio.robot import FlexibleRobot
@@ -36,7 +35,6 @@ from picchio.robot import FlexibleRobot
 # A cause claimed though more than noise is left must explain most of what there is.
 MOSTLY = 0.8
 BEYOND_DOUBT = 0.99
-_DECISIVE = 60.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,11 +117,11 @@ def diagnose_percussion(
     if whole.hypothesis.labels:
         say("looking for other causes that would do as well")
         same, rivals = alternatives(problem, found, candidates, scales, train)
-    causes = _causes(problem, whole, found, rivals, train)
+    causes = told_causes(whole, found, rivals, train)
     gain = measure_gain(problem, baseline.hypothesis, found.best.hypothesis, train, kept)
     verdict = _verdict(whole, causes, before, after, same, gain.explained)
     if any(e.name == "mains_hum" for e in whole.hypothesis.effects):
-        causes = _with_hum(causes, hum_lines(problem, whole))
+        causes = with_hum(causes, hum_lines(problem, whole))
     others = tuple(
         tuple(sorted(_pair(label) for label in labels))
         for labels, _ in same
@@ -140,7 +138,7 @@ def diagnose_percussion(
         causes=causes if claimed else (),
         alternatives=tuple(dict.fromkeys(others)) if claimed else (),
         leads=leads,
-        nuisances=_nuisances(whole if claimed or verdict == "nothing-wrong" else nominal),
+        nuisances=told_nuisances(whole if claimed or verdict == "nothing-wrong" else nominal),
         gain=gain,
         next_measurement=ask,
         scores=tuple(_scores(found)),
@@ -175,110 +173,6 @@ def _verdict(
     if sure and explained is not None and explained >= MOSTLY and not same:
         return "partial"
     return "unexplained"
-
-
-def _causes(
-    problem: Problem,
-    whole: Fit,
-    found: Search,
-    rivals: Sequence[Trial],
-    train: Sequence[MeasuredRecord],
-) -> tuple[Cause, ...]:
-    """The causes with their values, spreads and confidence."""
-    covariance = whole.covariance()
-    unknowns, vector = whole.hypothesis.unknowns(), whole.hypothesis.vector()
-    inflate = max(1.0, math.sqrt(whole.chi_square / max(whole.samples, 1)))
-    result = []
-    for effect in whole.hypothesis.causes:
-        index = whole.hypothesis.effects.index(effect)
-        values = {}
-        for p in effect.parameters:
-            std = 0.0
-            for k, unknown in enumerate(unknowns):
-                if unknown.effect == index and unknown.name == p.name:
-                    std = abs(unknown.slope(vector[k])) * math.sqrt(max(covariance[k, k], 0.0))
-            values[p.name] = Value(effect.values[p.name], std * inflate, p.unit)
-        result.append(
-            Cause(
-                effect.name,
-                effect.target,
-                _confidence(problem, found, rivals, effect, train),
-                values,
-            )
-        )
-    return tuple(result)
-
-
-def _confidence(
-    problem: Problem,
-    found: Search,
-    rivals: Sequence[Trial],
-    effect: Effect,
-    train: Sequence[MeasuredRecord],
-) -> float:
-    """From the poses' score differences to the best rival, and their spread (Student's t)."""
-    from scipy.stats import t as student
-
-    best = found.best
-    others = [r for r in rivals if effect.label not in r.fit.hypothesis.labels]
-    rival = min((r.fit for r in others), key=score, default=None)
-    if rival is None or len(rival.records) != len(best.records):
-        return 0.5 if len(train) < 3 else 1.0
-    poses = sorted({r.pose for r in best.records})
-    difference = np.zeros(len(poses))
-    for record, a, b in zip(best.records, best.residuals, rival.residuals, strict=True):
-        difference[poses.index(record.pose)] += float((b * b).sum() - (a * a).sum())
-    if len(poses) < 2:
-        return 1.0 if difference.sum() > 2.0 * LEAST_GAIN else 0.5
-    # A pose that decides beyond doubt on its own counts as one: how far beyond says nothing.
-    difference = np.clip(difference, -_DECISIVE, _DECISIVE)
-    total, spread = difference.mean(), difference.std(ddof=1) / math.sqrt(len(poses))
-    # What chance alone moves a pose's score by: that of log-likelihoods a few units apart.
-    spread = math.hypot(spread, 2.0 / math.sqrt(len(poses)))
-    return float(student.cdf(total / spread, len(poses) - 1))
-
-
-def _nuisances(found: Fit) -> dict[str, Value]:
-    """Fitted nuisances, in their own units."""
-    if found.jacobians is None:
-        return {}
-    covariance = found.covariance()
-    unknowns, vector = found.hypothesis.unknowns(), found.hypothesis.vector()
-    robot = found.records[0].setup.geometry.robot
-    nominal = dict(zip(robot.flexible_names, robot.stiffness, strict=True))
-    ratio = float(np.mean(robot.damping_ratio))
-    force = float(np.abs(found.records[0].setup.blows.height).max())
-    result = {}
-    for k, unknown in enumerate(unknowns):
-        effect = found.hypothesis.effects[unknown.effect]
-        if unknown.effect >= found.hypothesis.n_nuisances:
-            continue
-        key = NUISANCE_KEYS[effect.name]
-        scale, std = math.exp(vector[k]), math.exp(vector[k]) * math.sqrt(covariance[k, k])
-        if key == "stiffness":
-            prismatic = robot.tree.joints.get(effect.target)
-            unit = "N/m" if prismatic is not None and prismatic.type == "prismatic" else "N*m/rad"
-            size, name = float(nominal[effect.target]), f"stiffness.{effect.target}"
-        else:
-            size, unit = (ratio, "1") if key == "damping_ratio" else (force, "N")
-            name = key
-        result[name] = Value(scale * size, std * size, unit)
-    return result
-
-
-def _with_hum(causes: Sequence[Cause], lines: Hypothesis) -> tuple[Cause, ...]:
-    amplitude = {e.target: e.values["amplitude"] for e in lines.effects if e.name == "mains_hum"}
-    return tuple(
-        Cause(
-            c.effect,
-            c.target,
-            c.confidence,
-            {**c.parameters, "amplitude": Value(amplitude[c.target], 0.0, "1")},
-        )
-        if c.effect == "mains_hum"
-        else c
-        for c in causes
-    )
 
 
 def _leads(found: Search) -> list[tuple[str, str]]:

@@ -10,14 +10,16 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
-from picchio.diagnosis.percussion.unknowns import Hypothesis, Unknown
+from picchio.diagnosis.percussion.slopes import borrowed, fine_steps, jacobian, updated
+from picchio.diagnosis.percussion.unknowns import Hypothesis
 
 # Windows that grow, s: a long one at once lets the fit skip cycles.
 WINDOWS = (0.06, 0.16, 0.4, None)
 _CONVERGED = 1e-5
 _INSIDE = 1e-9
-_LEAST_STEP = 1e-7
 _HOPELESS = 1.5
+# A step that gains less than this share of what was foretold asks for a new Jacobian.
+_TRUSTED = 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,41 +79,6 @@ def prior_cost(hypothesis: Hypothesis) -> float:
     return float(((w * (u - means)) ** 2).sum())
 
 
-def jacobian(
-    problem: Problem,
-    hypothesis: Hypothesis,
-    records: Sequence[MeasuredRecord],
-    end: float | None,
-    at: list[FloatArray],
-    steps: FloatArray | None = None,
-) -> list[FloatArray]:
-    """D residual / d unknowns of every record by differences, (channels x m, unknowns).
-
-    Args:
-        problem: data and noise.
-        hypothesis: where.
-        records: which.
-        end: s.
-        at: the residuals there.
-        steps: (unknowns,) of the differences; the unknowns' own where None.
-    """
-    vector, unknowns = hypothesis.vector(), hypothesis.unknowns()
-    columns: list[list[FloatArray]] = [[] for _ in records]
-    for k, unknown in enumerate(unknowns):
-        step = unknown.step if steps is None else float(steps[k])
-        if vector[k] + step > unknown.upper:
-            step = -step
-        moved = vector.copy()
-        moved[k] += step
-        there = problem.residuals(hypothesis.at(moved).effects, records, end)
-        for i, (a, b) in enumerate(zip(there, at, strict=True)):
-            columns[i].append(((a - b) / step).ravel())
-    return [
-        np.stack(c, axis=1) if c else np.zeros((a.size, 0))
-        for c, a in zip(columns, at, strict=True)
-    ]
-
-
 def fit(
     problem: Problem,
     hypothesis: Hypothesis,
@@ -121,8 +88,12 @@ def fit(
     iterations: int = 8,
     with_jacobian: bool = False,
     rival: float = np.inf,
+    near: Fit | None = None,
 ) -> Fit:
     """Fit a hypothesis's unknowns.
+
+    The Jacobian is carried from step to step by Broyden's update (Mathematics of Computation 19
+    (1965) 577, doi:10.1090/S0025-5718-1965-0198670-6), and made anew where it has led astray.
 
     Args:
         problem: data and noise.
@@ -132,27 +103,31 @@ def fit(
         iterations: at most.
         with_jacobian: compute it at the end.
         rival: cost of another hypothesis: give up on one that stays far above it.
+        near: a fit to the same records, at least as long, whose unknowns come first among these:
+            its Jacobian is good enough to rank candidates by.
     """
     chosen = tuple(problem.records if records is None else records)
     here = hypothesis
     residuals = problem.residuals(here.effects, chosen, end)
     cost = _square(residuals) + prior_cost(here)
     damping = 1e-3
-    fresh: list[FloatArray] | None = None
+    slopes: list[FloatArray] | None = None
     steps: FloatArray | None = None
-    for turn in range(iterations):
-        if turn > 1 and cost > _HOPELESS * rival:
-            break
+    fresh, turn = False, 0
+    while turn < iterations and not (turn > 1 and cost > _HOPELESS * rival):
         unknowns = here.unknowns()
         if not unknowns:
             break
-        fresh = jacobian(problem, here, chosen, end, residuals, steps)
-        steps = _fine_steps(fresh, unknowns)
-        weights = prior_weights(here)
-        vector = here.vector()
+        if slopes is None:
+            first = None
+            if turn == 0 and near is not None and near.jacobians is not None:
+                first = borrowed(here, residuals, near.hypothesis, near.jacobians, near.residuals)
+            slopes = jacobian(problem, here, chosen, end, residuals, steps, first)
+            steps, fresh = fine_steps(slopes, unknowns), first is None
+        weights, vector = prior_weights(here), here.vector()
         means = np.array([u.prior[0] if u.prior else 0.0 for u in unknowns])
-        normal = sum(j.T @ j for j in fresh) + np.diag(weights**2)
-        gradient = sum(j.T @ r.ravel() for j, r in zip(fresh, residuals, strict=True))
+        normal = sum(j.T @ j for j in slopes) + np.diag(weights**2)
+        gradient = sum(j.T @ r.ravel() for j, r in zip(slopes, residuals, strict=True))
         gradient = gradient + weights**2 * (vector - means)
         if not np.isfinite(normal).all():
             break
@@ -160,7 +135,7 @@ def fit(
         lower = np.array([u.lower for u in unknowns])
         upper = np.array([u.upper for u in unknowns])
         improved = False
-        for _ in range(7):
+        for _ in range(7 if fresh else 2):
             step = _bounded_step(normal, gradient, scale, damping, vector, lower, upper)
             trial = here.at(vector + step)
             try:
@@ -173,26 +148,29 @@ def fit(
                 break
             damping *= 6.0
         if not improved:
-            break
+            if fresh:
+                break
+            slopes = None  # carried too far
+            if near is not None:
+                turn += 1
+            continue
+        turn += 1
         gained = cost - value
-        here, residuals, cost, fresh = trial, there, value, None
+        moved = trial.vector() - vector
+        foretold = -float(2.0 * gradient @ moved + moved @ normal @ moved)
+        slopes = updated(slopes, residuals, there, moved, scale)
+        here, residuals, cost = trial, there, value
         damping = max(damping / 8.0, 1e-9)
-        if gained < _CONVERGED * cost + 1e-3:
+        small = gained < _CONVERGED * cost + 1e-3
+        if small and (fresh or near is not None):
+            fresh = False
             break
-    if with_jacobian and fresh is None:
-        fresh = jacobian(problem, here, chosen, end, residuals, steps)
-    return Fit(here, residuals, fresh if with_jacobian else None, cost, chosen, end)
-
-
-def _fine_steps(parts: Sequence[FloatArray], unknowns: Sequence[Unknown]) -> FloatArray:
-    """Steps that change the residuals by about two standard deviations all in all.
-
-    The time of a blow's edge is known to a microsecond: a step of a thousandth would carry late
-    edges past samples, and its difference quotient would say nothing of the slope.
-    """
-    norms = np.sqrt(sum((part**2).sum(axis=0) for part in parts))
-    own = np.array([u.step for u in unknowns])
-    return np.asarray(np.clip(2.0 / np.maximum(norms, 1e-12), _LEAST_STEP, own))
+        fresh = False
+        if small or gained < _TRUSTED * foretold:
+            slopes = None
+    if with_jacobian and not (fresh and slopes is not None):
+        slopes = jacobian(problem, here, chosen, end, residuals, steps)
+    return Fit(here, residuals, slopes if with_jacobian else None, cost, chosen, end)
 
 
 def _square(residuals: Sequence[FloatArray]) -> float:
@@ -239,6 +217,7 @@ def fit_growing(
     windows: Sequence[float | None] = WINDOWS,
     iterations: int = 6,
     with_jacobian: bool = False,
+    near: Fit | None = None,
 ) -> Fit:
     """Fit up to one time after the other."""
     found: Fit | None = None
@@ -252,6 +231,7 @@ def fit_growing(
             end,
             iterations=iterations if last else 3,
             with_jacobian=with_jacobian and last,
+            near=near,
         )
     assert found is not None
     return found

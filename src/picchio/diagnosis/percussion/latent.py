@@ -9,6 +9,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.fit import Fit, fit
+from picchio.diagnosis.percussion.latent_start import blow_by_blow
 from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model import Effect
@@ -107,6 +108,9 @@ def fit_latent(problem: Problem, start: Fit, kind: type[Effect], target: str) ->
     if kind.name == "mains_hum":
         return start
     here = start
+    if kind.name == "pulse_jitter":
+        begun = blow_by_blow(problem, start, lambda known, late: _with(known, kind, dict(late)))
+        here = fit(problem, begun, start.records, start.end, iterations=2)
     most = {r.name: int(r.setup.blows.hit.max()) + 1 for r in start.records}
     largest = 0.45 * start.records[0].setup.blows.interval
     for turn in range(_ROUNDS):

@@ -22,6 +22,7 @@ _NEAR_EDGE = 1.8e-4
 _ON_EDGE = 1e-7
 _SMALL_JUMP = 0.05
 _WORKERS = 2
+_KEPT_EDGES = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,7 @@ class MeasuredRecord:
     noise: Mapping[str, Noise]
     pose: int
     _cuts: dict[float, PercussionSetup] = field(default_factory=dict)
+    _edges: dict[object, dict[str, BoolArray] | None] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -172,7 +174,7 @@ def residual(record: MeasuredRecord, model: Model, end: float | None = None) -> 
     hums = [e for e in model.effects if e.name == "mains_hum" and setup.name not in e.hidden]
     for hum in hums:
         take_out_line(rows, setup, hum.target, hum.values["frequency"])
-    masked = _near_edges(setup, model)
+    masked = _kept_edges(record, setup, model)
     out = np.empty((len(rows), count))
     kinds = {c.name: c for c in setup.channels}
     for i, (name, row) in enumerate(rows.items()):
@@ -182,9 +184,9 @@ def residual(record: MeasuredRecord, model: Model, end: float | None = None) -> 
             row = np.where(unknown, 0.0, row)
             # As large as noise, lest a fit gain by moving edges towards samples it misses.
             noise = np.where(np.arange(row.size) % 2, 1.0, -1.0)
-            out[i] = np.where(unknown, noise, _whiten(record.noise[name], row))
+            out[i] = np.where(unknown, noise, record.noise[name].whiten(row))
         else:
-            out[i] = _whiten(record.noise[name], row)
+            out[i] = record.noise[name].whiten(row)
     return out
 
 
@@ -197,21 +199,6 @@ def signal_power(records: Sequence[MeasuredRecord]) -> float:
             for name, values in record.values.items()
         )
     )
-
-
-def _whiten(noise: Noise, row: FloatArray) -> FloatArray:
-    """As `Noise.whiten`; compiled from the sample on where the filter has all its past."""
-    from scipy.signal import lfilter
-
-    model = noise.model
-    if model.order == 0:
-        return row / np.sqrt(model.variance)
-    p = model.order
-    out = np.empty_like(row)
-    out[:p] = model.whiten(row[:p])
-    taps = np.concatenate([[1.0], -model.predictors[p]])
-    out[p:] = lfilter(taps, 1.0, row)[p:] / np.sqrt(model.variances[p])
-    return out
 
 
 def take_out_line(
@@ -232,6 +219,19 @@ def take_out_line(
     for name in names:
         rows[name] = rows[name] - found @ basis
     return float(found[0]), float(found[1])
+
+
+def _kept_edges(
+    record: MeasuredRecord, setup: PercussionSetup, model: Model
+) -> dict[str, BoolArray] | None:
+    """As `_near_edges`, which most trials leave as it was."""
+    blind = ("structure", "over-time", "nonlinear", "motion")
+    key = (setup.samples, tuple(e.key for e in model.effects if e.where not in blind))
+    if key not in record._edges:
+        if len(record._edges) >= _KEPT_EDGES:
+            record._edges.pop(next(iter(record._edges)), None)
+        record._edges[key] = _near_edges(setup, model)
+    return record._edges[key]
 
 
 def _near_edges(setup: PercussionSetup, model: Model) -> dict[str, BoolArray] | None:

@@ -157,7 +157,7 @@ def try_candidates(
     chosen = _short_list(suspects, short_list)
     short = []
     for suspect in chosen:
-        tried = [_fit_short(problem, start.hypothesis, s, some, window) for s in suspect.starts]
+        tried = [_fit_short(problem, start, s, some, window) for s in suspect.starts]
         good = [t for t in tried if t is not None]
         if good:
             best = min(good, key=lambda f: f.cost)
@@ -205,20 +205,22 @@ def spread_out(records: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
 
 def _fit_short(
     problem: Problem,
-    known: Hypothesis,
+    known: Fit,
     start: Effect,
     records: Sequence[MeasuredRecord],
     window: float | None,
 ) -> Fit | None:
     """A candidate fitted to the first part of the records."""
     try:
-        hypothesis = known.plus(start)
+        hypothesis = known.hypothesis.plus(start)
         if start.latent is not None:
-            first = fit(problem, hypothesis, records, window, iterations=1)
+            turns = 0 if start.name == "pulse_jitter" else 1
+            first = fit(problem, hypothesis, records, window, iterations=turns)
             return fit_latent(problem, first, type(start), start.target)
         if window is None:
-            return fit(problem, hypothesis, records, None, iterations=3)
-        return fit_growing(problem, hypothesis, records, windows=(0.06, 0.16, window), iterations=4)
+            return fit(problem, hypothesis, records, None, iterations=3, near=known)
+        windows = (0.06, 0.16, window)
+        return fit_growing(problem, hypothesis, records, windows=windows, iterations=4, near=known)
     except InputError:
         return None
 
@@ -232,7 +234,8 @@ def _fit_long(
 ) -> Fit:
     kind = type(suspect.effect)
     if kind.latent is not None:
-        long = fit(problem, short.hypothesis, records, None, iterations=3)
+        turns = 0 if kind.name == "pulse_jitter" else 3
+        long = fit(problem, short.hypothesis, records, None, iterations=turns)
         return fit_latent(problem, long, kind, suspect.effect.target)
     return fit(problem, short.hypothesis, records, None, iterations=6, rival=rival)
 

@@ -1,0 +1,120 @@
+"""What is told of a fit: the causes' values, how sure they are, and the nuisances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from picchio.diagnosis.percussion.fit import Fit
+from picchio.diagnosis.percussion.problem import MeasuredRecord
+from picchio.diagnosis.percussion.select import LEAST_GAIN, Search, Trial, score
+from picchio.diagnosis.percussion.unknowns import NUISANCE_KEYS, Hypothesis
+from picchio.diagnosis.result import Cause, Value
+from picchio.model import Effect
+
+_DECISIVE = 60.0
+
+
+def told_causes(
+    whole: Fit,
+    found: Search,
+    rivals: Sequence[Trial],
+    train: Sequence[MeasuredRecord],
+) -> tuple[Cause, ...]:
+    """The causes with their values, spreads and confidence."""
+    covariance = whole.covariance()
+    unknowns, vector = whole.hypothesis.unknowns(), whole.hypothesis.vector()
+    inflate = max(1.0, math.sqrt(whole.chi_square / max(whole.samples, 1)))
+    result = []
+    for effect in whole.hypothesis.causes:
+        index = whole.hypothesis.effects.index(effect)
+        values = {}
+        for p in effect.parameters:
+            std = 0.0
+            for k, unknown in enumerate(unknowns):
+                if unknown.effect == index and unknown.name == p.name:
+                    std = abs(unknown.slope(vector[k])) * math.sqrt(max(covariance[k, k], 0.0))
+            values[p.name] = Value(effect.values[p.name], std * inflate, p.unit)
+        result.append(
+            Cause(
+                effect.name,
+                effect.target,
+                _confidence(found, rivals, effect, train),
+                values,
+            )
+        )
+    return tuple(result)
+
+
+def _confidence(
+    found: Search,
+    rivals: Sequence[Trial],
+    effect: Effect,
+    train: Sequence[MeasuredRecord],
+) -> float:
+    """From the poses' score differences to the best rival, and their spread (Student's t)."""
+    from scipy.stats import t as student
+
+    best = found.best
+    others = [r for r in rivals if effect.label not in r.fit.hypothesis.labels]
+    rival = min((r.fit for r in others), key=score, default=None)
+    if rival is None or len(rival.records) != len(best.records):
+        return 0.5 if len(train) < 3 else 1.0
+    poses = sorted({r.pose for r in best.records})
+    difference = np.zeros(len(poses))
+    for record, a, b in zip(best.records, best.residuals, rival.residuals, strict=True):
+        difference[poses.index(record.pose)] += float((b * b).sum() - (a * a).sum())
+    if len(poses) < 2:
+        return 1.0 if difference.sum() > 2.0 * LEAST_GAIN else 0.5
+    # A pose that decides beyond doubt on its own counts as one: how far beyond says nothing.
+    difference = np.clip(difference, -_DECISIVE, _DECISIVE)
+    total, spread = difference.mean(), difference.std(ddof=1) / math.sqrt(len(poses))
+    # What chance alone moves a pose's score by: that of log-likelihoods a few units apart.
+    spread = math.hypot(spread, 2.0 / math.sqrt(len(poses)))
+    return float(student.cdf(total / spread, len(poses) - 1))
+
+
+def told_nuisances(found: Fit) -> dict[str, Value]:
+    """Fitted nuisances, in their own units."""
+    if found.jacobians is None:
+        return {}
+    covariance = found.covariance()
+    unknowns, vector = found.hypothesis.unknowns(), found.hypothesis.vector()
+    robot = found.records[0].setup.geometry.robot
+    nominal = dict(zip(robot.flexible_names, robot.stiffness, strict=True))
+    ratio = float(np.mean(robot.damping_ratio))
+    force = float(np.abs(found.records[0].setup.blows.height).max())
+    result = {}
+    for k, unknown in enumerate(unknowns):
+        effect = found.hypothesis.effects[unknown.effect]
+        if unknown.effect >= found.hypothesis.n_nuisances:
+            continue
+        key = NUISANCE_KEYS[effect.name]
+        scale, std = math.exp(vector[k]), math.exp(vector[k]) * math.sqrt(covariance[k, k])
+        if key == "stiffness":
+            prismatic = robot.tree.joints.get(effect.target)
+            unit = "N/m" if prismatic is not None and prismatic.type == "prismatic" else "N*m/rad"
+            size, name = float(nominal[effect.target]), f"stiffness.{effect.target}"
+        else:
+            size, unit = (ratio, "1") if key == "damping_ratio" else (force, "N")
+            name = key
+        result[name] = Value(scale * size, std * size, unit)
+    return result
+
+
+def with_hum(causes: Sequence[Cause], lines: Hypothesis) -> tuple[Cause, ...]:
+    """The causes with the hum's amplitude, which is not fitted but taken out of the residual."""
+    amplitude = {e.target: e.values["amplitude"] for e in lines.effects if e.name == "mains_hum"}
+    return tuple(
+        Cause(
+            c.effect,
+            c.target,
+            c.confidence,
+            {**c.parameters, "amplitude": Value(amplitude[c.target], 0.0, "1")},
+        )
+        if c.effect == "mains_hum"
+        else c
+        for c in causes
+    )

@@ -1,0 +1,22 @@
+"""The colour taken out of a noise, sample by sample."""
+
+# mypy: disable-error-code="no-untyped-def"
+from __future__ import annotations
+
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def whiten(series, predictors, deviation, out):
+    """Subtract from each of `series` (m,) what its past foretells, over what that leaves.
+
+    predictors (p + 1, p): row k foretells from k samples back; deviation (p + 1,) is what each
+    row leaves. Into `out` (m,).
+    """
+    order = predictors.shape[1]
+    for i in range(series.size):
+        known = min(i, order)
+        left = series[i]
+        for k in range(known):
+            left -= predictors[known, k] * series[i - 1 - k]
+        out[i] = left / deviation[known]
