@@ -41,6 +41,7 @@ def test_a_map_as_json(tmp_path):
         (["--spacing", "nan"], "--spacing"),
         (["--spacing", "1e-9"], "too many"),
         (["--joint-grid", "100000"], "more than"),
+        (["--joint-grid", "2.5"], "whole numbers"),
         (["--workers", "-1"], "--workers"),
         (["--hits", "0"], "--hits"),
         (["--plane", "xa"], "plane"),
@@ -87,6 +88,8 @@ def test_damage_on_a_mesh(tmp_path):
     assert max(joint["damage_per_rivet"] for joint in joints) > 0.0
     for joint in joints:
         assert joint["worst_direction"] == pytest.approx([-1, 0, 0], abs=1e-9)
+    told = picchio(*common, "--spacing", "0.2", "--damage", cwd=tmp_path).stdout
+    assert "none does any" in told and "along the surface's normal" in told
     refused = picchio(*common, cwd=tmp_path)
     assert refused.returncode == 2 and "--spacing" in refused.stderr
     both = picchio(*common, "--plane", "xz", cwd=tmp_path)

@@ -164,6 +164,26 @@ def test_a_map_killed_and_started_again_is_the_same_map(tmp_path, chunks_before)
     assert sorted(os.listdir(tmp_path)) == ["cut.nc", "whole.nc"]
 
 
+@pytest.mark.parametrize("workers", [0, 1])
+def test_one_worker_is_this_process(tmp_path, robot, monkeypatch, workers):
+    monkeypatch.setitem(sys.modules, "distributed", None)  # importing it would fail
+    grid = places.joint_grid(robot, [2, 3, 3])
+    with workspace_map(robot, grid, BLOWS, tmp_path / "map.nc", workers=workers) as found:
+        assert found.sizes["point"] == 18
+
+
+@pytest.mark.parametrize("ending", [".nc", ".zarr"])
+def test_rows_are_written_in_blocks(tmp_path, robot, monkeypatch, ending):
+    """Blocks that end within a chunk, and chunks that end within a block."""
+    grid = places.joint_grid(robot, [2, 5, 5])
+    whole = workspace_map(robot, grid, BLOWS, tmp_path / f"whole{ending}")
+    monkeypatch.setattr("picchio.studies.map_file._ROWS", 12)
+    for chunk in (5, 12, 31):
+        cut = workspace_map(robot, grid, BLOWS, tmp_path / f"cut{chunk}{ending}", chunk=chunk)
+        for name in whole.data_vars:
+            np.testing.assert_array_equal(whole[name].values, cut[name].values)
+
+
 def test_chunks_of_another_map_are_not_mixed_in(tmp_path, robot):
     grid = places.joint_grid(robot, [2, 3, 3])
     folder = tmp_path / ".map.nc.chunks"

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import picchio
+from picchio.cli.assess_tables import show
 from picchio.core.errors import PicchioWarning
 from picchio.fatigue.reducer_library import load_reducer
+from picchio.studies.assess_checks import reducer_checks
 
 TASK = {
     "hits_per_rivet": 12,
@@ -47,6 +49,56 @@ def test_peak_torque_of_gravity_and_blows_against_the_limits(tmp_path):
     assert np.isnan(found.joint("joint_1").reducer_utilisation)
     assert found.limiting_joint == "joint_2"
     assert any("false brinelling" in line for line in found.assumptions)
+
+
+@pytest.mark.parametrize(
+    ("peak", "held", "binds", "share", "exceeded"),
+    [
+        # RV-40E by the catalogue: rated 412, repeated peaks 1029, momentary peaks 2058 N m.
+        (900.0, 300.0, "repeated peak torque", 900.0 / 1029.0, 0),
+        (500.0, 453.2, "rated torque, held", 1.1, 1),
+        (2469.6, 453.2, "repeated peak torque", 2.4, 3),
+    ],
+)
+def test_the_limit_that_binds(peak, held, binds, share, exceeded):
+    (name, check), none = reducer_checks(
+        (load_reducer("RV-40E-121"), None), np.array([[peak, held], [np.nan, np.nan]])
+    )
+    assert name == "RV-40E-121"
+    assert check.governed_by == binds
+    assert check.utilisation == pytest.approx(share)
+    assert len(check.warnings) == 1 + exceeded
+    assert none == ("", None)
+
+
+def test_the_task_s_largest_torques_count(tmp_path, capsys):
+    robot = robot_with(tmp_path, joint_2="RV-20E-121")
+    table = TASK | {
+        "operation": [
+            {"name": "up", "direction": [0, 0, 1], "poses": [[0.3, 0.2, -0.4], [0.3, 0.9, -1.0]]},
+            {"name": "out", "direction": [1, 0, 0], "poses": [[0.0, 0.0, 0.0]]},
+        ]
+    }
+    found = picchio.assess(robot, picchio.task_from_dict(table, robot))
+    joint = found.joint("joint_2")
+    per_pose = [op.reducer_utilisation[:, 1].max() for op in found.operations]
+    assert joint.reducer_utilisation == max(per_pose)
+    held = max(op.gravity_torque[:, 1].max() for op in found.operations)
+    # Gravity on the outstretched arm: over three times what the catalogue rates, 167 N m.
+    assert joint.reducer_governed_by == "rated torque, held"
+    assert joint.reducer_utilisation == pytest.approx(held / 167.0)
+    text = "\n".join(joint.reducer_warnings)
+    assert "false brinelling" in text and f"({held / 167.0:.2f} times)" in text
+    told = {j["name"]: j for j in found.to_dict()["joints"]}
+    assert told["joint_2"]["reducer_governed_by"] == "rated torque, held"
+    assert tuple(told["joint_2"]["reducer_warnings"]) == joint.reducer_warnings
+    without = found.joint("joint_1")
+    assert (without.reducer_governed_by, without.reducer_warnings) == ("", ())
+    show(found, tmp_path / "task.toml")
+    said = " ".join(capsys.readouterr().out.split())
+    assert "RV-20E-121" in said and "rated torque, held" in said
+    for line in joint.reducer_warnings:
+        assert f"joint_2: {line.removeprefix('RV-20E-121: ')}" in said
 
 
 def test_a_reducer_no_catalogue_has_is_told_and_left_unchecked(tmp_path):

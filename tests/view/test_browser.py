@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 
 import picchio
+from picchio.diagnosis.result import Cause, Diagnosis, Value
 from picchio.excitation import PulseTrain
 from picchio.view.report import assessment_report
 from picchio.view.scene import build_scene, compare_scene
@@ -321,6 +322,43 @@ def test_two_ghosts_play_two_histories(open_page, tmp_path, pictures, arm) -> No
     at = np.interp(moment, time, simulated[1])
     np.testing.assert_allclose(turned, np.abs([at, 1.6 * at]) * factor, rtol=0.02)
     assert page.locator("#direction").is_hidden()
+
+
+def test_causes_are_seen_and_told(open_page, tmp_path, pictures, arm) -> None:
+    mass = Cause("payload", "tool", 0.99, {"mass": Value(4.0, 0.02, "kg")})
+    spring = Cause("joint_stiffness", "joint_2", 0.99, {"scale": Value(0.7, 0.01, "1")})
+    found = Diagnosis("ambiguous", (mass, spring), ((("cable", "link_3"),),))
+    path = tmp_path / "causes.html"
+    path.write_text(build_scene(arm.robot, arm.worst.pose, BLOWS, diagnosis=found).html())
+    page = opened(open_page, path)
+    picture(page, pictures / "scene-causes.png")
+    assert page.locator("#causes li").all_inner_texts() == [
+        "payload: mass 4 kg",
+        "joint stiffness of joint_2: scale 0.7",
+        "cable of link_3",
+    ]
+    labels = page.locator("#labels span:visible").all_inner_texts()
+    assert labels == ["payload", "joint stiffness", "cable"]
+    hide_labels(page)
+    shown = picture(page)
+    for layer, least in (("alternatives", 500), ("causes", 800)):
+        page.locator(f"#layer-{layer}").set_checked(False)
+        without = picture(page)
+        assert changed(shown, without) > least, layer
+        shown = without
+    # It stands at rest, where Pinocchio has it, until it is played; then the causes move with it.
+    where = """(layer) => {
+      const { viewer, data } = picchio, { path } = data.frames.at(-1);
+      const node = viewer.scene_tree.find(["picchio", layer, ...path.split("/")]).object;
+      node.updateWorldMatrix(true, false);
+      return node.matrixWorld.toArray();
+    }"""
+    rest, ghost = page.evaluate(where, "causes"), page.evaluate(where, "ghost")
+    np.testing.assert_allclose(rest, ghost, atol=1e-9)
+    set_range(page, "time", 0.3)
+    moved = page.evaluate(where, "causes")
+    np.testing.assert_allclose(moved, page.evaluate(where, "robot"), atol=1e-9)
+    assert np.abs(np.subtract(moved, rest)).max() > 1e-4
 
 
 def test_a_recoiling_gun_slides(open_page, tmp_path, pictures, recoiling) -> None:

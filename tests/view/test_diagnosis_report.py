@@ -28,6 +28,7 @@ from picchio.robot import load_robot
 from picchio.view.report.diagnosis import diagnosis_report
 from picchio.view.report.page import number, spread
 from picchio.view.report.residual import residual_report
+from picchio.view.scene import diagnosis_scene
 
 OUTSIDE = re.compile(
     r"""(?:src|href|action|data)\s*=\s*["']\s*(?:https?:)?//|url\(\s*["']?https?:|@import"""
@@ -154,6 +155,19 @@ def test_every_name_is_escaped(case):
     )  # fmt: skip
     assert "<script" not in html
     assert html.count("&lt;script&gt;") > 10
+
+
+def test_the_scene_is_at_the_worst_record_and_in_the_page(case):
+    scene = diagnosis_scene(case.found, subdivisions=1)
+    poses = {r.name: r.setup.geometry.pose for r in case.found.problem.records}
+    assert any((scene.envelope.pose == pose).all() for pose in poses.values())
+    assert scene.diagnosis["lines"][0]["text"] == f"payload: mass {case.mass:.3g} kg"
+    html = diagnosis_report(case.found, scene=scene.html())
+    (frame,) = lxml_html.fromstring(html).xpath("//iframe")
+    assert frame.get("srcdoc") == scene.html()
+    assert "<script" not in html  # but for what the frame holds, escaped
+    policy = lxml_html.fromstring(html).xpath("//meta[@http-equiv]/@content")[0]
+    assert "default-src 'none'" in policy and "script-src 'unsafe-inline'" in policy
 
 
 @pytest.mark.parametrize("verdict", ["nothing-wrong", "unexplained", "partial", "ambiguous"])

@@ -178,11 +178,17 @@ def test_backwards_doubt_and_terms_have_their_place(arm: SimpleNamespace) -> Non
 def test_reducers_are_shown_beside_the_shafts(arm: SimpleNamespace) -> None:
     import dataclasses
 
-    worn = [dataclasses.replace(joint, reducer="RV-80E-121", reducer_utilisation=1.37)
+    worn = [dataclasses.replace(joint, reducer="RV-80E-121", reducer_utilisation=1.37,
+                                reducer_governed_by="repeated peak torque",
+                                reducer_warnings=("RV-80E-121: <too> much",))
             for joint in arm.assessment.joints]  # fmt: skip
     found = dataclasses.replace(arm.assessment, joints=tuple(worn))
     tree = lxml_html.fromstring(assessment_report(found, arm.robot, arm.task))
     assert "bad" in tree.xpath("//*[@id='verdict']")[0].get("class")
-    row = text_of(tree, "//table[1]/tbody/tr[1]")
+    assert "137" in text_of(tree, "(//table)[1]/tbody/tr[1]")
+    row = text_of(tree, "//table[@id='reducers']/tbody/tr[1]")
     assert "RV-80E-121" in row
     assert "137" in row
+    assert "repeated peak torque" in row
+    (line,) = tree.xpath("//*[@aria-label='Reducers']/li")
+    assert line.text_content() == "joint_1, joint_2, joint_3: <too> much"

@@ -15,6 +15,8 @@ from picchio.cli.options import (
     GravityStiffnessOption,
     JsonOption,
     RobotArgument,
+    SNCurveOption,
+    TaskOption,
     ToolOption,
 )
 from picchio.core.errors import InputError
@@ -34,19 +36,13 @@ def register(app: typer.Typer) -> None:
 
 def assess(
     robot: RobotArgument,
-    task: Annotated[
-        Path | None,
-        typer.Option("--task", metavar="FILE", help="Task (TOML); the robot's own if not given."),
-    ] = None,
+    task: TaskOption = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
     method: Annotated[
         str, typer.Option(help="rainflow: each rivet from rest, counted. paper: Nie et al. 2016.")
     ] = "rainflow",
-    sn_curve: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="S-N curve for all joints: a name or a TOML file."),
-    ] = None,
+    sn_curve: SNCurveOption = None,
     residue: Annotated[
         str, typer.Option(help="Rainflow residue: half-cycles, repeated or discarded.")
     ] = "half-cycles",
@@ -86,6 +82,7 @@ def assess(
 ) -> None:
     """How many rivets each joint of a robot survives on a task."""
     from picchio.cli.assess_tables import show, show_allowable, show_spread
+    from picchio.cli.inputs import task_file
     from picchio.cli.output import check_target, progress, said_warnings, write_json
     from picchio.core.files import atomic_write
     from picchio.fatigue.mean_stress import RULES
@@ -111,13 +108,7 @@ def assess(
     for target in (json, report):
         check_target(target, [robot, task, flex, sn_curve])
     loaded = load_robot(robot, flex=flex, tool=tool)
-    path = task or loaded.task_path
-    if path is None:
-        raise InputError(
-            f"{loaded.name} has no example task of its own",
-            key="--task",
-            hint="give one: a TOML file of the format picchio-task/1",
-        )
+    path = task_file(loaded, task)
     work = load_task(path, loaded)
     for target in (json, report):
         check_target(target, [*loaded.files, *work.files])

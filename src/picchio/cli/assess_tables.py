@@ -35,6 +35,11 @@ def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
                 )
     out.print()
     out.print(_life_table(found))
+    if any(joint.reducer for joint in found.joints):
+        out.print(_reducer_table(found))
+        for line in found.reducer_warnings:
+            out.print(f"  {line}", markup=False)
+        out.print()
     out.print(f"[bold]{verdict(found)}[/bold]\n")
     if len(found.operations) > 1 and any(joint.damage_share for joint in found.joints):
         out.print(_share_table(found))
@@ -89,6 +94,21 @@ def _life_table(found: Assessment) -> Any:
             f"{joint.worst_operation}, pose {joint.worst_pose + 1}",
             style="bold" if weakest else None,
         )
+    return table
+
+
+def _reducer_table(found: Assessment) -> Any:
+    table = _table(
+        "The reducers",
+        ("joint", "left"),
+        ("reducer", "left"),
+        ("used, %", "right"),
+        ("the limit that binds", "left"),
+    )
+    for joint in found.joints:
+        if joint.reducer:
+            used = _number(100 * joint.reducer_utilisation)
+            table.add_row(joint.name, joint.reducer, used, joint.reducer_governed_by or "-")
     return table
 
 

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.envelope import ForceOption, PeriodOption, WidthOption, choose_blows
-from picchio.cli.options import FlexOption, JsonOption, RobotArgument, ToolOption
+from picchio.cli.inputs import choose_blows, numbers
+from picchio.cli.options import (
+    FlexOption,
+    ForceOption,
+    HitsOption,
+    JsonOption,
+    PeriodOption,
+    RobotArgument,
+    ToolOption,
+    WidthOption,
+)
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
     from picchio.robot import FlexibleRobot
     from picchio.studies.places import Places
 
-_SLICE = 1_000_000
 EPILOG = "Example: picchio map fanuc_like_3dof --plane xz --spacing 0.1 --out map.nc"
 
 
@@ -36,7 +44,10 @@ def map_(
     box: Annotated[bool, typer.Option("--box", help="Points in a box.")] = False,
     points: Annotated[
         Path | None,
-        typer.Option(metavar="CSV", help="Points from x [m], y [m], z [m], and nx, ny, nz."),
+        typer.Option(
+            metavar="CSV",
+            help="Points from columns x \\[m], y \\[m], z \\[m], and normals nx, ny, nz.",
+        ),
     ] = None,
     surface: Annotated[
         Path | None,
@@ -59,9 +70,7 @@ def map_(
     branch: Annotated[
         str, typer.Option(help="all, any, elbow-up, elbow-down, or words such as joint_3+.")
     ] = "all",
-    hits: Annotated[
-        int | None, typer.Option(help="Blows of a burst from rest; steady state if not given.")
-    ] = None,
+    hits: HitsOption = None,
     damage: Annotated[
         bool,
         typer.Option(
@@ -78,7 +87,10 @@ def map_(
         bool, typer.Option("--restart", help="Throw away what an interrupted map has left.")
     ] = False,
     workers: Annotated[
-        int | None, typer.Option(help="Processes; 0 for none. By default, as the map is large.")
+        int | None,
+        typer.Option(
+            help="Processes; up to 1, no other is started. By default, as the map is large."
+        ),
     ] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A dask scheduler to use instead.")
@@ -86,6 +98,7 @@ def map_(
     json: JsonOption = None,
 ) -> None:
     """Map the workspace; stopped and started again, it goes on where it was."""
+    from picchio.cli.map_summary import show, summary_of
     from picchio.cli.output import check_numbers, check_target, progress, write_json
     from picchio.robot import load_robot
     from picchio.studies.map import workspace_map
@@ -105,7 +118,7 @@ def map_(
     where = _places(loaded, plane, at, box, points, surface, joint_grid, spacing, bounds)
     if direction is None:
         direction = "worst" if surface is None else "normal"
-    along = direction if direction in ("worst", "normal") else _numbers(direction, "--direction")
+    along = direction if direction in ("worst", "normal") else numbers(direction, "--direction")
     blows = choose_blows(loaded, force, period, width)
     with progress("places") as report:
         found = workspace_map(
@@ -114,11 +127,11 @@ def map_(
             workers=workers, scheduler=scheduler, restart=restart, progress=report,
         )  # fmt: skip
     with found:
-        summary = _summary(found, out)
+        summary = summary_of(found, out)
     if json is not None:
         write_json(summary, json)
     if json != "-":
-        _show(summary)
+        show(summary)
 
 
 def _places(
@@ -138,10 +151,10 @@ def _places(
         "--plane": plane, "--box": box or None, "--points": points, "--surface": surface,
         "--joint-grid": grid,
     }  # fmt: skip
-    given = [key for key, value in asked.items() if value is not None]
-    if len(given) > 1:
-        raise InputError("choose one", key=" ".join(given), choices=list(asked))
-    limits = None if bounds is None else _numbers(bounds, "--bounds")
+    chosen = [key for key, value in asked.items() if value is not None]
+    if len(chosen) > 1:
+        raise InputError("choose one", key=" ".join(chosen), choices=list(asked))
+    limits = None if bounds is None else numbers(bounds, "--bounds")
     if points is not None:
         return places.points_from_csv(points)
     if surface is not None:
@@ -149,7 +162,10 @@ def _places(
             raise InputError("a surface needs it", key="--spacing")
         return places.surface(surface, spacing=spacing)
     if grid is not None:
-        counts = [int(n) for n in _numbers(grid, "--joint-grid")]
+        given = numbers(grid, "--joint-grid")
+        if any(n != round(n) for n in given):
+            raise InputError("must be whole numbers", key="--joint-grid", value=grid)
+        counts = [round(n) for n in given]
         return places.joint_grid(robot, counts[0] if len(counts) == 1 else counts)
     if box:
         if spacing is None:
@@ -168,68 +184,3 @@ def _hits_of(robot: FlexibleRobot, hits: int | None) -> int:
     if robot.task_path is None:
         return TaskTable.model_fields["hits_per_rivet"].get_default()  # type: ignore[no-any-return]
     return parse_toml(robot.task_path, TaskTable, format=FORMAT).hits_per_rivet
-
-
-def _numbers(text: str, key: str) -> list[float]:
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError("must be numbers separated by commas", key=key, value=text) from None
-
-
-def _summary(found: Any, out: Path) -> dict[str, Any]:
-    """The largest deflection of every joint and where it is, read a slice at a time."""
-    count = int(found.sizes["point"])
-    names = [str(name) for name in found["joint"].values]
-    best: dict[str, dict[str, Any]] = {}
-    for first in range(0, count, _SLICE):
-        part = found.isel(point=slice(first, first + _SLICE))
-        peaks = part["peak_deflection"].values
-        for j, name in enumerate(names):
-            k = int(peaks[:, j].argmax())
-            if name not in best or peaks[k, j] > best[name]["peak_deflection"]:
-                row = part.isel(point=k)
-                best[name] = {
-                    "name": name,
-                    "peak_deflection": float(peaks[k, j]),
-                    "position": row["position"].values,
-                    "pose": row["pose"].values,
-                    "worst_direction": row["worst_direction"].values[j],
-                }
-        if "damage_per_rivet" in part:
-            _most_damage(best, names, part["damage_per_rivet"].values)
-    return {
-        "format": "picchio-map/1",
-        "robot": found.attrs["robot"],
-        "file": str(out),
-        "poses": count,
-        "joints": list(best.values()),
-    }
-
-
-def _most_damage(best: dict[str, dict[str, Any]], names: list[str], damage: Any) -> None:
-    import numpy as np
-
-    for j, name in enumerate(names):
-        known = damage[:, j][np.isfinite(damage[:, j])]
-        if len(known):
-            entry = best[name]
-            entry["damage_per_rivet"] = max(entry.get("damage_per_rivet", 0.0), float(known.max()))
-
-
-def _show(summary: dict[str, Any]) -> None:
-    from picchio.cli.output import console
-
-    screen = console()
-    screen.print(f"[bold]{summary['robot']}[/bold]: {summary['poses']} poses in {summary['file']}")
-    for joint in summary["joints"]:
-        x, y, z = joint["position"] + 0.0
-        screen.print(
-            f"  {joint['name']}: up to {1e3 * joint['peak_deflection']:.4g} mrad, at "
-            f"({x:.3f}, {y:.3f}, {z:.3f}) m{_told(joint)}"
-        )
-
-
-def _told(joint: dict[str, Any]) -> str:
-    damage = joint.get("damage_per_rivet")
-    return "" if damage is None else f"; a rivet costs up to {damage:.3g} of its life"

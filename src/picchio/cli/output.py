@@ -114,7 +114,7 @@ def progress(description: str) -> Iterator[Callable[[int, int], None]]:
     if not sys.stderr.isatty():
         yield lambda done, total: None
         return
-    import time
+    import threading
 
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -127,19 +127,16 @@ def progress(description: str) -> Iterator[Callable[[int, int], None]]:
         console=Console(stderr=True),
         transient=True,
     )
-    began = time.monotonic()
-    task = bar.add_task(description, total=None)
-    started = False
-
-    def update(done: int, total: int) -> None:
-        nonlocal started
-        if not started and time.monotonic() - began > _PATIENCE:
-            bar.start()
-            started = True
-        bar.update(task, completed=done, total=total)
-
+    # Before the first report there may be a minute of compiling, which should not look like death.
+    task = bar.add_task(f"{description} (a first run compiles for a minute)", total=None)
+    patience = threading.Timer(_PATIENCE, bar.start)
+    patience.daemon = True
+    patience.start()
     try:
-        yield update
+        yield lambda done, total: bar.update(
+            task, description=description, completed=done, total=total
+        )
     finally:
-        if started:
-            bar.stop()
+        patience.cancel()
+        patience.join()
+        bar.stop()

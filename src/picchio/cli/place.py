@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.options import FlexOption, JsonOption, RobotArgument, ToolOption
+from picchio.cli.options import (
+    FlexOption,
+    JsonOption,
+    RobotArgument,
+    SNCurveOption,
+    TaskOption,
+    ToolOption,
+)
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -24,10 +31,7 @@ def register(app: typer.Typer) -> None:
 
 def place(
     robot: RobotArgument,
-    task: Annotated[
-        Path | None,
-        typer.Option("--task", metavar="FILE", help="Task (TOML); the robot's own if not given."),
-    ] = None,
+    task: TaskOption = None,
     move: Annotated[
         str | None,
         typer.Option(
@@ -51,10 +55,7 @@ def place(
     ] = 400,
     flex: FlexOption = None,
     tool: ToolOption = None,
-    sn_curve: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="S-N curve for all joints: a name or a TOML file."),
-    ] = None,
+    sn_curve: SNCurveOption = None,
     self_collision: Annotated[
         bool,
         typer.Option(
@@ -69,6 +70,7 @@ def place(
     json: JsonOption = None,
 ) -> None:
     """Where to put the work, with which poses and hit rate, so that the robot lasts longest."""
+    from picchio.cli.inputs import numbers, task_file
     from picchio.cli.output import check_numbers, check_target, progress, write_json
     from picchio.robot import load_robot
     from picchio.studies import load_task
@@ -81,26 +83,20 @@ def place(
     check_numbers(margin=margin, off=off)
     if seed < 0:
         raise InputError("must not be negative", key="--seed", value=seed)
-    far = None if move is None else _numbers(move, "--move", 4)
+    far = None if move is None else numbers(move, "--move", 4)
     if far is not None:
         far[3] = math.radians(far[3])
     rates = None
     if period_range is not None:
-        low, high = _numbers(period_range, "--period-range", 2)
+        low, high = numbers(period_range, "--period-range", 2)
         rates = (low, high)
     loaded = load_robot(robot, flex=flex, tool=tool)
-    path = task or loaded.task_path
-    if path is None:
-        raise InputError(
-            f"{loaded.name} has no example task of its own",
-            key="--task",
-            hint="give one: a TOML file of the format picchio-task/1",
-        )
+    path = task_file(loaded, task)
     work = load_task(path, loaded)
     for target in (json, out):
         check_target(target, [*loaded.files, *work.files])
     try:
-        with progress("placements") as tick:
+        with progress("steps of the search") as tick:
             found = run(
                 loaded, work, move=far, period_range=rates,
                 placements=placements, off=off, margin=margin, sn_curve=sn_curve,
@@ -128,16 +124,6 @@ def place(
             print(f"The task with the work moved: {out}")
 
 
-def _numbers(text: str, key: str, count: int) -> list[float]:
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError("must be numbers separated by commas", key=key, value=text) from None
-    if len(values) != count:
-        raise InputError(f"must be {count} numbers", key=key, value=text)
-    return values
-
-
 def _show(found: Placement, off: float) -> None:
     from rich import box
     from rich.table import Table
@@ -146,21 +132,21 @@ def _show(found: Placement, off: float) -> None:
     from picchio.studies.verdict import format_count
 
     out = console()
-    x, y, z, heading = found.best.spot.move
+    # Zeros are added for the sake of their sign.
+    x, y, z = found.best.spot.move[:3].round(3) + 0.0
+    heading = round(math.degrees(found.best.spot.move[3]), 2) + 0.0
     out.print(
         f"[bold]{found.robot}[/bold]: {found.placements} placements tried all over, "
         f"{found.reached} of them within reach; {found.nearby} more near the best"
     )
     if found.moved:
         out.print(
-            f"  work: shift by ({x:.3f}, {y:.3f}, {z:.3f}) m, turn by {math.degrees(heading):.2f} "
-            f"deg about the vertical through its middle"
+            f"  work: shift by ({x:.3f}, {y:.3f}, {z:.3f}) m, turn by {heading:.2f} deg "
+            "about the vertical through its middle"
         )
-        bx, by, bz = found.best.base_position
-        out.print(
-            f"  or base: to ({bx:.3f}, {by:.3f}, {bz:.3f}) m, turned by "
-            f"{math.degrees(found.best.base_heading):.2f} deg"
-        )
+        bx, by, bz = found.best.base_position.round(3) + 0.0
+        turned = round(math.degrees(found.best.base_heading), 2) + 0.0
+        out.print(f"  or base: to ({bx:.3f}, {by:.3f}, {bz:.3f}) m, turned by {turned:.2f} deg")
         if found.best.spot.period is not None:
             out.print(f"  a blow every {1e3 * found.best.spot.period:.4g} ms")
     else:

@@ -7,25 +7,24 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from picchio.cli.envelope import (
-    ForceOption,
-    PeriodOption,
-    WidthOption,
-    choose_blows,
-    parse_pose,
-)
+from picchio.cli.inputs import choose_blows, numbers
 from picchio.cli.options import (
     FlexOption,
+    ForceOption,
     GravityStiffnessOption,
     JsonOption,
+    PeriodOption,
     RobotArgument,
+    TaskOption,
     ToolOption,
+    WidthOption,
 )
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
     import xarray
 
+    from picchio.diagnosis.result import Diagnosis
     from picchio.robot import FlexibleRobot
     from picchio.view.scene import Scene
 
@@ -47,10 +46,7 @@ def view(
         bool,
         typer.Option("--live", help="Show it in a live meshcat viewer, until it is interrupted."),
     ] = False,
-    task: Annotated[
-        Path | None,
-        typer.Option("--task", metavar="FILE", help="Task (TOML); the robot's own if not given."),
-    ] = None,
+    task: TaskOption = None,
     pose: Annotated[
         str | None,
         typer.Option(
@@ -67,6 +63,14 @@ def view(
     map_: Annotated[
         Path | None,
         typer.Option("--map", metavar="FILE", help="A workspace map (picchio map) as a layer."),
+    ] = None,
+    diagnosis: Annotated[
+        Path | None,
+        typer.Option(
+            "--diagnosis",
+            metavar="FILE",
+            help="What picchio diagnose --json found: the causes, where they sit.",
+        ),
     ] = None,
     joint: Annotated[
         str | None,
@@ -89,8 +93,9 @@ def view(
 
     if out is None and not live:
         raise InputError("needs a file", key="--out", hint="--out scene.html, or --live")
-    check_target(out, [flex, task, map_])
+    check_target(out, [flex, task, map_, diagnosis])
     loaded = load_robot(robot, flex=flex, tool=tool)
+    found = _diagnosis(diagnosis, loaded)
     workspace = None
     if map_ is not None:
         from picchio.studies.map import open_map
@@ -101,10 +106,10 @@ def view(
                            ("--hits", hits)):  # fmt: skip
             if value is not None:
                 raise InputError("needs --pose: a task says its blows itself", key=key, value=value)
-        scene = _of_task(loaded, task, joint, gravity_stiffness, workspace)
+        scene = _of_task(loaded, task, joint, gravity_stiffness, workspace, found)
     else:
         blows = choose_blows(loaded, force, period, width, task)
-        at = loaded.pose(parse_pose(pose))
+        at = loaded.pose(numbers(pose, "--pose"))
         Model(loaded, gravity_stiffness).linear_system(at)  # bad numbers are told before meshes
         scene = build_scene(
             loaded,
@@ -114,6 +119,7 @@ def view(
             joint=joint,
             gravity_stiffness=gravity_stiffness,
             workspace=workspace,
+            diagnosis=found,
         )
     size = 0
     if out is not None:
@@ -134,6 +140,7 @@ def _of_task(
     joint: str | None,
     gravity_stiffness: bool,
     workspace: xarray.Dataset | None,
+    diagnosis: Diagnosis | None,
 ) -> Scene:
     from picchio.cli.output import progress
     from picchio.studies import assess, load_task
@@ -147,19 +154,29 @@ def _of_task(
         )
     work = load_task(path, robot)
     with progress("poses") as report:
-        found = assess(robot, work, gravity_stiffness=gravity_stiffness, progress=report)
-    worst = worst_rivet(found, robot, work, gravity_stiffness=gravity_stiffness)
+        life = assess(robot, work, gravity_stiffness=gravity_stiffness, progress=report)
+    worst = worst_rivet(life, robot, work, gravity_stiffness=gravity_stiffness)
     return build_scene(
         robot,
         worst.pose,
         worst.operation.excitation,
         hits=worst.operation.hits_per_rivet,
         direction=worst.operation.direction,
-        assessment=found,
+        assessment=life,
         joint=joint,
         gravity_stiffness=gravity_stiffness,
         workspace=workspace,
+        diagnosis=diagnosis,
     )
+
+
+def _diagnosis(path: Path | None, robot: FlexibleRobot) -> Diagnosis | None:
+    """The diagnosis of a file, if it can be one of this robot."""
+    if path is None:
+        return None
+    from picchio.view.diagnosis_file import read_diagnosis
+
+    return read_diagnosis(path, robot)
 
 
 def _show_live(scene: Scene) -> None:

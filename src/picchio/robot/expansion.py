@@ -17,8 +17,10 @@ import pinocchio as pin
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.wide_model import BASE_AXES, root_position, widen
 
-BASE_AXES = ("x", "y", "z", "rx", "ry", "rz")
+__all__ = ["BASE_AXES", "Inertia", "Motion", "WideChain"]
+
 _STEP = 1e-4  # rad or m, of the central differences
 
 
@@ -95,7 +97,7 @@ class WideChain:
     def __init__(self, robot: FlexibleRobot) -> None:
         self.robot = robot
         source = robot.rigid._model
-        self._model, self._joint, hinges = _widen(robot, source)
+        self._model, self._joint, hinges = widen(robot, source)
         self._frames = {
             frame.name: (self._joint[frame.parentJoint], self._own_frame(frame))
             for frame in source.frames
@@ -115,7 +117,7 @@ class WideChain:
     @property
     def _from_root(self) -> Any:
         """From the last base joint to the world: undo where the root stands."""
-        return pin.SE3(np.eye(3), -_root_position(self.robot))
+        return pin.SE3(np.eye(3), -root_position(self.robot))
 
     def _selection(self, hinges: list[str]) -> FloatArray:
         """(nv of the wide model, c): which joints a coordinate moves; mimics follow."""
@@ -253,12 +255,6 @@ class WideChain:
         return Motion(here, np.array(gradient), rotation)
 
 
-def _root_position(robot: FlexibleRobot) -> FloatArray:
-    model = robot.rigid._model
-    root = model.frames[robot.rigid.frame(robot.tree.root)]
-    return np.array(root.placement.translation)
-
-
 def _link_inertia(robot: FlexibleRobot, link: str) -> Any:
     own = robot.tree.links.get(link)
     if own is None:
@@ -271,51 +267,3 @@ def _link_inertia(robot: FlexibleRobot, link: str) -> Any:
     matrix = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
     turn = pin.rpy.rpyToMatrix(*own.rpy)
     return pin.Inertia(own.mass, np.array(own.xyz), turn @ matrix @ turn.T)
-
-
-def _axis(joint: Any) -> tuple[bool, FloatArray]:
-    """Whether a joint of one degree of freedom turns, and its axis in its own frame."""
-    column = np.array(joint.createData().S).reshape(6)
-    angular = column[3:]
-    return bool(np.abs(angular).max() > 0.5), angular if np.abs(angular).max() > 0.5 else column[:3]
-
-
-def _widen(robot: FlexibleRobot, source: Any) -> tuple[Any, dict[int, int], list[str]]:
-    """The wide model, where each of the source's joints is in it, and who has hinges."""
-    root = _root_position(robot)
-    model = pin.Model()
-    model.gravity = source.gravity
-    parent = 0
-    kinds = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ,
-             pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)  # fmt: skip
-    for i, (axis, kind) in enumerate(zip(BASE_AXES, kinds, strict=True)):
-        place = pin.SE3(np.eye(3), root if i == 0 else np.zeros(3))
-        parent = model.addJoint(parent, kind(), place, f"base.{axis}")
-    from_root = pin.SE3(np.eye(3), -root)
-    model.appendBodyToJoint(parent, from_root.act(source.inertias[0]), pin.SE3.Identity())
-    where, hinges = {0: parent}, []
-    for i in range(1, source.njoints):
-        name, place = source.names[i], source.jointPlacements[i]
-        if source.parents[i] == 0:
-            place = from_root * place
-        at = where[source.parents[i]]
-        turns, own = _axis(source.joints[i])
-        if turns and name in robot.flexible_names:
-            hinges.append(name)
-            first, second = _perpendicular(own)
-            for k, side in enumerate((first, second)):
-                joint = pin.JointModelRevoluteUnaligned(side)
-                at = model.addJoint(at, joint, place, f"hinge.{name}.{k + 1}")
-                place = pin.SE3.Identity()
-        kind = pin.JointModelRevoluteUnaligned if turns else pin.JointModelPrismaticUnaligned
-        where[i] = model.addJoint(at, kind(own), place, name)
-        model.appendBodyToJoint(where[i], source.inertias[i], pin.SE3.Identity())
-    return model, where, hinges
-
-
-def _perpendicular(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Two unit vectors that are perpendicular to an axis and to each other."""
-    helper = np.eye(3)[int(np.abs(axis).argmin())]
-    first = np.cross(axis, helper)
-    first /= np.linalg.norm(first)
-    return first, np.cross(axis, first)

@@ -22,11 +22,16 @@ from picchio.fatigue import (
 )
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.rainflow import Residue
-from picchio.fatigue.reducer import Reducer
+from picchio.fatigue.reducer import Reducer, ReducerCheck
 from picchio.fatigue.sn_curve import MinerRule
 from picchio.model import Model
 from picchio.robot import FlexibleRobot
-from picchio.studies.assess_checks import reducer_of, warn_about_shafts, warn_about_yield
+from picchio.studies.assess_checks import (
+    reducer_checks,
+    reducer_of,
+    warn_about_shafts,
+    warn_about_yield,
+)
 from picchio.studies.assessment import (
     Assessment,
     JointLife,
@@ -103,7 +108,7 @@ def assess(
     model = Model(robot, gravity_stiffness, gravity_balanced)
     job = _Job(model, rule, curves, reducers, paper_curve)
     total = sum(len(operation.poses) for operation in task.operations)
-    results, checks = [], []
+    results, checks, torques = [], [], []
     done = 0
     for operation in task.operations:
         rows = []
@@ -114,19 +119,20 @@ def assess(
                 progress(done, total)
         results.append(_operation_result(operation, rows))
         checks.append(np.array([row["check"] for row in rows]))
+        torques += [row["reducer_torques"] for row in rows]
     if paper_mean_stress:
         results = [_at_mean_stress(result, robot, curves) for result in results]
+    used = reducer_checks(reducers, np.max(torques, axis=0))
     joints = tuple(
-        _joint_life(j, robot, task, results, curves, reducers[j]) for j in range(len(curves))
+        _joint_life(j, robot, task, results, curves, *used[j]) for j in range(len(curves))
     )
     warn_about_yield(joints, curves)
     limiting = _limiting(joints)
-    used = [curve.name for curve in dict.fromkeys(c for c in curves if c is not None)]
-    name = "paper, at the poses' mean stress" if paper_mean_stress else method
+    named = [curve.name for curve in dict.fromkeys(c for c in curves if c is not None)]
     return Assessment(
         robot=robot.name,
-        method=name,
-        sn_curve=", ".join(dict.fromkeys(used)),
+        method="paper, at the poses' mean stress" if paper_mean_stress else method,
+        sn_curve=", ".join(dict.fromkeys(named)),
         assumptions=assumptions_of(rule, model, curves, reducers),
         joints=joints,
         operations=tuple(results),
@@ -157,7 +163,7 @@ class _Job:
         out = {key: np.full(n, np.nan) for key in columns}
         out["steady_peak_deflection"] = np.array([peak(load.steady) for load in loads.joints])
         out["rest_peak_deflection"] = np.array([peak(load.rest) for load in loads.joints])
-        out["check"] = np.full((n, 2), np.nan)
+        out["check"], out["reducer_torques"] = np.full((2, n, 2), np.nan)
         own = out[f"{self.rule.needs}_peak_deflection"]
         out["peak_deflection"] = own.copy()
         out["peak_torque"] = loads.stiffness * own
@@ -169,9 +175,9 @@ class _Job:
         for j, (joint, load) in enumerate(zip(robot.flexible_joints, loads.joints, strict=True)):
             reducer = self.reducers[j]
             if reducer is not None and load.rest is not None:
-                held = load.stiffness * load.static
-                found = reducer.check_blows(load.peak_torque_with_gravity, held)
-                out["reducer_utilisation"][j] = found.utilisation
+                torques = load.peak_torque_with_gravity, abs(load.stiffness * load.static)
+                out["reducer_torques"][j] = torques
+                out["reducer_utilisation"][j] = reducer.check_blows(*torques).utilisation
             curve = self.curves[j]
             if joint.shaft is None or curve is None:
                 continue
@@ -195,7 +201,8 @@ class _Job:
 
 
 def _operation_result(operation: Operation, rows: list[dict[str, FloatArray]]) -> OperationResult:
-    stacked = {key: np.array([row[key] for row in rows]) for key in rows[0] if key != "check"}
+    columns = [key for key in rows[0] if key not in ("check", "reducer_torques")]
+    stacked = {key: np.array([row[key] for row in rows]) for key in columns}
     return OperationResult(
         name=operation.name,
         direction=operation.direction,
@@ -226,7 +233,8 @@ def _joint_life(
     task: Task,
     results: list[OperationResult],
     curves: tuple[SNCurve | None, ...],
-    reducer: Reducer | None,
+    reducer: str,
+    check: ReducerCheck | None,
 ) -> JointLife:
     joint, curve = robot.flexible_joints[j], curves[j]
     # Miner over every pose and operation: eqs. 19-22 with a_i in the hits, b_i in the rivets.
@@ -246,7 +254,7 @@ def _joint_life(
         gravity_shear_stress=float(max(r.gravity_shear_stress[:, j].max() for r in results)),
         peak_total_stress=float(max(r.peak_total_stress[:, j].max() for r in results)),
         utilisation=float(max(r.utilisation[:, j].max() for r in results)),
-        reducer=reducer.name if reducer is not None else "",
+        reducer=reducer,
         reducer_utilisation=float(max(r.reducer_utilisation[:, j].max() for r in results)),
         damage_per_rivet=per_rivet,
         rivets_to_failure=life(per_rivet) if curve is not None else math.nan,
@@ -254,6 +262,8 @@ def _joint_life(
         worst_operation=results[k].name,
         worst_pose=int(ranked[k][:, j].argmax()),
         damage_share=shares,
+        reducer_governed_by=check.governed_by if check is not None else "",
+        reducer_warnings=check.warnings if check is not None else (),
     )
 
 

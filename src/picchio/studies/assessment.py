@@ -90,6 +90,8 @@ class JointLife:
         worst_operation: where the utilisation (or, without a shaft, the deflection) is largest.
         worst_pose: index of the pose there.
         damage_share: of each operation in this joint's damage; empty without damage.
+        reducer_governed_by: the limit that binds, such as "repeated peak torque"; empty without.
+        reducer_warnings: what the catalogue does not promise, and which limits are exceeded.
     """
 
     name: str
@@ -109,6 +111,8 @@ class JointLife:
     worst_operation: str
     worst_pose: int
     damage_share: Mapping[str, float] = field(default_factory=dict)
+    reducer_governed_by: str = ""
+    reducer_warnings: tuple[str, ...] = ()
 
     @property
     def life(self) -> float:
@@ -196,6 +200,15 @@ class Assessment:
         """The entry of one joint."""
         return next(joint for joint in self.joints if joint.name == name)
 
+    @property
+    def reducer_warnings(self) -> tuple[str, ...]:
+        """What the reducers' catalogues do not promise, a sentence each, with its joints."""
+        said: dict[str, list[str]] = {}
+        for joint in self.joints:
+            for line in joint.reducer_warnings:
+                said.setdefault(line.removeprefix(f"{joint.reducer}: "), []).append(joint.name)
+        return tuple(f"{', '.join(names)}: {text}" for text, names in said.items())
+
     def __repr__(self) -> str:
         from picchio.studies.verdict import verdict
 
@@ -220,6 +233,7 @@ class Assessment:
             }
         if any(j.reducer for j in joints):
             table["reducer used [%]"] = [100 * j.reducer_utilisation for j in joints]
+            table["reducer's limit"] = [j.reducer_governed_by for j in joints]
         facts = {"method": self.method, "S-N curve": self.sn_curve or None}
         rows = zip(*table.values(), strict=True)
         return sheet(f"Assessment of {self.robot}", facts, list(table), rows, verdict(self))

@@ -13,6 +13,7 @@ from picchio.excitation import Excitation
 from picchio.fatigue import SNCurve
 from picchio.model import Model
 from picchio.robot import FlexibleRobot
+from picchio.robot.statics import balancing
 from picchio.studies.life_rules import RainflowRule
 from picchio.studies.loads import loads_at
 from picchio.studies.task import Operation
@@ -112,12 +113,28 @@ def _exactly(
             found.damage[s, j] = rule(joint, load, operation.hits_per_rivet, curve).damage
 
 
+def gravity_torque_at(robot: FlexibleRobot, poses: FloatArray) -> FloatArray:
+    """Torque (p, n) that the springs carry at rest at poses (p, nv), unchecked, N m (N)."""
+    index = robot.flexible_index
+    held = np.array([robot.rigid.gravity_torque(pose) for pose in poses])
+    held = held.reshape(len(poses), len(robot.joint_names))[:, index]
+    if any(joint.balancer is not None for joint in robot.flexible_joints):
+        rows = poses[:, index]
+        added = [balancing(robot.flexible_joints, robot.tree, row)[0] for row in rows]
+        held = held + np.array(added).reshape(held.shape)
+    return np.asarray(held)
+
+
 def stiffness_at(robot: FlexibleRobot, poses: FloatArray) -> FloatArray:
     """Stiffness (p, n) of the joints at poses (p, nv), N m/rad; curves at gravity's torque."""
-    n = len(robot.flexible_joints)
-    if any(joint.stiffness_curve is not None for joint in robot.flexible_joints):
-        return np.array([robot.stiffness_at(pose) for pose in poses]).reshape(len(poses), n)
-    return np.tile(robot.stiffness, (len(poses), 1))
+    springs = np.tile(robot.stiffness, (len(poses), 1))
+    curves = [joint.stiffness_curve for joint in robot.flexible_joints]
+    if any(curve is not None for curve in curves):
+        held = gravity_torque_at(robot, poses)
+        for j, curve in enumerate(curves):
+            if curve is not None:
+                springs[:, j] = curve.tangent(held[:, j])
+    return springs
 
 
 def stress_per_torque(robot: FlexibleRobot) -> FloatArray:

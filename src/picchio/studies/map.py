@@ -66,7 +66,8 @@ def workspace_map(
         damage: count the damage of a rivet of so many hits, too, from rest with its ring-down; for
             the worst direction it is searched, which takes many times as long.
         chunk: places at a time.
-        workers: processes; as many as cores, or none for small maps, if not given.
+        workers: processes; up to one, this process does the work itself. As many as cores, and
+            none for small maps, if not given.
         scheduler: address of a dask scheduler to use instead.
         restart: throw away what an interrupted map has left, instead of going on.
         progress: called with (places done, places in all).
@@ -104,7 +105,11 @@ def workspace_map(
     if damage is not None and damage < 1:
         raise InputError("must be at least 1", key="damage", value=damage)
     if damage is not None and all(joint.shaft is None for joint in robot.flexible_joints):
-        raise InputError("no joint has a shaft, so no damage can be told", key="damage")
+        raise InputError(
+            "no joint has a shaft, so no damage can be told",
+            key="damage",
+            hint="give shafts in a sidecar",
+        )
     job = MapJob(robot, excitation, places, direction, branch, hits, damage)
     if restart:
         shutil.rmtree(_folder_of(target), ignore_errors=True)
@@ -150,7 +155,8 @@ def _open_folder(target: Path, job: MapJob, chunk: int) -> Path:
     plan = {
         "robot": [hashlib.sha256(path.read_bytes()).hexdigest() for path in job.robot.files],
         "tool": job.robot.tool_frame,
-        "stiffness": job.robot.stiffness.tolist(),
+        "joints": [repr(joint) for joint in job.robot.flexible_joints],
+        "mounting": repr(job.robot.mounting),
         "excitation": job.excitation.describe(),
         "places": job.places.describe(),
         "direction": job.direction,
@@ -200,8 +206,8 @@ def _run(
     scheduler: str | None,
 ) -> Iterator[tuple[int, int]]:
     places = sum(last - first for first, last in missing)
-    alone = scheduler is None and (workers == 0 or (workers is None and places < _WORTH_WORKERS))
-    if alone or not missing:
+    alone = places < _WORTH_WORKERS if workers is None else workers <= 1
+    if not missing or (scheduler is None and alone):
         for span in missing:
             yield compute_chunk(job, folder, span)
         return

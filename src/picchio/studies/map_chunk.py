@@ -60,8 +60,7 @@ class MapJob:
             hits=self.hits,
             direction=self._direction(place),
         )
-        # The translation part of the Jacobian is cheap, the position itself is one more call.
-        position = np.array([robot.tool_position(pose) for pose in poses]).reshape(-1, 3)
+        position = tool_places(robot, poses)
         torque = stiffness * found.peak_deflection
         factor = [
             joint.shaft.radius / joint.shaft.polar_moment if joint.shaft else np.nan
@@ -119,6 +118,21 @@ class MapJob:
             chosen.append(pose)
             place.append(k + first)
         return np.array(chosen).reshape(-1, solved.poses.shape[1]), np.array(place, dtype=int)
+
+
+def tool_places(robot: FlexibleRobot, poses: FloatArray) -> FloatArray:
+    """(p, 3) m, world: where the tool's force acts at poses (p, nv)."""
+    from picchio.robot.chain import tool_chain
+    from picchio.robot.chain_kernel import places_of
+    from picchio.robot.inverse_kinematics import tables_of
+    from picchio.robot.tool import RECOIL_JOINT
+
+    if RECOIL_JOINT in robot.joint_names:  # the chain ends before it
+        return np.array([robot.tool_position(pose) for pose in poses]).reshape(-1, 3)
+    chain = tool_chain(robot)
+    found = np.empty((len(poses), 3))
+    places_of(tables_of(chain), np.ascontiguousarray(poses[:, chain.index]), found)
+    return found
 
 
 def branch_codes(poses: FloatArray) -> FloatArray:

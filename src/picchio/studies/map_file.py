@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,10 @@ import numpy as np
 
 from picchio.core.errors import InputError
 from picchio.studies.map_chunk import Columns
+
+# Rows written at a time, and of a piece of a Zarr store: a piece is then written once, not again
+# and again with every chunk of the map that falls into it.
+_ROWS = 65536
 
 # Variable: (dimensions, unit, what it is).
 VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
@@ -52,10 +56,9 @@ def join_chunks(target: Path, chunks: Iterable[Columns], attributes: dict[str, A
     rows = 0
     out = writer(part, attributes)
     try:
-        for columns in chunks:
-            if len(columns["place"]):
-                out.append(columns)
-                rows += len(columns["place"])
+        for columns in _in_blocks(chunks):
+            out.append(columns)
+            rows += len(columns["place"])
         out.close()
     except BaseException:
         _remove(part)
@@ -65,6 +68,22 @@ def join_chunks(target: Path, chunks: Iterable[Columns], attributes: dict[str, A
         raise InputError("no point of the map can be reached within the joint limits", key="places")
     _remove(target)
     os.replace(part, target)
+
+
+def _in_blocks(chunks: Iterable[Columns]) -> Iterator[Columns]:
+    """The same rows, `_ROWS` at a time; the last block may be shorter, none is empty."""
+    held: list[Columns] = []
+    count = 0
+    for columns in chunks:
+        held.append(columns)
+        count += len(columns["place"])
+        while count >= _ROWS:
+            whole = {name: np.concatenate([part[name] for part in held]) for name in columns}
+            yield {name: values[:_ROWS] for name, values in whole.items()}
+            held = [{name: values[_ROWS:].copy() for name, values in whole.items()}]
+            count -= _ROWS
+    if count:
+        yield {name: np.concatenate([part[name] for part in held]) for name in held[0]}
 
 
 def _remove(path: Path) -> None:
@@ -139,8 +158,7 @@ class _ZarrWriter:
         if self._mode == "w":
             texts = {name: np.array(values, dtype=object) for name, values in names.items()}
             chunk = xarray.Dataset(data, coords=texts, attrs=others)
-            # Pieces of one size, whatever the first chunk of the map happened to hold.
-            rows = {name: {"chunks": (65536, *(columns[name].shape[1:]))} for name in data}
+            rows = {name: {"chunks": (_ROWS, *(columns[name].shape[1:]))} for name in data}
             chunk.to_zarr(self._path, mode="w", consolidated=False, encoding=rows)
             self._mode = "a"
         else:

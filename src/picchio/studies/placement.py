@@ -22,10 +22,11 @@ from picchio.robot import FlexibleRobot
 from picchio.robot.chain import tool_chain
 from picchio.studies.assess_checks import reducer_of
 from picchio.studies.curves import curves_of
-from picchio.studies.placement_descent import descend
+from picchio.studies.placement_descent import ROUNDS, descend
 from picchio.studies.placement_loads import Loads, with_period
 from picchio.studies.placement_result import JointUse, Off, Placement, Standing
-from picchio.studies.placement_search import SHIFTS, Search, Spot
+from picchio.studies.placement_search import SHIFTS, Search
+from picchio.studies.placement_spot import Spot
 from picchio.studies.placement_work import Work
 from picchio.studies.self_collision import SelfCollision
 from picchio.studies.task import Task
@@ -66,7 +67,8 @@ def place(
         sn_curve: for all joints, instead of their own.
         self_collision: check for it where the URDF has meshes.
         seed: moves what is tried.
-        progress: called with (placements done, placements in all) of the global part.
+        progress: called with (steps done, steps in all): placements all over, then rounds of the
+            local searches.
 
     Returns:
         the placement; never worse than the start where the start is within the limits, and
@@ -193,7 +195,13 @@ def _search(
 ) -> Spot | None:
     rng = np.random.default_rng(seed)
     rates = [None] if periods is None else list(np.linspace(*periods, _PERIODS))
-    found = search.explore(half, rates, placements, seed, progress)
+    total = placements + (_DESCENTS + 1) * ROUNDS
+
+    def tell(done: int) -> None:
+        if progress is not None:
+            progress(min(done, total), total)
+
+    found = search.explore(half, rates, placements, seed, tell)
     chosen: list[Spot] = [] if start is None else [start]
     if start is not None and periods is not None:
         own = search.loads.task.operations[0].excitation.period
@@ -208,7 +216,14 @@ def _search(
         if settled is not None:
             chosen.append(settled)
     step = 0.5 * half / placements**0.25
-    ended = [descend(search, spot, step, half, periods, rng) for spot in chosen]
+    ended = []
+    for k, spot in enumerate(chosen):
+
+        def step_done(number: int, done: int = placements + k * ROUNDS) -> None:
+            tell(done + number)
+
+        ended.append(descend(search, spot, step, half, periods, rng, step_done))
+    tell(total)
     return min(ended, key=lambda s: (s.damage, s.utilisation), default=None)
 
 
@@ -225,12 +240,12 @@ def _near(one: Spot, other: Spot, half: FloatArray) -> bool:
 def _settle(search: Search, spot: Spot, seed: int) -> Spot | None:
     """The spot, checked; with other poses where links would touch; None where none are left."""
     worst = Spot(spot.move, spot.period, spot.poses, math.inf, math.inf)
-    everywhere = search.everywhere(4, seed)
+    everywhere = search.reach.everywhere(4, seed)
     for seeds in (
-        [q[None, search.chain.index] for q in spot.poses],
+        [q[None, search.reach.chain.index] for q in spot.poses],
         [everywhere] * len(spot.poses),
     ):
-        found = search.score(search.candidates(spot.move[None], seeds), spot.period, worst)
+        found = search.score(search.reach.candidates(spot.move[None], seeds), spot.period, worst)
         if found and found[0] is not None:
             return found[0]
     return None

@@ -7,12 +7,15 @@ along their self-motion at the same time: each rivet place takes its best on its
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.studies.placement_search import Search, Spot
+from picchio.studies.placement_search import Search
+from picchio.studies.placement_spot import Spot
 
-_ROUNDS = 60
+ROUNDS = 60
 _SMALLEST = 2e-4
 _SHAKEN = 4
 
@@ -24,6 +27,7 @@ def descend(
     half: FloatArray,
     periods: tuple[float, float] | None,
     rng: np.random.Generator,
+    tell: Callable[[int], object] = lambda done: None,
 ) -> Spot:
     """The best placement near a start.
 
@@ -34,6 +38,7 @@ def descend(
         half: (4,) how far the work may move in all, m and rad.
         periods: s, lowest and highest, or None.
         rng: for the directions beside the axes.
+        tell: called with the number of each round, at most `ROUNDS`.
 
     Returns:
         a spot that is at least as good, free of self-collisions if the start is.
@@ -41,12 +46,13 @@ def descend(
     best = start
     free = np.flatnonzero(step > 0.0)
     shrink = 1.0
-    for _ in range(_ROUNDS):
+    for number in range(ROUNDS):
         if shrink < _SMALLEST:
             break
+        tell(number)
         moves = _trials(best.move, step * shrink, half, free, rng)
         seeds = _shaken(search, best, min(shrink, 1.0), rng)
-        candidates = search.candidates(moves, seeds)
+        candidates = search.reach.candidates(moves, seeds)
         search.nearby += len(moves)
         found = search.score(candidates, best.period, best)
         if periods is not None and best.period is not None:
@@ -86,8 +92,8 @@ def _shaken(
     search: Search, best: Spot, shrink: float, rng: np.random.Generator
 ) -> list[FloatArray]:
     """First guesses around the best poses; the solver brings them back to the tool's place."""
-    index = search.chain.index
+    index = search.reach.chain.index
     own = best.poses[:, index]
-    count = _SHAKEN if search.redundant else 0
+    count = _SHAKEN if search.reach.redundant else 0
     noise = rng.normal(size=(count, len(own), len(index))) * max(0.5 * shrink, 1e-3)
     return [np.vstack([own[k : k + 1], own[k] + noise[:, k]]) for k in range(len(own))]

@@ -14,7 +14,12 @@ from picchio.excitation import Excitation, MeasuredForce
 from picchio.fatigue import SNCurve
 from picchio.fatigue.reducer import Reducer
 from picchio.robot import FlexibleRobot
-from picchio.studies.batch_damage import BatchDamage, batch_damage, stress_per_torque
+from picchio.studies.batch_damage import (
+    BatchDamage,
+    batch_damage,
+    gravity_torque_at,
+    stress_per_torque,
+)
 from picchio.studies.task import Task
 
 
@@ -92,7 +97,7 @@ class Loads:
         used = found.amplitude * stress_per_torque(self.robot) / allowable
         if not self.by_effort and not any(self.reducers):
             return np.asarray(used)
-        held = np.array([self.robot.gravity_torque(pose) for pose in poses]).reshape(used.shape)
+        held = gravity_torque_at(self.robot, poses)
         if blows.preload:
             jacobian = self.robot.mass_and_jacobian(poses)[1]
             held = held - blows.preload * np.einsum("pdn,pd->pn", jacobian, directions)

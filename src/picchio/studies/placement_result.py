@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from picchio.core.arrays import FloatArray
-from picchio.studies.placement_search import Spot
+from picchio.studies.placement_spot import Spot
 
 FORMAT = "picchio-placement/1"
 

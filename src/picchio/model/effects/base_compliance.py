@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import MODAL_SHARE, Effect, parameter
+from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
+from picchio.model.effects.yielding import MODAL_SHARE, yielding_damping, yielding_stiffness
 from picchio.model.plant import Plant
 
 
@@ -14,24 +15,8 @@ class BaseCompliance(Effect):
     where = "structure"
     target_kind = "axis"
     parameters = (
-        parameter(
-            "stiffness",
-            "N*m/rad",
-            neutral=float("inf"),
-            lower=1e-3,
-            upper=1e13,
-            log=True,
-            meaning="of the foundation (N/m along an axis)",
-        ),
-        parameter(
-            "damping",
-            "N*m*s/rad",
-            neutral=0.0,
-            lower=1e-9,
-            upper=1e9,
-            log=True,
-            meaning="of the foundation (N s/m along an axis)",
-        ),
+        yielding_stiffness("of the foundation (N/m along an axis)", upper=1e13),
+        yielding_damping("of the foundation (N s/m along an axis)", upper=1e9),
         MODAL_SHARE,
     )
     meaning = "pedestal, floor or bolts yield under the whole robot"

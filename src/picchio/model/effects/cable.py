@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import MODAL_SHARE, Effect, parameter
+from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
+from picchio.model.effects.yielding import MODAL_SHARE
 from picchio.model.plant import Plant
 
 

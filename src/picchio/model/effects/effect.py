@@ -176,13 +176,3 @@ def parameter(
 ) -> Parameter:
     """A parameter, in few words."""
     return Parameter(name, unit, neutral, lower, upper, log, meaning)
-
-
-# Of effects that let something beside the joints yield; see `Plant.modal_share`.
-MODAL_SHARE = parameter(
-    "modal_share",
-    neutral=1.0,
-    lower=0.0,
-    upper=1.0,
-    meaning="1: the stated damping is that of the modes with this effect; 0: of the joints alone",
-)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import MODAL_SHARE, Effect, parameter
+from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
+from picchio.model.effects.yielding import MODAL_SHARE, yielding_damping, yielding_stiffness
 from picchio.model.plant import Plant
 
 
@@ -17,15 +18,7 @@ class ServoCompliance(Effect):
     where = "structure"
     target_kind = "joint"
     parameters = (
-        parameter(
-            "stiffness",
-            "N*m/rad",
-            neutral=float("inf"),
-            lower=1e-3,
-            upper=1e12,
-            log=True,
-            meaning="of the servo, after the gear",
-        ),
+        yielding_stiffness("of the servo, after the gear", upper=1e12),
         parameter(
             "rotor_inertia",
             "kg*m^2",
@@ -35,15 +28,7 @@ class ServoCompliance(Effect):
             log=True,
             meaning="after the gear",
         ),
-        parameter(
-            "damping",
-            "N*m*s/rad",
-            neutral=0.0,
-            lower=1e-9,
-            upper=1e7,
-            log=True,
-            meaning="of the servo, after the gear",
-        ),
+        yielding_damping("of the servo, after the gear", upper=1e7),
         MODAL_SHARE,
     )
     meaning = "the drive does not hold its side of the spring: servo or brake yields"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import MODAL_SHARE, Effect, parameter
+from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
+from picchio.model.effects.yielding import MODAL_SHARE, yielding_damping, yielding_stiffness
 from picchio.model.plant import Plant
 
 
@@ -14,24 +15,8 @@ class TransverseCompliance(Effect):
     where = "structure"
     target_kind = "joint or link"
     parameters = (
-        parameter(
-            "stiffness",
-            "N*m/rad",
-            neutral=float("inf"),
-            lower=1e-3,
-            upper=1e12,
-            log=True,
-            meaning="tilting stiffness of the bearing",
-        ),
-        parameter(
-            "damping",
-            "N*m*s/rad",
-            neutral=0.0,
-            lower=1e-9,
-            upper=1e8,
-            log=True,
-            meaning="tilting damping of the bearing",
-        ),
+        yielding_stiffness("tilting stiffness of the bearing", upper=1e12),
+        yielding_damping("tilting damping of the bearing", upper=1e8),
         MODAL_SHARE,
     )
     meaning = "bearing or link bends across the joint's axis"

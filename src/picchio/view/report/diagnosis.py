@@ -31,6 +31,7 @@ def diagnosis_report(
     command: str | None = None,
     life: Mapping[str, Any] | None = None,
     warnings: Sequence[str] = (),
+    scene: str | None = None,
 ) -> str:
     """What the simulation gets wrong, why, and what is gained, as a page to read and print.
 
@@ -43,6 +44,8 @@ def diagnosis_report(
         command: the command line that gave this, to reproduce it.
         life: {"baseline": {...}, "extended": {...}} as in the JSON; the diagnosis's own if None.
         warnings: what was warned of on the way, a sentence each.
+        scene: HTML of `picchio.view.scene.diagnosis_scene`, to be shown in the report; it adds
+            its own size.
 
     Returns:
         the HTML.
@@ -72,6 +75,7 @@ def diagnosis_report(
         leads=[f"{words(effect)}, {target}" for effect, target in diagnosis.leads],
         warnings=list(dict.fromkeys(warnings)),
         model_toml=model_toml,
+        scene=scene,
         command=command or f"picchio diagnose {name} --data {campaign.folder or 'CAMPAIGN'}",
         folder="in memory" if campaign.folder is None else campaign.folder.name,
         records=len(problem.records),

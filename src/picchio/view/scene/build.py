@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.result import Diagnosis
 from picchio.excitation import Excitation
 from picchio.model import Model
 from picchio.robot import FlexibleRobot
@@ -16,6 +18,7 @@ from picchio.studies.envelope import DirectionEnvelope, direction_envelope
 from picchio.vibration.response import unit_vector
 from picchio.view.plots.style import direction_label
 from picchio.view.scene.body import Body, build_body
+from picchio.view.scene.causes import add_causes
 from picchio.view.scene.kinematics import frames, world
 from picchio.view.scene.mesh import Mesh, arrow, ring, sphere, turned_to
 from picchio.view.scene.motion import vibration
@@ -27,6 +30,7 @@ from picchio.view.scene.overlay import (
     rivet_values,
 )
 from picchio.view.scene.scene import Item, Scene
+from picchio.view.scene.site import Site
 
 if TYPE_CHECKING:
     import xarray
@@ -42,6 +46,7 @@ def build_scene(
     assessment: Assessment | None = None,
     joint: str | None = None,
     workspace: xarray.Dataset | None = None,
+    diagnosis: Diagnosis | None = None,
     gravity_stiffness: bool = False,
     subdivisions: int = 4,
 ) -> Scene:
@@ -56,11 +61,13 @@ def build_scene(
         assessment: of a task, for the rivets and the joints' colours.
         joint: whose envelope is shown first; the limiting one if not given.
         workspace: a map of `picchio.studies.map`, coloured by the peak of the joint shown.
+        diagnosis: of this robot: its causes are drawn where they sit, and the layers about life
+            start hidden.
         gravity_stiffness: add dg/dq to the springs.
         subdivisions: fineness of the envelopes.
 
     Raises:
-        InputError: a bad pose, direction or joint.
+        InputError: a bad pose, direction or joint; a diagnosis of another robot.
     """
     checked = robot.pose(pose)
     envelope = direction_envelope(Model(robot, gravity_stiffness), checked, excitation, hits)
@@ -81,9 +88,19 @@ def build_scene(
         _add_rivets(scene, body, assessment)
     if workspace is not None:
         _add_workspace(scene, workspace, units)
+    if diagnosis is not None:
+        along = blow if blow is not None else _against_the_tool(robot, checked)
+        site = partial(Site, robot, checked, tree, places, body, along)
+        add_causes(scene, site, diagnosis)
     scene.motion = vibration(robot, envelope, body.reach, blow, scene.chosen)
     _aim(scene, body, places)
     return scene
+
+
+def _against_the_tool(robot: FlexibleRobot, pose: FloatArray) -> FloatArray:
+    """(3,) the force on a tool that hits along its own axis."""
+    axis = np.array(robot.tool.axis)
+    return -robot.state(pose).tool_rotation @ axis / np.linalg.norm(axis)
 
 
 def _first(envelope: DirectionEnvelope, assessment: Assessment | None, joint: str | None) -> int:

@@ -37,7 +37,7 @@ def send(scene: Scene, viewer: Any) -> None:
 
     root = viewer["picchio"]
     root.delete()
-    for layer in ("robot", "joints"):
+    for layer in ("robot", "joints", *scene.swatches):
         for frame in scene.frames:
             root[layer][frame.path].set_transform(frame.matrix @ joint_motion(frame))
     for number, item in enumerate(scene.items):
@@ -99,7 +99,9 @@ def _data(scene: Scene) -> dict[str, Any]:
     samples = np.einsum("ndk,d->nk", motion["samples"], along).astype("<f4")
     return {
         "chosen": scene.chosen,
+        "playing": scene.playing,
         "target": _turned(scene.camera[1]),
+        "layers": ["robot", "joints", *scene.swatches],
         "told": [joint["text"] for joint in scene.joints],
         "items": [
             {"path": _path(item, number).split("/"), "joint": item.joint,

@@ -60,6 +60,7 @@ def scene_data(scene: Scene, packer: Packer) -> dict[str, Any]:
         "layers": [{"id": i, "text": text, "on": on} for i, text, on in scene.layers],
         "labels": scene.labels,
         "joints": scene.joints,
+        "swatches": scene.swatches,
         "scales": {layer: scale.to_dict() for layer, scale in scene.scales.items()},
         "motion": {
             "samples": packer.add(samples, "f4"),
@@ -69,6 +70,8 @@ def scene_data(scene: Scene, packer: Packer) -> dict[str, Any]:
                 {**track, "samples": packer.add(track["samples"], "f4")} for track in scene.tracks
             ],
         },
+        "diagnosis": scene.diagnosis,
+        "playing": scene.playing,
         "camera": scene.camera.tolist(),
         "floor": scene.floor,
         "tool": scene.envelope.tool_position.tolist(),

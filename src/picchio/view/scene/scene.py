@@ -38,12 +38,15 @@ class Scene:
         meshes: distinct geometry.
         items: what is placed where.
         layers: (id, words, shown at first).
-        labels: text at a place: {"text", "layer", "node" or "at", "joint"}.
+        labels: text at a place: {"text", "layer", "at" (3,) m, "node" that it is in, "joint"}.
         joints: the flexible joints: {"name", "scale", "peak", "text", and "map" its colour bar}.
         scales: colour bars by layer.
+        swatches: colours of layers that have one, "#rrggbb".
         motion: the vibration, see `picchio.view.scene.motion`.
         tracks: recorded motions to play as ghosts in its place: {"layer", "text", "colour",
             "samples" (n, k) rad}, see `picchio.view.scene.compare`.
+        diagnosis: what the panel tells: {"verdict", "lines": [{"text", "layer"}]}, or None.
+        playing: whether the vibration is shown at once.
         camera: position and target, (2, 3) m.
         floor: "cell" m, "squares" along a side, "at" the middle (3,) m.
         chosen: index of the joint whose envelope is shown at first.
@@ -61,8 +64,11 @@ class Scene:
     labels: list[dict[str, Any]] = field(default_factory=list)
     joints: list[dict[str, Any]] = field(default_factory=list)
     scales: dict[str, Scale] = field(default_factory=dict)
+    swatches: dict[str, str] = field(default_factory=dict)
     motion: dict[str, Any] = field(default_factory=dict)
     tracks: list[dict[str, Any]] = field(default_factory=list)
+    diagnosis: dict[str, Any] | None = None
+    playing: bool = True
     camera: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
     floor: dict[str, Any] = field(default_factory=dict)
     chosen: int = 0

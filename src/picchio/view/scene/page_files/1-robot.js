@@ -18,14 +18,15 @@ function place(layer, frame, moved) {
 }
 
 const moving = data.frames.filter((frame) => frame.axis && frame.follows);
-const layersOfRobot = ["robot", "ghost", "joints", ...data.motion.tracks.map((t) => t.layer)];
-// Rings sit on the same tree as the links; the ghost stays where it is.
+const marks = ["joints", ...Object.keys(data.swatches)];
+const layersOfRobot = ["robot", "ghost", ...marks, ...data.motion.tracks.map((t) => t.layer)];
+// Rings and causes sit on the same tree as the links; the ghost stays where it is.
 for (const layer of layersOfRobot) for (const frame of data.frames) place(layer, frame, 0);
 
 // --- state ------------------------------------------------------------------------------
 const motion = data.motion;
 const state = { joint: data.chosen, size: 1, factor: motion.factor, direction: 0, time: 0,
-  playing: !matchMedia("(prefers-reduced-motion: reduce)").matches, on: {} };
+  playing: data.playing && !matchMedia("(prefers-reduced-motion: reduce)").matches, on: {} };
 const duration = motion.step * motion.count;
 let samples = null;
 const made = [];
@@ -61,8 +62,8 @@ function bend(layers, x) {
 
 function drawMotion() {
   if (motion.tracks.length)
-    motion.tracks.forEach((track, k) => bend(k ? [track.layer] : [track.layer, "joints"], recorded(track, state.time)));
-  else bend(["robot", "joints"], deflections(state.time));
+    motion.tracks.forEach((track, k) => bend(k ? [track.layer] : [track.layer, ...marks], recorded(track, state.time)));
+  else bend(["robot", ...marks], deflections(state.time));
   byId("clock").textContent = `${(1e3 * state.time).toFixed(0)} ms of ` +
     `${(1e3 * duration).toFixed(0)}, ${motion.slow}\u00d7 slow`;
   byId("time").value = state.time / duration;

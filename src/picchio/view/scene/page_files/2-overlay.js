@@ -50,7 +50,9 @@ function drawLabels() {
     let visible = shown(label.layer, label.joint);
     if (visible) {
       if (label.node) {
-        viewer.scene_tree.find(pathOf("joints", label.node)).object.getWorldPosition(spot);
+        const { object } = viewer.scene_tree.find(pathOf("joints", label.node));
+        object.updateWorldMatrix(true, false);
+        spot.fromArray(label.at || [0, 0, 0]).applyMatrix4(object.matrixWorld);
       } else {
         spot.fromArray(label.at);
         if (label.layer === "worst") {
@@ -72,6 +74,8 @@ function drawLabels() {
       x -= 14 + box.w / 2;
       y += (tool.y > spot.y ? 1 : -1) * (box.h / 2 + 10);
     }
+    // Above what is pointed at, which may be as large as the label.
+    if (label.layer in data.swatches) y -= 0.9 * box.h;
     x = Math.min(Math.max(x, 4), width - box.w - 4);
     // Joints lie close together: a label that would cover another moves below it.
     for (let tries = 0; tries < 24; tries++) {

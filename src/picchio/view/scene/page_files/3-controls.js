@@ -25,6 +25,7 @@ function controls() {
     drawMotion();
   };
   tellFactor();
+  if (data.diagnosis) tellDiagnosis(data.diagnosis);
   byId("time").oninput = (e) => { play(false); state.time = e.target.value * duration * 0.9999; drawMotion(); };
   byId("play").onclick = () => play(!state.playing);
   for (const layer of data.layers) {
@@ -39,12 +40,8 @@ function controls() {
     text.textContent = layer.text;
     line.append(box, text);
     const track = motion.tracks.find((t) => t.layer === layer.id);
-    if (track) {
-      const swatch = document.createElement("i");
-      swatch.className = "swatch";
-      swatch.style.background = track.colour;
-      line.append(swatch);
-    }
+    const colour = track ? track.colour : data.swatches[layer.id];
+    if (colour) line.append(swatch(colour));
     byId("layers").append(line);
     if (data.scales[layer.id]) bars[layer.id] = addBar(data.scales[layer.id]);
   }
@@ -53,6 +50,24 @@ function controls() {
     title.textContent = data.scales.rivets.title;
     byId("layers").append(title);
     addBar(data.scales.rivets);
+  }
+}
+
+function swatch(colour) {
+  const patch = document.createElement("i");
+  patch.className = "swatch";
+  patch.style.background = colour;
+  return patch;
+}
+
+function tellDiagnosis({ verdict, lines }) {
+  byId("diagnosis").hidden = false;
+  byId("verdict").textContent = verdict;
+  for (const { text, layer } of lines) {
+    const line = document.createElement("li"), words = document.createElement("span");
+    words.textContent = text;
+    line.append(swatch(data.swatches[layer]), words);
+    byId("causes").append(line);
   }
 }
 

@@ -51,8 +51,8 @@ function addItems(array) {
       if (layer === "envelope") object.renderOrder = 2;
       viewer.set_object(pathOf(layer, item.node).concat(`item${k}`), object);
       made.push({ object, item: { ...item, layer } });
-      if (layer !== "joints") continue;
-      // A ring inside its link shines through it.
+      if (!marks.includes(layer)) continue;
+      // What marks a joint or a cause shines through the link that it is in.
       const through = new THREE.Mesh(shapes[item.mesh], paint.clone());
       Object.assign(through.material, { depthTest: false, transparent: true, opacity: 0.45 });
       through.renderOrder = 1;
@@ -80,7 +80,8 @@ unpack().then((array) => {
   stage();
   play(state.playing);
   drawOverlay();
-  drawMotion();
+  // Else it stands at rest until it is played.
+  if (data.playing) drawMotion();
   tick(performance.now());
   window.picchio = { viewer, state, data, made, ready: true };
   document.documentElement.dataset.ready = "true";

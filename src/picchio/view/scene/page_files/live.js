@@ -3,7 +3,7 @@
   const data = JSON.parse(@@data@@);
   const root = ["meshcat", "picchio"];
   const show = (item, on) => this.set_property(root.concat(item.path), "visible", on);
-  const state = { joint: data.chosen, size: 1, factor: data.motion.factor, time: 0, playing: true };
+  const state = { joint: data.chosen, size: 1, factor: data.motion.factor, time: 0, playing: data.playing };
   // An older scene's loop sees by this that it is over.
   const self = (window.picchio_live = { state });
 
@@ -43,7 +43,7 @@
       for (let i = 0; i < 4; i++)
         for (let j = 0; j < 4; j++)
           for (let k = 0; k < 4; k++) m[4 * j + i] += frame.matrix[4 * k + i] * own[4 * j + k];
-      for (const layer of ["robot", "joints"]) this.set_transform(root.concat(layer, frame.path), m);
+      for (const layer of data.layers) this.set_transform(root.concat(layer, frame.path), m);
     }
     this.set_dirty();
   };

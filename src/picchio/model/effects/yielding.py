@@ -1,0 +1,25 @@
+"""Parameters of effects that let something beside the joints yield."""
+
+from __future__ import annotations
+
+from picchio.model.effects.effect import Parameter, parameter
+
+# See `Plant.modal_share`.
+MODAL_SHARE = parameter(
+    "modal_share",
+    neutral=1.0,
+    lower=0.0,
+    upper=1.0,
+    meaning="1: the stated damping is that of the modes with this effect; 0: of the joints alone",
+)
+
+
+def yielding_stiffness(meaning: str, upper: float) -> Parameter:
+    """Of what is rigid in the nominal model, N m/rad."""
+    return parameter("stiffness", "N*m/rad", neutral=float("inf"), lower=1e-3, upper=upper,
+                     log=True, meaning=meaning)  # fmt: skip
+
+
+def yielding_damping(meaning: str, upper: float) -> Parameter:
+    """Beside such a stiffness, N m s/rad."""
+    return parameter("damping", "N*m*s/rad", lower=1e-9, upper=upper, log=True, meaning=meaning)
