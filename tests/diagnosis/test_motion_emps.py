@@ -79,14 +79,24 @@ def test_the_screws_turn_is_found(diagnosis):
     assert pitch == pytest.approx(2.5e-3, rel=0.003)
 
 
-@pytest.mark.parametrize("gone", ["coulomb_friction", "asymmetric_friction", "encoder_delay"])
-def test_without_a_cause_no_wrong_name(robot, emps, gone):
+GONE = ["coulomb_friction", "asymmetric_friction", "encoder_delay", "torque_ripple"]
+
+
+@pytest.mark.parametrize("gone", GONE)
+def test_without_a_cause_no_wrong_name(robot, emps, diagnosis, gone):
     from picchio.diagnosis.motion.candidates import motion_effects
 
-    diagnosis = diagnose_motion(robot, emps, catalogue=set(motion_effects()) - {gone})
-    assert diagnosis.verdict in ("partial", "unexplained")
+    other = diagnose_motion(robot, emps, catalogue=set(motion_effects()) - {gone})
+    assert other.verdict in ("partial", "unexplained")
     if gone == "coulomb_friction":
-        assert diagnosis.verdict == "unexplained"
+        assert other.verdict == "unexplained"
+    # An offset is what the authors published in the asymmetry's place.
+    instead = {"asymmetric_friction": {("torque_offset", "slide")}}.get(gone, set())
+    assert labels(other) - labels(diagnosis) == instead
+
+
+def labels(diagnosis):
+    return {(c.effect, c.target) for c in diagnosis.causes}
 
 
 def values(diagnosis, effect):
@@ -99,6 +109,14 @@ def test_an_injected_delay_adds_to_the_one_there(robot, emps, diagnosis, seconds
     found = values(diagnose_motion(robot, changed), "encoder_delay")
     own = values(diagnosis, "encoder_delay")[0]["delay"].value
     assert found[0]["delay"].value - own == pytest.approx(seconds, rel=0.1)
+
+
+@pytest.mark.slow
+def test_the_smallest_delay_that_is_found(robot, emps, diagnosis):
+    changed = injection.inject(emps, injection.delay("motor_position", 0.25e-3))
+    found = values(diagnose_motion(robot, changed), "encoder_delay")[0]["delay"].value
+    own = values(diagnosis, "encoder_delay")[0]["delay"].value
+    assert found - own == pytest.approx(0.25e-3, abs=0.05e-3)
 
 
 @pytest.mark.parametrize("mass", [20.0, 40.0])
@@ -115,7 +133,7 @@ def test_an_injected_mass_is_found_beyond_the_tolerance(robot, emps, repository,
     )
 
 
-@pytest.mark.parametrize("factor", [0.8, 1.3])
+@pytest.mark.parametrize("factor", [0.8, 0.85, 1.2, 1.3])
 def test_an_injected_gain_is_told_as_a_set(robot, emps, factor):
     diagnosis = diagnose_motion(robot, injection.inject(emps, injection.gain("slide", factor)))
     every = {(c.effect, c.target) for c in diagnosis.causes}
@@ -123,9 +141,9 @@ def test_an_injected_gain_is_told_as_a_set(robot, emps, factor):
     assert ("torque_gain", "slide") in every
 
 
-@pytest.mark.parametrize("amplitude", [1.0, 2.0])
+@pytest.mark.parametrize("amplitude", [0.7, 1.0, 2.0])
 def test_an_injected_ripple_is_found(robot, emps, amplitude):
-    """1 N of 54 N RMS."""
+    """Down to 0.7 N of 54 N RMS."""
     changed = injection.inject(emps, injection.ripple("slide", 700.0, amplitude, "motor_position"))
     found = [p for p in values(diagnose_motion(robot, changed), "torque_ripple")
              if p["order"].value < 1000.0]  # fmt: skip

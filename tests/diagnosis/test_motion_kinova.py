@@ -35,8 +35,16 @@ def test_the_ripples_orders(diagnosis):
             order = c.parameters["order"].value
             assert abs(order - round(order)) < 0.03
             orders[c.target].add(round(order))
-    assert {2, 7, 12, 14} <= orders["joint_5"] | orders["joint_6"] | orders["joint_7"]
-    assert all(12 in orders[joint] for joint in ("joint_5", "joint_6", "joint_7"))
+    for joint in ("joint_5", "joint_6", "joint_7"):
+        assert {7, 12, 14} <= orders[joint], joint
+    # Joint 6 has a line at 2 as well, which loses on the records held out and is not claimed.
+    assert all(2 in orders[joint] for joint in ("joint_5", "joint_7"))
+
+
+def test_what_joint_6_has_at_two_cycles_is_seen_and_not_claimed(diagnosis):
+    dropped = [(d["target"], round(d["order"])) for d in diagnosis.details["dropped"]
+               if d["effect"] == "torque_ripple"]  # fmt: skip
+    assert ("joint_6", 2) in dropped
 
 
 def test_ripple_tells_that_the_current_is_late(diagnosis):

@@ -94,18 +94,39 @@ def test_without_delay_in_the_catalogue_no_wrong_name(robot, kuka):
                for c in diagnosis.causes)  # fmt: skip
 
 
-@pytest.mark.parametrize("more", [0.001, 0.004])
-def test_an_injected_delay_adds_to_the_one_there(robot, kuka, more):
+@pytest.mark.parametrize(
+    ("gone", "instead"),
+    [
+        ("viscous_friction", {("load_friction", "joint_a3")}),
+        ("joint_inertia", {("torque_gain", "joint_a1")}),
+        ("joint_stiffness", set()),
+        ("torque_offset", set()),
+    ],
+)
+def test_without_a_cause_the_verdict_stays_partial(robot, kuka, diagnosis, gone, instead):
+    """What comes in its place is told: an axis without weight can't tell inertia from gain."""
+    other = diagnose_motion(robot, kuka, without=[gone])
+    labels = [{(c.effect, c.target) for c in d.causes} for d in (diagnosis, other)]
+    assert other.verdict == "partial"
+    assert other.gain.explained < diagnosis.gain.explained
+    assert labels[1] - labels[0] == instead
+
+
+@pytest.mark.parametrize("more", [0.0001, 0.001, 0.004])
+def test_an_injected_delay_adds_to_the_one_there(robot, kuka, diagnosis, more):
     changed = injection.inject(kuka, injection.delay("position", more))
     found = diagnose_motion(robot, changed).causes[0]
     assert (found.effect, found.target) == ("encoder_delay", "position")
     assert found.parameters["delay"].value - more == pytest.approx(3.05e-3, abs=0.1e-3)
+    own = diagnosis.causes[0].parameters["delay"].value
+    assert found.parameters["delay"].value - own == pytest.approx(more, abs=0.03e-3)
 
 
-def test_an_injected_payload_adds_to_the_one_there(robot, kuka, diagnosis, repository):
+@pytest.mark.parametrize("added", [15.0, 30.0])
+def test_an_injected_payload_adds_to_the_one_there(robot, kuka, diagnosis, repository, added):
     urdf = str(repository / "robots" / "kuka_kr300_r2500" / "robot.urdf")
-    change = injection.payload(urdf, "tool0", 30.0, "motor_position")
+    change = injection.payload(urdf, "tool0", added, "motor_position")
     found = diagnose_motion(robot, injection.inject(kuka, change))
     mass = [next(c for c in d.causes if c.effect == "payload").parameters["mass"].value
             for d in (diagnosis, found)]  # fmt: skip
-    assert mass[1] - mass[0] == pytest.approx(30.0, abs=8.0)
+    assert mass[1] - mass[0] == pytest.approx(added, abs=2.0)

@@ -6,9 +6,13 @@ import pytest
 from picchio.campaign import Campaign, Record
 from picchio.diagnosis.motion import diagnose_motion
 from picchio.diagnosis.motion.baseline import stated_friction
-from picchio.diagnosis.motion.orders import _power, _spectrum
+from picchio.diagnosis.motion.order_spectrum import power_at, power_spectrum
+from picchio.diagnosis.motion.orders import find_orders
 from picchio.diagnosis.motion.split import split
+from picchio.diagnosis.motion.state import State
 from picchio.diagnosis.motion.stretches import confidence
+from picchio.diagnosis.motion.system import System
+from picchio.model.effects import effect_class
 from picchio.prediction.motion import MotionLog
 from picchio.robot import load_robot
 
@@ -50,9 +54,76 @@ def test_the_spectrum_over_angles_is_the_exact_sum():
     rng = np.random.default_rng(0)
     angle = np.cumsum(rng.uniform(0.0, 1e-3, 4000))
     values = np.cos(700.0 * angle) + rng.normal(size=angle.size)
-    orders, power = _spectrum([(angle, values)], 5.0, 2500.0, 0.5)
-    exact = _power([(angle, values)], orders)
+    orders, power = power_spectrum([(angle, values)], 5.0, 2500.0, 0.5)
+    exact = power_at([(angle, values)], orders)
     np.testing.assert_allclose(power, exact, atol=2e-3 * exact.max())
+
+
+def sweeps(samples=5000, speeds=(0.10, 0.31)):
+    """Two records of a slide, one slow and one fast."""
+    t = np.arange(samples) / RATE
+    records = []
+    for number, speed in enumerate(speeds):
+        x = speed * t + 0.005 * np.sin(2.0 * t)
+        return_ = MotionLog(f"{number}.csv", RATE, {"slide": x}, {"slide": "motor_position"},
+                            {"slide": np.zeros(samples)}, {}, {})  # fmt: skip
+        records.append(return_)
+    return System(load_robot("emps"), records, 20.0)
+
+
+def noise(system, levels, rng, colour=0.0):
+    """Residuals with a noise of its own in every record."""
+    from scipy.signal import lfilter
+
+    residual = np.zeros(system.size)
+    for s in system.segments:
+        white = rng.normal(size=s.samples.size)
+        residual[s.rows] = levels[s.record] * lfilter([1.0], [1.0, -colour], white)
+    return residual
+
+
+def wave_in(system, record, order, size):
+    residual = np.zeros(system.size)
+    for s in system.segments:
+        if s.record == record and s.group[0] == "ripple":
+            angle = system.predictors[record].nominal.angle["slide"][s.samples]
+            residual[s.rows] = size * np.cos(order * angle)
+    return residual
+
+
+@pytest.mark.slow
+def test_noise_has_no_orders():
+    """A false alarm in one search of ten thousand is allowed: none in 200 is what to expect."""
+    system, rng = sweeps(), np.random.default_rng(8)
+    for number in range(200):
+        residual = noise(system, (1.0, 5.0), rng, colour=0.9 * (number % 2))
+        assert find_orders(system, residual, "slide", State()) == []
+
+
+def test_a_quiet_records_lines_are_found_beside_a_noisy_one():
+    """Each record is held against its own noise, in its own range of orders."""
+    system, rng = sweeps(), np.random.default_rng(9)
+    residual = noise(system, (1.0, 30.0), rng)
+    # The fast record resolves orders up to 8100 a metre, the slow one up to 22000.
+    for order in (2000.0, 2600.0, 15000.0):
+        residual += wave_in(system, 0, order, 0.3)
+    found = [line.order for line in find_orders(system, residual, "slide", State())]
+    assert sorted(found) == pytest.approx([2000.0, 2600.0, 15000.0], rel=1e-3)
+
+
+def test_side_lobes_of_a_strong_line_are_no_lines():
+    system, rng = sweeps(), np.random.default_rng(10)
+    residual = noise(system, (0.1, 0.1), rng) + wave_in(system, 0, 5000.0, 20.0)
+    found = [line.order for line in find_orders(system, residual, "slide", State())]
+    assert found == pytest.approx([5000.0], rel=1e-4)
+
+
+def test_what_is_left_of_a_known_ripple_is_no_line_of_its_own():
+    system, rng = sweeps(), np.random.default_rng(11)
+    residual = noise(system, (1.0, 1.0), rng) + wave_in(system, 0, 5010.0, 0.5)
+    assert find_orders(system, residual, "slide", State())
+    ripple = effect_class("torque_ripple")("slide", order=5000.0, cosine=1.0)
+    assert find_orders(system, residual, "slide", State(effects=(ripple,))) == []
 
 
 def test_confidence_is_students():

@@ -296,3 +296,9 @@ def test_a_loaded_joint_rests_at_the_edge_of_its_play(arm, geometry):
     assert lifted < 1.0
     scale = np.abs(plain.position).max()
     assert np.abs(found.position - plain.position).max() < 1e-5 * scale
+
+
+def test_a_foundation_is_stated_per_metre_along_an_axis_and_per_radian_about_it():
+    kind = effect_class("base_compliance")
+    assert [kind("x").unit(n) for n in ("stiffness", "damping")] == ["N/m", "N*s/m"]
+    assert [kind("rx").unit(n) for n in ("stiffness", "damping")] == ["N*m/rad", "N*m*s/rad"]

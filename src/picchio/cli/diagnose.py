@@ -16,6 +16,7 @@ from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
     from picchio.campaign import Campaign
+    from picchio.cli.diagnose_motion import MotionAnswer
     from picchio.diagnosis.percussion.diagnose import PercussionDiagnosis
     from picchio.diagnosis.result import Diagnosis
     from picchio.model import Effect
@@ -70,7 +71,8 @@ def diagnose(
     be known is said, and what to measure to know it.
     """
     from picchio.campaign import load_campaign
-    from picchio.cli.output import check_target, said_warnings, write_json
+    from picchio.cli.diagnose_motion import diagnose_motion_records
+    from picchio.cli.output import check_target, console, said_warnings, write_json
     from picchio.core.files import atomic_write
     from picchio.core.provenance import provenance
     from picchio.model.effects import effect_class
@@ -86,47 +88,56 @@ def diagnose(
     loaded = load_robot(robot, flex=flex, tool=tool, allow_rigid=kinds == {"motion"})
     for target in (json, report, model):
         check_target(target, [*loaded.files, *campaign.files])
+    percussion: PercussionDiagnosis | None = None
+    motion: MotionAnswer | None = None
     if kinds == {"motion"}:
-        found = _motion(loaded, campaign, without or ())
-        percussion = None
-        effects: tuple[Effect, ...] = ()
+        motion = diagnose_motion_records(loaded, campaign, without or (), task)
+        found, effects, notes = motion.diagnosis, motion.carried.effects, motion.notes
+        life = motion.life.life
     else:
         with _telling() as say:
             percussion = _percussion(loaded, campaign, without or (), gravity_stiffness, say)
-        found = percussion.diagnosis
-        effects = percussion.extended.hypothesis.effects
-    life: Mapping[str, Any] | None = found.life
-    if percussion is not None:
-        life = _life(loaded, task, effects, found)
-    text = ""
-    if percussion is not None:
-        text = _model_text(robot, flex, tool, effects, model, [*loaded.files, *campaign.files])
-    content = found.to_dict() | {"life": life}
+        found, effects = percussion.diagnosis, percussion.extended.hypothesis.effects
+        life, notes = _life(loaded, task, effects, found), "found by picchio diagnose"
+    text = _model_text(robot, flex, tool, effects, model, [*loaded.files, *campaign.files], notes)
+    content = found.to_dict() | {"life": life} | (motion.extra() if motion is not None else {})
     content["scores"] = [dict(row) for row in found.scores]
     content["provenance"] = provenance([*loaded.files, *campaign.files])
     if model is not None:
-        if percussion is None:
-            raise InputError("is for percussion records; see picchio identify", key="--model")
         with atomic_write(model) as stream:
             stream.write(text)
     if report is not None:
-        if percussion is None:
-            raise InputError("is for percussion records", key="--report")
-        from picchio.view.report.diagnosis import diagnosis_report
-
-        page = diagnosis_report(
-            percussion,
-            model_toml=text,
-            command=" ".join(["picchio", *map(shlex.quote, sys.argv[1:])]),
-            life=life,
-            warnings=said_warnings(),
-        )
+        command = " ".join(["picchio", *map(shlex.quote, sys.argv[1:])])
+        if motion is not None:
+            page = motion.page(campaign, text, command, said_warnings())
+        else:
+            assert percussion is not None
+            page = _page(percussion, text, command, life)
         with atomic_write(report) as stream:
             stream.write(page)
     if json is not None:
         write_json(content, json)
     if json != "-":
         _show(found, life)
+        if motion is not None:
+            console().print(f"Life: {motion.life.why}.")
+
+
+def _page(
+    percussion: PercussionDiagnosis, text: str, command: str, life: Mapping[str, Any] | None
+) -> str:
+    from picchio.cli.output import said_warnings
+    from picchio.view.report.diagnosis import diagnosis_report
+    from picchio.view.scene import diagnosis_scene
+
+    return diagnosis_report(
+        percussion,
+        model_toml=text,
+        command=command,
+        life=life,
+        warnings=said_warnings(),
+        scene=diagnosis_scene(percussion).html(),
+    )
 
 
 def _percussion(
@@ -141,14 +152,6 @@ def _percussion(
     return diagnose_percussion(
         robot, campaign, without=without, gravity_stiffness=gravity_stiffness, progress=say
     )
-
-
-def _motion(
-    robot: FlexibleRobot, campaign: Campaign, without: list[str] | tuple[str, ...]
-) -> Diagnosis:
-    from picchio.diagnosis.motion import diagnose_motion
-
-    return diagnose_motion(robot, campaign, without=without)
 
 
 @contextmanager
@@ -190,6 +193,7 @@ def _model_text(
     effects: tuple[Effect, ...],
     model: Path | None,
     files: list[Path],
+    notes: str,
 ) -> str:
     from picchio.core.provenance import provenance
     from picchio.robot.saved_model import saved_model_text
@@ -202,7 +206,7 @@ def _model_text(
         flex=flex,
         tool=tool,
         folder=model.parent if model is not None else None,
-        notes="found by picchio diagnose",
+        notes=notes,
         provenance={"picchio": str(stamp.get("picchio", stamp.get("version", "")))},
     )
 
@@ -211,6 +215,7 @@ def _show(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
     from rich.table import Table
 
     from picchio.cli.output import console
+    from picchio.diagnosis.alternatives import differences, in_words
     from picchio.diagnosis.result import VERDICTS
     from picchio.model.effects import effect_class
 
@@ -230,11 +235,10 @@ def _show(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
                 unit = "" if value.unit == "1" else value.unit
                 table.add_row(*head, f"{name} {value.value:.5g}", f"{value.std:.2g}", unit)
         out.print(table)
-        for cause in found.causes:
-            out.print(f"  {cause.effect}: {effect_class(cause.effect).meaning}")
-    for each in found.alternatives:
-        names = ", ".join(f"{effect} of {target}" for effect, target in each)
-        out.print(f"  these data cannot tell it from: {names}")
+        for name in dict.fromkeys(cause.effect for cause in found.causes):
+            out.print(f"  {name}: {effect_class(name).meaning}")
+    for each in differences(found):
+        out.print(f"  these data cannot tell it from {in_words(each)}")
     for effect, target in found.leads:
         out.print(f"  helped, but is not the cause: {effect} of {target}")
     gain = found.gain

@@ -17,6 +17,8 @@ from picchio.vibration._exponential_kernel import fastest_rate, step_matrices, t
 from picchio.vibration._friction_kernel import COULOMB, stick
 
 _BACKLASH, _CONTACT = 0, 4
+# From so many time constants of the fastest mode on, matrices are cheaper than a series.
+_STIFF = 30.0
 
 
 @njit(cache=True, nogil=True)
@@ -90,17 +92,17 @@ def _pseudo_force(
 def integrate(
     start, mass, gradient, curvature, damping, stiffness, b, b_gradient,
     kinds, parameters, rows, start_states,
-    step, lengths, regular, force0, force1, sample, force_after,
+    step, lengths, regular, same, force0, force1, sample, force_after,
     x_out, v_out, a_out, end,
 ):  # fmt: skip
     """Advance from `start` over all steps and write the samples.
 
     `start` is (2N,), deflections and rates; mass, gradient, curvature, damping, stiffness, b and
     b_gradient are the system's; kinds, parameters and rows its nonlinear elements', start_states
-    their inner states. Each of the K steps has a length (s), is `regular` where that is `step`,
-    has a straight line through its force (force0 to force1, N), and a sample number at its end,
-    or -1; force_after is the force just after it. Written are x_out, v_out, a_out (samples, N)
-    and end (2N + elements,), the last state.
+    their inner states. Each of the K steps has a length (s), is `regular` where that is `step`, or
+    has a number that equal lengths share (`same`); it has a straight line through its force
+    (force0 to force1, N), and a sample number at its end, or -1; force_after is the force just
+    after it. Written are x_out, v_out, a_out (samples, N) and end (2N + elements,), the last state.
     """
     n = b.size
     inverse = np.linalg.inv(mass)
@@ -121,6 +123,12 @@ def integrate(
     zero = np.zeros(2 * n)
     square, line, no_friction = np.empty((n, n)), np.empty((3, n)), np.zeros(elements)
     known, bend = False, np.empty(2)
+    kept = 0
+    for k in range(lengths.size):
+        kept = max(kept, same[k] + 1)
+    made = np.zeros(kept, dtype=np.bool_)
+    short = np.empty((kept, 2 * n, 2 * n))
+    short_start, short_end = np.empty((kept, 2 * n, n)), np.empty((kept, 2 * n, n))
     for k in range(lengths.size):
         if has_friction:
             for e in range(elements):
@@ -137,20 +145,29 @@ def integrate(
         for i in range(n):
             f0[i] = b[i] * force0[k] + p0[i]
             f1[i] = b[i] * force1[k] + p0[i]
+        whole, by_start, by_end = exponential, from_start, from_end
+        by_matrix = regular[k]
+        if not by_matrix and lengths[k] * fastest > _STIFF:
+            u, by_matrix = same[k], True
+            if not made[u]:
+                made[u] = True
+                one, two, three = step_matrices(inverse, damping, stiffness, lengths[k])
+                short[u], short_start[u], short_end[u] = one, two, three
+            whole, by_start, by_end = short[u], short_start[u], short_end[u]
         for attempt in range(2):
-            if regular[k]:
+            if by_matrix:
                 for i in range(2 * n):
                     total = 0.0
                     for j in range(2 * n):
-                        total += exponential[i, j] * y[j]
+                        total += whole[i, j] * y[j]
                     for j in range(n):
-                        total += from_start[i, j] * f0[j] + from_end[i, j] * f1[j]
+                        total += by_start[i, j] * f0[j] + by_end[i, j] * f1[j]
                     new[i] = total
             else:
                 taylor(y, f0, f1, lengths[k], inverse, ik, ic, fastest, new)
             if has_friction:
                 stick(new, n, rows, kinds, parameters, friction, kick, zero, lengths[k],
-                       regular[k], from_start, from_end, inverse, ik, ic, fastest)  # fmt: skip
+                       by_matrix, by_start, by_end, inverse, ik, ic, fastest)  # fmt: skip
             for e in range(elements):
                 if kinds[e] == 2:
                     before = 0.0

@@ -54,6 +54,7 @@ class Plan:
     step: float
     lengths: FloatArray
     regular: BoolArray
+    same: IndexArray
     force0: FloatArray
     force1: FloatArray
     sample: IndexArray
@@ -147,10 +148,14 @@ def make_plan(
     if middle:
         before = _at(force, points - 2 * _EDGE)
         after = 0.5 * (before + after)
+    regular = np.abs(lengths - fine) < 1e-9 * fine + 2 * _EDGE
+    same = np.full(lengths.size, -1)
+    same[~regular] = np.unique(np.round(lengths[~regular], 12), return_inverse=True)[1]
     return Plan(
         step=fine,
         lengths=lengths,
-        regular=np.abs(lengths - fine) < 1e-9 * fine + 2 * _EDGE,
+        regular=regular,
+        same=same,
         force0=mean - 0.5 * slope,
         force1=mean + 0.5 * slope,
         sample=sample,
@@ -191,7 +196,7 @@ def _run(
         start[: 2 * n], system.mass, system.mass_gradient, system.gravity_curvature,
         system.damping, system.stiffness, system.force, system.force_gradient,
         kinds, parameters, system.rows, start[2 * n :],
-        plan.step, plan.lengths, plan.regular, plan.force0, plan.force1,
+        plan.step, plan.lengths, plan.regular, plan.same, plan.force0, plan.force1,
         plan.sample[1:], plan.force_after[1:], x, v, a, end,
     )  # fmt: skip
     return CoordinateMotion(x, v, a), end

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,7 @@ class Candidate:
         coordinates: those of the columns.
         neutral: (c,) where nothing changes.
         searched: how many parameters were searched for.
+        noise: power of a sample's noise as a line sees it; None of what is no line.
     """
 
     effect: Effect
@@ -44,6 +45,7 @@ class Candidate:
     coordinates: list[Coordinate]
     neutral: FloatArray
     searched: int = 0
+    noise: float | None = None
 
     @property
     def label(self) -> tuple[str, str]:
@@ -107,8 +109,10 @@ def candidates(
             if near not in (None, target) and kind.target_kind == "joint":
                 continue
             if name == _RIPPLE:
-                for order in find_orders(system, base.residual, target):
-                    found += _make(system, base, predicted, kind(target, order=order), {"order"})
+                for line in find_orders(system, base.residual, target, base.state):
+                    effect = kind(target, order=line.order)
+                    made = _make(system, base, predicted, effect, {"order"})
+                    found += [replace(each, noise=line.noise) for each in made]
             elif (name, target) not in taken and _NEEDS.get(name, "") in ("", *(
                 effect for effect, where in taken if where == target
             )):  # fmt: skip

@@ -16,20 +16,20 @@ from picchio.diagnosis.motion.instruments import instrument_shifts
 from picchio.diagnosis.motion.noise import noise_levels
 from picchio.diagnosis.motion.rivals import rivals
 from picchio.diagnosis.motion.score import Scorer
-from picchio.diagnosis.motion.select import RIPPLE, Step, necessity, select
+from picchio.diagnosis.motion.select import RIPPLE, Step, eliminate, necessity, select
 from picchio.diagnosis.motion.split import split
 from picchio.diagnosis.motion.state import State
 from picchio.diagnosis.motion.system import Group, System
 from picchio.diagnosis.motion.validate import validate
 from picchio.diagnosis.motion.values import cause, nuisances
 from picchio.diagnosis.result import Cause, Diagnosis, Gain, Verdict
+from picchio.diagnosis.verdict_rules import MOSTLY
 from picchio.model.effects import Effect
 from picchio.model.effects import catalogue as all_effects
 from picchio.prediction.motion import MotionLog, choose_cutoff, read_logs
 from picchio.robot import FlexibleRobot
 
 _NOISE = 1.15  # residual over noise that counts as noise: noise is known to about a tenth
-_MOST = 0.5  # of what is to be explained
 _SURE = 0.9999
 _READINGS = ("encoder_delay",)
 Pair = tuple[str, str]
@@ -91,6 +91,8 @@ def diagnose_motion(
     dropped: list[tuple[Effect, dict[str, float]]] = []
     if outside:
         found, dropped = validate(system, judge_on, found)
+        # What stood only beside a cause that is gone goes, too.
+        found = eliminate(system, found) if dropped else found
     found = fit(system, found.state)
     return _conclude(system, judge_on, before, found, kinds, steps, dropped)
 
@@ -151,7 +153,7 @@ def _verdict(system: System, before: Fit, found: Fit, noise: Mapping[Group, floa
     ):
         return "named"
     explained = gain.explained
-    return "partial" if explained is not None and explained >= _MOST else "unexplained"
+    return "partial" if explained is not None and explained >= MOSTLY else "unexplained"
 
 
 def _quiet(found: Fit, noise: Mapping[Group, float], groups: Sequence[Group]) -> bool:
@@ -194,7 +196,10 @@ def _details(system: System, judge_on: System, before: Fit, found: Fit,
         ],
         "train": table(system, before.state, found.state, inner),
         "held_out": table(judge_on, before.state, found.state, noise),
-        "dropped": [{"effect": e.name, "target": e.target, "gain": dict(g)} for e, g in dropped],
+        "dropped": [
+            {"effect": e.name, "target": e.target, "order": e.values.get("order"), "gain": dict(g)}
+            for e, g in dropped
+        ],
         "stiffness": _stiffness(system, found, causes),
         "instruments": instrument_shifts(system, found),
         "systems": {"train": system, "held_out": judge_on},

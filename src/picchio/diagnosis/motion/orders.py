@@ -2,115 +2,100 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.motion.order_spectrum import Spectrum, order_spectrum, power_at
+from picchio.diagnosis.motion.state import State
 from picchio.diagnosis.motion.system import System
-from picchio.model.motion import RIPPLE, TORQUE
 
-_FALSE_ALARM = 1e-4
-_FINE = 0.5  # of a radian of the highest order, between the grid's angles
+_FALSE_ALARM = 1e-4  # of one search of one joint
 _MOST = 6
-_FASTEST = 0.4  # of the sampling rate
-_WIDTH = 400  # orders about each that tell the local level
+_SIDE_LOBES = 4.0  # times those of an even sweep
+_APART = 3.0  # independent lines between two that are found at once
 
 
-def find_orders(system: System, residual: FloatArray, joint: str) -> list[float]:
+@dataclass(frozen=True)
+class Line:
+    """One that stands out.
+
+    Attributes:
+        order: cycles a turn of the motor (of the joint, where the gear ratio is not known).
+        noise: power of a sample's noise as this line sees it, N^2 m^2 or N^2.
+    """
+
+    order: float
+    noise: float
+
+
+def find_orders(system: System, residual: FloatArray, joint: str, state: State) -> list[Line]:
     """Orders whose line stands out of its neighbourhood, the strongest first.
 
-    The residual, band and above together, is held against exp(i order angle) for all orders that
-    the record's speed and rate allow. Its local median tells what no ripple would leave; a line
-    must be above that by more than chance makes of so many.
+    The residual of each record, band and above together, is held against exp(i order angle) for
+    all orders that its travel, speed and rate allow. A line's power over the median of its
+    neighbours tells how likely noise makes it; records, each against its own noise, are put
+    together by Fisher's rule. A line must be less likely than one in ten thousand searches, in one
+    record or in all together.
 
     Args:
         system: the training equations.
         residual: (rows,).
         joint: whose torque.
-
-    Returns:
-        cycles a turn of the motor (of the joint, where the gear ratio is not known).
+        state: whose delays say where the joint was when a torque was made; what is left close to
+            one of its ripples is that ripple's size changing, and no line of its own.
     """
-    pieces = _pieces(system, residual, joint)
-    if not pieces:
+    spectrum = order_spectrum(system, residual, joint, state)
+    if spectrum is None:
         return []
-    ratio = system.predictors[0].nominal.gear_ratio[joint]
-    travel = max(float(np.ptp(angle)) for angle, _ in pieces)
-    rates = [s.rate for s in system.logs]
-    fastest = max(float(np.abs(np.diff(angle)).max()) * min(rates) for angle, _ in pieces)
-    highest = 2.0 * np.pi * _FASTEST * min(rates) / fastest
-    step = 0.25 * 2.0 * np.pi / travel
-    lowest = 6.0 * np.pi / travel  # three periods in the record
-    if travel == 0.0 or highest <= lowest + 50 * step:
-        return []
-    orders, power = _spectrum(pieces, lowest, highest, step)
-    return [_finer(pieces, orders[i], step) / ratio for i in _peaks(power)]
+    known = [
+        e.values["order"] for e in state.every if (e.name, e.target) == ("torque_ripple", joint)
+    ]
+    found = [_finer(spectrum, i) / spectrum.ratio for i in _peaks(spectrum, known)]
+    return [Line(order, spectrum.noise(order)) for order in found]
 
 
-def _pieces(
-    system: System, residual: FloatArray, joint: str
-) -> list[tuple[FloatArray, FloatArray]]:
-    """Angle and residual of every record in which the joint moves, at the ripple's samples."""
-    pieces = []
-    for record, predictor in enumerate(system.predictors):
-        of = {s.group: s for s in system.segments if s.record == record}
-        ripple, torque = of.get((RIPPLE, joint)), of.get((TORQUE, joint))
-        if torque is None:
-            continue
-        fine = torque if ripple is None else ripple
-        values = residual[fine.rows].copy()
-        if ripple is not None:
-            values += np.interp(ripple.samples, torque.samples, residual[torque.rows])
-        pieces.append((predictor.nominal.angle[joint][fine.samples], values - values.mean()))
-    return pieces
+def _together(evidence: list[FloatArray]) -> FloatArray:
+    """(k,) of all records: the strongest alone, or all by Fisher's rule; less for having chosen."""
+    from scipy.stats import gamma
+
+    every = np.array(evidence)
+    if len(every) == 1:
+        return every[0]
+    tried = np.sum(every > 0.0, axis=0)
+    summed = -gamma.logsf(every.sum(axis=0), np.maximum(tried, 1))
+    found: FloatArray = np.maximum(every.max(axis=0), summed) - np.log(tried + 1.0)
+    return found
 
 
-def _spectrum(pieces: list[tuple[FloatArray, FloatArray]], lowest: float, highest: float,
-              step: float) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """Power at orders from lowest to highest, rad^-1: values spread over a grid of angles, FFT."""
-    spacing = _FINE / highest
-    size = 1 << int(np.ceil(np.log2(2.0 * np.pi / (step * spacing))))
-    orders = np.arange(size // 2 + 1) * (2.0 * np.pi / (size * spacing))
-    # Linear spreading is a convolution with a triangle, whose transform is sinc^2.
-    response = np.sinc(orders * spacing / (2.0 * np.pi)) ** 2
-    power = np.zeros(orders.size)
-    for angle, values in pieces:
-        place = (angle - angle.min()) / spacing
-        cell = np.floor(place).astype(np.intp)
-        part = place - cell
-        grid = np.bincount(cell, (1.0 - part) * values, size) + (
-            np.bincount(cell + 1, part * values, size)
-        )  # fmt: skip
-        scale = float(values @ values) or 1.0
-        power += np.abs(np.fft.rfft(grid[:size]) / response) ** 2 / scale
-    inside = (orders >= lowest) & (orders <= highest)
-    return orders[inside], power[inside]
+def _peaks(spectrum: Spectrum, known: Sequence[float]) -> list[int]:
+    """The lines that noise does not make, by what each is where it is clearest.
 
-
-def _power(pieces: list[tuple[FloatArray, FloatArray]], orders: FloatArray) -> FloatArray:
-    """The same at few orders, exactly."""
-    power = np.zeros(orders.size)
-    for angle, values in pieces:
-        scale = float(values @ values) or 1.0
-        power += np.abs(np.exp(-1j * np.outer(orders, angle)) @ values) ** 2 / scale
-    return power
-
-
-def _peaks(power: FloatArray) -> list[int]:
-    from scipy.ndimage import median_filter
-
-    width = min(_WIDTH, power.size // 2) | 1
-    level = median_filter(power, width, mode="nearest") / np.log(2.0)
-    ratio = power / np.maximum(level, 1e-300)
-    threshold = np.log(power.size / _FALSE_ALARM)
-    inner = (ratio[1:-1] >= ratio[:-2]) & (ratio[1:-1] > ratio[2:]) & (ratio[1:-1] > threshold)
-    found = np.flatnonzero(inner) + 1
+    None that another's side lobe may be, and none beside a known one.
+    """
+    evidence = _together([lines.evidence for lines in spectrum.records])
+    threshold = np.log(evidence.size / _FALSE_ALARM)
+    inner = (evidence[1:-1] >= evidence[:-2]) & (evidence[1:-1] > evidence[2:])
+    found = np.flatnonzero(inner & (evidence[1:-1] > threshold)) + 1
     kept: list[int] = []
-    for i in found[np.argsort(-ratio[found])]:
-        if all(abs(i - other) > 12 for other in kept):
+    for i in found[np.argsort(-evidence[found])]:
+        clearest = max(spectrum.records, key=lambda r: float(r.evidence[i]))
+        lines = clearest.travel / (2.0 * np.pi)  # for each rad^-1
+        away = np.abs(spectrum.orders[kept] - spectrum.orders[i]) * lines
+        beside = np.abs(np.asarray(known) * spectrum.ratio - spectrum.orders[i]) * lines
+        if np.any(away <= _APART) or np.any(beside <= _APART):
+            continue
+        lobes = [_SIDE_LOBES * clearest.power(k) / (np.pi * x) ** 2
+                 for k, x in zip(kept, away, strict=True)]  # fmt: skip
+        if clearest.power(i) > max(lobes, default=0.0):
             kept.append(int(i))
     return kept[:_MOST]
 
 
-def _finer(pieces: list[tuple[FloatArray, FloatArray]], order: float, step: float) -> float:
-    near = order + np.linspace(-step, step, 41)
-    return float(near[int(np.argmax(_power(pieces, near)))])
+def _finer(spectrum: Spectrum, peak: int) -> float:
+    """The order of a peak, between the grid's lines, rad^-1."""
+    near = spectrum.orders[peak] + spectrum.step * np.linspace(-1.0, 1.0, 41)
+    power = sum(power_at([(r.angle, r.values)], near) / r.level[peak] for r in spectrum.records)
+    return float(near[int(np.argmax(power))])

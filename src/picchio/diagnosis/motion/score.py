@@ -9,14 +9,18 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.motion.fit import Fit, correlation_length
+from picchio.diagnosis.motion.order_spectrum import Spectrum, order_spectrum
 from picchio.diagnosis.motion.state import Coordinate
 from picchio.diagnosis.motion.stretches import (
+    Stretch,
     Validated,
     confidence,
     cross_validate,
-    per_stretch,
+    stretches_of,
+    without_added,
 )
 from picchio.diagnosis.motion.system import Group, Segment, System
+from picchio.model.effects import Effect
 
 _TINY = 1e-300
 _SAME = 0.02  # of a column's power: less of its own and others do the same already
@@ -69,7 +73,9 @@ class Scorer:
         self.prior = np.array(prior)
         pull = [p * (c.centre - c.value) for p, c in zip(prior, base.coordinates, strict=True)]
         self.pull = np.array(pull)
-        self._touched: dict[int, np.ndarray] = {}
+        self._stretches: dict[int, list[Stretch]] = {}
+        self._sums: dict[int, tuple[np.ndarray, FloatArray, FloatArray]] = {}
+        self._spectra: dict[str, Spectrum | None] = {}
         # A coordinate at its bound stays there.
         self.free = np.array([
             c.lower + 1e-9 < c.value < c.upper - 1e-9 for c in base.coordinates
@@ -84,6 +90,7 @@ class Scorer:
         searched: int = 0,
         without: Sequence[int] = (),
         back: FloatArray | None = None,
+        noise: float | None = None,
     ) -> Score | None:
         """Score a candidate.
 
@@ -94,6 +101,8 @@ class Scorer:
             searched: further parameters that were searched for.
             without: coordinates of the base that are left out.
             back: (rows,) what is added to the base's residual.
+            noise: of a candidate that is a line in the spectrum: power of a sample's noise there.
+                A line is to be held against the noise beside it, not against all that is left.
 
         Returns:
             None where it does nothing in these records, or nothing that the base can't do.
@@ -107,13 +116,14 @@ class Scorer:
         # Coordinates of the base that other groups determine as well are held by those, too.
         free = self.free.copy()
         free[list(without)] = False
-        for s in kept:
-            self._touch(s)
-        index = np.flatnonzero(free & np.any([self._touched[s.rows.start] for s in kept], axis=0))
+        parts = [part for s in kept for part in self._of(s)]
+        touched_by = np.zeros(free.size, dtype=bool)
+        touched_by[np.concatenate([part.columns for part in parts])] = True
+        index = np.flatnonzero(free & touched_by)
         right = self.right if back is None else self.right + back * self.weight
-        first = per_stretch(kept, self.system.block, self.left[:, index], None, right)
-        second = per_stretch(kept, self.system.block, self.left[:, index], added, right)
-        elsewhere = self._elsewhere(groups, index, right)
+        second = [part.block(index, added, right) for part in parts]
+        first = [without_added(block, index.size) for block in second]
+        elsewhere = self._elsewhere(groups, index)
         prior, pull = self.prior[index], self.pull[index]
         base = cross_validate(first, elsewhere, prior, pull, len(index))
         wide = cross_validate(second, elsewhere, prior, pull, len(index))
@@ -130,29 +140,58 @@ class Scorer:
             left[s.rows] = right[s.rows] - self.left[s.rows][:, index] @ (
                 wide.solution[: len(index)]
             ) - added[s.rows] @ wide.solution[len(index):]  # fmt: skip
-        correlation = {g: correlation_length(self.system, left, g) for g in groups}
-        return _compare(base, wide, correlation, self.base.correlation, groups,
+        common = dict(self.base.correlation)
+        if noise is None:
+            correlation = {g: correlation_length(self.system, left, g) for g in groups}
+        else:
+            correlation = {g: noise / self.base.level[g] ** 2 for g in groups}
+            common |= correlation
+        return _compare(base, wide, correlation, common, groups,
                         columns.shape[1] + searched, tuple(float(v) for v in values),
                         admissible)  # fmt: skip
 
-    def _touch(self, s: Segment) -> None:
-        if s.rows.start not in self._touched:
-            self._touched[s.rows.start] = np.any(self.left[s.rows], axis=0)
+    def noise_of(self, effect: Effect) -> float | None:
+        """Of a ripple, the power of a sample's noise beside its line; None of others."""
+        if "order" not in effect.values:
+            return None
+        if effect.target not in self._spectra:
+            base = self.base
+            self._spectra[effect.target] = order_spectrum(
+                self.system, base.residual, effect.target, base.state
+            )
+        spectrum = self._spectra[effect.target]
+        return None if spectrum is None else spectrum.noise(effect.values["order"])
 
-    def _elsewhere(self, groups: tuple[Group, ...], index: np.ndarray,
-                   right: FloatArray) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-        """Normal equations of the other groups, for the coordinates that matter here."""
+    def _of(self, s: Segment) -> list[Stretch]:
+        if s.rows.start not in self._stretches:
+            self._stretches[s.rows.start] = stretches_of(s, self.system.block, self.left)
+        return self._stretches[s.rows.start]
+
+    def _elsewhere(self, groups: tuple[Group, ...],
+                   index: np.ndarray) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+        """Normal equations of the other groups, for the coordinates that matter here.
+
+        What is added, or added back, is nothing there.
+        """
         normal, target = np.zeros((index.size, index.size)), np.zeros(index.size)
         for s in self.system.segments:
             if s.group in groups:
                 continue
-            self._touch(s)
-            if not self._touched[s.rows.start][index].any():
-                continue
-            left = self.left[s.rows][:, index]
-            normal += left.T @ left
-            target += left.T @ right[s.rows]
+            columns, own, right = self._sum(s)
+            shared, place, here = np.intersect1d(index, columns, True, return_indices=True)
+            if shared.size:
+                normal[np.ix_(place, place)] += own[np.ix_(here, here)]
+                target[place] += right[here]
         return normal, target
+
+    def _sum(self, s: Segment) -> tuple[np.ndarray, FloatArray, FloatArray]:
+        """A segment's normal equations: columns, left and right side."""
+        if s.rows.start not in self._sums:
+            parts = self._of(s)
+            normal = sum(part.normal for part in parts)
+            right = sum(self.right[part.rows] @ part.left for part in parts)
+            self._sums[s.rows.start] = (parts[0].columns, np.asarray(normal), np.asarray(right))
+        return self._sums[s.rows.start]
 
 
 def _compare(

@@ -27,6 +27,8 @@ _TIE = 1.0
 _ALIKE = 0.9
 _ROUNDS = 12
 _NEAR = 0.05  # orders
+_WITHIN = 3.0  # standard deviations
+_TOLD_APART = 0.1  # orders: no chance hit of a whole number
 
 Scored = tuple[Score, Candidate]
 Progress = Callable[[int, int], None]
@@ -65,7 +67,7 @@ def select(
     pick = lambda names: {n: k for n, k in kinds.items() if n in names}  # noqa: E731
     ripple, elastic = pick({RIPPLE}), pick(_ELASTIC)
     slow = pick(set(kinds) - {RIPPLE, *_ELASTIC})
-    stages = [(ripple, 2), (slow, _ROUNDS), (elastic, 3), (ripple, 2)]
+    stages = [(ripple, 2), (slow, _ROUNDS), (elastic, 3), (ripple, _ROUNDS)]
     current = fit(system, start)
     steps: list[Step] = []
     for number, (pool, rounds) in enumerate(stages):
@@ -96,9 +98,31 @@ def _forward(system: System, current: Fit, pool: Mapping[str, type[Effect]],
             grown = state.with_effect(candidate.started(score.values))
             state = _take_over(system, current, grown, candidate)
         current = fit(system, state)
+        if RIPPLE in pool:
+            current = lock(system, current)
         if RIPPLE in pool and "encoder_delay" in kinds:
             current = time_by_ripple(system, current, kinds["encoder_delay"])
     return current
+
+
+def lock(system: System, current: Fit) -> Fit:
+    """The fit with orders that are whole within three standard deviations made whole.
+
+    What repeats with the motor's turn does so a whole number of times. A line that does not fit a
+    whole number (a bearing's, or that of a wave generator against its flexspline) stays where it
+    is, and so does every order where the gear ratio is not known.
+    """
+    state = current.state
+    for c, std in zip(current.coordinates, current.std, strict=True):
+        if c.name != "order" or c.index < 0:
+            continue
+        effect = state.every[c.index]
+        whole = round(c.value)
+        ratio = system.predictors[0].nominal.gear_ratio[effect.target]
+        near = abs(c.value - whole) <= _WITHIN * std <= _TOLD_APART
+        if ratio != 1.0 and whole >= 1 and near:
+            state = state.moved(c, float(whole))
+    return current if state is current.state else fit(system, state)
 
 
 def score_all(system: System, base: Fit, kinds: Mapping[str, type[Effect]]) -> list[Scored]:
@@ -107,7 +131,7 @@ def score_all(system: System, base: Fit, kinds: Mapping[str, type[Effect]]) -> l
     found = []
     for candidate in candidates(system, base, dict(kinds)):
         score = scorer.score(candidate.columns, candidate.coordinates, candidate.neutral,
-                             searched=candidate.searched)  # fmt: skip
+                             searched=candidate.searched, noise=candidate.noise)  # fmt: skip
         if score is not None:
             found.append((score, candidate))
     return sorted(found, key=lambda pair: -pair[0].rank)
@@ -196,7 +220,9 @@ def necessity(scorer: Scorer, index: int) -> Score | None:
     coordinates = [current.coordinates[i] for i in own]
     columns = current.columns[:, own]
     values = np.array([c.value for c in coordinates])
-    return scorer.score(columns, coordinates, values - part, without=own, back=columns @ part)
+    noise = scorer.noise_of(current.state.effects[index])
+    return scorer.score(columns, coordinates, values - part, without=own, back=columns @ part,
+                        noise=noise)  # fmt: skip
 
 
 def own_part(current: Fit, index: int) -> tuple[list[int], FloatArray]:

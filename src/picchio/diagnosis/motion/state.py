@@ -101,6 +101,8 @@ def effect_coordinates(effect: Effect, index: int, rate: float) -> list[Coordina
     found = []
     for p in effect.parameters:
         value, lower, upper = effect.values[p.name], p.lower, p.upper
+        if p.name == "order" and value.is_integer():
+            continue  # locked to the motor's turn: no measured order is whole to the last digit
         if (effect.name, p.name) in INVERSE:
             value, lower, upper = 1.0 / value, 1.0 / p.upper, 1.0 / p.lower
             step = 0.1

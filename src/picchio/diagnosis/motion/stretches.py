@@ -26,33 +26,73 @@ class Block:
     power: float
 
 
-def per_stretch(
-    segments: list[Segment],
-    block: np.ndarray,
-    left: FloatArray,
-    added: FloatArray | None,
-    right: FloatArray,
-) -> list[Block]:
-    """The normal equations of some segments, stretch by stretch.
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """One stretch of a segment, with the base's columns that are not nothing there.
+
+    Attributes:
+        group: of the segment.
+        number: which stretch of which record.
+        rows: of the system.
+        columns: (t,) which.
+        left: (m, t) those columns.
+        normal: (t, t) left^T left.
+    """
+
+    group: Group
+    number: int
+    rows: slice
+    columns: np.ndarray
+    left: FloatArray
+    normal: FloatArray
+
+    def block(self, index: np.ndarray, added: FloatArray, right: FloatArray) -> Block:
+        """Normal equations.
+
+        Args:
+            index: of the base's columns, ascending: those that are asked for.
+            added: (rows, c) more columns, of the whole system.
+            right: (rows,) what all shall make up, of the whole system.
+        """
+        place = np.searchsorted(index, self.columns)
+        here = (place < index.size) & (index[np.minimum(place, index.size - 1)] == self.columns) \
+            if index.size else np.zeros(self.columns.size, dtype=bool)  # fmt: skip
+        place, y, more = place[here], right[self.rows], added[self.rows]
+        size = index.size + more.shape[1]
+        normal, target = np.zeros((size, size)), np.zeros(size)
+        normal[np.ix_(place, place)] = self.normal[np.ix_(here, here)]
+        target[place] = (y @ self.left)[here]
+        if np.any(more):
+            cross = (more.T @ self.left)[:, here]
+            normal[index.size :, place] = cross
+            normal[place, index.size :] = cross.T
+            normal[index.size :, index.size :] = more.T @ more
+            target[index.size :] = y @ more
+        return Block(self.group, self.number, y.size, normal, target, float(y @ y))
+
+
+def stretches_of(s: Segment, block: np.ndarray, left: FloatArray) -> list[Stretch]:
+    """A segment's stretches.
 
     Args:
-        segments: which.
+        s: the segment.
         block: (rows,) the stretch of every row of the system.
-        left: (rows, k) columns.
-        added: (rows, c) more columns, or None.
-        right: (rows,) what they shall make up.
+        left: (rows, k) the base's columns.
     """
+    columns = np.flatnonzero(np.any(left[s.rows], axis=0))
+    touched, number = np.ascontiguousarray(left[s.rows][:, columns]), block[s.rows]
+    edges = np.flatnonzero(np.diff(number)) + 1
     found = []
-    for s in segments:
-        part = left[s.rows] if added is None else np.hstack([left[s.rows], added[s.rows]])
-        target, number = right[s.rows], block[s.rows]
-        edges = np.flatnonzero(np.diff(number)) + 1
-        starts, ends = np.append(0, edges), np.append(edges, number.size)
-        for start, end in zip(starts, ends, strict=True):
-            x, y = part[start:end], target[start:end]
-            found.append(Block(s.group, int(number[start]), end - start, x.T @ x, x.T @ y,
-                                float(y @ y)))  # fmt: skip
+    for start, end in zip(np.append(0, edges), np.append(edges, number.size), strict=True):
+        x = touched[start:end]
+        rows = slice(s.rows.start + int(start), s.rows.start + int(end))
+        found.append(Stretch(s.group, int(number[start]), rows, columns, x, x.T @ x))
     return found
+
+
+def without_added(b: Block, count: int) -> Block:
+    """A block's first `count` columns alone."""
+    return Block(b.group, b.block, b.rows, b.normal[:count, :count], b.right[:count], b.power)
 
 
 @dataclass

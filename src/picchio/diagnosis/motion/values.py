@@ -41,14 +41,16 @@ def parameters(system: System, current: Fit, effect: Effect, number: int) -> dic
     }  # fmt: skip
     found: dict[str, Value] = {}
     for p in effect.parameters:
-        if p.name not in std:
+        if p.name not in std and p.name != "order":
             continue
-        value, spread = effect.values[p.name], std[p.name]
+        # An order that is locked to the motor's turn has no spread.
+        value, spread = effect.values[p.name], std.get(p.name, 0.0)
         if (effect.name, p.name) in INVERSE:
             spread *= value**2
-        found[p.name] = Value(value, spread, unit_of(robot, effect.target, p.unit))
+        found[p.name] = Value(float(value), spread, unit_of(robot, effect.target, p.unit))
     if effect.name == "joint_stiffness" and "scale" in found:
-        documented = dict(zip(robot.flexible_names, robot.stiffness, strict=True))[effect.target]
+        stated = dict(zip(robot.flexible_names, robot.stiffness, strict=True))
+        documented = float(stated[effect.target])
         unit = "N/m" if unit_of(robot, effect.target, "rad") == "m" else "N*m/rad"
         scale = found["scale"]
         found["stiffness"] = Value(scale.value * documented, scale.std * documented, unit)

@@ -36,7 +36,7 @@ def told_causes(
             for k, unknown in enumerate(unknowns):
                 if unknown.effect == index and unknown.name == p.name:
                     std = abs(unknown.slope(vector[k])) * math.sqrt(max(covariance[k, k], 0.0))
-            values[p.name] = Value(effect.values[p.name], std * inflate, p.unit)
+            values[p.name] = Value(effect.values[p.name], std * inflate, effect.unit(p.name))
         result.append(
             Cause(
                 effect.name,

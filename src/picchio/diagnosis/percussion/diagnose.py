@@ -20,7 +20,6 @@ from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.select import (
     LEAST_GAIN,
     Search,
-    Trial,
     alternatives,
     refit,
     score,
@@ -28,12 +27,11 @@ from picchio.diagnosis.percussion.select import (
 )
 from picchio.diagnosis.percussion.unknowns import TOLERATED, Hypothesis
 from picchio.diagnosis.result import Cause, Diagnosis, Verdict
+from picchio.diagnosis.verdict_rules import MOSTLY
 from picchio.model.effects import Scales
 from picchio.prediction.noise_level import Noise
 from picchio.robot import FlexibleRobot
 
-# A cause claimed though more than noise is left must explain most of what there is.
-MOSTLY = 0.8
 BEYOND_DOUBT = 0.99
 
 
@@ -112,13 +110,17 @@ def diagnose_percussion(
         nominal = fit(problem, baseline.hypothesis, problem.records, None, iterations=3)
     before = weigh(problem, nominal.residuals)
     after = weigh(problem, whole.residuals)
+    gain = measure_gain(problem, baseline.hypothesis, found.best.hypothesis, train, kept)
     same: list[tuple[frozenset[str], float]] = []
-    rivals: list[Trial] = []
-    if whole.hypothesis.labels:
+    rivals = [
+        t
+        for t in (found.steps[0] if found.steps else [])
+        if t.finished(train) and t.fit.hypothesis.labels != whole.hypothesis.labels
+    ]
+    if whole.hypothesis.labels and (after.is_noise or _mostly(gain.explained)):
         say("looking for other causes that would do as well")
         same, rivals = alternatives(problem, found, candidates, scales, train)
     causes = told_causes(whole, found, rivals, train)
-    gain = measure_gain(problem, baseline.hypothesis, found.best.hypothesis, train, kept)
     verdict = _verdict(whole, causes, before, after, same, gain.explained)
     if any(e.name == "mains_hum" for e in whole.hypothesis.effects):
         causes = with_hum(causes, hum_lines(problem, whole))
@@ -157,6 +159,10 @@ def _chi_square(
     return float(sum((r * r).sum() for r in problem.residuals(hypothesis.effects, records)))
 
 
+def _mostly(explained: float | None) -> bool:
+    return explained is not None and explained >= MOSTLY
+
+
 def _verdict(
     whole: Fit,
     causes: Sequence[Cause],
@@ -170,7 +176,7 @@ def _verdict(
     if after.is_noise:
         return "ambiguous" if same else "named"
     sure = all(cause.confidence >= BEYOND_DOUBT for cause in causes)
-    if sure and explained is not None and explained >= MOSTLY and not same:
+    if sure and _mostly(explained) and not same:
         return "partial"
     return "unexplained"
 

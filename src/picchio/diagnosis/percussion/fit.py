@@ -113,7 +113,7 @@ def fit(
     damping = 1e-3
     slopes: list[FloatArray] | None = None
     steps: FloatArray | None = None
-    fresh, turn = False, 0
+    fresh, refined, turn = False, False, 0
     while turn < iterations and not (turn > 1 and cost > _HOPELESS * rival):
         unknowns = here.unknowns()
         if not unknowns:
@@ -148,13 +148,16 @@ def fit(
                 break
             damping *= 6.0
         if not improved:
-            if fresh:
+            if fresh and (refined or not _kinked(here)):
                 break
-            slopes = None  # carried too far
+            # Carried too far; or differences were too coarse for a motion that a kink makes rough.
+            refined = fresh
+            slopes, damping = None, 1e-3
             if near is not None:
                 turn += 1
             continue
         turn += 1
+        refined = False
         gained = cost - value
         moved = trial.vector() - vector
         foretold = -float(2.0 * gradient @ moved + moved @ normal @ moved)
@@ -171,6 +174,11 @@ def fit(
     if with_jacobian and not (fresh and slopes is not None):
         slopes = jacobian(problem, here, chosen, end, residuals, steps)
     return Fit(here, residuals, slopes if with_jacobian else None, cost, chosen, end)
+
+
+def _kinked(hypothesis: Hypothesis) -> bool:
+    """Whether a small change of an unknown may change the motion a lot."""
+    return any(effect.where == "nonlinear" for effect in hypothesis.effects)
 
 
 def _square(residuals: Sequence[FloatArray]) -> float:

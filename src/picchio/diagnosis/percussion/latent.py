@@ -22,6 +22,7 @@ LATENT = ("pulse_jitter", "missed_hits", "mains_hum")
 _SHIFT = 2e-4  # s
 _WEAKER = 0.2
 _ROUNDS = 6
+_SHARES = (1.0, 0.5, 0.25, 0.1)
 _MAINS = (50.0, 60.0)
 
 
@@ -115,11 +116,12 @@ def fit_latent(problem: Problem, start: Fit, kind: type[Effect], target: str) ->
     largest = 0.45 * start.records[0].setup.blows.interval
     for turn in range(_ROUNDS):
         current = _current(here.hypothesis, kind.name)
-        hidden = {}
+        known, wanted = {}, {}
         for record, residual, columns in zip(
             here.records, here.residuals, _columns(problem, here, kind), strict=True
         ):
             numbers = np.array(current.get(record.name, np.zeros(most[record.name])), dtype=float)
+            known[record.name] = numbers.copy()
             if columns.shape[1]:
                 numbers[1 : 1 + columns.shape[1]] += np.linalg.lstsq(
                     columns, -residual.ravel(), rcond=1e-6
@@ -128,7 +130,10 @@ def fit_latent(problem: Problem, start: Fit, kind: type[Effect], target: str) ->
                 numbers = np.clip(numbers, -largest, largest)
             else:
                 numbers = np.round(np.clip(numbers, 0.0, 1.0))
-            hidden[record.name] = tuple(numbers)
+            wanted[record.name] = numbers
+        hidden = {name: tuple(numbers) for name, numbers in wanted.items()}
+        if kind.name == "pulse_jitter":
+            hidden = _shortened(problem, here, kind, known, wanted)
         hypothesis = _with(here.hypothesis, kind, hidden)
         before = here.cost
         here = fit(problem, hypothesis, here.records, here.end, iterations=2)
@@ -146,6 +151,37 @@ def fit_latent(problem: Problem, start: Fit, kind: type[Effect], target: str) ->
         e.with_values(**value) if e.name == kind.name else e for e in here.hypothesis.effects
     )
     return replace(here, hypothesis=replace(here.hypothesis, effects=effects))
+
+
+def _shortened(
+    problem: Problem,
+    here: Fit,
+    kind: type[Effect],
+    known: dict[str, FloatArray],
+    wanted: dict[str, FloatArray],
+) -> dict[str, tuple[float, ...]]:
+    """Each record's step to what is wanted, halved until it helps that record."""
+    best = {name: tuple(numbers) for name, numbers in known.items()}
+    before = {
+        r.name: float((x * x).sum()) for r, x in zip(here.records, here.residuals, strict=True)
+    }
+    left = list(here.records)
+    for share in _SHARES:
+        trial = {
+            r.name: tuple(known[r.name] + share * (wanted[r.name] - known[r.name])) for r in left
+        }
+        effects = _with(here.hypothesis, kind, {**best, **trial}).effects
+        there = problem.residuals(effects, left, here.end)
+        worse = []
+        for record, residual in zip(left, there, strict=True):
+            if float((residual * residual).sum()) < before[record.name]:
+                best[record.name] = trial[record.name]
+            else:
+                worse.append(record)
+        left = worse
+        if not left:
+            break
+    return best
 
 
 def hidden_numbers(hypothesis: Hypothesis, n_records: int) -> float:

@@ -21,6 +21,11 @@ class BaseCompliance(Effect):
     )
     meaning = "pedestal, floor or bolts yield under the whole robot"
 
+    def unit(self, parameter: str) -> str:
+        """As of any effect; along an axis per metre, where about it per radian."""
+        unit = super().unit(parameter)
+        return unit if self.target.startswith("r") else unit.replace("N*m", "N").replace("rad", "m")
+
     def structure(self, plant: Plant) -> None:
         """Let the base's coordinate move."""
         plant.modal_share = self.values["modal_share"]

@@ -116,6 +116,10 @@ class Effect(ABC):
         """Name and target, for people."""
         return f"{self.name}:{self.target}"
 
+    def unit(self, parameter: str) -> str:
+        """The unit of a parameter at this effect's target, SI."""
+        return next(p.unit for p in self.parameters if p.name == parameter)
+
     def with_values(self, **values: float) -> Self:
         """The same effect with other values."""
         neutral = {p.name: p.neutral for p in self.parameters}
