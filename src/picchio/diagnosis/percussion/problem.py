@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -44,11 +45,20 @@ class MeasuredRecord:
     pose: int
     _cuts: dict[float, PercussionSetup] = field(default_factory=dict)
     _edges: dict[object, dict[str, BoolArray] | None] = field(default_factory=dict)
+    _fillers: dict[str, FloatArray] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
         """Its file."""
         return self.setup.name
+
+    def filler(self, channel: str) -> FloatArray:
+        """(m,) of +-1 without a pattern, always the same: in place of what is not known."""
+        if channel not in self._fillers:
+            seed = zlib.crc32(f"{self.name}/{channel}".encode())
+            signs = np.random.default_rng(seed).integers(0, 2, self.setup.samples.count)
+            self._fillers[channel] = 2.0 * signs - 1.0
+        return self._fillers[channel]
 
     def until(self, end: float | None) -> PercussionSetup:
         """The setup up to a time, s."""
@@ -185,8 +195,7 @@ def residual(record: MeasuredRecord, model: Model, end: float | None = None) -> 
             unknown = masked[kinds[name].group]
             row = np.where(unknown, 0.0, row)
             # As large as noise, lest a fit gain by moving edges towards samples it misses.
-            noise = np.where(np.arange(row.size) % 2, 1.0, -1.0)
-            out[i] = np.where(unknown, noise, record.noise[name].whiten(row))
+            out[i] = np.where(unknown, record.filler(name)[:count], record.noise[name].whiten(row))
         else:
             out[i] = record.noise[name].whiten(row)
     return out
