@@ -141,9 +141,9 @@ def test_an_injected_gain_is_told_as_a_set(robot, emps, factor):
     assert ("torque_gain", "slide") in every
 
 
-@pytest.mark.parametrize("amplitude", [0.7, 1.0, 2.0])
+@pytest.mark.parametrize("amplitude", [0.5, 0.7, 1.0, 2.0])
 def test_an_injected_ripple_is_found(robot, emps, amplitude):
-    """Down to 0.7 N of 54 N RMS."""
+    """Down to 0.5 N of 54 N RMS."""
     changed = injection.inject(emps, injection.ripple("slide", 700.0, amplitude, "motor_position"))
     found = [p for p in values(diagnose_motion(robot, changed), "torque_ripple")
              if p["order"].value < 1000.0]  # fmt: skip

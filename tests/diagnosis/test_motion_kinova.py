@@ -1,19 +1,34 @@
 """Kinova Gen3: friction per joint, and the ripple's orders, which nobody told."""
 
+import sys
+from pathlib import Path
+
 import pytest
 
 import picchio.datasets
 from picchio.diagnosis.motion import diagnose_motion
 from picchio.robot import load_robot
 
+sys.path.insert(0, str(Path(__file__).parent))
+import motion_injection as injection
+
 pytestmark = pytest.mark.slow
 JOINTS = [f"joint_{n}" for n in range(1, 8)]
 
 
 @pytest.fixture(scope="module")
-def diagnosis(measured_data):
-    campaign = picchio.datasets.load("kinova-gen3", measured_data)
-    return diagnose_motion(load_robot("kinova_gen3"), campaign)
+def kinova(measured_data):
+    return picchio.datasets.load("kinova-gen3", measured_data)
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return load_robot("kinova_gen3")
+
+
+@pytest.fixture(scope="module")
+def diagnosis(robot, kinova):
+    return diagnose_motion(robot, kinova)
 
 
 def test_every_joint_has_friction(diagnosis):
@@ -65,3 +80,39 @@ def test_gain_on_motions_of_all_joints(diagnosis):
     # Joint 2 rings at 6 Hz, inside the band, which no effect of the catalogue explains.
     assert max(parts.values()) < 1.05
     assert max(part for (_, channel), part in parts.items() if "joint_2" not in channel) < 0.75
+
+
+def labels(diagnosis):
+    return {(c.effect, c.target) for c in diagnosis.causes}
+
+
+def value(diagnosis, effect, name):
+    return next(c for c in diagnosis.causes if c.effect == effect).parameters[name].value
+
+
+def test_without_payload_in_the_catalogue_no_wrong_name(robot, kinova, diagnosis):
+    other = diagnose_motion(robot, kinova, without=["payload"])
+    assert other.verdict in ("partial", "unexplained")
+    assert other.gain.explained < diagnosis.gain.explained - 0.05
+    assert labels(other) < labels(diagnosis)
+
+
+def test_the_smallest_payload_that_is_found(robot, kinova, diagnosis, repository):
+    urdf = str(repository / "robots" / "kinova_gen3" / "robot.urdf")
+    found = diagnose_motion(robot, injection.inject(kinova, injection.payload(urdf, "tool0", 0.25)))
+    more = value(found, "payload", "mass") - value(diagnosis, "payload", "mass")
+    assert more == pytest.approx(0.25, abs=0.03)
+
+
+def test_the_smallest_delay_that_is_found(robot, kinova, diagnosis):
+    found = diagnose_motion(robot, injection.inject(kinova, injection.delay("torque", 0.001)))
+    more = value(found, "encoder_delay", "delay") - value(diagnosis, "encoder_delay", "delay")
+    assert more == pytest.approx(0.001, abs=0.05e-3)
+
+
+def test_the_smallest_ripple_that_is_found(robot, kinova):
+    """5 cycles a motor turn, 0.05 N m of 0.4 N m that shake joint 6."""
+    changed = injection.inject(kinova, injection.ripple("joint_6", 500.0, 0.05))
+    orders = [c.parameters["order"].value for c in diagnose_motion(robot, changed).causes
+              if (c.effect, c.target) == ("torque_ripple", "joint_6")]  # fmt: skip
+    assert any(order == pytest.approx(5.0, abs=0.02) for order in orders)

@@ -130,3 +130,18 @@ def test_an_injected_payload_adds_to_the_one_there(robot, kuka, diagnosis, repos
     mass = [next(c for c in d.causes if c.effect == "payload").parameters["mass"].value
             for d in (diagnosis, found)]  # fmt: skip
     assert mass[1] - mass[0] == pytest.approx(added, abs=2.0)
+
+
+def test_an_injected_ripple_is_found_beside_its_own_side_lobes(robot, kuka):
+    """300 cycles a radian, to and fro over 0.8 rad: 38 periods, in a band that shakes as much."""
+    change = injection.ripple("joint_a1", 300.0, 150.0, "motor_position")
+    found = diagnose_motion(robot, injection.inject(kuka, change))
+    ripples = [c for c in found.causes if c.effect == "torque_ripple"]
+    assert [c.target for c in ripples] == ["joint_a1"]
+    assert ripples[0].parameters["order"].value == pytest.approx(300.0, rel=0.003)
+    assert ripples[0].parameters["amplitude"].value == pytest.approx(150.0, rel=0.2)
+
+
+def test_an_injected_gain_is_told_as_a_set(robot, kuka):
+    found = diagnose_motion(robot, injection.inject(kuka, injection.gain("joint_a3", 1.3)))
+    assert ("torque_gain", "joint_a3") in {pair for each in found.alternatives for pair in each}

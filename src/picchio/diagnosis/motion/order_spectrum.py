@@ -19,6 +19,8 @@ _FEWEST_NEIGHBOURS = 16
 # The median of m lines tells their level as well as the mean of about half as many.
 _MEDIAN = 0.48
 _FEWEST = 50  # lines of the grid
+_CLEANED = 4  # lines that are taken out before the noise is told
+_CLEAR = 10.0  # evidence of such a line
 
 Piece = tuple[FloatArray, FloatArray]
 
@@ -112,11 +114,44 @@ def order_spectrum(
         orders, power = power_spectrum([piece], lowest, highest, step)
         within = (orders >= inside[0]) & (orders <= inside[1])
         if np.count_nonzero(within) > _FEWEST:
-            own = 2.0 * np.pi / max(float(np.ptp(piece[0])), 1e-12)
-            found.append(_lines(piece, power, within, own / float(orders[1] - orders[0])))
+            found.append(_cleaned(piece, orders, power, within, (lowest, highest, step)))
     if not found:
         return None
     return Spectrum(orders, tuple(found), step, system.predictors[0].nominal.gear_ratio[joint])
+
+
+def _cleaned(piece: Piece, orders: FloatArray, power: FloatArray, within: FloatArray,
+             grid: tuple[float, float, float]) -> Lines:  # fmt: skip
+    """A record's lines against the noise that is left once the strongest are taken out.
+
+    Where a joint goes to and fro, a line's own side lobes are far above the noise, and would be
+    taken for its neighbourhood's.
+    """
+    angle, left = piece
+    spacing = 2.0 * np.pi / max(float(np.ptp(angle)), 1e-12) / float(orders[1] - orders[0])
+    scale = float(left @ left) or 1.0
+    top, place = power, np.arange(orders.size)
+    lines = _lines(piece, power, top, within, spacing)
+    taken = np.zeros(orders.size, dtype=bool)
+    for _ in range(_CLEANED):
+        at = int(np.argmax(np.where(taken, 0.0, lines.evidence)))
+        if lines.evidence[at] <= _CLEAR or taken[at]:
+            break
+        taken |= np.abs(place - at) <= spacing
+        left = _without(angle, left, orders[at], grid[2])
+        power = power_spectrum([(angle, left)], *grid)[1] * (float(left @ left) / scale)
+        top = np.where(taken, np.maximum(top, power), power)
+        lines = _lines(piece, power, top, within, spacing)
+    return lines
+
+
+def _without(angle: FloatArray, values: FloatArray, order: float, step: float) -> FloatArray:
+    """The values less the wave of an order, or of one within a step of it that takes more."""
+    near = order + step * np.linspace(-1.0, 1.0, 21)
+    best = near[int(np.argmax(power_at([(angle, values)], near)))]
+    waves = np.column_stack([np.cos(best * angle), np.sin(best * angle)])
+    found: FloatArray = values - waves @ np.linalg.solve(waves.T @ waves, waves.T @ values)
+    return found
 
 
 def _pieces(system: System, residual: FloatArray, joint: str, state: State) -> list[Piece]:
@@ -181,12 +216,14 @@ def power_at(pieces: list[Piece], orders: FloatArray) -> FloatArray:
     return power
 
 
-def _lines(piece: Piece, power: FloatArray, within: FloatArray, spacing: float) -> Lines:
+def _lines(piece: Piece, power: FloatArray, top: FloatArray, within: FloatArray,
+           spacing: float) -> Lines:  # fmt: skip
     """A record's lines against its own noise.
 
     Args:
         piece: angle and residual.
-        power: (k,).
+        power: (k,) from which the noise is told.
+        top: (k,) of the lines.
         within: (k,) whether the record can tell.
         spacing: lines of the grid for each one that this record can tell apart.
     """
@@ -200,10 +237,10 @@ def _lines(piece: Piece, power: FloatArray, within: FloatArray, spacing: float) 
     known = _MEDIAN * neighbours / spacing
     level = np.maximum(level / np.log(2.0), 1e-300)
     # An exponential over a level that `known` lines tell: Fisher's F with 2 and 2 known.
-    chance = known * np.log1p(own / level / known)
+    chance = known * np.log1p(top[first : last + 1] / level / known)
     whole, evidence = np.full(power.size, np.inf), np.zeros(power.size)
     whole[first : last + 1], evidence[first : last + 1] = level, chance
-    return Lines(*piece, whole, power / whole, evidence)
+    return Lines(*piece, whole, top / whole, evidence)
 
 
 def _local_median(x: FloatArray, half: FloatArray) -> tuple[FloatArray, FloatArray]:

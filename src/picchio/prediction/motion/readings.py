@@ -147,7 +147,7 @@ class Predictor:
         """What an effect adds: filtered where it jumps."""
         name = (effect.key, key)
         if name not in self._parts:
-            if len(self._parts) > 200:
+            if len(self._parts) > 600:
                 self._parts.clear()
             motion = replace(self.nominal, body=dict(body), added=[], gains={}, delays={})
             effect.motion(motion)
