@@ -13,12 +13,15 @@ import pytest
 import trial
 
 import picchio
+from picchio.campaign import Tolerance
 from picchio.cli.main import run as command
 from picchio.diagnosis.percussion.evidence import weigh
 from picchio.diagnosis.percussion.fit import fit_growing
 from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.diagnosis.result import Gain
+from picchio.model.effects import effect_class
+from picchio.robot import load_robot
 
 ARM = "fanuc_like_3dof"
 FEW = {"robot": ARM, "snr": 40, "records": 9}
@@ -155,3 +158,17 @@ def test_with_the_true_cause_taken_out_no_other_is_named(effect):
     """The cause's whole class is taken out of the catalogue: `trial.class_of`."""
     row = trial.run(_case("left-out", effect))
     assert row["verdict"] != "named", row
+
+
+def test_a_nuisance_that_is_no_cause_any_more_stays_where_it_was():
+    """From its nominal value the fit would skip cycles, and the cause would seem to be needed."""
+    arm = load_robot("fanuc_like_3dof")
+    start = Hypothesis.baseline(arm, Tolerance(stiffness=0.05))
+    softer = effect_class("joint_stiffness")
+    for scale, back in ((0.93, 0.93), (0.7, 0.9), (1.4, 1.1)):
+        freed = start.plus(softer("joint_3", scale=scale))
+        assert freed.labels == {"joint_stiffness:joint_3"}
+        held = freed.minus("joint_stiffness:joint_3")
+        assert held.labels == frozenset()
+        values = {e.label: e.values["scale"] for e in held.effects}
+        assert values["joint_stiffness:joint_3"] == pytest.approx(back)

@@ -14,6 +14,7 @@ from picchio.diagnosis.motion.state import INVERSE, Coordinate, effect_coordinat
 from picchio.diagnosis.motion.system import System
 from picchio.model.effects import Effect, catalogue
 from picchio.model.motion import TORQUE, WINDUP
+from picchio.prediction.motion import Around
 
 _RIPPLE = "torque_ripple"
 # Where two explain the same, the first is more usual in a drive. What the data can't tell apart
@@ -102,6 +103,7 @@ def candidates(
     """
     taken = {(e.name, e.target) for e in base.state.every}
     predicted = system.measured - base.residual
+    around = system.around(base.state.every)
     found: list[Candidate] = []
     for name in sorted(kinds, key=usual):
         kind = kinds[name]
@@ -111,14 +113,14 @@ def candidates(
             if name == _RIPPLE:
                 for line in find_orders(system, base.residual, target, base.state):
                     effect = kind(target, order=line.order)
-                    made = _make(system, base, predicted, effect, {"order"})
+                    made = _make(system, base, predicted, effect, {"order"}, around)
                     found += [replace(each, noise=line.noise) for each in made]
             elif (name, target) not in taken and _NEEDS.get(name, "") in ("", *(
                 effect for effect, where in taken if where == target
             )):  # fmt: skip
                 for trial in _trials(system, kind, target):
                     effect = kind(target, **trial)
-                    found += _make(system, base, predicted, effect, set(trial))
+                    found += _make(system, base, predicted, effect, set(trial), around)
     return found
 
 
@@ -138,7 +140,7 @@ def _trials(system: System, kind: type[Effect], target: str) -> list[dict[str, f
 
 
 def _make(system: System, base: Fit, predicted: FloatArray, effect: Effect,
-          searched: set[str]) -> list[Candidate]:  # fmt: skip
+          searched: set[str], around: list[Around]) -> list[Candidate]:  # fmt: skip
     """Derivatives at nothing, by what is not searched for."""
     inverse = {p for name, p in INVERSE if name == effect.name}
     rate = system.logs[0].rate
@@ -155,7 +157,7 @@ def _make(system: System, base: Fit, predicted: FloatArray, effect: Effect,
     coordinates = [
         c for c in effect_coordinates(effect, index, rate) if c.name not in searched
     ]  # fmt: skip
-    kept, columns = jacobian(system, state, predicted, coordinates)
+    kept, columns = jacobian(system, state, predicted, coordinates, around)
     if not kept:
         return []
     return [Candidate(effect, columns, kept, np.array([c.value for c in kept]), len(searched))]

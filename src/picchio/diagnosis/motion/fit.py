@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.motion.state import Coordinate, State
 from picchio.diagnosis.motion.system import BLOCKS, Group, System
+from picchio.prediction.motion import Around
 
 _ROUNDS = 6
 _TINY = 1e-300
@@ -91,16 +93,39 @@ def finish(system: System, state: State) -> Fit:
 
 
 def jacobian(
-    system: System, state: State, predicted: FloatArray, coordinates: list[Coordinate]
+    system: System,
+    state: State,
+    predicted: FloatArray,
+    coordinates: list[Coordinate],
+    around: Sequence[Around] | None = None,
 ) -> tuple[list[Coordinate], FloatArray]:
-    """(rows, k) derivatives; coordinates that change nothing are left out."""
-    kept, columns = [], []
+    """(rows, k) derivatives; coordinates that change nothing are left out.
+
+    Args:
+        system: the equations.
+        state: where.
+        predicted: (rows,) there.
+        coordinates: the k of them.
+        around: of `System.around` there, where it is known.
+    """
+    kept: list[Coordinate] = []
+    columns: list[FloatArray] = []
+    column: FloatArray | None
+    around = system.around(state.every) if around is None else around
     for c in coordinates:
+        if c.index < 0:
+            column = system.by_scale(around, c.name)
+            if np.any(column):
+                kept.append(c)
+                columns.append(column)
+            continue
         sign = -1.0 if c.value + c.step > c.upper else 1.0
         other = state.moved(c, c.value + sign * c.step)
-        only = other.every[c.index] if c.index >= 0 else None
-        changed = system.predict(other.every, other.scales, only, predicted)
-        column = clean(system, changed - predicted) / (sign * c.step)
+        effect = other.every[c.index]
+        column = system.by_parameter(around, state.every[c.index], effect, c.name, sign * c.step)
+        if column is None:
+            changed = system.predict(other.every, other.scales, effect, predicted)
+            column = clean(system, changed - predicted) / (sign * c.step)
         if np.any(column):
             kept.append(c)
             columns.append(column)
@@ -156,6 +181,20 @@ def stable_solve(normal: FloatArray, right: FloatArray) -> FloatArray:
         pass
     found = np.linalg.lstsq(scaled, right / scale, rcond=1e-11)[0] / scale
     return found
+
+
+def stable_solves(normal: FloatArray, right: FloatArray) -> FloatArray:
+    """(n, k) `stable_solve` of n systems, (n, k, k) and (n, k)."""
+    scale = np.sqrt(np.maximum(np.diagonal(normal, axis1=1, axis2=2), _TINY))
+    scaled = normal / (scale[:, :, None] * scale[:, None, :])
+    try:
+        pivots = np.diagonal(np.linalg.cholesky(scaled), axis1=1, axis2=2)
+        if pivots.min(initial=1.0) > _PIVOT:
+            solved: FloatArray = np.linalg.solve(scaled, (right / scale)[:, :, None])[:, :, 0]
+            return solved / scale
+    except np.linalg.LinAlgError:
+        pass
+    return np.array([stable_solve(a, b) for a, b in zip(normal, right, strict=True)])
 
 
 def levels(system: System, residual: FloatArray) -> dict[Group, float]:

@@ -76,6 +76,7 @@ class Scorer:
         self._stretches: dict[int, list[Stretch]] = {}
         self._sums: dict[int, tuple[np.ndarray, FloatArray, FloatArray]] = {}
         self._spectra: dict[str, Spectrum | None] = {}
+        self._bases: dict[object, Validated] = {}
         # A coordinate at its bound stays there.
         self.free = np.array([
             c.lower + 1e-9 < c.value < c.upper - 1e-9 for c in base.coordinates
@@ -122,10 +123,15 @@ class Scorer:
         index = np.flatnonzero(free & touched_by)
         right = self.right if back is None else self.right + back * self.weight
         second = [part.block(index, added, right) for part in parts]
-        first = [without_added(block, index.size) for block in second]
         elsewhere = self._elsewhere(groups, index)
         prior, pull = self.prior[index], self.pull[index]
-        base = cross_validate(first, elsewhere, prior, pull, len(index))
+        key = (groups, index.tobytes()) if back is None and not without else None
+        base = self._bases.get(key)
+        if base is None:
+            first = [without_added(block, index.size) for block in second]
+            base = cross_validate(first, elsewhere, prior, pull, len(index))
+        if key is not None:
+            self._bases[key] = base
         wide = cross_validate(second, elsewhere, prior, pull, len(index))
         if wide.own < _SAME:
             return None

@@ -122,7 +122,7 @@ def lock(system: System, current: Fit) -> Fit:
         near = abs(c.value - whole) <= _WITHIN * std <= _TOLD_APART
         if ratio != 1.0 and whole >= 1 and near:
             state = state.moved(c, float(whole))
-    return current if state is current.state else fit(system, state)
+    return current if state is current.state else fit(system, state, rounds=2)
 
 
 def score_all(system: System, base: Fit, kinds: Mapping[str, type[Effect]]) -> list[Scored]:

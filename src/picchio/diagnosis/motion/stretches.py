@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.diagnosis.motion.fit import stable_solve
+from picchio.diagnosis.motion.fit import stable_solve, stable_solves
 from picchio.diagnosis.motion.system import Group, Segment
 
 _TINY = 1e-300
@@ -132,32 +132,30 @@ def cross_validate(
         pull: (base,) towards its centre.
         base: how many columns are not added ones.
     """
-    size = blocks[0].right.size
-    normal, right = np.zeros((size, size)), np.zeros(size)
-    normal[:base, :base] = elsewhere[0] + np.diag(prior)
-    right[:base] = elsewhere[1] + pull
-    for b in blocks:
-        normal += b.normal
-        right += b.right
+    normals = np.array([b.normal for b in blocks])
+    rights = np.array([b.right for b in blocks])
+    power = np.array([b.power for b in blocks])
+    normal, right = normals.sum(axis=0), rights.sum(axis=0)
+    normal[:base, :base] += elsewhere[0] + np.diag(prior)
+    right[:base] += elsewhere[1] + pull
     solution = stable_solve(normal, right)
+    # Every stretch is left out in turn, with all groups' equations in it.
+    numbers, stretch = np.unique([b.block for b in blocks], return_inverse=True)
+    member = (stretch == np.arange(numbers.size)[:, None]).astype(np.float64)
+    fewer = normal - np.tensordot(member, normals, 1)
+    others = stable_solves(fewer, right - member @ rights)[stretch]
+    here = _left(power, normals, rights, np.broadcast_to(solution, others.shape))
+    there = _left(power, normals, rights, others)
     inside: dict[Group, float] = {}
     rows: dict[Group, int] = {}
     outside: dict[tuple[Group, int], float] = {}
-    for b in blocks:
-        inside[b.group] = inside.get(b.group, 0.0) + left_of(b, solution)
-        rows[b.group] = rows.get(b.group, 0) + b.rows
-    for number in dict.fromkeys(b.block for b in blocks):
-        held = [b for b in blocks if b.block == number]
-        fewer, less = normal.copy(), right.copy()
-        for b in held:
-            fewer -= b.normal
-            less -= b.right
-        other = stable_solve(fewer, less)
-        for b in held:
-            outside[b.group, number] = outside.get((b.group, number), 0.0) + left_of(b, other)
     count: dict[tuple[Group, int], int] = {}
-    for b in blocks:
-        count[b.group, b.block] = count.get((b.group, b.block), 0) + b.rows
+    for b, own, foreign in zip(blocks, here.tolist(), there.tolist(), strict=True):
+        place = (b.group, b.block)
+        inside[b.group] = inside.get(b.group, 0.0) + own
+        rows[b.group] = rows.get(b.group, 0) + b.rows
+        outside[place] = outside.get(place, 0.0) + foreign
+        count[place] = count.get(place, 0) + b.rows
     return Validated(solution, inside, rows, outside, count, _own(normal, base))
 
 
@@ -171,9 +169,12 @@ def _own(normal: FloatArray, count: int) -> float:
     return float(np.max(left / np.maximum(np.diag(c), _TINY)))
 
 
-def left_of(b: Block, solution: FloatArray) -> float:
-    """Power that a solution leaves in a stretch."""
-    return max(0.0, float(b.power - 2.0 * solution @ b.right + solution @ b.normal @ solution))
+def _left(power: FloatArray, normal: FloatArray, right: FloatArray,
+          solution: FloatArray) -> FloatArray:  # fmt: skip
+    """(n,) power that solutions leave, each in its stretch."""
+    half = (normal @ solution[:, :, None])[:, :, 0] - 2.0 * right
+    found: FloatArray = np.maximum(0.0, power + np.sum(solution * half, axis=1))
+    return found
 
 
 def confidence(differences: FloatArray) -> float:

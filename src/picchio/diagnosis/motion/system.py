@@ -10,7 +10,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.model.effects import Effect
 from picchio.model.motion import RIPPLE, TORQUE, WINDUP
-from picchio.prediction.motion import Band, MotionLog, Predictor, Readings
+from picchio.prediction.motion import Around, Band, MotionLog, Predictor, Readings
 from picchio.robot import FlexibleRobot
 
 Group = tuple[str, str]  # (kind, joint)
@@ -110,6 +110,41 @@ class System:
                      WINDUP: readings[s.record].windup}[s.group[0]]  # fmt: skip
             values = found[s.group[1]][s.samples]
             out[s.rows] = values - values.mean() if s.group[0] == WINDUP else values
+        return out
+
+    def around(self, effects: Sequence[Effect]) -> list[Around]:
+        """What all effects together do to each one's term, record by record."""
+        return [predictor.around(effects) for predictor in self.predictors]
+
+    def by_scale(self, around: Sequence[Around], joint: str) -> FloatArray:
+        """(rows,) derivative by the factor on a joint's rigid-body torque."""
+        return self._rows(
+            joint, [p.by_scale(a, joint) for p, a in zip(self.predictors, around, strict=True)]
+        )
+
+    def by_parameter(
+        self, around: Sequence[Around], effect: Effect, other: Effect, name: str, step: float
+    ) -> FloatArray | None:
+        """(rows,) derivative by an effect's parameter, as `Predictor.by_parameter` has it."""
+        found: list[Readings] = []
+        for predictor, each in zip(self.predictors, around, strict=True):
+            readings = predictor.by_parameter(each, effect, other, name, step)
+            if readings is None:
+                return None
+            found.append(readings)
+        return self._rows(effect.target, found)
+
+    def _rows(self, joint: str, readings: Sequence[Readings]) -> FloatArray:
+        """(rows,) what one joint's readings are there, record by record."""
+        out = np.zeros(self.size)
+        for s in self.segments:
+            if s.group[1] != joint:
+                continue
+            found = readings[s.record]
+            series = {TORQUE: found.torque, RIPPLE: found.ripple, WINDUP: found.windup}[s.group[0]]
+            if joint in series:
+                values = series[joint][s.samples]
+                out[s.rows] = values - values.mean() if s.group[0] == WINDUP else values
         return out
 
     @staticmethod

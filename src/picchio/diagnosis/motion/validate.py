@@ -30,8 +30,8 @@ def validate(
     if len(held_out.logs) < 2:
         return current, dropped
     while current.state.effects:
-        seen = look(held_out, current)
-        gains = [gain_by_record(train, held_out, current, i, seen)
+        seen, equations = look(held_out, current), normal_equations(train, current)
+        gains = [gain_by_record(held_out, current, i, seen, equations)
                  for i in range(len(current.state.effects))]  # fmt: skip
         failing = [
             i for i, found in enumerate(gains)
@@ -58,32 +58,47 @@ def _fails(gains: dict[str, float], ripple: bool) -> bool:
     return mean <= 0.0 or worst <= (-_LITTLE if ripple else 0.0)
 
 
+def normal_equations(train: System, current: Fit) -> tuple[FloatArray, FloatArray]:
+    """(k, k) and (k,): of all training rows, weighted, for the fit's coordinates."""
+    weight = row_weights(train, current.level)
+    left = current.columns * weight[:, None]
+    return left.T @ left, left.T @ (current.residual * weight)
+
+
 def gain_by_record(
-    train: System, held_out: System, current: Fit, index: int,
-    seen: tuple[FloatArray, FloatArray],
+    held_out: System, current: Fit, index: int, seen: tuple[FloatArray, FloatArray],
+    equations: tuple[FloatArray, FloatArray],
 ) -> dict[str, float]:  # fmt: skip
     """File -> part of the power in its equations that an effect takes away, linearised.
 
     Without the effect everything else is fitted anew to the training records.
+
+    Args:
+        held_out: the equations of the records held out.
+        current: the fit to the training records.
+        index: which effect.
+        seen: of `look`.
+        equations: of `normal_equations`.
     """
     own, part = own_part(current, index)
     if not own:
         return {}
     rest = [i for i in range(len(current.coordinates)) if i not in own]
-    weight = row_weights(train, current.level)
-    left = current.columns[:, rest] * weight[:, None]
-    target = (current.residual + current.columns[:, own] @ part) * weight
+    normal, right = equations
     prior = np.array([_prior(current.coordinates[i]) for i in rest])
-    step = stable_solve(left.T @ left + np.diag(prior), left.T @ target)
+    target = right[rest] + normal[np.ix_(rest, own)] @ part
+    step = stable_solve(normal[np.ix_(rest, rest)] + np.diag(prior), target)
+    change = np.zeros(len(current.coordinates))
+    change[own], change[rest] = part, -step
     columns, residual = seen
-    without = residual + columns[:, own] @ part - columns[:, rest] @ step
     found: dict[str, list[float]] = {}
     scale = row_weights(held_out, {g: current.level.get(g, 1.0) for g in held_out.groups})
     for s in held_out.segments:
         if not np.any(columns[s.rows][:, own]):
             continue
+        without = residual[s.rows] + columns[s.rows] @ change
         sums = found.setdefault(held_out.logs[s.record].file, [0.0, 0.0])
-        sums[0] += float(np.sum((without[s.rows] * scale[s.rows]) ** 2))
+        sums[0] += float(np.sum((without * scale[s.rows]) ** 2))
         sums[1] += float(np.sum((residual[s.rows] * scale[s.rows]) ** 2))
     return {file: (a - b) / max(a, 1e-300) for file, (a, b) in found.items()}
 

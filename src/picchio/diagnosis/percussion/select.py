@@ -22,6 +22,8 @@ MOST_CAUSES = 3
 _LEAN = 6
 SHORT_LIST = 7
 LONG_FITS = 3
+# A fit gains more than its screening promises, but hardly three times as much.
+_SHORT = 0.3
 # Fall of BIC below which nothing is claimed: with a hundred candidates tried, chance alone
 # reaches it in less than one of a thousand campaigns.
 LEAST_GAIN = 8.0
@@ -110,7 +112,7 @@ def search(
         say(f"looking for cause {number + 1}")
         quiet = found.evidence.is_noise
         trials = try_candidates(
-            problem, here.hypothesis, candidates, scales, records, found, whole=quiet
+            problem, here.hypothesis, candidates, scales, records, found, whole=quiet, least=least
         )
         if not trials:
             break
@@ -138,11 +140,12 @@ def try_candidates(
     short_list: int = SHORT_LIST,
     long_fits: int = LONG_FITS,
     whole: bool = False,
+    least: float = 0.0,
 ) -> list[Trial]:
     """Screen all candidates, fit the best on growing windows; the best first.
 
     Where plenty is left to explain, the first part of a part of the records screens as well;
-    `whole` takes all there is, and stops where no candidate promises anything.
+    `whole` takes all there is, and stops where no candidate promises anything near `least`.
     """
     some = list(records) if whole else spread_out(records)
     window = None if whole else SCREEN_WINDOW
@@ -154,7 +157,8 @@ def try_candidates(
         )
     logarithm = math.log(max(start.samples, 2))
     if whole:
-        suspects = [s for s in suspects if s.gain - s.numbers * logarithm > -logarithm]
+        enough = max(-logarithm, _SHORT * least)
+        suspects = [s for s in suspects if s.gain - s.numbers * logarithm > enough]
         promising = [s.gain - min(s.numbers, 2) * logarithm > 0.0 for s in suspects]
         if not any(promising):
             return []

@@ -131,10 +131,10 @@ class Hypothesis:
         return replace(self, effects=(*self.effects, effect), scales=self.scales + own)
 
     def minus(self, label: str) -> Hypothesis:
-        """Without one of the causes."""
+        """Without one of the causes; a nuisance that was freed goes back into its tolerance."""
         if label in self.freed:
             effects = tuple(
-                effect.with_values(scale=1.0) if effect.label == label else effect
+                self._tolerated(effect) if effect.label == label else effect
                 for effect in self.effects
             )
             return replace(self, effects=effects, freed=self.freed - {label})
@@ -142,6 +142,15 @@ class Hypothesis:
             e for i, e in enumerate(self.effects) if i < self.n_nuisances or e.label != label
         )
         return replace(self, effects=kept)
+
+    def _tolerated(self, nuisance: Effect) -> Effect:
+        """At the tolerated value nearest to where it is: a jump from there would skip cycles."""
+        lower, upper = self._tolerance(nuisance)
+        return nuisance.with_values(scale=min(max(nuisance.values["scale"], lower), upper))
+
+    def _tolerance(self, nuisance: Effect) -> tuple[float, float]:
+        sigma = getattr(self.tolerance, NUISANCE_KEYS[nuisance.name])
+        return max(1.0 - TOLERATED * sigma, 0.05), 1.0 + TOLERATED * sigma
 
     def unknowns(self) -> list[Unknown]:
         """What the fit may move."""
@@ -159,8 +168,7 @@ class Hypothesis:
                     if sigma == 0.0:
                         continue
                     if effect.label not in self.freed:
-                        lower = max(1.0 - TOLERATED * sigma, 0.05)
-                        upper = 1.0 + TOLERATED * sigma
+                        lower, upper = self._tolerance(effect)
                         prior = (0.0, sigma)
                 scale = scales.get(f"{effect.label}.{p.name}", 1.0)
                 if p.logarithmic:

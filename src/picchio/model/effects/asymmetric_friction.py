@@ -20,6 +20,7 @@ class AsymmetricFriction(Effect):
         parameter("coefficient", "N*m*s/rad", lower=-1e7, upper=1e7,
                   meaning="viscous: half of (forwards less backwards)"),
     )  # fmt: skip
+    linear = ("torque", "coefficient")
     meaning = "gear and seals resist more in one direction than in the other"
     source = "Janot, Gautier, Brunot, EMPS benchmark, 2019"
 

@@ -21,6 +21,7 @@ class CoulombFriction(Effect):
         ),
         parameter("smoothing", "rad/s", lower=0.0, upper=5e-3, meaning="rate below which it fades"),
     )
+    linear = ("torque",)
     meaning = "dry friction between link and motor side"
 
     def structure(self, plant: Plant) -> None:

@@ -19,6 +19,7 @@ class JointInertia(Effect):
             "inertia", "kg*m^2", lower=-1e4, upper=1e5, meaning="added inertia about the joint"
         ),
     )
+    linear = ("inertia",)
     meaning = "something unmodelled turns with the joint's link side"
 
     def structure(self, plant: Plant) -> None:

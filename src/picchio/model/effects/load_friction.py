@@ -17,6 +17,7 @@ class LoadFriction(Effect):
     parameters = (
         parameter("coefficient", lower=0.0, upper=1.0, meaning="friction over transmitted torque"),
     )
+    linear = ("coefficient",)
     meaning = "teeth and bearings rub more under load: the gear's efficiency"
     source = "Hamon, Gautier, Garrec, IROS 2010"
 

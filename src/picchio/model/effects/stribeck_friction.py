@@ -19,6 +19,7 @@ class StribeckFriction(Effect):
         parameter("velocity", "rad/s", neutral=0.01, lower=1e-7, upper=1e3, log=True,
                   meaning="where it has fallen to 37 %"),
     )  # fmt: skip
+    linear = ("torque",)
     meaning = "the lubricant's film builds up with speed: friction falls first"
     source = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994"
 

@@ -15,6 +15,7 @@ class TorqueOffset(Effect):
     where = "motion"
     target_kind = "joint"
     parameters = (parameter("torque", "N*m", lower=-1e6, upper=1e6, meaning="added"),)
+    linear = ("torque",)
     meaning = "the current sensor's zero is off, or a constant load pulls at the joint"
 
     def motion(self, motion: Motion) -> None:

@@ -22,6 +22,7 @@ class TorqueRipple(Effect):
         parameter("cosine", "N*m", lower=-1e6, upper=1e6, meaning="amplitude at angle zero"),
         parameter("sine", "N*m", lower=-1e6, upper=1e6, meaning="a quarter period later"),
     )
+    linear = ("cosine", "sine")
     meaning = "magnets, slots, bearings or the wave generator pulse once or several times a turn"
     source = "Tuttle, Seering, IEEE Trans. Robotics and Automation 12(3), 1996"
 

@@ -15,6 +15,7 @@ class ViscousFriction(Effect):
     parameters = (
         parameter("coefficient", "N*m*s/rad", lower=0.0, upper=1e7, meaning="torque over velocity"),
     )
+    linear = ("coefficient",)
     meaning = "lubricant and seals resist in proportion to the speed"
     source = "Swevers, Verdonck, De Schutter, IEEE Control Systems 27(5), 2007"
 

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.model.effects import Effect
-from picchio.model.motion import RIPPLE, ROTOR, TORQUE, WINDUP
+from picchio.model.motion import RIPPLE, ROTOR, TORQUE, WINDUP, Motion
 from picchio.prediction.motion.filters import Band
 from picchio.prediction.motion.log import MotionLog
 from picchio.prediction.motion.rigid import rigid_motion
 from picchio.robot import FlexibleRobot
 
 _TAPS = 8
-Parts = list[tuple[str, str, FloatArray]]
+_KEPT = 400
+Part = tuple[str, str, FloatArray]
+Parts = list[Part]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +36,32 @@ class Readings:
     windup: dict[str, FloatArray]
 
 
+@dataclass(frozen=True, eq=False)
+class Around:
+    """What all effects together do to each one's own term.
+
+    Attributes:
+        body: joint -> torque that the bodies take, N m.
+        key: what the body torque follows from.
+        gains: joint -> factor on what its drive reports.
+        delays: channel group -> s.
+    """
+
+    body: Mapping[str, FloatArray]
+    key: Hashable
+    gains: Mapping[str, float]
+    delays: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class _Term:
+    """What one effect adds: (kind, joint, values), filtered where it jumps; gains; delays."""
+
+    parts: Parts
+    gains: Mapping[str, float]
+    delays: Mapping[str, float]
+
+
 class Predictor:
     """Predicts one record again and again while effects change; terms are kept.
 
@@ -47,11 +75,12 @@ class Predictor:
         self.log, self.band = log, band
         self.nominal = rigid_motion(robot, log, band)
         self._moving = frozenset(log.moving)
-        self._parts: dict[object, tuple[Parts, dict[str, float], dict[str, float]]] = {}
+        self._terms: dict[Hashable, _Term] = {}
+        self._heavy: dict[type[Effect], bool] = {}
 
     def body(self, effects: Sequence[Effect]) -> dict[str, FloatArray]:
         """Joint -> torque that the bodies take, with the effects that add masses, N m."""
-        motion = replace(self.nominal, body=dict(self.nominal.body), added=[], gains={}, delays={})
+        motion = self._motion(self.nominal.body)
         for effect in effects:
             if self.concerns(effect):
                 effect.motion(motion)
@@ -60,6 +89,23 @@ class Predictor:
     def concerns(self, effect: Effect) -> bool:
         """Whether the effect can show in this record: a joint that stands tells nothing."""
         return effect.target_kind != "joint" or effect.target in self._moving
+
+    def around(self, effects: Sequence[Effect]) -> Around:
+        """What these effects do to the terms of each."""
+        heavy = [e for e in effects if self._is_body(e)]
+        body = self.body(heavy) if heavy else self.nominal.body
+        key = tuple(e.key for e in heavy)
+        gains: dict[str, float] = {}
+        delays: dict[str, float] = {}
+        for effect in effects:
+            if effect.linear or not self.concerns(effect):
+                continue
+            term = self._of(effect, body, key)
+            for name, gain in term.gains.items():
+                gains[name] = gains.get(name, 1.0) * gain
+            for group, delay in term.delays.items():
+                delays[group] = delays.get(group, 0.0) + delay
+        return Around(body, key, gains, delays)
 
     def predict(
         self,
@@ -74,96 +120,162 @@ class Predictor:
             scales: joint -> factor on the nominal rigid-body torque; 1 where left out.
             joint: only this one's readings are asked for.
         """
-        heavy = [e for e in effects if self._is_body(e)]
-        body = self.body(heavy) if heavy else self.nominal.body
-        key = tuple(e.key for e in heavy)
+        around = self.around(effects)
         torque = {}
         for name, nominal in self.nominal.body.items():
             if joint in (None, name):
                 factor = 1.0 if scales is None else scales.get(name, 1.0)
-                torque[name] = body[name] + (factor - 1.0) * nominal
+                torque[name] = around.body[name] + (factor - 1.0) * nominal
         ripple = {name: np.zeros(self.log.samples) for name in torque}
         windup = {name: np.zeros(self.log.samples) for name in self.log.link if name in torque}
-        gains: dict[str, float] = {}
-        delays: dict[str, float] = {}
+        found = Readings(torque, ripple, windup)
         for effect in effects:
-            if not self.concerns(effect) or (
-                joint is not None and effect.target_kind == "joint" and effect.target != joint
+            if self.concerns(effect) and (
+                joint is None or effect.target_kind != "joint" or effect.target == joint
             ):
-                continue
-            parts, own_gains, own_delays = self._of(effect, body, key)
-            for kind, name, values in parts:
-                target = {TORQUE: torque, RIPPLE: ripple, WINDUP: windup}[kind]
-                if name in target:
-                    target[name] = target[name] + values
-            for name, gain in own_gains.items():
-                gains[name] = gains.get(name, 1.0) * gain
-            for group, delay in own_delays.items():
-                delays[group] = delays.get(group, 0.0) + delay
-        for name, gain in gains.items():
-            if name in torque:
-                torque[name], ripple[name] = gain * torque[name], gain * ripple[name]
-        self._delay(torque, ripple, windup, delays)
-        return Readings(torque, ripple, windup)
+                for factor, part in self._parts(effect, around):
+                    _add(found, part, factor)
+        self._report(found, around)
+        for name in windup:
+            late = around.delays.get("position", 0.0) - around.delays.get("motor_position", 0.0)
+            if late:
+                motor = self.log.angle[name]
+                windup[name] = windup[name] + shift_smooth(motor, late * self.log.rate) - motor
+        return found
 
-    def _delay(self, torque: dict[str, FloatArray], ripple: dict[str, FloatArray],
-               windup: dict[str, FloatArray], delays: Mapping[str, float]) -> None:  # fmt: skip
-        """Times at which things were stamped.
+    def by_scale(self, around: Around, joint: str) -> Readings:
+        """Derivative of the readings by the factor on a joint's rigid-body torque."""
+        found = Readings({joint: self.nominal.body[joint]}, {}, {})
+        self._report(found, around)
+        return found
+
+    def by_parameter(
+        self, around: Around, effect: Effect, other: Effect, name: str, step: float
+    ) -> Readings | None:
+        """Derivative of the readings by one parameter of an effect on a joint.
+
+        Args:
+            around: all effects, this one among them or not.
+            effect: as it is.
+            other: the same with that parameter moved.
+            name: the parameter.
+            step: by which it was moved (in the coordinate of the derivative).
+
+        Returns:
+            None where the effect acts through others' terms, too (masses, gains, delays): the
+            whole prediction has to be made twice.
+        """
+        if effect.target_kind != "joint":
+            return None
+        found = Readings({}, {}, {})
+        if not self.concerns(effect):
+            return found
+        if name in effect.linear:
+            parts = [(1.0, part) for part in self._unit(effect, name, around)]
+        else:
+            if self._is_body(effect) or self._is_body(other):
+                return None
+            for each in () if effect.linear else (effect, other):
+                term = self._of(each, around.body, around.key)
+                if term.gains or term.delays:
+                    return None
+            parts = [(f / step, part) for f, part in self._parts(other, around)]
+            parts += [(-f / step, part) for f, part in self._parts(effect, around)]
+        for factor, part in parts:
+            _add(found, part, factor)
+        self._report(found, around)
+        return found
+
+    def _report(self, found: Readings, around: Around) -> None:
+        """What the drives report, and the times at which it was stamped; in place.
 
         Torques are predicted from measured angles: where those are late, the measured torque is
         early against its prediction.
         """
-        if not delays:
-            return
-        for joint in torque:
-            late = delays.get(TORQUE, 0.0) - delays.get(self.log.group[joint], 0.0)
-            if late:
-                torque[joint] = shift(torque[joint], late * self.log.rate)
-                ripple[joint] = shift(ripple[joint], late * self.log.rate)
-        for joint in windup:
-            late = delays.get("position", 0.0) - delays.get("motor_position", 0.0)
-            if late:
-                motor = self.log.angle[joint]
-                windup[joint] = windup[joint] + shift_smooth(motor, late * self.log.rate) - motor
+        for series in (found.torque, found.ripple):
+            for joint in series:
+                if (gain := around.gains.get(joint, 1.0)) != 1.0:
+                    series[joint] = gain * series[joint]
+                late = around.delays.get(TORQUE, 0.0)
+                late -= around.delays.get(self.log.group[joint], 0.0)
+                if late and np.any(series[joint]):
+                    series[joint] = shift(series[joint], late * self.log.rate)
+
+    def _motion(self, body: Mapping[str, FloatArray]) -> Motion:
+        return replace(self.nominal, body=dict(body), added=[], gains={}, delays={})
 
     def _is_body(self, effect: Effect) -> bool:
         """Whether the effect changes what other effects see: the load of the gears."""
-        if not self.concerns(effect):
+        if effect.linear or not self.concerns(effect):
             return False
-        known = self._parts.get(("is body", type(effect)))
-        if known is None:
-            motion = replace(self.nominal, body=dict(self.nominal.body), added=[], gains={},
-                             delays={})  # fmt: skip
+        kind = type(effect)
+        if kind not in self._heavy:
+            motion = self._motion(self.nominal.body)
             effect.motion(motion)
             changed = any(motion.body[j] is not x for j, x in self.nominal.body.items())
-            known = ([], {"body": float(changed)}, {})
-            neutral = all(effect.values[p.name] == p.neutral for p in effect.parameters)
-            if not neutral:
-                self._parts["is body", type(effect)] = known
-        return bool(known[1]["body"])
+            if all(effect.values[p.name] == p.neutral for p in effect.parameters):
+                return changed
+            self._heavy[kind] = changed
+        return self._heavy[kind]
 
-    def _of(self, effect: Effect, body: dict[str, FloatArray], key: object) -> tuple[
-            Parts, dict[str, float], dict[str, float]]:  # fmt: skip
-        """What an effect adds: filtered where it jumps."""
-        name = (effect.key, key)
-        if name not in self._parts:
-            if len(self._parts) > 600:
-                self._parts.clear()
-            motion = replace(self.nominal, body=dict(body), added=[], gains={}, delays={})
-            effect.motion(motion)
-            parts: Parts = []
-            for kind, joint, values in motion.added:
-                if kind == ROTOR:
-                    parts.append((TORQUE, joint, values))
-                elif kind == TORQUE:
-                    parts.append((TORQUE, joint, self.band.low_pass(values)))
-                elif kind == RIPPLE:
-                    slow = self.band.low_pass(values)
-                    parts += [(TORQUE, joint, slow), (RIPPLE, joint, values - slow)]
-                else:
-                    parts.append((kind, joint, values))
-            self._parts[name] = (parts, motion.gains, motion.delays)
-        return self._parts[name]
+    def _parts(self, effect: Effect, around: Around) -> list[tuple[float, Part]]:
+        """What an effect adds, each with a factor."""
+        if not effect.linear:
+            return [(1.0, part) for part in self._of(effect, around.body, around.key).parts]
+        return [
+            (effect.values[name], part) for name in effect.linear
+            if effect.values[name] != 0.0 for part in self._unit(effect, name, around)
+        ]  # fmt: skip
+
+    def _unit(self, effect: Effect, name: str, around: Around) -> Parts:
+        """What an effect adds for each unit of a parameter that it is linear in."""
+        one = effect.with_values(**{other: float(other == name) for other in effect.linear})
+        return self._of(one, around.body, around.key).parts
+
+    def _of(self, effect: Effect, body: Mapping[str, FloatArray], key: Hashable) -> _Term:
+        """An effect's own term, kept."""
+        for known in (effect.key, (effect.key, key)):
+            if known in self._terms:
+                return self._terms[known]
+        if len(self._terms) > _KEPT:
+            self._terms.clear()
+        motion = self._motion(body)
+        motion.body = loads = _Watched(motion.body)
+        effect.motion(motion)
+        parts: Parts = []
+        for kind, joint, values in motion.added:
+            if kind == ROTOR:
+                parts.append((TORQUE, joint, values))
+            elif kind == TORQUE:
+                parts.append((TORQUE, joint, self.band.low_pass(values)))
+            elif kind == RIPPLE:
+                slow = self.band.low_pass(values)
+                parts += [(TORQUE, joint, slow), (RIPPLE, joint, values - slow)]
+            else:
+                parts.append((kind, joint, values))
+        # A term that looked at no load stays when masses change.
+        term = self._terms[(effect.key, key) if loads.seen else effect.key] = _Term(
+            parts, motion.gains, motion.delays
+        )
+        return term
+
+
+class _Watched(dict[str, FloatArray]):
+    """Notes whether anything in it was looked at."""
+
+    seen = False
+
+    def __getitem__(self, joint: str) -> FloatArray:
+        self.seen = True
+        return super().__getitem__(joint)
+
+
+def _add(found: Readings, part: Part, factor: float) -> None:
+    """Add a part; of a derivative's readings, which start empty, the first is the sum."""
+    kind, joint, values = part
+    target = {TORQUE: found.torque, RIPPLE: found.ripple, WINDUP: found.windup}[kind]
+    more = values if factor == 1.0 else factor * values
+    target[joint] = target[joint] + more if joint in target else more
 
 
 def shift(series: FloatArray, late: float) -> FloatArray:
