@@ -15,6 +15,7 @@ TESTS = str(Path(__file__).resolve().parent.parent)
 if TESTS not in sys.path:
     sys.path.insert(0, TESTS)
 
+import burst  # noqa: E402
 from ablations import METHODS  # noqa: E402
 
 import picchio  # noqa: E402
@@ -89,7 +90,10 @@ def run(case, salt=0, without=(), method="diagnose"):
     robot = picchio.load_robot(case["robot"])
     began, spent = time.monotonic(), time.process_time()
     if method == "diagnose":
-        result = judge(case, truth, diagnose_percussion(robot, campaign, without=without))
+        found = diagnose_percussion(robot, campaign, without=without)
+        result = judge(case, truth, found)
+        if truth["causes"] and result["right"]:
+            result["burst"] = burst.errors(found, truth, seed_of(case, salt))
     else:
         result = judge_labels(case, truth, METHODS[method](robot, campaign))
     result["seconds"] = round(time.monotonic() - began, 1)
