@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,7 +23,6 @@ _NEAR_EDGE = 1.8e-4
 _SMEARED = 0.5
 _ON_EDGE = 1e-7
 _SMALL_JUMP = 0.05
-_WORKERS = 2
 _KEPT_EDGES = 8
 
 
@@ -118,7 +116,6 @@ class Problem:
                 hint="percussion records need pose, direction and accelerations or deflections",
             )
         self.n_poses = len(poses)
-        self._pool = ThreadPoolExecutor(_WORKERS)
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -146,7 +143,8 @@ class Problem:
             with np.errstate(all="ignore"):
                 return residual(record, model, end)
 
-        return list(self._pool.map(one, chosen))
+        # One after the other: threads would wait for the interpreter most of the time.
+        return [one(record) for record in chosen]
 
     def predictions(
         self, effects: Iterable[Effect], records: Sequence[MeasuredRecord] | None = None
@@ -154,7 +152,7 @@ class Problem:
         """What every channel would read."""
         model = self.model.with_effects(effects)
         chosen = self.records if records is None else records
-        return list(self._pool.map(lambda r: r.setup.predict(model), chosen))
+        return [record.setup.predict(model) for record in chosen]
 
 
 def _noise(
