@@ -28,7 +28,8 @@ from pathlib import Path
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "tests" / "diagnosis"))
+# Not the folder of benchmarks, which has a rainflow.py of its own.
+sys.path[0] = str(ROOT / "tests" / "diagnosis")
 ARM = "fanuc_like_3dof"
 UNNAMEABLE = {"outside": "out of the catalogue", "left-out": "true cause taken out"}
 SALT = 1  # of the seeds published in docs/; those with 0 were used while building
