@@ -15,12 +15,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import os
 import secrets
 import subprocess
 import sys
-from collections import Counter, defaultdict
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
@@ -31,7 +29,6 @@ ROOT = Path(__file__).resolve().parent.parent
 # Not the folder of benchmarks, which has a rainflow.py of its own.
 sys.path[0] = str(ROOT / "tests" / "diagnosis")
 ARM = "fanuc_like_3dof"
-UNNAMEABLE = {"outside": "out of the catalogue", "left-out": "true cause taken out"}
 SALT = 1  # of the seeds published in docs/; those with 0 were used while building
 
 
@@ -60,84 +57,6 @@ def cases(draws):
                 yield {"robot": robot, "kind": "null", "snr": 40, "draw": 10 * draw + n}
             for n in range(3):
                 yield {"robot": robot, "kind": "single", "snr": 40, "draw": 3 * draw + n}
-
-
-def summary(rows):
-    """The tables of docs/diagnosis.md."""
-    skipped = Counter(row["verdict"] for row in rows if row["verdict"].startswith("not "))
-    rows = [row for row in rows if not row["verdict"].startswith("not ")]
-    kinds = defaultdict(list)
-    for row in rows:
-        kinds[(row["robot"], row["kind"], row["snr"])].append(row)
-    print(f"{'robot':<18}{'kind':<10}{'SNR':>4}{'cases':>7}{'right':>9}  verdicts")
-    for (robot, kind, snr), found in sorted(kinds.items()):
-        right = sum(row["right"] for row in found)
-        verdicts = dict(Counter(row["verdict"] for row in found))
-        share = f"{right}/{len(found)}" if kind not in UNNAMEABLE else "-"
-        print(f"{robot:<18}{kind:<10}{snr:>4}{len(found):>7}{share:>9}  {verdicts}")
-    if skipped:
-        print(f"left aside: {dict(skipped)}")
-    nulls = [row for row in rows if row["kind"] == "null"]
-    if nulls:
-        alarms = sum(row["verdict"] != "nothing-wrong" for row in nulls)
-        bound = upper_bound(alarms, len(nulls))
-        print(f"\nfalse alarms: {alarms} in {len(nulls)}; rate below {100 * bound:.2g} % (95 %)")
-    for kind, what in UNNAMEABLE.items():
-        found = [row for row in rows if row["kind"] == kind]
-        if found:
-            named = sum(row["verdict"] == "named" for row in found)
-            print(f"{what}: {named} of {len(found)} named wrongly")
-    for kind in ("single", "pair", "triple", "weak"):
-        found = [row for row in rows if row["kind"] == kind]
-        wrong = [row for row in found if row["verdict"] == "named" and not row["right"]]
-        if found:
-            print(f"{kind}: {len(wrong)} of {len(found)} named, but not (or not only) what it was")
-    errors = [
-        e for row in rows if row["right"] and row["snr"] == 40 for e in row["errors"].values()
-    ]
-    if errors:
-        size = sorted(abs(e[0]) for e in errors)
-        print(
-            f"parameters at 40 dB: {len(size)}, median error {100 * size[len(size) // 2]:.2g} %, "
-            f"95th percentile {100 * size[int(0.95 * len(size))]:.2g} %"
-        )
-        pulls = [e[1] for e in errors if math.isfinite(e[1])]
-        inside = sum(p <= 1.96 for p in pulls)
-        print(f"95 % intervals cover {inside} of {len(pulls)}")
-    for snr in (40, 20):
-        gains = sorted(
-            row["explained"] for row in rows
-            if row["right"] and row["snr"] == snr and row["truth"] and row.get("explained")
-        )  # fmt: skip
-        if gains:
-            print(
-                f"held-out excess explained at {snr} dB: median {gains[len(gains) // 2]:.4f}, "
-                f"lowest {gains[0]:.4f}, of {len(gains)}"
-            )
-    times = sorted(row["cpu_seconds"] for row in rows if row["robot"] == ARM and row["truth"])
-    if times:
-        print(
-            f"CPU time a data set with a cause ({ARM}): median {times[len(times) // 2]:.0f} s, "
-            f"95th percentile {times[int(0.95 * len(times))]:.0f} s"
-        )
-    effects = defaultdict(list)
-    for row in rows:
-        if row["kind"] == "single" and row["robot"] == ARM and row["truth"]:
-            effects[row["truth"][0][0]].append(row["right"])
-    for effect, found in sorted(effects.items()):
-        if not all(found):
-            print(f"  {effect}: {sum(found)} of {len(found)}")
-    for row in rows:
-        wrong = row["verdict"] == "named" if row["kind"] in UNNAMEABLE else not row["right"]
-        if wrong:
-            print("wrong:", row["case"], row["truth"], "->", row["verdict"], row["claimed"])
-
-
-def upper_bound(events, cases):
-    """Of a rate, 95 %, one-sided (Clopper and Pearson)."""
-    from scipy.stats import beta
-
-    return float(beta.ppf(0.95, events + 1, cases - events)) if events < cases else 1.0
 
 
 def one(case, salt, method="diagnose"):
@@ -201,7 +120,9 @@ def main():
                 rows.append(row)
                 note = (row["case"], row["verdict"], row["claimed"])
                 print(f"{number}/{len(todo)}", *note, file=sys.stderr)
-    summary(rows)
+    import trial_tables
+
+    trial_tables.summary(rows)
 
 
 if __name__ == "__main__":

@@ -90,7 +90,7 @@ def run(case, salt=0, without=(), method="diagnose"):
     robot = picchio.load_robot(case["robot"])
     began, spent = time.monotonic(), time.process_time()
     if method == "diagnose":
-        found = diagnose_percussion(robot, campaign, without=without)
+        found = diagnose_percussion(robot, campaign, without=without, workers=1)
         result = judge(case, truth, found)
         if truth["causes"] and result["right"]:
             result["burst"] = burst.errors(found, truth, seed_of(case, salt))

@@ -20,7 +20,8 @@ from picchio.diagnosis.percussion.evidence import weigh
 from picchio.diagnosis.percussion.fit import fit, fit_growing
 from picchio.diagnosis.percussion.gain import held_out, measure_gain
 from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.select import Search, Trial, score
+from picchio.diagnosis.percussion.select import Search
+from picchio.diagnosis.percussion.trials import Trial, score
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.diagnosis.result import Cause, Diagnosis, Value
 from picchio.model.effects import effect_class

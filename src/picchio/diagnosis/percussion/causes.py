@@ -9,7 +9,8 @@ import numpy as np
 
 from picchio.diagnosis.percussion.fit import Fit
 from picchio.diagnosis.percussion.problem import MeasuredRecord
-from picchio.diagnosis.percussion.select import LEAST_GAIN, Search, Trial, score
+from picchio.diagnosis.percussion.select import LEAST_GAIN, Search
+from picchio.diagnosis.percussion.trials import Trial, score
 from picchio.diagnosis.percussion.unknowns import NUISANCE_KEYS, Hypothesis
 from picchio.diagnosis.result import Cause, Value
 from picchio.model import Effect

@@ -22,9 +22,9 @@ from picchio.diagnosis.percussion.select import (
     Search,
     alternatives,
     refit,
-    score,
     search,
 )
+from picchio.diagnosis.percussion.trials import score
 from picchio.diagnosis.percussion.unknowns import TOLERATED, Hypothesis
 from picchio.diagnosis.result import Cause, Diagnosis, Verdict
 from picchio.diagnosis.verdict_rules import MOSTLY
@@ -66,6 +66,7 @@ def diagnose_percussion(
     without: Iterable[str] = (),
     noise: Mapping[str, Noise] | None = None,
     gravity_stiffness: bool = True,
+    workers: int | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> PercussionDiagnosis:
     """What the simulation of these percussion records gets wrong, and why.
@@ -76,6 +77,7 @@ def diagnose_percussion(
         without: names of effects that must not be considered.
         noise: channel -> noise; estimated where None.
         gravity_stiffness: whether gravity's change with the deflection counts.
+        workers: processes (Linux only); as many as cores where None. The result is the same.
         progress: told what is being done.
 
     Raises:
@@ -83,7 +85,7 @@ def diagnose_percussion(
     """
     say = progress or (lambda text: None)
     say("reading the records and their noise")
-    problem = Problem(robot, campaign, noise, gravity_stiffness=gravity_stiffness)
+    problem = Problem(robot, campaign, noise, gravity_stiffness=gravity_stiffness, workers=workers)
     train, kept = held_out(problem)
     start = Hypothesis.baseline(robot, campaign.tolerance)
     say("fitting the nominal model within its tolerance")

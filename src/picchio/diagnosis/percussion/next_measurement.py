@@ -12,7 +12,7 @@ from picchio.campaign import parse_channel
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.fit import Fit
 from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.select import Trial
+from picchio.diagnosis.percussion.trials import Trial
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model.geometry import Geometry
 from picchio.prediction.percussion import PercussionSetup

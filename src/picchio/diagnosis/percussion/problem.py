@@ -75,6 +75,7 @@ class Problem:
         campaign: the records.
         noise: channel -> noise; estimated from the campaign where None.
         gravity_stiffness: whether gravity's change with the deflection counts.
+        workers: processes for what is independent; as many as cores where None.
 
     Raises:
         InputError: no percussion record, or none with a channel that can be predicted.
@@ -87,7 +88,9 @@ class Problem:
         noise: Mapping[str, Noise] | None = None,
         *,
         gravity_stiffness: bool = True,
+        workers: int | None = 1,
     ) -> None:
+        self.workers = workers
         self.robot, self.campaign = robot, campaign
         self.model = Model(robot, gravity_stiffness)
         setups = percussion_setups(robot, campaign)

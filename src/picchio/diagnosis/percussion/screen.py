@@ -76,38 +76,36 @@ def flat(parts: Sequence[FloatArray]) -> FloatArray:
     return np.concatenate([part.ravel() for part in parts])
 
 
-def screen(
-    problem: Problem,
-    fit: Fit,
-    candidates: Iterable[tuple[type[Effect], str]],
-    scales: Scales,
-) -> list[Suspect]:
-    """Every candidate's promise, the largest first.
+class Screen:
+    """Tells every candidate's promise.
 
     Args:
         problem: data and noise.
         fit: of what is known so far, with its Jacobian; the same records and time are used.
-        candidates: effects and targets.
         scales: sizes that matter.
     """
-    project = Projector(fit)
-    left = project(flat(fit.residuals))
-    known = fit.hypothesis
-    found = []
-    for kind, target in candidates:
-        label = f"{kind.name}:{target}"
-        if label in known.labels:
-            continue
+
+    def __init__(self, problem: Problem, fit: Fit, scales: Scales) -> None:
+        self.problem, self.fit, self.scales = problem, fit, scales
+        self.project = Projector(fit)
+        self.left = self.project(flat(fit.residuals))
+
+    def suspect(self, candidate: tuple[type[Effect], str]) -> Suspect | None:
+        """What an effect at a target promises; None where it can't act, or is known already."""
+        kind, target = candidate
+        if f"{kind.name}:{target}" in self.fit.hypothesis.labels:
+            return None
         if kind.name in LATENT:
-            found.append(latent_gain(problem, fit, kind, target, project, left))
-            continue
-        if kind.discrete and fit.end is None:
-            continue  # what has no small size would have been seen before
-        trials = [kind(target, **values) for values in kind(target).trials(scales)]
-        suspect = _suspect(problem, fit, trials, project, left)
-        if suspect is not None:
-            found.append(suspect)
-    return sorted(found, key=lambda s: -(s.gain - s.numbers * math.log(left.size)))
+            return latent_gain(self.problem, self.fit, kind, target, self.project, self.left)
+        if kind.discrete and self.fit.end is None:
+            return None  # what has no small size would have been seen before
+        trials = [kind(target, **values) for values in kind(target).trials(self.scales)]
+        return _suspect(self.problem, self.fit, trials, self.project, self.left)
+
+    def ranked(self, suspects: Iterable[Suspect | None]) -> list[Suspect]:
+        """The most promising first."""
+        found = [s for s in suspects if s is not None]
+        return sorted(found, key=lambda s: -(s.gain - s.numbers * math.log(self.left.size)))
 
 
 def _suspect(

@@ -1,0 +1,217 @@
+"""One round: screen all candidates, fit the most promising, rank them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.fit import Fit, fit, fit_growing
+from picchio.diagnosis.percussion.helpers import Helpers
+from picchio.diagnosis.percussion.latent import fit_latent, hidden_numbers
+from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.screen import Screen, Suspect
+from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.model import Effect
+from picchio.model.effects import Scales
+
+SCREEN_WINDOW = 0.3
+_LEAN = 6
+SHORT_LIST = 7
+LONG_FITS = 3
+# A fit gains more than its screening promises, but hardly three times as much.
+_SHORT = 0.3
+# Sets whose BIC is within this cannot be told apart.
+SAME = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One candidate fitted."""
+
+    label: str
+    fit: Fit
+    score: float
+    promise: float
+
+    def finished(self, records: Sequence[MeasuredRecord]) -> bool:
+        """Whether it was fitted to all of these records."""
+        return len(self.fit.records) == len(records)
+
+
+def score(found: Fit) -> float:
+    """BIC: chi-square and priors, plus ln(samples) for every number the causes hold."""
+    causes = found.hypothesis.causes
+    numbers = sum(_numbers(effect) for effect in causes)
+    numbers_hidden = hidden_numbers(found.hypothesis, len(found.records))
+    return found.cost + (numbers + numbers_hidden) * math.log(max(found.samples, 2))
+
+
+def _numbers(effect: Effect) -> int:
+    if effect.latent is not None:
+        return 1
+    if effect.discrete:
+        return 1
+    return len(effect.parameters)
+
+
+def try_candidates(
+    problem: Problem,
+    known: Hypothesis,
+    candidates: Iterable[tuple[type[Effect], str]],
+    scales: Scales,
+    records: Sequence[MeasuredRecord],
+    *,
+    short_list: int = SHORT_LIST,
+    long_fits: int = LONG_FITS,
+    whole: bool = False,
+    least: float = 0.0,
+    log: Callable[[dict[str, Any]], None] | None = None,
+) -> list[Trial]:
+    """Screen all candidates, fit the best on growing windows; the best first.
+
+    Where plenty is left to explain, the first part of a part of the records screens as well;
+    `whole` takes all there is, and stops where no candidate promises anything near `least`.
+    """
+    some = list(records) if whole else spread_out(records)
+    window = None if whole else SCREEN_WINDOW
+    start = fit(problem, known, some, window, iterations=4, with_jacobian=True)
+    look = Screen(problem, start, scales)
+
+    def short_fit(effect: Effect) -> Fit | None:
+        return _light(_fit_short(problem, start, effect, some, window))
+
+    def long_fit(task: tuple[Hypothesis, Effect, float]) -> Fit | None:
+        return _light(_fit_long(problem, *task, records))
+
+    functions: dict[str, Callable[[Any], Any]]
+    functions = {"screen": look.suspect, "short": short_fit, "long": long_fit}
+    with Helpers(problem.workers, functions) as helpers:
+        suspects = look.ranked(helpers.map("screen", candidates))
+        logarithm = math.log(max(start.samples, 2))
+        if log is not None:
+            log({s.label: s.gain - s.numbers * logarithm for s in suspects})
+        if whole:
+            enough = max(-logarithm, _SHORT * least)
+            suspects = [s for s in suspects if s.gain - s.numbers * logarithm > enough]
+            if not any(s.gain - min(s.numbers, 2) * logarithm > 0.0 for s in suspects):
+                return []
+        chosen = _short_list(suspects, short_list)
+        tried = [(suspect, effect) for suspect in chosen for effect in suspect.starts]
+        fits = helpers.map("short", [effect for _, effect in tried])
+        short = _best_of_each(tried, fits, some)
+        return _long_trials(helpers, short, list(records), long_fits)
+
+
+def _light(found: Fit | None) -> Fit | None:
+    """A fit without its records, which whoever asked for it has."""
+    return None if found is None else replace(found, records=())
+
+
+def _best_of_each(
+    tried: Sequence[tuple[Suspect, Effect]],
+    fits: Sequence[Fit | None],
+    records: Sequence[MeasuredRecord],
+) -> list[tuple[Suspect, Fit, float]]:
+    """Every suspect with its best fit and that one's score, the best first."""
+    found: dict[str, tuple[Suspect, Fit, float]] = {}
+    for (suspect, _), light in zip(tried, fits, strict=True):
+        if light is None:
+            continue
+        known = found.get(suspect.label)
+        if known is None or light.cost < known[1].cost:
+            own = replace(light, records=tuple(records))
+            found[suspect.label] = (suspect, own, score(own))
+    return sorted(found.values(), key=lambda item: item[2])
+
+
+def _long_trials(
+    helpers: Helpers,
+    short: Sequence[tuple[Suspect, Fit, float]],
+    records: Sequence[MeasuredRecord],
+    long_fits: int,
+) -> list[Trial]:
+    """Those that did best so far, fitted to everything; the best first."""
+    trials: list[Trial] = []
+    wanted = []
+    for place, (suspect, found, value) in enumerate(short):
+        # What is far behind after the first part will not catch up.
+        behind = value - short[0][2]
+        late = place >= long_fits or (place > 0 and behind > 0.5 * short[0][2] + 200.0)
+        if late and (behind > SAME or place >= 2 * long_fits):
+            trials.append(Trial(suspect.label, found, math.inf, suspect.gain))
+        else:
+            wanted.append((suspect, found))
+    rival = math.inf
+    # The first is the others' rival: a fit that stays far above it is given up.
+    for some in (wanted[:1], wanted[1:]):
+        tasks = [(found.hypothesis, suspect.effect, rival) for suspect, found in some]
+        for (suspect, _), light in zip(some, helpers.map("long", tasks), strict=True):
+            long = replace(light, records=tuple(records))
+            rival = min(rival, long.cost)
+            trials.append(Trial(suspect.label, long, score(long), suspect.gain))
+    return sorted(trials, key=lambda t: t.score)
+
+
+def _short_list(suspects: Sequence[Suspect], size: int) -> list[Suspect]:
+    """The best, but no more than three of one effect: others deserve a hearing, too."""
+    chosen: list[Suspect] = []
+    for suspect in suspects:
+        same = sum(1 for s in chosen if s.effect.name == suspect.effect.name)
+        if same < 3 and suspect.gain > 0.0:
+            chosen.append(suspect)
+        if len(chosen) == size:
+            break
+    return chosen
+
+
+def spread_out(records: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
+    """One or two records of every pose, their directions taken in turn."""
+    by_pose: dict[int, list[MeasuredRecord]] = {}
+    for record in records:
+        by_pose.setdefault(record.pose, []).append(record)
+    per_pose = max(1, math.ceil(_LEAN / len(by_pose)))
+    chosen = []
+    for turn, own in enumerate(by_pose.values()):
+        order = own[turn % len(own) :] + own[: turn % len(own)]
+        chosen += order[:per_pose]
+    return chosen
+
+
+def _fit_short(
+    problem: Problem,
+    known: Fit,
+    start: Effect,
+    records: Sequence[MeasuredRecord],
+    window: float | None,
+) -> Fit | None:
+    """A candidate fitted to the first part of the records."""
+    try:
+        hypothesis = known.hypothesis.plus(start)
+        if start.latent is not None:
+            turns = 0 if start.name == "pulse_jitter" else 1
+            first = fit(problem, hypothesis, records, window, iterations=turns)
+            return fit_latent(problem, first, type(start), start.target)
+        if window is None:
+            return fit(problem, hypothesis, records, None, iterations=3, near=known)
+        windows = (0.06, 0.16, window)
+        return fit_growing(problem, hypothesis, records, windows=windows, iterations=4, near=known)
+    except InputError:
+        return None
+
+
+def _fit_long(
+    problem: Problem,
+    short: Hypothesis,
+    effect: Effect,
+    rival: float,
+    records: Sequence[MeasuredRecord],
+) -> Fit:
+    """A candidate fitted to all of the records."""
+    if effect.latent is not None:
+        turns = 0 if effect.name == "pulse_jitter" else 3
+        long = fit(problem, short, records, None, iterations=turns)
+        return fit_latent(problem, long, type(effect), effect.target)
+    return fit(problem, short, records, None, iterations=6, rival=rival)

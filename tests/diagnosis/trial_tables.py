@@ -1,0 +1,184 @@
+"""The tables of the blind trial: what docs/diagnosis.md says was printed by them."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, defaultdict
+
+ARM = "fanuc_like_3dof"
+UNNAMEABLE = {"outside": "out of the catalogue", "left-out": "true cause taken out"}
+WITHIN = {"peak": 0.01, "life": 0.05}  # of a burst that nobody measured
+
+
+def summary(rows):
+    """Print everything."""
+    rows = [row for row in rows if not _aside(row)]
+    print_kinds(rows)
+    print_rates(rows)
+    print_parameters(rows)
+    print_gains(rows)
+    print_bursts(rows)
+    print_times(rows)
+    print_confusion(rows)
+    print_wrong(rows)
+
+
+def _aside(row):
+    return row["verdict"] in ("not made", "not detectable")
+
+
+def wrong(row):
+    """Whether a case counts against the method."""
+    if row["kind"] in UNNAMEABLE:
+        return row["verdict"] == "named" or row["verdict"].startswith("failed")
+    return not row["right"]
+
+
+def print_kinds(rows):
+    """Verdicts by robot, kind and noise."""
+    kinds = defaultdict(list)
+    for row in rows:
+        kinds[(row["robot"], row["kind"], row["snr"])].append(row)
+    print(f"{'robot':<18}{'kind':<10}{'SNR':>4}{'cases':>7}{'right':>9}  verdicts")
+    for (robot, kind, snr), found in sorted(kinds.items()):
+        right = f"{sum(not wrong(row) for row in found)}/{len(found)}"
+        verdicts = dict(Counter(row["verdict"] for row in found).most_common())
+        print(f"{robot:<18}{kind:<10}{snr:>4}{len(found):>7}{right:>9}  {verdicts}")
+
+
+def print_rates(rows):
+    """False alarms and wrong names."""
+    nulls = [row for row in rows if row["kind"] == "null"]
+    if nulls:
+        alarms = sum(row["verdict"] != "nothing-wrong" for row in nulls)
+        bound = upper_bound(alarms, len(nulls))
+        print(f"\nfalse alarms: {alarms} in {len(nulls)}; rate below {100 * bound:.2g} % (95 %)")
+    for kind, what in UNNAMEABLE.items():
+        found = [row for row in rows if row["kind"] == kind]
+        if found:
+            named = sum(row["verdict"] == "named" for row in found)
+            print(f"{what}: {named} of {len(found)} named wrongly")
+    for kind in ("single", "pair", "triple", "weak"):
+        found = [row for row in rows if row["kind"] == kind]
+        bad = [row for row in found if row["verdict"] == "named" and not row["right"]]
+        if found:
+            print(f"{kind}: {len(bad)} of {len(found)} named, but not (or not only) what it was")
+
+
+def print_parameters(rows):
+    """Errors of the causes' parameters, and what their intervals cover."""
+    named = [row for row in rows if row["right"] and row["snr"] == 40]
+    errors = [(key, *e) for row in named for key, e in row["errors"].items()]
+    if not errors:
+        return
+    size = sorted(abs(e[1]) for e in errors)
+    print(
+        f"\nparameters at 40 dB: {len(size)}, median error {100 * quantile(size, 0.5):.2g} %, "
+        f"95th percentile {100 * quantile(size, 0.95):.2g} %"
+    )
+    pulls = [e[2] for e in errors if math.isfinite(e[2])]
+    for level, z in ((50, 0.674), (95, 1.960)):
+        inside = sum(p <= z for p in pulls)
+        low, high = (100 * x for x in proportion(inside, len(pulls)))
+        print(f"{level} % intervals cover {inside} of {len(pulls)}: {low:.0f} to {high:.0f} %")
+    for key, error, pull in sorted(errors, key=lambda e: -abs(e[1]))[:8]:
+        print(f"  largest: {key} {100 * error:+.2g} %, {pull:.1f} standard deviations")
+
+
+def print_gains(rows):
+    """What of the excess in records held out is explained."""
+    for snr in (40, 20):
+        gains = sorted(
+            row["explained"] for row in rows
+            if row["right"] and row["snr"] == snr and row["truth"] and row.get("explained")
+        )  # fmt: skip
+        if gains:
+            print(
+                f"held-out excess explained at {snr} dB: median {quantile(gains, 0.5):.4f}, "
+                f"5th percentile {quantile(gains, 0.05):.4f}, lowest {gains[0]:.4f}, "
+                f"of {len(gains)}"
+            )
+
+
+def print_bursts(rows):
+    """Peak and life of a burst that nobody measured, before and after."""
+    for snr in (40, 20):
+        found = [row["burst"] for row in rows if row["snr"] == snr and row.get("burst")]
+        for model in ("baseline", "extended"):
+            for what, limit in WITHIN.items():
+                size = sorted(abs(e) for told in found for e in told.get(model, {}).get(what, ()))
+                if size:
+                    inside = sum(e <= limit for e in size)
+                    print(
+                        f"burst at {snr} dB, {model}, {what}: median error "
+                        f"{100 * quantile(size, 0.5):.2g} %, 95th percentile "
+                        f"{100 * quantile(size, 0.95):.2g} %; {inside} of {len(size)} within "
+                        f"{100 * limit:g} %"
+                    )
+
+
+def print_times(rows):
+    """CPU time by robot."""
+    for robot in dict.fromkeys(row["robot"] for row in rows):
+        for kind in dict.fromkeys(row["kind"] for row in rows):
+            times = sorted(
+                row["cpu_seconds"] for row in rows
+                if row["robot"] == robot and row["kind"] == kind and "cpu_seconds" in row
+            )  # fmt: skip
+            if times:
+                print(
+                    f"CPU time, {robot}, {kind}: median {quantile(times, 0.5):.0f} s, "
+                    f"95th percentile {quantile(times, 0.95):.0f} s"
+                )
+
+
+def print_confusion(rows):
+    """Single effects on the arm of three joints: what was hidden, and what was said."""
+    table = defaultdict(Counter)
+    for row in rows:
+        if row["kind"] == "single" and row["robot"] == ARM and row["truth"]:
+            table[row["truth"][0][0]][_said(row)] += 1
+    if not table:
+        return
+    print("\nhidden -> said")
+    for effect in sorted(table):
+        said = ", ".join(f"{what} {count}" for what, count in table[effect].most_common())
+        print(f"  {effect:<22}{said}")
+
+
+def _said(row):
+    names = sorted({effect for effect, _ in row["claimed"]})
+    true = sorted({effect for effect, _ in row["truth"]})
+    if row["right"]:
+        return "it" if row["verdict"] == "named" else f"it, {row['verdict']}"
+    if names == true:
+        return "it, elsewhere"
+    return f"{row['verdict']}: {' + '.join(names) or '-'}"
+
+
+def print_wrong(rows):
+    """Every case that counts against the method."""
+    for row in rows:
+        if wrong(row):
+            print("wrong:", row["case"], row["truth"], "->", row["verdict"], row["claimed"])
+
+
+def quantile(ordered, share):
+    """Of an ascending list."""
+    return ordered[min(int(share * len(ordered)), len(ordered) - 1)]
+
+
+def upper_bound(events, cases):
+    """Of a rate, 95 %, one-sided (Clopper and Pearson)."""
+    from scipy.stats import beta
+
+    return float(beta.ppf(0.95, events + 1, cases - events)) if events < cases else 1.0
+
+
+def proportion(events, cases):
+    """95 % interval of a rate (Clopper and Pearson)."""
+    from scipy.stats import beta
+
+    low = float(beta.ppf(0.025, events, cases - events + 1)) if events else 0.0
+    high = float(beta.ppf(0.975, events + 1, cases - events)) if events < cases else 1.0
+    return low, high
