@@ -194,6 +194,88 @@ def test_nonlinear_elements_against_scipy(arm, geometry, name):
     assert np.abs(found.position).max() > 0.0
 
 
+def _with_dry_friction(system, force, times, row, limit):
+    """scipy from event to event: sliding either way, or held with the torque that it takes."""
+    n = system.mass.shape[0]
+    inverse = np.linalg.inv(system.mass)
+    compliance = row @ inverse @ row
+
+    def pull(t, y):
+        return system.force * force(t) - system.stiffness @ y[:n] - system.damping @ y[n:]
+
+    def held(t, y):
+        return row @ inverse @ pull(t, y) / compliance
+
+    def rate(side):
+        def of(t, y):
+            friction = held(t, y) if side == 0 else side * limit
+            return np.concatenate([y[n:], inverse @ (pull(t, y) - friction * row)])
+
+        return of
+
+    def comes_to_rest(t, y):
+        return row @ y[n:]
+
+    def lets_go(t, y):
+        return abs(held(t, y)) - limit
+
+    comes_to_rest.terminal = lets_go.terminal = True
+    lets_go.direction = 1.0
+    out, y, side = np.zeros((n, times.size)), np.zeros(2 * n), 0
+    turns = 0
+    edges = np.unique(np.append(force.start, times[-1] + 1e-9))
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        t = a
+        while t < b - 1e-9:
+            if side == 0 and abs(held(t + 1e-12, y)) > limit:
+                side = 1 if held(t + 1e-12, y) > 0.0 else -1
+            comes_to_rest.direction = -float(side)
+            event = lets_go if side == 0 else comes_to_rest
+            found = solve_ivp(
+                rate(side), (t, b), y, events=event, dense_output=True, rtol=1e-10, atol=1e-15,
+                max_step=1e-3,
+            )  # fmt: skip
+            t_end = found.t[-1]
+            here = (times >= t) & (times < t_end)
+            out[:, here] = found.sol(times[here])[:n]
+            y = found.y[:, -1].copy()
+            if found.status == 1:
+                y[n:] -= (row @ y[n:]) * inverse @ row / compliance  # exactly at rest
+                turns += side != 0
+                if side == 0:
+                    side = 1 if held(t_end, y) > 0.0 else -1
+                elif abs(held(t_end, y)) <= limit:
+                    side = 0
+                else:
+                    side = -side
+            t = t_end if t_end > t else np.nextafter(t, np.inf)
+    return out, turns
+
+
+@pytest.mark.parametrize("torque", [1.0, 4.0, 15.0])
+def test_dry_friction_against_scipy_from_event_to_event(arm, geometry, torque):
+    import dataclasses
+
+    effect = effect_class("coulomb_friction")("joint_3", torque=torque)
+    system, _ = motion(arm, geometry, [effect])
+    flat = dataclasses.replace(
+        system,
+        mass_gradient=0.0 * system.mass_gradient,
+        gravity_curvature=0.0 * system.gravity_curvature,
+        force_gradient=0.0 * system.force_gradient,
+    )
+    force = Blows.of(BLOWS, 6, DIRECTION).force()
+    ours = integrate(flat, force, CLOCK).position.T
+    reference, turns = _with_dry_friction(
+        flat, force, CLOCK.times, np.array([0.0, 0.0, 1.0]), torque
+    )
+    plain = integrate(dataclasses.replace(flat, elements=(), rows=flat.rows[:0]), force, CLOCK)
+    scale = np.abs(reference).max()
+    assert turns >= 5  # it does turn round
+    assert np.abs(ours - reference).max() < 2e-4 * scale
+    assert np.abs(plain.position.T - reference).max() > 0.005 * scale  # and it does matter
+
+
 def test_friction_sticks(arm, geometry):
     held = effect_class("coulomb_friction")("joint_2", torque=1e4)
     system, found = motion(arm, geometry, [held])

@@ -36,11 +36,40 @@ def _smooth_friction(free, gain, limit, smooth):
 
 
 @njit(cache=True, nogil=True)
+def _ideal_friction(before, free, gain, limit):
+    """Mean and last value of ideal friction in a step, from the rate before and after it.
+
+    A joint that slides towards rest comes to it within the step at `part`; from there it is held
+    where friction can, or slides the other way. Without this the friction of a step in which the
+    joint turns round would have the last part's sign all through, an impulse wrong by as much as
+    the step is long. The rate is a straight line in each part.
+    """
+    change = free - before
+    side = 1.0 if before > 0.0 else -1.0
+    slope = change - side * gain * limit
+    if before != 0.0 and (before + slope) * side > 0.0:
+        return side * limit, side * limit  # it slides all through
+    part = min(max(-before / slope, 0.0), 1.0) if before != 0.0 else 0.0
+    if abs(change) <= gain * limit:
+        mean = min(max(free / gain, -limit), limit)
+        held = mean
+        if part < 1.0:
+            held = min(max((mean - side * limit * part) / (1.0 - part), -limit), limit)
+        return mean, held
+    last = limit if change > 0.0 else -limit
+    return last * (1.0 - part) + side * limit * part, last
+
+
+@njit(cache=True, nogil=True)
 def stick(
-    new, n, rows, kinds, parameters, friction, kick, zero, length, regular,
+    old, last, new, n, rows, kinds, parameters, friction, kick, zero, length, regular,
     from_start, from_end, inverse, ik, ic, fastest,
 ):  # fmt: skip
-    """Dry friction that holds a joint still at the step's end where it can, else its limit."""
+    """Dry friction of a step: it holds a joint still where it can, else it has its limit.
+
+    `old` and `new` are the states before and after, (2N,); the mean over the step goes to
+    `friction`, the value at its end to `last`, and `new` is moved by it.
+    """
     for e in range(kinds.size):
         if kinds[e] != COULOMB:
             continue
@@ -59,15 +88,18 @@ def stick(
                 continue
             rate = 0.0
             gain = 0.0
+            before = 0.0
             for j in range(n):
+                before += rows[e, j] * old[n + j]
                 rate += rows[e, j] * new[n + j]
                 gain += rows[e, j] * kick[e, n + j]
             free = rate + gain * friction[e]  # the rate without this friction
             limit, smooth = parameters[e, 0], parameters[e, 1]
             if smooth <= _IDEAL:
-                wanted = min(max(free / gain, -limit), limit)
+                wanted, last[e] = _ideal_friction(before, free, gain, limit)
             else:
                 wanted = _smooth_friction(free, gain, limit, smooth)
+                last[e] = wanted
             change = wanted - friction[e]
             friction[e] = wanted
             for i in range(2 * n):

@@ -112,7 +112,7 @@ def integrate(
     elements = kinds.size
     y = start.copy()
     states = start_states.copy()
-    friction = np.zeros(elements)
+    friction, last = np.zeros(elements), np.zeros(elements)
     has_friction = False
     for e in range(elements):
         has_friction = has_friction or kinds[e] == COULOMB
@@ -166,7 +166,7 @@ def integrate(
             else:
                 taylor(y, f0, f1, lengths[k], inverse, ik, ic, fastest, new)
             if has_friction:
-                stick(new, n, rows, kinds, parameters, friction, kick, zero, lengths[k],
+                stick(y, last, new, n, rows, kinds, parameters, friction, kick, zero, lengths[k],
                        by_matrix, by_start, by_end, inverse, ik, ic, fastest)  # fmt: skip
             for e in range(elements):
                 if kinds[e] == 2:
@@ -200,7 +200,7 @@ def integrate(
             s = sample[k]
             acceleration = _pseudo_force(
                 y, force_after[k], mass, gradient, curvature, inverse, damping, stiffness,
-                b, b_gradient, kinds, parameters, rows, states, friction, square, line, p1,
+                b, b_gradient, kinds, parameters, rows, states, last, square, line, p1,
             )  # fmt: skip
             for i in range(n):
                 x_out[s, i] = y[i]

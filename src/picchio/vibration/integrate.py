@@ -16,7 +16,7 @@ from picchio.model.system import VibratingSystem
 SMOOTH_STEP = 1e-3
 KINKED_STEP = 4e-4
 ROUGH_STEP = 2e-4
-_ROUGH = (ElementKind.COULOMB, ElementKind.BOUC_WEN)
+_ROUGH = (ElementKind.BOUC_WEN,)
 _EDGE = 1e-10
 _GAUSS = 0.5 - np.sqrt(3.0) / 6.0
 _SHOOTING = 40
