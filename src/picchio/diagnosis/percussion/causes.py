@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from picchio.diagnosis.percussion.confidence import confidence
 from picchio.diagnosis.percussion.fit import Fit
 from picchio.diagnosis.percussion.problem import MeasuredRecord
 from picchio.diagnosis.percussion.select import LEAST_GAIN, Search
@@ -14,8 +15,6 @@ from picchio.diagnosis.percussion.trials import Trial, score
 from picchio.diagnosis.percussion.unknowns import NUISANCE_KEYS, Hypothesis
 from picchio.diagnosis.result import Cause, Value
 from picchio.model import Effect
-
-_DECISIVE = 60.0
 
 
 def told_causes(
@@ -56,25 +55,12 @@ def _confidence(
     train: Sequence[MeasuredRecord],
 ) -> float:
     """From the poses' score differences to the best rival, and their spread (Student's t)."""
-    from scipy.stats import t as student
-
     best = found.best
     others = [r for r in rivals if effect.label not in r.fit.hypothesis.labels]
     rival = min((r.fit for r in others), key=score, default=None)
     if rival is None or len(rival.records) != len(best.records):
         return 0.5 if len(train) < 3 else 1.0
-    poses = sorted({r.pose for r in best.records})
-    difference = np.zeros(len(poses))
-    for record, a, b in zip(best.records, best.residuals, rival.residuals, strict=True):
-        difference[poses.index(record.pose)] += float((b * b).sum() - (a * a).sum())
-    if len(poses) < 2:
-        return 1.0 if difference.sum() > 2.0 * LEAST_GAIN else 0.5
-    # A pose that decides beyond doubt on its own counts as one: how far beyond says nothing.
-    difference = np.clip(difference, -_DECISIVE, _DECISIVE)
-    total, spread = difference.mean(), difference.std(ddof=1) / math.sqrt(len(poses))
-    # What chance alone moves a pose's score by: that of log-likelihoods a few units apart.
-    spread = math.hypot(spread, 2.0 / math.sqrt(len(poses)))
-    return float(student.cdf(total / spread, len(poses) - 1))
+    return confidence(best, rival, LEAST_GAIN)
 
 
 def told_nuisances(found: Fit) -> dict[str, Value]:

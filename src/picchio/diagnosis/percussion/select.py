@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from picchio.diagnosis.percussion.confidence import confidence
 from picchio.diagnosis.percussion.evidence import Evidence, weigh
 from picchio.diagnosis.percussion.fit import Fit, fit
 from picchio.diagnosis.percussion.latent import LATENT, fit_latent
@@ -22,6 +23,8 @@ LEAST_GAIN = 8.0
 # The forward model itself is exact to about this share of the signal (sensors smear jumps, second
 # order in the deflection): what gains less than that is no cause.
 EXACT = 3e-4
+# Where noise is all that seems left, a further cause must be as sure as that, over the poses.
+SURE = 0.99
 
 
 @dataclass(eq=False)
@@ -82,6 +85,9 @@ def search(
         if score(here) - best.score < least:
             break
         if confirmed is not None and not confirmed(here, best.fit):
+            break
+        # What the model itself is not exact to may look like a last small cause in some pose.
+        if quiet and here.hypothesis.labels and confidence(best.fit, here, LEAST_GAIN) < SURE:
             break
         found.best = prune(problem, best.fit, records, least, newest=best.label)
         if found.best.hypothesis.labels == here.hypothesis.labels:
