@@ -237,7 +237,8 @@ def _with_dry_friction(system, force, times, row, limit):
             )  # fmt: skip
             t_end = found.t[-1]
             here = (times >= t) & (times < t_end)
-            out[:, here] = found.sol(times[here])[:n]
+            if here.any():
+                out[:, here] = found.sol(times[here])[:n]
             y = found.y[:, -1].copy()
             if found.status == 1:
                 y[n:] -= (row @ y[n:]) * inverse @ row / compliance  # exactly at rest
@@ -254,7 +255,7 @@ def _with_dry_friction(system, force, times, row, limit):
     return out, turns
 
 
-@pytest.mark.parametrize("torque", [2.0, 5.0, 15.0])
+@pytest.mark.parametrize("torque", [1.0, 5.0, 15.0])
 def test_dry_friction_against_scipy_from_event_to_event(arm, geometry, torque):
     import dataclasses
 
