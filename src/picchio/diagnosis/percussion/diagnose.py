@@ -119,10 +119,12 @@ def diagnose_percussion(
         for t in (found.steps[0] if found.steps else [])
         if t.finished(train) and t.fit.hypothesis.labels != whole.hypothesis.labels
     ]
-    if whole.hypothesis.labels and (after.is_noise or _mostly(gain.explained)):
+    causes = told_causes(whole, found, rivals, train)
+    # More rivals can only lessen the confidence: what isn't sure by now won't be claimed.
+    if causes and (after.is_noise or (_mostly(gain.explained) and _sure(causes))):
         say("looking for other causes that would do as well")
         same, rivals = alternatives(problem, found, candidates, scales, train)
-    causes = told_causes(whole, found, rivals, train)
+        causes = told_causes(whole, found, rivals, train)
     verdict = _verdict(whole, causes, before, after, same, gain.explained)
     if any(e.name == "mains_hum" for e in whole.hypothesis.effects):
         causes = with_hum(causes, hum_lines(problem, whole))
@@ -177,10 +179,13 @@ def _verdict(
         return "nothing-wrong" if before.is_noise else "unexplained"
     if after.is_noise:
         return "ambiguous" if same else "named"
-    sure = all(cause.confidence >= BEYOND_DOUBT for cause in causes)
-    if sure and _mostly(explained) and not same:
+    if _sure(causes) and _mostly(explained) and not same:
         return "partial"
     return "unexplained"
+
+
+def _sure(causes: Sequence[Cause]) -> bool:
+    return all(cause.confidence >= BEYOND_DOUBT for cause in causes)
 
 
 def _leads(found: Search) -> list[tuple[str, str]]:
