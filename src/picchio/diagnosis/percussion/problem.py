@@ -20,6 +20,9 @@ _JUMPING = ("force", "acceleration", "accelerometer")
 # A sample this near a jump of the force, but not on it, holds neither side for sure: a sensor of
 # finite bandwidth smears a jump, and what keeps it from aliasing by about half a sample.
 _NEAR_EDGE = 1.8e-4
+# s, more: two samples that stand alike on either side of an edge are to be both in or both out,
+# whatever a fit does to the clock; else it gains by moving one of them out.
+_MARGIN = 2e-5
 _SMEARED = 0.5
 _ON_EDGE = 1e-7
 _SMALL_JUMP = 0.05
@@ -268,6 +271,6 @@ def _near_edges(setup: PercussionSetup, model: Model) -> dict[str, BoolArray] | 
         before = np.abs(times - edges[np.clip(place - 1, 0, edges.size - 1)])
         after = np.abs(times - edges[np.clip(place, 0, edges.size - 1)])
         distance = np.minimum(before, after)
-        near = max(_NEAR_EDGE, _SMEARED * setup.samples.step)
-        found[group] = (distance < near) & (distance > _ON_EDGE)
+        near = max(_NEAR_EDGE, _SMEARED * setup.samples.step) + _MARGIN
+        found[group] = distance < near
     return found

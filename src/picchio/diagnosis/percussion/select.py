@@ -23,6 +23,8 @@ LEAST_GAIN = 8.0
 # The forward model itself is exact to about this share of the signal (sensors smear jumps, second
 # order in the deflection): what gains less than that is no cause.
 EXACT = 3e-4
+# Of the least gain: beyond that no fit without the cause comes near.
+_CLEAR = 10.0
 # Where noise is all that seems left, a further cause must be as sure as that, over the poses.
 SURE = 0.99
 
@@ -89,7 +91,8 @@ def search(
         # What the model itself is not exact to may look like a last small cause in some pose.
         if quiet and here.hypothesis.labels and confidence(best.fit, here, LEAST_GAIN) < SURE:
             break
-        found.best = prune(problem, best.fit, records, least, newest=best.label)
+        clear = score(here) - best.score > _CLEAR * least
+        found.best = prune(problem, best.fit, records, least, best.label, alone=not clear)
         if found.best.hypothesis.labels == here.hypothesis.labels:
             break
     found.evidence = weigh(problem, found.best.residuals, found.best.records)
@@ -102,11 +105,17 @@ def prune(
     records: Sequence[MeasuredRecord],
     least: float = LEAST_GAIN,
     newest: str = "",
+    *,
+    alone: bool = True,
 ) -> Fit:
-    """Take out every cause, the newest included, that the others do without."""
+    """Take out every cause, the newest included, that the others do without.
+
+    With `alone` the last one, too: a fit with a cause in it goes on where the fit without it had
+    stopped, and what it gains may be the nuisances' doing.
+    """
     best = found
     for label in sorted(found.hypothesis.labels, key=lambda text: text == newest):
-        if len(best.hypothesis.labels) < 2:
+        if len(best.hypothesis.labels) < 2 and not alone:
             break
         without = fit(problem, best.hypothesis.minus(label), records, None, iterations=5)
         if score(without) < score(best) + least:
