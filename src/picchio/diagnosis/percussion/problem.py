@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -47,6 +48,7 @@ class MeasuredRecord:
     _cuts: dict[float, PercussionSetup] = field(default_factory=dict)
     _edges: dict[object, dict[str, BoolArray] | None] = field(default_factory=dict)
     _fillers: dict[str, FloatArray] = field(default_factory=dict)
+    _pinned: list[dict[str, BoolArray] | None] = field(default_factory=list)
 
     @property
     def name(self) -> str:
@@ -152,6 +154,23 @@ class Problem:
         # One after the other: threads would wait for the interpreter most of the time.
         return [one(record) for record in chosen]
 
+    @contextmanager
+    def pinned(self, effects: Iterable[Effect]) -> Iterator[None]:
+        """Within the block, samples near edges are those of this model, whatever is tried.
+
+        What moves edges changes which samples are known. A sample that is left out costs what
+        noise does on average, one that is not costs what it happens to: by a choice among
+        thousands of them a fit gains as much as a small cause does.
+        """
+        model = self.model.with_effects(effects)
+        for record in self.records:
+            record._pinned.append(_near_edges(record.setup, model))
+        try:
+            yield
+        finally:
+            for record in self.records:
+                record._pinned.pop()
+
     def predictions(
         self, effects: Iterable[Effect], records: Sequence[MeasuredRecord] | None = None
     ) -> list[dict[str, FloatArray]]:
@@ -239,7 +258,11 @@ def take_out_line(
 def _kept_edges(
     record: MeasuredRecord, setup: PercussionSetup, model: Model
 ) -> dict[str, BoolArray] | None:
-    """As `_near_edges`, which most trials leave as it was."""
+    """As `_near_edges`, which most trials leave as it was, or as it was pinned."""
+    if record._pinned:
+        fixed = record._pinned[-1]
+        count = setup.samples.count
+        return None if fixed is None else {g: mask[:count] for g, mask in fixed.items()}
     blind = ("structure", "over-time", "nonlinear", "motion")
     key = (setup.samples, tuple(e.key for e in model.effects if e.where not in blind))
     if key not in record._edges:

@@ -21,6 +21,8 @@ from picchio.diagnosis.percussion.problem import Problem
 from picchio.model import Effect
 from picchio.model.effects import Scales
 
+_FAINT = 20.0
+
 
 @dataclass(frozen=True, eq=False)
 class Suspect:
@@ -83,10 +85,12 @@ class Screen:
         problem: data and noise.
         fit: of what is known so far, with its Jacobian; the same records and time are used.
         scales: sizes that matter.
+        faint: whether only what hardly stands out of the noise is looked for. A typical size is
+            then far too large: late in a record it no longer looks like a small one.
     """
 
-    def __init__(self, problem: Problem, fit: Fit, scales: Scales) -> None:
-        self.problem, self.fit, self.scales = problem, fit, scales
+    def __init__(self, problem: Problem, fit: Fit, scales: Scales, faint: bool = False) -> None:
+        self.problem, self.fit, self.scales, self.faint = problem, fit, scales, faint
         self.project = Projector(fit)
         self.left = self.project(flat(fit.residuals))
 
@@ -100,7 +104,24 @@ class Screen:
         if kind.discrete and self.fit.end is None:
             return None  # what has no small size would have been seen before
         trials = [kind(target, **values) for values in kind(target).trials(self.scales)]
-        return _suspect(self.problem, self.fit, trials, self.project, self.left)
+        if self.faint:
+            trials = [self._faint(trial) for trial in trials]
+        return _suspect(self.problem, self.fit, trials, self.project, self.left, self.faint)
+
+    def _faint(self, trial: Effect) -> Effect:
+        """The trial so small that it changes the data by some standard deviations all in all."""
+        fit = self.fit
+        first = fit.records[:1]
+        try:
+            effects = fit.hypothesis.plus(trial).effects
+            (there,) = self.problem.residuals(effects, first, fit.end)
+        except InputError:
+            return trial
+        change = float(np.linalg.norm(there - fit.residuals[0])) * math.sqrt(len(fit.records))
+        if not change > _FAINT:
+            return trial
+        values = _resized(trial, _FAINT / change)
+        return type(trial)(trial.target, **values)
 
     def ranked(self, suspects: Iterable[Suspect | None]) -> list[Suspect]:
         """The most promising first."""
@@ -114,6 +135,7 @@ def _suspect(
     trials: Sequence[Effect],
     project: Projector,
     left: FloatArray,
+    faint: bool,
 ) -> Suspect | None:
     base, columns, kept = flat(fit.residuals), [], []
     for trial in trials:
@@ -136,7 +158,11 @@ def _suspect(
     # the residual falls by the part of it that the change (of either size) can undo
     alone = (moves.T @ -left) / size**2
     gains = np.where(alone > 0.0, (alone * size) ** 2, 0.0)
-    linear = all(p.neutral == 0.0 and p.lower < 0.0 for p in kept[0].parameters)
+    # What is small acts alike either way, a factor as well as a difference.
+    linear = all(
+        (p.neutral == 0.0 and p.lower < 0.0) or (faint and p.neutral == 1.0 and p.logarithmic)
+        for p in kept[0].parameters
+    )
     if linear:
         gains = (alone * size) ** 2
     numbers = len(kept[0].parameters)
@@ -177,8 +203,11 @@ def _vector(trials: Sequence[Effect]) -> bool:
 def _scaled(trial: Effect, weight: float, signed: bool) -> Effect:
     """The trial made larger or smaller as the residual asks."""
     size = float(np.clip(abs(weight), 0.05, 8.0))
-    if signed:
-        size = math.copysign(size, weight)
+    return _bounded(trial, _resized(trial, math.copysign(size, weight) if signed else size))
+
+
+def _resized(trial: Effect, size: float) -> dict[str, float]:
+    """A trial's values with its distance from doing nothing so many times as large."""
     values = dict(trial.values)
     for p in trial.parameters:
         value = values[p.name]
@@ -193,8 +222,7 @@ def _scaled(trial: Effect, weight: float, signed: bool) -> Effect:
         else:
             continue
         values[p.name] = min(max(new, p.lower), p.upper)
-    kept = {p.name: values[p.name] for p in trial.parameters if values[p.name] != p.neutral}
-    return _bounded(trial, kept)
+    return {p.name: values[p.name] for p in trial.parameters if values[p.name] != p.neutral}
 
 
 def _bounded(trial: Effect, values: dict[str, float]) -> Effect:

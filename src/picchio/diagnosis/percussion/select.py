@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -71,30 +72,36 @@ def search(
     say = progress or (lambda text: None)
     found = Search(baseline, baseline)
     least = max(LEAST_GAIN, EXACT**2 * signal_power(records))
-    for number in range(MOST_CAUSES):
-        here = found.best
-        found.evidence = weigh(problem, here.residuals, here.records)
-        say(f"looking for cause {number + 1}")
-        quiet = found.evidence.is_noise
-        trials = try_candidates(
-            problem, here.hypothesis, candidates, scales, records,
-            whole=quiet, least=least, log=found.scores.append,
-        )  # fmt: skip
-        if not trials:
-            break
-        found.steps.append(trials)
-        best = trials[0]
-        if score(here) - best.score < least:
-            break
-        if confirmed is not None and not confirmed(here, best.fit):
-            break
-        # What the model itself is not exact to may look like a last small cause in some pose.
-        if quiet and here.hypothesis.labels and confidence(best.fit, here, LEAST_GAIN) < SURE:
-            break
-        clear = score(here) - best.score > _CLEAR * least
-        found.best = prune(problem, best.fit, records, least, best.label, alone=not clear)
-        if found.best.hypothesis.labels == here.hypothesis.labels:
-            break
+    with ExitStack() as stack:
+        pinned = False
+        for number in range(MOST_CAUSES):
+            here = found.best
+            found.evidence = weigh(problem, here.residuals, here.records)
+            say(f"looking for cause {number + 1}")
+            quiet = found.evidence.is_noise
+            if quiet and not pinned:
+                stack.enter_context(problem.pinned(here.hypothesis.effects))
+                pinned = True
+            trials = try_candidates(
+                problem, here.hypothesis, candidates, scales, records,
+                whole=quiet, least=least, log=found.scores.append,
+            )  # fmt: skip
+            if not trials:
+                break
+            found.steps.append(trials)
+            best = trials[0]
+            gain = score(here) - best.score
+            if gain < least or (confirmed is not None and not confirmed(here, best.fit)):
+                break
+            # What the model itself is not exact to may look like a last small cause in some pose.
+            known = bool(here.hypothesis.labels)
+            if quiet and known and confidence(best.fit, here, LEAST_GAIN) < SURE:
+                break
+            found.best = prune(
+                problem, best.fit, records, least, best.label, alone=gain <= _CLEAR * least
+            )
+            if found.best.hypothesis.labels == here.hypothesis.labels:
+                break
     found.evidence = weigh(problem, found.best.residuals, found.best.records)
     return found
 

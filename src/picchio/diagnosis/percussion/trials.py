@@ -78,7 +78,7 @@ def try_candidates(
     some = list(records) if whole else spread_out(records)
     window = None if whole else SCREEN_WINDOW
     start = fit(problem, known, some, window, iterations=4, with_jacobian=True)
-    look = Screen(problem, start, scales)
+    look = Screen(problem, start, scales, faint=whole)
 
     def short_fit(effect: Effect) -> Fit | None:
         return _light(_fit_short(problem, start, effect, some, window))
