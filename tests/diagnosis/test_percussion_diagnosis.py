@@ -37,7 +37,7 @@ SINGLES = [
     "pulse_rate", "pulse_jitter", "rebound", "stiffness_drift", "sensor_gain", "sensor_delay",
     "mount_resonance",
 ]  # fmt: skip
-OUTSIDE = ["coupled_joints", "quadratic_damping", "loose_bolt"]
+OUTSIDE = ["coupled_joints", "loose_bolt"]
 
 
 def _case(kind, effect=None, draw=0):
