@@ -19,10 +19,10 @@ from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.evidence import weigh
 from picchio.diagnosis.percussion.fit import fit, fit_growing
-from picchio.diagnosis.percussion.helpers import Helpers
 from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.trials import try_candidates
 from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.diagnosis.percussion.workers import Workers
 from picchio.diagnosis.result import Gain
 from picchio.model.effects import effect_class
 from picchio.robot import load_robot
@@ -178,7 +178,7 @@ def test_a_nuisance_that_is_no_cause_any_more_stays_where_it_was():
         assert values["joint_stiffness:joint_3"] == pytest.approx(back)
 
 
-def test_helpers_change_nothing(arm):
+def test_workers_change_nothing(arm):
     """Processes or not: the same suspects, the same fits, to the last bit."""
     campaign, _ = trial.make(
         {**FEW, "kind": "single", "effect": "payload", "draw": 0, "records": 3}
@@ -203,14 +203,14 @@ def test_helpers_change_nothing(arm):
     assert found[0][1][0][0] == "payload:tool"
 
 
-def test_an_error_in_a_helper_is_an_error_here():
+def test_an_error_in_a_worker_is_an_error_here():
     def fail(item):
         if item == 3:
             raise InputError("broken", key="item", value=item)
         return -item
 
     for workers in (1, 2):
-        with Helpers(workers, {"fail": fail}) as helpers:
-            assert helpers.map("fail", [1, 2, 4]) == [-1, -2, -4]
+        with Workers(workers, {"fail": fail}) as pool:
+            assert pool.map("fail", [1, 2, 4]) == [-1, -2, -4]
             with pytest.raises(InputError, match="broken"):
-                helpers.map("fail", [1, 3, 2])
+                pool.map("fail", [1, 3, 2])

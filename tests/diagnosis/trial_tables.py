@@ -48,11 +48,13 @@ def print_kinds(rows):
 
 def print_rates(rows):
     """False alarms and wrong names."""
-    nulls = [row for row in rows if row["kind"] == "null"]
-    if nulls:
-        alarms = sum(row["verdict"] != "nothing-wrong" for row in nulls)
-        bound = upper_bound(alarms, len(nulls))
-        print(f"\nfalse alarms: {alarms} in {len(nulls)}; rate below {100 * bound:.2g} % (95 %)")
+    print()
+    for snr in (40, 20):
+        nulls = [row for row in rows if row["kind"] == "null" and row["snr"] == snr]
+        if nulls:
+            alarms = sum(row["verdict"] != "nothing-wrong" for row in nulls)
+            bound = f"rate below {100 * upper_bound(alarms, len(nulls)):.2g} % (95 %)"
+            print(f"false alarms at {snr} dB: {alarms} in {len(nulls)}; {bound}")
     for kind, what in UNNAMEABLE.items():
         found = [row for row in rows if row["kind"] == kind]
         if found:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -130,6 +132,16 @@ def _reference(system, force, times, extra):
     return np.concatenate(out, axis=1)
 
 
+def _flat(system):
+    """Without geometry's second order, on both sides: the elements are what is tested."""
+    return dataclasses.replace(
+        system,
+        mass_gradient=0.0 * system.mass_gradient,
+        gravity_curvature=0.0 * system.gravity_curvature,
+        force_gradient=0.0 * system.force_gradient,
+    )
+
+
 class _Extra:
     def __init__(self, function, states=0):
         self.function, self.states = function, states
@@ -140,8 +152,6 @@ class _Extra:
 
 @pytest.mark.parametrize("name", ["hardening", "backlash", "hysteresis", "workpiece_contact"])
 def test_nonlinear_elements_against_scipy(arm, geometry, name):
-    import dataclasses
-
     unit = np.array([0.0, 1.0, 0.0])
     if name == "hardening":
         effect = effect_class(name)("joint_2", cubic=8e10)
@@ -177,13 +187,7 @@ def test_nonlinear_elements_against_scipy(arm, geometry, name):
             return push * b, np.zeros(0)
 
         extra = _Extra(contact)
-    # Geometry's second order is left out on both sides: the elements are what is tested.
-    flat = dataclasses.replace(
-        system,
-        mass_gradient=0.0 * system.mass_gradient,
-        gravity_curvature=0.0 * system.gravity_curvature,
-        force_gradient=0.0 * system.force_gradient,
-    )
+    flat = _flat(system)
     force = Blows.of(BLOWS, 6, DIRECTION).force()
     ours = integrate(flat, force, CLOCK).position.T
     reference = _reference(flat, force, CLOCK.times, extra)
@@ -257,16 +261,9 @@ def _with_dry_friction(system, force, times, row, limit):
 
 @pytest.mark.parametrize("torque", [1.0, 5.0, 15.0])
 def test_dry_friction_against_scipy_from_event_to_event(arm, geometry, torque):
-    import dataclasses
-
     effect = effect_class("coulomb_friction")("joint_3", torque=torque)
     system, _ = motion(arm, geometry, [effect])
-    flat = dataclasses.replace(
-        system,
-        mass_gradient=0.0 * system.mass_gradient,
-        gravity_curvature=0.0 * system.gravity_curvature,
-        force_gradient=0.0 * system.force_gradient,
-    )
+    flat = _flat(system)
     force = Blows.of(BLOWS, 6, DIRECTION).force()
     ours = integrate(flat, force, CLOCK).position.T
     reference, turns = _with_dry_friction(

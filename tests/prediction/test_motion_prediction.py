@@ -11,7 +11,7 @@ from picchio.core.errors import InputError
 from picchio.model.effects import effect_class
 from picchio.prediction.motion import Band, Predictor, choose_cutoff, read_logs
 from picchio.prediction.motion.closed_loop import CascadeLaw, friction_curve, simulate_closed_loop
-from picchio.prediction.motion.readings import shift
+from picchio.prediction.motion.fractional_delay import shift
 from picchio.robot import load_robot
 
 RATE = 500.0

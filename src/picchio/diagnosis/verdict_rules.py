@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+BEYOND_DOUBT = 0.99
+"""The least confidence, over the poses, of what is claimed though not all is explained."""
+
 MOSTLY = 0.8
 """The least share of the held-out excess that the causes of a `partial` verdict explain.
 

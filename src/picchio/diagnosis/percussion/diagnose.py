@@ -27,12 +27,10 @@ from picchio.diagnosis.percussion.select import (
 from picchio.diagnosis.percussion.trials import score
 from picchio.diagnosis.percussion.unknowns import TOLERATED, Hypothesis
 from picchio.diagnosis.result import Cause, Diagnosis, Verdict
-from picchio.diagnosis.verdict_rules import MOSTLY
+from picchio.diagnosis.verdict_rules import BEYOND_DOUBT, MOSTLY
 from picchio.model.effects import Scales
 from picchio.prediction.noise_level import Noise
 from picchio.robot import FlexibleRobot
-
-BEYOND_DOUBT = 0.99
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,7 @@ from picchio.model import Effect
 from picchio.model.effects import Scales
 
 _FAINT = 20.0
+_SOME = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,13 +112,15 @@ class Screen:
     def _faint(self, trial: Effect) -> Effect:
         """The trial so small that it changes the data by some standard deviations all in all."""
         fit = self.fit
-        first = fit.records[:1]
+        # The first few: what one direction of the force does not show another does.
+        some = fit.records[:_SOME]
         try:
             effects = fit.hypothesis.plus(trial).effects
-            (there,) = self.problem.residuals(effects, first, fit.end)
+            there = flat(self.problem.residuals(effects, some, fit.end))
         except InputError:
             return trial
-        change = float(np.linalg.norm(there - fit.residuals[0])) * math.sqrt(len(fit.records))
+        change = float(np.linalg.norm(there - flat(fit.residuals[: len(some)])))
+        change *= math.sqrt(len(fit.records) / len(some))
         if not change > _FAINT:
             return trial
         values = _resized(trial, _FAINT / change)

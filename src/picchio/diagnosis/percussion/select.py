@@ -14,6 +14,7 @@ from picchio.diagnosis.percussion.latent import LATENT, fit_latent
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.trials import SAME, Trial, score, try_candidates
 from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.diagnosis.verdict_rules import BEYOND_DOUBT
 from picchio.model import Effect
 from picchio.model.effects import Scales, effect_class
 
@@ -26,8 +27,6 @@ LEAST_GAIN = 8.0
 EXACT = 3e-4
 # Of the least gain: beyond that no fit without the cause comes near.
 _CLEAR = 10.0
-# Where noise is all that seems left, a further cause must be as sure as that, over the poses.
-SURE = 0.99
 
 
 @dataclass(eq=False)
@@ -95,7 +94,7 @@ def search(
                 break
             # What the model itself is not exact to may look like a last small cause in some pose.
             known = bool(here.hypothesis.labels)
-            if quiet and known and confidence(best.fit, here, LEAST_GAIN) < SURE:
+            if quiet and known and confidence(best.fit, here, LEAST_GAIN) < BEYOND_DOUBT:
                 break
             found.best = prune(
                 problem, best.fit, records, least, best.label, alone=gain <= _CLEAR * least

@@ -9,11 +9,11 @@ from typing import Any
 
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.fit import Fit, fit, fit_growing
-from picchio.diagnosis.percussion.helpers import Helpers
 from picchio.diagnosis.percussion.latent import fit_latent, hidden_numbers
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.screen import Screen, Suspect
 from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.diagnosis.percussion.workers import Workers
 from picchio.model import Effect
 from picchio.model.effects import Scales
 
@@ -88,8 +88,8 @@ def try_candidates(
 
     functions: dict[str, Callable[[Any], Any]]
     functions = {"screen": look.suspect, "short": short_fit, "long": long_fit}
-    with Helpers(problem.workers, functions) as helpers:
-        suspects = look.ranked(helpers.map("screen", candidates))
+    with Workers(problem.workers, functions) as pool:
+        suspects = look.ranked(pool.map("screen", candidates))
         logarithm = math.log(max(start.samples, 2))
         if log is not None:
             log({s.label: s.gain - s.numbers * logarithm for s in suspects})
@@ -100,9 +100,9 @@ def try_candidates(
                 return []
         chosen = _short_list(suspects, short_list)
         tried = [(suspect, effect) for suspect in chosen for effect in suspect.starts]
-        fits = helpers.map("short", [effect for _, effect in tried])
+        fits = pool.map("short", [effect for _, effect in tried])
         short = _best_of_each(tried, fits, some)
-        return _long_trials(helpers, short, list(records), long_fits)
+        return _long_trials(pool, short, list(records), long_fits)
 
 
 def _light(found: Fit | None) -> Fit | None:
@@ -128,7 +128,7 @@ def _best_of_each(
 
 
 def _long_trials(
-    helpers: Helpers,
+    pool: Workers,
     short: Sequence[tuple[Suspect, Fit, float]],
     records: Sequence[MeasuredRecord],
     long_fits: int,
@@ -148,7 +148,7 @@ def _long_trials(
     # The first is the others' rival: a fit that stays far above it is given up.
     for some in (wanted[:1], wanted[1:]):
         tasks = [(found.hypothesis, suspect.effect, rival) for suspect, found in some]
-        for (suspect, _), light in zip(some, helpers.map("long", tasks), strict=True):
+        for (suspect, _), light in zip(some, pool.map("long", tasks), strict=True):
             long = replace(light, records=tuple(records))
             rival = min(rival, long.cost)
             trials.append(Trial(suspect.label, long, score(long), suspect.gain))

@@ -24,12 +24,12 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-class Helpers:
-    """Maps functions over items; a `with` block is as long as the helpers live.
+class Workers:
+    """Maps functions over items; a `with` block is as long as the processes live.
 
     The functions may use whatever exists when the block begins: processes are forked, so nothing
     of that is copied or sent. Items and results are. Where a process can't be forked safely (not
-    on Linux, or within a helper), or one core is all there is, this process does the work itself.
+    on Linux, or within such a process), or one core is all there is, this one does the work itself.
 
     Args:
         workers: processes; as many as cores where None, eight at most.

@@ -1,0 +1,89 @@
+"""Faint causes: at faint sizes, and without a choice of which samples count."""
+
+import numpy as np
+import pytest
+import trial
+
+import picchio
+from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.confidence import confidence
+from picchio.diagnosis.percussion.fit import Fit, fit
+from picchio.diagnosis.percussion.problem import Problem
+from picchio.diagnosis.percussion.screen import Screen
+from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.model.effects import effect_class
+
+ARM = "fanuc_like_3dof"
+CASE = {"robot": ARM, "kind": "null", "snr": 40, "draw": 0, "records": 3}
+
+
+@pytest.fixture(scope="module")
+def problem():
+    campaign, _ = trial.make(CASE)
+    return Problem(picchio.load_robot(ARM), campaign)
+
+
+@pytest.fixture(scope="module")
+def base(problem):
+    start = Hypothesis.baseline(problem.robot, problem.campaign.tolerance)
+    return fit(problem, start, with_jacobian=True)
+
+
+def unknown(problem, effects):
+    """How many samples count as unknown: they hold the filler."""
+    count = 0
+    for record, rows in zip(problem.records, problem.residuals(effects), strict=True):
+        for name, row in zip(record.values, rows, strict=True):
+            count += int(np.sum(row == record.filler(name)[: row.size]))
+    return count
+
+
+def drift(base, rate):
+    effect = effect_class("clock_drift")("accelerometer.tool", rate=rate)
+    return base.hypothesis.plus(effect).effects
+
+
+def test_a_drift_of_a_millionth_moves_no_sample_across(problem, base):
+    """These samples stand as far from the edges as separates the known from the unknown."""
+    counts = {unknown(problem, drift(base, rate)) for rate in (-3e-6, -1e-9, 0.0, 1e-9, 3e-6)}
+    assert len(counts) == 1
+    assert counts.pop() > 0
+
+
+def test_what_is_known_can_be_pinned(problem, base):
+    before, large = unknown(problem, base.hypothesis.effects), drift(base, 3e-4)
+    assert unknown(problem, large) != before
+    with problem.pinned(base.hypothesis.effects):
+        assert unknown(problem, large) == before
+    assert unknown(problem, large) != before
+
+
+def test_faint_trials_are_faint(problem, base):
+    effects = base.hypothesis.effects
+    scales = measure_scales(problem, effects, problem.predictions(effects))
+    look = Screen(problem, base, scales, faint=True)
+    seen = 0
+    for kind, target in all_candidates(problem):
+        if kind.name not in ("payload", "link_mass", "joint_damping", "tool_offset"):
+            continue
+        for values in kind(target).trials(scales):
+            trial_ = look._faint(kind(target, **values))
+            there = problem.residuals(base.hypothesis.plus(trial_).effects)
+            change = np.sqrt(sum(((a - b) ** 2).sum() for a, b in
+                                 zip(there, base.residuals, strict=True)))  # fmt: skip
+            assert change < 100.0, trial_  # typical sizes change them by thousands
+            seen += 1
+    assert seen >= 5
+
+
+def test_confidence_is_of_the_poses_not_of_their_sum(problem, base):
+    """One pose that gains a lot and two that gain nothing are no evidence."""
+    records = [type(r)(r.setup, r.values, r.noise, i) for i, r in enumerate(problem.records)]
+
+    def like(sums):
+        rows = [np.full((1, 4), np.sqrt(s / 4.0)) for s in sums]
+        return Fit(base.hypothesis, rows, None, sum(sums), tuple(records), None)
+
+    assert confidence(like([100.0] * 3), like([120.0] * 3), 8.0) > 0.99
+    assert confidence(like([100.0] * 3), like([1100.0, 100.0, 100.0]), 8.0) < 0.9
+    assert confidence(like([100.0] * 3), like([100.0] * 3), 8.0) == pytest.approx(0.5)
