@@ -219,6 +219,22 @@ def compare_dofs() -> tuple[dict[str, float], dict[str, float], dict[int, float]
     return ratios, counted, costs
 
 
+def go_cores() -> None:
+    """The kernel's wall time a pose on one core and on more, in turns, three times (3 DoF)."""
+    block = random_poses(picchio.load_robot(ROBOTS[3]), 4096)
+    robot = picchio.load_robot(ROBOTS[3])
+
+    def run() -> None:
+        for _ in range(25):
+            ours(robot, block)
+
+    print("\ncores   us a pose, by the wall's clock")
+    for cores in (1, numba.config.NUMBA_NUM_THREADS) * 3:
+        numba.set_num_threads(cores)
+        print(f"{cores:5d}   {clock(run, time.perf_counter) / (25 * 4096) * 1e6:9.2f}", flush=True)
+    numba.set_num_threads(1)
+
+
 def go_long() -> list[dict[str, Any]]:
     """Cost a pose and memory against poses, chunk and cores (3 DoF): kernel, then whole maps."""
     robot = picchio.load_robot(ROBOTS[3])
@@ -262,11 +278,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", metavar="FILE")
     parser.add_argument("--long", action="store_true")
+    parser.add_argument("--cores", action="store_true", help="only one core against all")
     options = parser.parse_args()
     numba.set_num_threads(1)
     arm = picchio.load_robot(ROBOTS[3])
     print("compiling, where it was not done before: about a minute ...", flush=True)
     ours(arm, POSE[None])
+    if options.cores:
+        go_cores()
+        return
     ratios, counted, costs = compare_dofs()
     few = random_poses(arm, 50)
     own = float(np.abs(ours(arm, few) / ours(arm, few, compiled=False) - 1).max())
