@@ -48,7 +48,7 @@ def candidate_targets(problem: Problem, effect: type[Effect]) -> list[str]:
         groups = [g for g in problem.groups if g != "force"]
         if effect.name in _AXES_ONLY:
             groups = [g for g in groups if g.split(".")[0] in _VECTOR]
-        if effect.name in ("mount_resonance", "sensor_highpass"):
+        if effect.name == "mount_resonance":
             groups = [g for g in groups if g.split(".")[0] in _MOUNTED]
         if effect.name in ("sensor_gain", "sensor_delay") and "force" in problem.groups:
             groups.append("force")

@@ -136,7 +136,7 @@ def fit(
         upper = np.array([u.upper for u in unknowns])
         improved = False
         for _ in range(7 if fresh else 2):
-            step = _bounded_step(normal, gradient, scale, damping, vector, lower, upper)
+            step = bounded_step(normal, gradient, scale, damping, vector, lower, upper)
             trial = here.at(vector + step)
             try:
                 there = problem.residuals(trial.effects, chosen, end)
@@ -186,7 +186,7 @@ def _square(residuals: Sequence[FloatArray]) -> float:
     return total if np.isfinite(total) else np.inf
 
 
-def _bounded_step(
+def bounded_step(
     normal: FloatArray,
     gradient: FloatArray,
     scale: FloatArray,

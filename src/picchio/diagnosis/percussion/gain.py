@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from picchio.diagnosis.percussion.fit import fit
-from picchio.diagnosis.percussion.latent import LATENT, fit_latent
+from picchio.diagnosis.percussion.latent import LATENT
+from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.diagnosis.result import Gain

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,9 +22,9 @@ if TYPE_CHECKING:
 LATENT = ("pulse_jitter", "missed_hits", "mains_hum")
 _SHIFT = 2e-4  # s
 _WEAKER = 0.2
-_ROUNDS = 6
-_SHARES = (1.0, 0.5, 0.25, 0.1)
 _MAINS = (50.0, 60.0)
+# Late blows that the screening tries.
+_LOOKED_AT = 1.8
 
 
 def latent_gain(
@@ -48,19 +49,37 @@ def latent_gain(
         return Suspect(best, gain, 2 * len(known.records), (best,))
     start = kind(target)
     fall, numbers = 0.0, 0
-    for residual, columns in zip(known.residuals, _columns(problem, known, kind), strict=True):
+    for residual, columns in zip(
+        known.residuals, hidden_columns(problem, known, kind), strict=True
+    ):
         if columns.shape[1] == 0:
             continue
         weights = np.linalg.lstsq(columns, -residual.ravel(), rcond=1e-6)[0]
         fall += float((residual**2).sum() - ((residual.ravel() + columns @ weights) ** 2).sum())
         numbers += columns.shape[1]
+    if kind.name == "pulse_jitter" and known.end is not None:
+        fall = max(fall, _late_share(problem, known, kind) * float(left @ left))
     return Suspect(start, fall, numbers, (start,))
 
 
-def _columns(problem: Problem, known: Fit, kind: type[Effect]) -> list[FloatArray]:
+def _late_share(problem: Problem, known: Fit, kind: type[Effect]) -> float:
+    """What share of the residual the times of the first late blows explain.
+
+    A blow that comes late by more than its own edges' width is not seen in any slope.
+    """
+    interval = min(r.setup.blows.interval for r in known.records)
+    end = min((1 + _LOOKED_AT) * interval, known.end or math.inf)
+    first = fit(problem, known.hypothesis, known.records, end, iterations=3)
+    early = replace(first, end=end)
+    begun = blow_by_blow(problem, early, lambda old, late: with_hidden(old, kind, dict(late)))
+    late = fit(problem, begun, known.records, end, iterations=2)
+    return max(1.0 - late.chi_square / max(first.chi_square, 1e-300), 0.0)
+
+
+def hidden_columns(problem: Problem, known: Fit, kind: type[Effect]) -> list[FloatArray]:
     """The residual's change with every blow's shift or weakening, per record."""
     hypothesis = known.hypothesis
-    current = _current(hypothesis, kind.name)
+    current = current_hidden(hypothesis, kind.name)
     most = max(int(r.setup.blows.hit.max()) + 1 for r in known.records)
     step = _SHIFT if kind.name == "pulse_jitter" else _WEAKER
     found: list[list[FloatArray]] = [[] for _ in known.records]
@@ -72,7 +91,9 @@ def _columns(problem: Problem, known: Fit, kind: type[Effect]) -> list[FloatArra
             if hit < count:
                 numbers[hit] += step
             hidden[record.name] = tuple(numbers)
-        there = problem.residuals(_with(hypothesis, kind, hidden).effects, known.records, known.end)
+        there = problem.residuals(
+            with_hidden(hypothesis, kind, hidden).effects, known.records, known.end
+        )
         for i, (record, new, old) in enumerate(
             zip(known.records, there, known.residuals, strict=True)
         ):
@@ -84,104 +105,22 @@ def _columns(problem: Problem, known: Fit, kind: type[Effect]) -> list[FloatArra
     ]
 
 
-def _current(hypothesis: Hypothesis, name: str) -> dict[str, tuple[float, ...]]:
+def current_hidden(hypothesis: Hypothesis, name: str) -> dict[str, tuple[float, ...]]:
+    """Record -> an effect's hidden numbers, as far as they are known."""
     for effect in hypothesis.effects:
         if effect.name == name:
             return dict(effect.hidden)
     return {}
 
 
-def _with(
+def with_hidden(
     hypothesis: Hypothesis, kind: type[Effect], hidden: dict[str, tuple[float, ...]]
 ) -> Hypothesis:
-    from dataclasses import replace
-
+    """With an effect's hidden numbers (record -> numbers), and the effect if it was not there."""
     effects = tuple(e.with_hidden(hidden) if e.name == kind.name else e for e in hypothesis.effects)
     if kind.name not in {e.name for e in hypothesis.effects}:
         effects = (*effects, kind("tool").with_hidden(hidden))
     return replace(hypothesis, effects=effects)
-
-
-def fit_latent(problem: Problem, start: Fit, kind: type[Effect], target: str) -> Fit:
-    """Fit the hidden numbers record by record, and the rest, in turns."""
-    from dataclasses import replace
-
-    if kind.name == "mains_hum":
-        return start
-    here = start
-    if kind.name == "pulse_jitter":
-        begun = blow_by_blow(problem, start, lambda known, late: _with(known, kind, dict(late)))
-        here = fit(problem, begun, start.records, start.end, iterations=2)
-    most = {r.name: int(r.setup.blows.hit.max()) + 1 for r in start.records}
-    largest = 0.45 * start.records[0].setup.blows.interval
-    for turn in range(_ROUNDS):
-        current = _current(here.hypothesis, kind.name)
-        known, wanted = {}, {}
-        for record, residual, columns in zip(
-            here.records, here.residuals, _columns(problem, here, kind), strict=True
-        ):
-            numbers = np.array(current.get(record.name, np.zeros(most[record.name])), dtype=float)
-            known[record.name] = numbers.copy()
-            if columns.shape[1]:
-                numbers[1 : 1 + columns.shape[1]] += np.linalg.lstsq(
-                    columns, -residual.ravel(), rcond=1e-6
-                )[0]
-            if kind.name == "pulse_jitter":
-                numbers = np.clip(numbers, -largest, largest)
-            else:
-                numbers = np.round(np.clip(numbers, 0.0, 1.0))
-            wanted[record.name] = numbers
-        hidden = {name: tuple(numbers) for name, numbers in wanted.items()}
-        if kind.name == "pulse_jitter":
-            hidden = _shortened(problem, here, kind, known, wanted)
-        hypothesis = _with(here.hypothesis, kind, hidden)
-        before = here.cost
-        here = fit(problem, hypothesis, here.records, here.end, iterations=2)
-        if turn and before - here.cost < 1e-4 * here.cost:
-            break
-    numbers = np.concatenate(
-        [np.array(v)[1:] for v in _current(here.hypothesis, kind.name).values()]
-    )
-    value = (
-        {"std": float(np.sqrt(np.mean(numbers**2)))}
-        if kind.name == "pulse_jitter"
-        else {"fraction": float(numbers.mean())}
-    )
-    effects = tuple(
-        e.with_values(**value) if e.name == kind.name else e for e in here.hypothesis.effects
-    )
-    return replace(here, hypothesis=replace(here.hypothesis, effects=effects))
-
-
-def _shortened(
-    problem: Problem,
-    here: Fit,
-    kind: type[Effect],
-    known: dict[str, FloatArray],
-    wanted: dict[str, FloatArray],
-) -> dict[str, tuple[float, ...]]:
-    """Each record's step to what is wanted, halved until it helps that record."""
-    best = {name: tuple(numbers) for name, numbers in known.items()}
-    before = {
-        r.name: float((x * x).sum()) for r, x in zip(here.records, here.residuals, strict=True)
-    }
-    left = list(here.records)
-    for share in _SHARES:
-        trial = {
-            r.name: tuple(known[r.name] + share * (wanted[r.name] - known[r.name])) for r in left
-        }
-        effects = _with(here.hypothesis, kind, {**best, **trial}).effects
-        there = problem.residuals(effects, left, here.end)
-        worse = []
-        for record, residual in zip(left, there, strict=True):
-            if float((residual * residual).sum()) < before[record.name]:
-                best[record.name] = trial[record.name]
-            else:
-                worse.append(record)
-        left = worse
-        if not left:
-            break
-    return best
 
 
 def hidden_numbers(hypothesis: Hypothesis, n_records: int) -> float:
@@ -200,8 +139,6 @@ def hidden_numbers(hypothesis: Hypothesis, n_records: int) -> float:
 
 def hum_lines(problem: Problem, found: Fit) -> Hypothesis:
     """The hum's amplitude and phases of every record written into its effect."""
-    from dataclasses import replace
-
     from picchio.diagnosis.percussion.problem import take_out_line
 
     hypothesis = found.hypothesis

@@ -10,7 +10,8 @@ from typing import Any
 from picchio.diagnosis.percussion.confidence import confidence
 from picchio.diagnosis.percussion.evidence import Evidence, weigh
 from picchio.diagnosis.percussion.fit import Fit, fit
-from picchio.diagnosis.percussion.latent import LATENT, fit_latent
+from picchio.diagnosis.percussion.latent import LATENT, with_hidden
+from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.trials import SAME, Trial, score, try_candidates
 from picchio.diagnosis.percussion.unknowns import Hypothesis
@@ -101,8 +102,48 @@ def search(
             )
             if found.best.hypothesis.labels == here.hypothesis.labels:
                 break
+            found.best = _with_latent(problem, found.best, best.label)
+            if known and not weigh(problem, found.best.residuals, found.best.records).is_noise:
+                found.best = exchange(problem, found, records, least)
     found.evidence = weigh(problem, found.best.residuals, found.best.records)
     return found
+
+
+def _with_latent(problem: Problem, best: Fit, newest: str) -> Fit:
+    """What earlier causes draw anew in every record, looked for again beside the newest cause."""
+    for cause in best.hypothesis.causes:
+        if cause.label != newest and cause.name in LATENT and cause.name != "mains_hum":
+            kind = type(cause)
+            # From the start: without the newest cause some numbers may have been far off.
+            start = replace(best, hypothesis=with_hidden(best.hypothesis, kind, {}))
+            again = fit_latent(problem, start, kind, cause.target)
+            best = again if again.cost < best.cost else best
+    return best
+
+
+def exchange(
+    problem: Problem, found: Search, records: Sequence[MeasuredRecord], least: float
+) -> Fit:
+    """The best fit, with an earlier cause replaced by a close rival where that now does better.
+
+    The first cause is chosen while the others still disturb: a rival may have been the right one.
+    """
+    best = found.best
+    for step in found.steps[:-1]:
+        for rival in step[1:]:
+            chosen = step[0].label
+            if chosen not in best.hypothesis.labels or not rival.finished(records):
+                continue
+            if rival.label in best.hypothesis.labels or rival.label.split(":")[0] in LATENT:
+                continue
+            joined = rival.fit.hypothesis
+            for cause in best.hypothesis.causes:
+                if cause.label not in (chosen, *joined.labels):
+                    joined = joined.joined(cause)
+            other = fit(problem, joined, records, None, iterations=6, rival=best.cost)
+            if score(other) < score(best) - least:
+                best = other
+    return best
 
 
 def prune(
@@ -149,8 +190,9 @@ def alternatives(
             trials = [t for t in found.steps[0] if t.label != cause.label]
         else:
             others = best.hypothesis.minus(cause.label)
-            left = [(k, t) for k, t in candidates if f"{k.name}:{t}" != cause.label]
-            trials = try_candidates(problem, others, left, scales, records)
+            trials = try_candidates(
+                problem, others, candidates, scales, records, cause=cause.label, best=best
+            )
         tried += [t for t in trials if t.finished(records)]
         for trial in trials:
             worse = trial.score - reference

@@ -9,7 +9,8 @@ from typing import Any
 
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.fit import Fit, fit, fit_growing
-from picchio.diagnosis.percussion.latent import fit_latent, hidden_numbers
+from picchio.diagnosis.percussion.latent import hidden_numbers
+from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.screen import Screen, Suspect
 from picchio.diagnosis.percussion.unknowns import Hypothesis
@@ -23,6 +24,11 @@ SHORT_LIST = 7
 LONG_FITS = 3
 # A fit gains more than its screening promises, but hardly three times as much.
 _SHORT = 0.3
+# What promises less than this share of what the cause itself promised is no rival of it.
+_HOPE = 0.1
+# Numbers that are drawn anew in every record are screened as free as they are: nothing to add.
+_HOPE_LATENT = 0.5
+_RIVALS = 2
 # Sets whose BIC is within this cannot be told apart.
 SAME = 10.0
 
@@ -68,12 +74,16 @@ def try_candidates(
     long_fits: int = LONG_FITS,
     whole: bool = False,
     least: float = 0.0,
+    cause: str = "",
+    best: Fit | None = None,
     log: Callable[[dict[str, Any]], None] | None = None,
 ) -> list[Trial]:
     """Screen all candidates, fit the best on growing windows; the best first.
 
     Where plenty is left to explain, the first part of a part of the records screens as well;
     `whole` takes all there is, and stops where no candidate promises anything near `least`.
+    With a `cause`, which is a label among the candidates, its rivals are looked for: it is screened
+    to know what may be expected of them; `best` is the fit to all records that has it.
     """
     some = list(records) if whole else spread_out(records)
     window = None if whole else SCREEN_WINDOW
@@ -98,11 +108,29 @@ def try_candidates(
             suspects = [s for s in suspects if s.gain - s.numbers * logarithm > enough]
             if not any(s.gain - min(s.numbers, 2) * logarithm > 0.0 for s in suspects):
                 return []
+        if cause:
+            suspects = _rivals(suspects, cause)
         chosen = _short_list(suspects, short_list)
         tried = [(suspect, effect) for suspect in chosen for effect in suspect.starts]
         fits = pool.map("short", [effect for _, effect in tried])
         short = _best_of_each(tried, fits, some)
-        return _long_trials(pool, short, list(records), long_fits)
+        if best is None or not short:
+            return _long_trials(pool, short, list(records), long_fits)
+        own = fit(problem, best.hypothesis, some, window, iterations=2)
+        mark = min(score(own), short[0][2])
+        return _long_trials(pool, short, list(records), long_fits, mark, best.cost)
+
+
+def _rivals(suspects: Sequence[Suspect], cause: str) -> list[Suspect]:
+    """Those that may do as well as the cause; the best few however little they promise."""
+    own = max((s.gain for s in suspects if s.label == cause), default=0.0)
+    chosen: list[Suspect] = []
+    for s in suspects:
+        latent = s.effect.latent is not None
+        hopeful = s.gain >= (_HOPE_LATENT if latent else _HOPE) * own
+        if s.label != cause and (hopeful or (len(chosen) < _RIVALS and not latent)):
+            chosen.append(s)
+    return chosen
 
 
 def _light(found: Fit | None) -> Fit | None:
@@ -132,19 +160,24 @@ def _long_trials(
     short: Sequence[tuple[Suspect, Fit, float]],
     records: Sequence[MeasuredRecord],
     long_fits: int,
+    mark: float | None = None,
+    rival: float = math.inf,
 ) -> list[Trial]:
-    """Those that did best so far, fitted to everything; the best first."""
+    """Those that did best so far, fitted to everything; the best first.
+
+    `mark` is the score to come near to in the first part, `rival` the cost to come near to in all.
+    """
     trials: list[Trial] = []
     wanted = []
     for place, (suspect, found, value) in enumerate(short):
         # What is far behind after the first part will not catch up.
-        behind = value - short[0][2]
-        late = place >= long_fits or (place > 0 and behind > 0.5 * short[0][2] + 200.0)
+        mark = value if mark is None else mark
+        behind = value - mark
+        late = place >= long_fits or (place > 0 and behind > 0.5 * mark + 200.0)
         if late and (behind > SAME or place >= 2 * long_fits):
             trials.append(Trial(suspect.label, found, math.inf, suspect.gain))
         else:
             wanted.append((suspect, found))
-    rival = math.inf
     # The first is the others' rival: a fit that stays far above it is given up.
     for some in (wanted[:1], wanted[1:]):
         tasks = [(found.hypothesis, suspect.effect, rival) for suspect, found in some]

@@ -130,6 +130,12 @@ class Hypothesis:
         )
         return replace(self, effects=(*self.effects, effect), scales=self.scales + own)
 
+    def joined(self, cause: Effect) -> Hypothesis:
+        """With one more cause, at just the values that it has in another hypothesis."""
+        more = self.plus(cause)
+        effects = tuple(cause if e.label == cause.label else e for e in more.effects)
+        return replace(more, effects=effects)
+
     def minus(self, label: str) -> Hypothesis:
         """Without one of the causes; a nuisance that was freed goes back into its tolerance."""
         if label in self.freed:

@@ -1,0 +1,103 @@
+"""Choosing causes: what is chosen first may be wrong, and every cause must be a candidate."""
+
+from __future__ import annotations
+
+import pytest
+
+import picchio
+from picchio.diagnosis.percussion.candidates import all_candidates
+from picchio.diagnosis.percussion.fit import fit, fit_growing
+from picchio.diagnosis.percussion.latent_fit import fit_latent
+from picchio.diagnosis.percussion.problem import Problem
+from picchio.diagnosis.percussion.select import Search, exchange
+from picchio.diagnosis.percussion.trials import Trial, score
+from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.model.effects import effect_class
+from worlds import campaign as worlds
+from worlds import cases
+from worlds.effects import EFFECTS
+
+ROBOT = "fanuc_like_3dof"
+SENSORS = ("accelerometer.tool", "deflection")
+TRUE = (
+    ("joint_stiffness", "joint_1", {"scale": 1.4}),
+    ("force_amplitude", "tool", {"scale": 0.75}),
+)
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return picchio.load_robot(ROBOT)
+
+
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_whatever_may_be_hidden_is_a_candidate(effect, arm, plain_problem):
+    have = {f"{kind.name}:{target}" for kind, target in all_candidates(plain_problem)}
+    for seed in range(6):
+        causes = cases.causes(
+            "single", seed, robot=ROBOT, effect=effect, sensors=SENSORS, records=3
+        )
+        for name, target, _ in causes:
+            assert f"{name}:{target}" in have
+
+
+@pytest.fixture(scope="module")
+def plain_problem(arm):
+    campaign, _ = worlds.make(robot=ROBOT, seed=11, sensors=SENSORS, records=3)
+    return Problem(arm, campaign)
+
+
+@pytest.fixture(scope="module")
+def two_causes(arm):
+    """Two causes in the data; one of them is known, the other was taken for hysteresis."""
+    campaign, _ = worlds.make(robot=ROBOT, seed=12, causes=TRUE, sensors=SENSORS, records=3)
+    problem = Problem(arm, campaign)
+    start = Hypothesis.baseline(arm, campaign.tolerance)
+    baseline = fit_growing(problem, start)
+
+    def trial_of(name, **values):
+        known = baseline.hypothesis.plus(effect_class(name)("joint_1", **values))
+        found = fit_growing(problem, known)
+        return Trial(f"{name}:joint_1", found, score(found), 0.0)
+
+    wrong = trial_of("hysteresis", torque=20.0, deflection=2e-4)
+    right = trial_of("joint_stiffness", scale=1.3)
+    both = wrong.fit.hypothesis.plus(effect_class("force_amplitude")("tool", scale=0.8))
+    best = fit(problem, both, iterations=6)
+    return problem, baseline, wrong, right, best
+
+
+def test_a_rival_replaces_what_was_chosen_too_early(two_causes):
+    problem, baseline, wrong, right, best = two_causes
+    later = Trial("force_amplitude:tool", best, score(best), 0.0)
+    found = Search(baseline, best, steps=[[wrong, right], [later]])
+    better = exchange(problem, found, problem.records, 8.0)
+    assert better.hypothesis.labels == {"joint_stiffness:joint_1", "force_amplitude:tool"}
+    assert better.chi_square / better.samples < 1.1 < best.chi_square / best.samples
+
+
+def test_what_is_right_is_not_replaced(two_causes):
+    problem, baseline, wrong, right, _ = two_causes
+    both = right.fit.hypothesis.plus(effect_class("force_amplitude")("tool", scale=0.8))
+    best = fit(problem, both, iterations=6)
+    later = Trial("force_amplitude:tool", best, score(best), 0.0)
+    found = Search(baseline, best, steps=[[right, wrong], [later]])
+    assert exchange(problem, found, problem.records, 8.0) is best
+
+
+def test_late_blows_and_what_is_common_are_found_at_once(arm):
+    """From a wrong force: in turns, force and times would follow each other for long."""
+    jitter = ("pulse_jitter", "tool", {"std": 1.5e-3})
+    campaign, truth = worlds.make(
+        robot=ROBOT, seed=13, causes=(jitter,), sensors=SENSORS, records=3
+    )
+    problem = Problem(arm, campaign)
+    start = Hypothesis.baseline(arm, campaign.tolerance)
+    early = fit(problem, start, end=0.03)
+    known = fit(problem, early.hypothesis, iterations=0)
+    found = fit_latent(problem, known, effect_class("pulse_jitter"), "tool")
+    assert found.chi_square / found.samples < 1.1
+    cause = next(e for e in found.hypothesis.effects if e.name == "pulse_jitter")
+    for i, record in enumerate(problem.records):
+        late = truth["world"].bench(i).blows.late
+        assert max(abs(a - b) for a, b in zip(cause.hidden[record.name], late, strict=True)) < 1e-4
