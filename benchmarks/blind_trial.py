@@ -120,7 +120,7 @@ def main():
                 stream.write(json.dumps(row) + "\n")
                 stream.flush()
                 rows.append(row)
-                note = (row["case"], row["verdict"], row["claimed"])
+                note = (row["case"], row["verdict"], row.get("claimed", ""))
                 print(f"{number}/{len(todo)}", *note, file=sys.stderr)
     import trial_tables
 
