@@ -54,6 +54,10 @@ def cases(draws):
             yield {"robot": ARM, "kind": "left-out", "effect": effect, "snr": 40, "draw": draw}
         for effect in EFFECTS:
             yield {"robot": ARM, "kind": "weak", "effect": effect, "snr": 20, "draw": draw}
+        for effect in EFFECTS:
+            yield {"robot": ARM, "kind": "few", "effect": effect, "snr": 40, "draw": draw}
+        for n in range(20):
+            yield {"robot": ARM, "kind": "few-null", "snr": 40, "draw": 20 * draw + n}
         for robot in ("ur10", "kinova_gen3"):
             for n in range(10):
                 yield {"robot": robot, "kind": "null", "snr": 40, "draw": 10 * draw + n}

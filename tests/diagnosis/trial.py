@@ -16,6 +16,7 @@ if TESTS not in sys.path:
     sys.path.insert(0, TESTS)
 
 import burst  # noqa: E402
+import follow_up  # noqa: E402
 from ablations import METHODS  # noqa: E402
 
 import picchio  # noqa: E402
@@ -57,9 +58,12 @@ def make(case, salt=0):
     robot = picchio.load_robot(case["robot"])
     accelerometer = f"accelerometer.{robot.tool_frame}"
     weak = case["kind"] == "weak"
-    sensors = case.get("sensors") or ((accelerometer,) if weak else (accelerometer, "deflection"))
-    kind = {"weak": "single", "left-out": "single"}.get(case["kind"], case["kind"])
-    options = {"sensors": tuple(sensors), "records": case.get("records", 18)}
+    few = case["kind"] in ("few", "few-null")
+    alone = weak or few
+    sensors = case.get("sensors") or ((accelerometer,) if alone else (accelerometer, "deflection"))
+    kind = {"weak": "single", "left-out": "single", "few": "single", "few-null": "null"}
+    kind = kind.get(case["kind"], case["kind"])
+    options = {"sensors": tuple(sensors), "records": case.get("records", 3 if few else 18)}
     causes = cases.causes(
         kind,
         seed,
@@ -92,6 +96,8 @@ def run(case, salt=0, without=(), method="diagnose"):
     if method == "diagnose":
         found = diagnose_percussion(robot, campaign, without=without, workers=1)
         result = judge(case, truth, found)
+        if case["kind"] == "few" and found.diagnosis.verdict == "ambiguous":
+            result["follow_up"] = follow(robot, case, campaign, truth, found, seed_of(case, salt))
         if truth["causes"] and result["right"]:
             result["burst"] = burst.errors(found, truth, seed_of(case, salt))
     else:
@@ -99,6 +105,20 @@ def run(case, salt=0, without=(), method="diagnose"):
     result["seconds"] = round(time.monotonic() - began, 1)
     result["cpu_seconds"] = round(time.process_time() - spent, 1)
     return result
+
+
+def follow(robot, case, campaign, truth, found, seed):
+    """What comes out when the measurement that was asked for is taken, too."""
+    ask = found.diagnosis.next_measurement
+    if ask is None:
+        return None
+    more = follow_up.taken(ask, campaign, truth, seed)
+    after = judge(case, truth, diagnose_percussion(robot, more, workers=1))
+    return {
+        "foretold": [rival["chi_square"] for rival in ask["rivals"]],
+        "sensor": ask["sensor"],
+        **{key: after[key] for key in ("verdict", "claimed", "alternatives", "right")},
+    }
 
 
 def judge(case, truth, found):

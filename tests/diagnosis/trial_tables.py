@@ -7,6 +7,7 @@ from collections import Counter, defaultdict
 
 ARM = "fanuc_like_3dof"
 UNNAMEABLE = {"outside": "out of the catalogue", "left-out": "true cause taken out"}
+ENOUGH = 30.0  # chi-square from which a measurement is foretold to tell causes apart
 WITHIN = {"peak": 0.01, "life": 0.05}  # of a burst that nobody measured
 
 
@@ -18,6 +19,7 @@ def summary(rows):
     print_parameters(rows)
     print_gains(rows)
     print_bursts(rows)
+    print_sets(rows)
     print_times(rows)
     print_confusion(rows)
     print_wrong(rows)
@@ -117,6 +119,31 @@ def print_bursts(rows):
                         f"{100 * quantile(size, 0.95):.2g} %; {inside} of {len(size)} within "
                         f"{100 * limit:g} %"
                     )
+
+
+def print_sets(rows):
+    """Three records of one pose: sets that hold the truth, and what the next measurement tells."""
+    few = [row for row in rows if row["kind"] == "few"]
+    if not few:
+        return
+    claimed = [row for row in few if row["claimed"]]
+    print(
+        f"three records, no deflections: {len(claimed)} of {len(few)} claimed, the truth among "
+        f"what is told in {sum(row['right'] for row in claimed)}; "
+        f"{sum(row['verdict'] == 'ambiguous' for row in few)} told as sets"
+    )
+    asked = [row["follow_up"] for row in few if row.get("follow_up")]
+    can = [f for f in asked if min(f["foretold"]) >= ENOUGH]
+    done = sum(f["verdict"] == "named" and f["right"] and not f["alternatives"] for f in can)
+    print(
+        f"next measurement: foretold to tell all apart in {len(can)} of {len(asked)}; taken, it "
+        f"named the cause alone in {done} of them"
+    )
+    nulls = [row for row in rows if row["kind"] == "few-null"]
+    if nulls:
+        alarms = sum(row["verdict"] != "nothing-wrong" for row in nulls)
+        bound = f"rate below {100 * upper_bound(alarms, len(nulls)):.2g} % (95 %)"
+        print(f"three records, nothing hidden: {alarms} false alarms in {len(nulls)}; {bound}")
 
 
 def print_times(rows):

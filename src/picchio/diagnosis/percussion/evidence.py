@@ -15,8 +15,12 @@ _BANDS = 8
 _ANSWERS = 3.0
 # A second-order model is exact to about this share of the noise's power at 40 dB.
 _MODEL_FLOOR = 0.01
-# Relative error of what the noise's spectrum has above white noise.
+# Relative error of what the noise's spectrum has above white noise, where it was fitted to this
+# many quiet samples of a group or more; from fewer it is known less well.
 _COLOUR_ERROR = 0.12
+_PLENTY = 8000.0
+# Samples that say as much of a noise's slow part as one of white noise says of all.
+_SLOW = 12.0
 BAND_LIMIT = 4.5
 POSE_LIMIT = 5.0
 
@@ -121,13 +125,18 @@ def _colour(problem: Problem, group: str) -> Callable[[float], float]:
     record = next(r for r in problem.records if group in r.setup.groups)
     name = next(c.name for c in record.setup.channels if c.group == group)
     noise = record.noise[name]
+    samples = _channels_of(problem, group) / (2.0 * max(noise.error, 1e-6) ** 2)
+    # Colour that so few samples did not show may be there all the same.
+    unseen = float(np.sqrt(max(_SLOW / samples - _SLOW / _PLENTY, 0.0)))
     if noise.white:
-        return lambda frequency: 0.0
+        return lambda frequency: unseen
     white = float(np.median(noise.psd))
+    share = _COLOUR_ERROR * max(1.0, float(np.sqrt(_PLENTY / samples)))
 
     def unsure(frequency: float) -> float:
         here = float(np.interp(frequency, noise.frequency, noise.psd))
-        return _COLOUR_ERROR * abs(1.0 - white / here) if here > 0.0 else 0.0
+        colour = share * abs(1.0 - white / here) if here > 0.0 else 0.0
+        return max(colour, unseen)
 
     return unsure
 

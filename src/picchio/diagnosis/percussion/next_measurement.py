@@ -1,18 +1,19 @@
-"""What to measure next: where the rivals' predictions differ most."""
+"""What to measure next: where the rivals' predictions differ most, whatever else is refitted."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from picchio.campaign import parse_channel
+from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.fit import Fit
 from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.trials import Trial
+from picchio.diagnosis.percussion.trials import SAME, Trial
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model.geometry import Geometry
 from picchio.prediction.percussion import PercussionSetup
@@ -20,7 +21,34 @@ from picchio.prediction.percussion import PercussionSetup
 _POSES = 6
 _DIRECTIONS = 3
 _SENSORS = ("deflection", "accelerometer")
+_RIVALS = 4
 _SEED = 20160401
+# What noise may take from a difference that was foreseen.
+_ENOUGH = 3.0 * SAME
+# Relative noise of a sensor that the campaign does not have.
+_NEW_SENSOR = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class _Shot:
+    """One record that might be taken, and by how much chi-square would tell each rival."""
+
+    geometry: Geometry
+    direction: FloatArray
+    sensor: str
+    at_hand: bool
+    told: FloatArray
+
+    @property
+    def least(self) -> float:
+        """Chi-square by which it tells the rival that it tells least of those it tells."""
+        clear = self.told >= _ENOUGH
+        return float(self.told[clear].min()) if clear.any() else 0.0
+
+    @property
+    def worth(self) -> tuple[int, bool, float, float]:
+        """Rivals told apart; no new sensor needed; the least of them; all of them."""
+        return int((self.told >= _ENOUGH).sum()), self.at_hand, self.least, float(self.told.sum())
 
 
 def next_measurement(
@@ -29,52 +57,89 @@ def next_measurement(
     rivals: Sequence[Trial],
     same: Sequence[tuple[frozenset[str], float]],
 ) -> dict[str, Any] | None:
-    """The pose, direction, level and sensors that best separate the best model from its rival.
+    """The pose, direction and sensors that best separate the best model from its rivals.
 
-    Each rival's best fit is simulated against the other in records that were not taken: new
-    poses and directions, more force, the sensors at hand and those that are missing.
+    Each rival's best fit is simulated against the best one in records that were not taken: other
+    poses and directions, the most force that was used, the sensors at hand and those missing. A
+    difference counts as far as the best model's own unknowns, known as well as they are by now,
+    could not make up for it.
 
     Returns:
-        as in the JSON; None where there is no rival to be told apart.
+        as in the JSON, with `rivals` (what it would tell the best from, and what it would not);
+        None where there is no rival to be told apart.
     """
     tied = {labels for labels, _ in same}
-    others = [t.fit for t in rivals if not tied or t.fit.hypothesis.labels in tied]
+    others: dict[frozenset[str], Fit] = {}
+    for trial in sorted(rivals, key=lambda t: t.fit.cost):
+        labels = trial.fit.hypothesis.labels
+        if (not tied or labels in tied) and labels != best.hypothesis.labels:
+            others.setdefault(labels, trial.fit)
     if not others:
         return None
-    other = min(others, key=lambda f: f.cost)
+    chosen = list(others.values())[: _RIVALS if tied else 1]
+    shots = _shots(problem, best, [fit.hypothesis for fit in chosen])
+    if not shots:
+        return None
+    shot = max(shots, key=lambda s: s.worth)
+    names = [_name(fit.hypothesis) for fit in chosen]
+    told = [name for name, value in zip(names, shot.told, strict=True) if value >= _ENOUGH]
+    alike = [name for name in names if name not in told]
+    why = f"{_name(best.hypothesis)} is best told here, by the {shot.sensor}, "
+    if told:
+        why += f"from {' or '.join(told)}: chi-square would fall by {shot.least:.3g}"
+        if alike:
+            why += f"; from {' or '.join(alike)} nothing that was tried tells it"
+    else:
+        why = (
+            f"nothing that was tried tells {_name(best.hypothesis)} from {' or '.join(alike)}; "
+            f"this comes nearest (chi-square {float(shot.told.max()):.3g}, {shot.sensor})"
+        )
+    pose = zip(problem.robot.joint_names, shot.geometry.pose, strict=True)
+    return {
+        "why": why,
+        "pose": {name: round(float(q), 6) for name, q in pose},
+        "direction": [round(float(c), 6) for c in shot.direction],
+        "force": _force(problem),
+        "sensor": shot.sensor,
+        "separation": float(shot.told.max()),
+        "rivals": [
+            {"causes": name, "chi_square": float(value)}
+            for name, value in zip(names, shot.told, strict=True)
+        ],
+    }
+
+
+def _name(hypothesis: Hypothesis) -> str:
+    return " + ".join(sorted(hypothesis.labels)) or "the nominal model"
+
+
+def _force(problem: Problem) -> float:
+    """N, the most that was used."""
+    return max(float(np.abs(r.setup.blows.height).max()) for r in problem.records)
+
+
+def _shots(problem: Problem, best: Fit, rivals: Sequence[Hypothesis]) -> list[_Shot]:
     rng = np.random.default_rng(_SEED)
-    robot = problem.robot
-    some = problem.records[0]
-    poses = [r.setup.geometry for r in problem.records[:: max(1, len(problem.records) // 3)]]
-    poses += [Geometry(some.setup.geometry.chain, _pose(problem, rng)) for _ in range(_POSES)]
-    force = float(np.abs(some.setup.blows.height).max())
-    tried = []
+    some = max(problem.records, key=lambda r: float(np.abs(r.setup.blows.height).max()))
+    every = max(1, len(problem.records) // 3)
+    poses = [r.setup.geometry for r in problem.records[::every]]
+    chain = some.setup.geometry.chain
+    poses += [Geometry(chain, _pose(problem, rng)) for _ in range(_POSES)]
+    shots = []
     for geometry in poses:
         for direction in _directions(rng):
-            value, sensor = _separation(
-                problem, some.setup, geometry, direction, best.hypothesis, other.hypothesis
-            )
-            tried.append((value, sensor, geometry, direction))
-    if not tried:
-        return None
-    value, sensor, geometry, direction = max(tried, key=lambda item: item[0])
-    pose = {
-        name: round(float(q), 6) for name, q in zip(robot.joint_names, geometry.pose, strict=True)
-    }
-    names = " + ".join(sorted(best.hypothesis.labels)) or "the nominal model"
-    rival = " + ".join(sorted(other.hypothesis.labels))
-    return {
-        "why": f"{names} and {rival} differ most here: by {value:.3g} times the noise "
-        f"(RMS, {sensor})",
-        "pose": pose,
-        "direction": [round(float(c), 6) for c in direction],
-        "force": force,
-        "sensor": sensor,
-        "separation": float(value),
-    }
+            setup = _setup(problem, some.setup, geometry, direction)
+            try:
+                told = _told(problem, setup, best, rivals)
+            except InputError:  # one of the models is none there
+                continue
+            for name, value in told.items():
+                at_hand = any(group.split(".")[0] == name for group in problem.groups)
+                shots.append(_Shot(geometry, direction, name, at_hand, value))
+    return shots
 
 
-def _pose(problem: Problem, rng: np.random.Generator) -> np.ndarray:
+def _pose(problem: Problem, rng: np.random.Generator) -> FloatArray:
     robot = problem.robot
     seen = np.array([r.setup.geometry.pose for r in problem.records])
     low = np.maximum(robot.lower, seen.min(axis=0) - 0.6)
@@ -82,50 +147,84 @@ def _pose(problem: Problem, rng: np.random.Generator) -> np.ndarray:
     return np.asarray(rng.uniform(low, np.maximum(high, low)))
 
 
-def _directions(rng: np.random.Generator) -> list[np.ndarray]:
+def _directions(rng: np.random.Generator) -> list[FloatArray]:
     turned = rng.normal(size=(_DIRECTIONS - 1, 3))
     return [np.eye(3)[int(rng.integers(3))], *(d / np.linalg.norm(d) for d in turned)]
 
 
-def _separation(
-    problem: Problem,
-    like: PercussionSetup,
-    geometry: Geometry,
-    direction: np.ndarray,
-    one: Hypothesis,
-    other: Hypothesis,
-) -> tuple[float, str]:
-    """RMS difference of two hypotheses over the noise, and in which sensors it is seen best."""
-    robot = problem.robot
-    frame = robot.tool_frame
-    names = [f"deflection.{n}" for n in robot.flexible_names]
+def _setup(
+    problem: Problem, like: PercussionSetup, geometry: Geometry, direction: FloatArray
+) -> PercussionSetup:
+    """The record that would be taken, with every sensor that could be had."""
+    frame = problem.robot.tool_frame
+    names = [f"deflection.{n}" for n in problem.robot.flexible_names]
     names += [f"accelerometer.{frame}.{a}" for a in "xyz"]
-    channels = tuple(parse_channel(name)[0] for name in names)
-    rotation = geometry.motion(robot.tool_frame).rotation
-    setup = replace(
+    channels = {c.name: c for c in like.channels}
+    channels |= {name: parse_channel(name)[0] for name in names}
+    rotation = geometry.motion(frame).rotation
+    return replace(
         like,
         geometry=geometry,
         blows=like.blows.change(direction=direction, tool_rotation=rotation),
-        channels=channels,
-        _motions={},
-        _forces={},
-        _systems={},
-    )
-    try:
-        a = setup.predict(problem.model.with_effects(one.effects))
-        b = setup.predict(problem.model.with_effects(other.effects))
-    except InputError:
-        return 0.0, _SENSORS[0]
-    best, where = 0.0, _SENSORS[0]
+        channels=tuple(channels.values()),
+        _motions={}, _forces={}, _systems={},
+    )  # fmt: skip
+
+
+def _told(
+    problem: Problem, setup: PercussionSetup, best: Fit, rivals: Sequence[Hypothesis]
+) -> dict[str, FloatArray]:
+    """Sensor -> by how much chi-square would tell each rival, when the best model is refitted."""
+    here = setup.predict(problem.model.with_effects(best.hypothesis.effects))
+    there = [setup.predict(problem.model.with_effects(h.effects)) for h in rivals]
+    moves, covariance = _moves(problem, setup, best, here)
+    own = [c.name for c in setup.channels if c.group in problem.groups]
+    found = {}
     for sensor in _SENSORS:
-        rows = [name for name in names if name.startswith(sensor)]
-        known = [problem.noise[n].std for n in rows if n in problem.noise]
-        noise = (
-            float(np.mean(known))
-            if known
-            else 0.01 * float(np.sqrt(np.mean([np.mean(a[n] ** 2) for n in rows])))
-        )
-        value = float(np.sqrt(np.mean([np.mean((a[n] - b[n]) ** 2) for n in rows])) / noise)
-        if value > best:
-            best, where = value, sensor
-    return best, where
+        rows = own + [n for n in here if n.startswith(f"{sensor}.") and n not in own]
+        noise = {name: _noise(problem, name, here) for name in rows}
+        slopes = np.concatenate([moves[n] / noise[n] for n in rows]) if moves else None
+        told = []
+        for other in there:
+            left = np.concatenate([(other[n] - here[n]) / noise[n] for n in rows])
+            told.append(_left(left, slopes, covariance))
+        found[sensor] = np.array(told)
+    return found
+
+
+def _noise(problem: Problem, name: str, here: dict[str, FloatArray]) -> float:
+    known = problem.noise.get(name)
+    if known is not None and known.std > 0.0:
+        return known.std
+    return _NEW_SENSOR * max(float(np.sqrt(np.mean(here[name] ** 2))), 1e-300)
+
+
+def _moves(
+    problem: Problem, setup: PercussionSetup, best: Fit, here: dict[str, FloatArray]
+) -> tuple[dict[str, FloatArray], FloatArray]:
+    """Channel -> (samples, unknowns) of the best model, and the unknowns' covariance."""
+    if best.jacobians is None:
+        return {}, np.zeros((0, 0))
+    covariance = best.covariance()
+    vector = best.hypothesis.vector()
+    steps = np.clip(np.sqrt(np.maximum(covariance.diagonal(), 0.0)), 1e-6, 1e-3)
+    columns: dict[str, list[FloatArray]] = {name: [] for name in here}
+    for k, step in enumerate(steps):
+        moved = vector.copy()
+        moved[k] += step
+        effects = best.hypothesis.at(moved).effects
+        there = setup.predict(problem.model.with_effects(effects))
+        for name in here:
+            columns[name].append((there[name] - here[name]) / step)
+    return {name: np.stack(c, axis=1) for name, c in columns.items()}, covariance
+
+
+def _left(left: FloatArray, slopes: FloatArray | None, covariance: FloatArray) -> float:
+    """Chi-square of a difference after what the unknowns, within what is known, can do."""
+    total = float(left @ left)
+    if slopes is None:
+        return total
+    root = np.linalg.cholesky(covariance + 1e-18 * np.eye(len(covariance)) * covariance.max())
+    scaled = slopes @ root
+    right = scaled.T @ left
+    return total - float(right @ np.linalg.solve(np.eye(len(root)) + scaled.T @ scaled, right))

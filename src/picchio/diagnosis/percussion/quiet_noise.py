@@ -19,7 +19,7 @@ from picchio.prediction.noise_level import Noise
 from picchio.prediction.percussion import POSITION_KINDS, PercussionSetup
 
 # Fewer quiet samples a channel than this say too little.
-LEAST_SAMPLES = 600
+LEAST_SAMPLES = 120
 _ORDER = 24
 _LONGEST = 400
 _SMALL = 2e-3

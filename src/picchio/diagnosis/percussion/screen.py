@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,11 @@ from picchio.model.effects import Scales
 
 _FAINT = 20.0
 _SOME = 3
+# A first look is at every so-manyth record; what promises there less than so much of its share of
+# what is asked for is not looked at further.
+_EVERY = 3
+_FIRST = 0.6
+_CHANCE = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +93,24 @@ class Screen:
         scales: sizes that matter.
         faint: whether only what hardly stands out of the noise is looked for. A typical size is
             then far too large: late in a record it no longer looks like a small one.
+        enough: a fall of chi-square below which a promise is of no use.
     """
 
-    def __init__(self, problem: Problem, fit: Fit, scales: Scales, faint: bool = False) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        fit: Fit,
+        scales: Scales,
+        faint: bool = False,
+        enough: float = 0.0,
+    ) -> None:
         self.problem, self.fit, self.scales, self.faint = problem, fit, scales, faint
         self.project = Projector(fit)
         self.left = self.project(flat(fit.residuals))
+        self.enough, self.first = enough, None
+        # Chance alone promises one or two: below that a glance tells nothing.
+        if enough * _FIRST / _EVERY > _CHANCE and len(fit.records) > _EVERY:
+            self.first = Screen(problem, _part(fit), scales, faint)
 
     def suspect(self, candidate: tuple[type[Effect], str]) -> Suspect | None:
         """What an effect at a target promises; None where it can't act, or is known already."""
@@ -104,6 +121,10 @@ class Screen:
             return latent_gain(self.problem, self.fit, kind, target, self.project, self.left)
         if kind.discrete and self.fit.end is None:
             return None  # what has no small size would have been seen before
+        if self.first is not None:
+            glance = self.first.suspect(candidate)
+            if glance is None or glance.gain < _FIRST * self.enough / _EVERY:
+                return glance
         trials = [kind(target, **values) for values in kind(target).trials(self.scales)]
         if self.faint:
             trials = [self._faint(trial) for trial in trials]
@@ -130,6 +151,17 @@ class Screen:
         """The most promising first."""
         found = [s for s in suspects if s is not None]
         return sorted(found, key=lambda s: -(s.gain - s.numbers * math.log(self.left.size)))
+
+
+def _part(fit: Fit) -> Fit:
+    """Every third record of a fit, as if it had been fitted to those alone."""
+    assert fit.jacobians is not None
+    return replace(
+        fit,
+        records=fit.records[::_EVERY],
+        residuals=fit.residuals[::_EVERY],
+        jacobians=fit.jacobians[::_EVERY],
+    )
 
 
 def _suspect(

@@ -29,6 +29,7 @@ _HOPE = 0.1
 # Numbers that are drawn anew in every record are screened as free as they are: nothing to add.
 _HOPE_LATENT = 0.5
 _RIVALS = 2
+_MOST_RIVALS = 5
 # Sets whose BIC is within this cannot be told apart.
 SAME = 10.0
 
@@ -88,7 +89,7 @@ def try_candidates(
     some = list(records) if whole else spread_out(records)
     window = None if whole else SCREEN_WINDOW
     start = fit(problem, known, some, window, iterations=4, with_jacobian=True)
-    look = Screen(problem, start, scales, faint=whole)
+    look = Screen(problem, start, scales, faint=whole, enough=_SHORT * least if whole else 0.0)
 
     def short_fit(effect: Effect) -> Fit | None:
         return _light(_fit_short(problem, start, effect, some, window))
@@ -110,7 +111,7 @@ def try_candidates(
                 return []
         if cause:
             suspects = _rivals(suspects, cause)
-        chosen = _short_list(suspects, short_list)
+        chosen = _short_list(suspects, min(short_list, _MOST_RIVALS) if cause else short_list)
         tried = [(suspect, effect) for suspect in chosen for effect in suspect.starts]
         fits = pool.map("short", [effect for _, effect in tried])
         short = _best_of_each(tried, fits, some)
