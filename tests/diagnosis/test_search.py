@@ -6,10 +6,10 @@ import pytest
 
 import picchio
 from picchio.diagnosis.percussion.candidates import all_candidates
+from picchio.diagnosis.percussion.exchange import exchange
 from picchio.diagnosis.percussion.fit import fit, fit_growing
 from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.select import Search, exchange
 from picchio.diagnosis.percussion.trials import Trial, score
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model.effects import effect_class
@@ -64,25 +64,23 @@ def two_causes(arm):
     right = trial_of("joint_stiffness", scale=1.3)
     both = wrong.fit.hypothesis.plus(effect_class("force_amplitude")("tool", scale=0.8))
     best = fit(problem, both, iterations=6)
-    return problem, baseline, wrong, right, best
+    return problem, wrong, right, best
 
 
 def test_a_rival_replaces_what_was_chosen_too_early(two_causes):
-    problem, baseline, wrong, right, best = two_causes
+    problem, wrong, right, best = two_causes
     later = Trial("force_amplitude:tool", best, score(best), 0.0)
-    found = Search(baseline, best, steps=[[wrong, right], [later]])
-    better = exchange(problem, found, problem.records, 8.0)
+    better = exchange(problem, best, [[wrong, right], [later]], problem.records, 8.0)
     assert better.hypothesis.labels == {"joint_stiffness:joint_1", "force_amplitude:tool"}
     assert better.chi_square / better.samples < 1.1 < best.chi_square / best.samples
 
 
 def test_what_is_right_is_not_replaced(two_causes):
-    problem, baseline, wrong, right, _ = two_causes
+    problem, wrong, right, _ = two_causes
     both = right.fit.hypothesis.plus(effect_class("force_amplitude")("tool", scale=0.8))
     best = fit(problem, both, iterations=6)
     later = Trial("force_amplitude:tool", best, score(best), 0.0)
-    found = Search(baseline, best, steps=[[right, wrong], [later]])
-    assert exchange(problem, found, problem.records, 8.0) is best
+    assert exchange(problem, best, [[right, wrong], [later]], problem.records, 8.0) is best
 
 
 def test_late_blows_and_what_is_common_are_found_at_once(arm):

@@ -85,7 +85,7 @@ def run(case, salt=0, without=(), method="diagnose"):
     """
     try:
         campaign, truth = make(case, salt)
-    except ValueError as error:  # no sensor that could have this effect
+    except (ValueError, FloatingPointError) as error:  # no sensor for it; no such arm
         return {**_head(case), "verdict": "not made", "why": str(error)}
     if case["kind"] == "weak" and not cases.is_detectable(truth, float(case["snr"])):
         return {**_head(case), "verdict": "not detectable"}

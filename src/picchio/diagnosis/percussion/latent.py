@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.fit import Fit, fit
 from picchio.diagnosis.percussion.latent_start import blow_by_blow
 from picchio.diagnosis.percussion.problem import Problem
@@ -69,10 +70,13 @@ def _late_share(problem: Problem, known: Fit, kind: type[Effect]) -> float:
     """
     interval = min(r.setup.blows.interval for r in known.records)
     end = min((1 + _LOOKED_AT) * interval, known.end or math.inf)
-    first = fit(problem, known.hypothesis, known.records, end, iterations=3)
-    early = replace(first, end=end)
-    begun = blow_by_blow(problem, early, lambda old, late: with_hidden(old, kind, dict(late)))
-    late = fit(problem, begun, known.records, end, iterations=2)
+    try:
+        first = fit(problem, known.hypothesis, known.records, end, iterations=3)
+        early = replace(first, end=end)
+        begun = blow_by_blow(problem, early, lambda old, late: with_hidden(old, kind, dict(late)))
+        late = fit(problem, begun, known.records, end, iterations=2)
+    except InputError:  # led to where there is no model
+        return 0.0
     return max(1.0 - late.chi_square / max(first.chi_square, 1e-300), 0.0)
 
 

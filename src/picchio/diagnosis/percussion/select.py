@@ -9,8 +9,9 @@ from typing import Any
 
 from picchio.diagnosis.percussion.confidence import confidence
 from picchio.diagnosis.percussion.evidence import Evidence, weigh
+from picchio.diagnosis.percussion.exchange import exchange, prune, replaced, with_latent
 from picchio.diagnosis.percussion.fit import Fit, fit
-from picchio.diagnosis.percussion.latent import LATENT, with_hidden
+from picchio.diagnosis.percussion.latent import LATENT
 from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.trials import SAME, Trial, score, try_candidates
@@ -28,6 +29,10 @@ LEAST_GAIN = 8.0
 EXACT = 3e-4
 # Of the least gain: beyond that no fit without the cause comes near.
 _CLEAR = 10.0
+# How often every cause is replaced in turn, and up to what share of the baseline's cost that is
+# worth while.
+_SWEEPS = 2
+_HALFWAY = 0.3
 
 
 @dataclass(eq=False)
@@ -39,6 +44,7 @@ class Search:
         best: the hypothesis that stands at the end.
         steps: per step the trials, the best first.
         evidence: on all records used for fitting.
+        pinned: whether noise was all that was left, and what is known is held fixed since.
     """
 
     baseline: Fit
@@ -46,6 +52,7 @@ class Search:
     steps: list[list[Trial]] = field(default_factory=list)
     scores: list[dict[str, Any]] = field(default_factory=list)
     evidence: Evidence | None = None
+    pinned: bool = False
 
 
 def search(
@@ -72,16 +79,16 @@ def search(
     say = progress or (lambda text: None)
     found = Search(baseline, baseline)
     least = max(LEAST_GAIN, EXACT**2 * signal_power(records))
-    with ExitStack() as stack:
-        pinned = False
-        for number in range(MOST_CAUSES):
+
+    def grow(stack: ExitStack) -> None:
+        for _ in range(MOST_CAUSES):
             here = found.best
             found.evidence = weigh(problem, here.residuals, here.records)
-            say(f"looking for cause {number + 1}")
+            say(f"looking for cause {len(here.hypothesis.labels) + 1}")
             quiet = found.evidence.is_noise
-            if quiet and not pinned:
+            if quiet and not found.pinned:
                 stack.enter_context(problem.pinned(here.hypothesis.effects))
-                pinned = True
+                found.pinned = True
             trials = try_candidates(
                 problem, here.hypothesis, candidates, scales, records,
                 whole=quiet, least=least, log=found.scores.append,
@@ -102,72 +109,29 @@ def search(
             )
             if found.best.hypothesis.labels == here.hypothesis.labels:
                 break
-            found.best = _with_latent(problem, found.best, best.label)
+            found.best = with_latent(problem, found.best, best.label)
             if known and not weigh(problem, found.best.residuals, found.best.records).is_noise:
-                found.best = exchange(problem, found, records, least)
+                found.best = exchange(problem, found.best, found.steps, records, least)
+            if len(found.best.hypothesis.labels) >= MOST_CAUSES:
+                break
+
+    with ExitStack() as stack:
+        grow(stack)
+        for _ in range(_SWEEPS):
+            best = found.best
+            several = len(best.hypothesis.labels) > 1
+            if not several or best.cost > _HALFWAY * baseline.cost:
+                break
+            if weigh(problem, best.residuals, best.records).is_noise:
+                break
+            say("looking whether the causes chosen first were the right ones")
+            found.best = replaced(problem, best, candidates, scales, records, least)
+            if found.best is best:
+                break
+            if len(found.best.hypothesis.labels) < MOST_CAUSES:
+                grow(stack)
     found.evidence = weigh(problem, found.best.residuals, found.best.records)
     return found
-
-
-def _with_latent(problem: Problem, best: Fit, newest: str) -> Fit:
-    """What earlier causes draw anew in every record, looked for again beside the newest cause."""
-    for cause in best.hypothesis.causes:
-        if cause.label != newest and cause.name in LATENT and cause.name != "mains_hum":
-            kind = type(cause)
-            # From the start: without the newest cause some numbers may have been far off.
-            start = replace(best, hypothesis=with_hidden(best.hypothesis, kind, {}))
-            again = fit_latent(problem, start, kind, cause.target)
-            best = again if again.cost < best.cost else best
-    return best
-
-
-def exchange(
-    problem: Problem, found: Search, records: Sequence[MeasuredRecord], least: float
-) -> Fit:
-    """The best fit, with an earlier cause replaced by a close rival where that now does better.
-
-    The first cause is chosen while the others still disturb: a rival may have been the right one.
-    """
-    best = found.best
-    for step in found.steps[:-1]:
-        for rival in step[1:]:
-            chosen = step[0].label
-            if chosen not in best.hypothesis.labels or not rival.finished(records):
-                continue
-            if rival.label in best.hypothesis.labels or rival.label.split(":")[0] in LATENT:
-                continue
-            joined = rival.fit.hypothesis
-            for cause in best.hypothesis.causes:
-                if cause.label not in (chosen, *joined.labels):
-                    joined = joined.joined(cause)
-            other = fit(problem, joined, records, None, iterations=6, rival=best.cost)
-            if score(other) < score(best) - least:
-                best = other
-    return best
-
-
-def prune(
-    problem: Problem,
-    found: Fit,
-    records: Sequence[MeasuredRecord],
-    least: float = LEAST_GAIN,
-    newest: str = "",
-    *,
-    alone: bool = True,
-) -> Fit:
-    """Take out every cause, the newest included, that the others do without.
-
-    With `alone` the last one, too: a fit with a cause in it goes on where the fit without it had
-    stopped, and what it gains may be the nuisances' doing.
-    """
-    best = found
-    for label in sorted(found.hypothesis.labels, key=lambda text: text == newest):
-        if len(best.hypothesis.labels) < 2 and not alone:
-            break
-        without = fit(problem, best.hypothesis.minus(label), records, None, iterations=5)
-        if score(without) < score(best) + least:
-            best = without
-    return best
 
 
 def alternatives(

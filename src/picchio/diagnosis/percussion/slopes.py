@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.unknowns import Hypothesis, Unknown
 
@@ -42,7 +43,12 @@ def jacobian(
             step = -step
         moved = vector.copy()
         moved[k] += step
-        there = problem.residuals(hypothesis.at(moved).effects, records, end)
+        try:
+            there = problem.residuals(hypothesis.at(moved).effects, records, end)
+        except InputError:  # no model there, such as springs that gravity overturns
+            step = -step
+            moved[k] = vector[k] + step
+            there = problem.residuals(hypothesis.at(moved).effects, records, end)
         for i, (a, b) in enumerate(zip(there, at, strict=True)):
             columns[i].append(((a - b) / step).ravel())
     found = [

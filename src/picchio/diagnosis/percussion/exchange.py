@@ -1,0 +1,114 @@
+"""Causes taken out or replaced by others: what was chosen first may be wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from picchio.diagnosis.percussion.evidence import weigh
+from picchio.diagnosis.percussion.fit import Fit, fit
+from picchio.diagnosis.percussion.latent import LATENT, with_hidden
+from picchio.diagnosis.percussion.latent_fit import fit_latent
+from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.trials import Trial, score, try_candidates
+from picchio.model import Effect
+from picchio.model.effects import Scales
+
+
+def prune(
+    problem: Problem,
+    found: Fit,
+    records: Sequence[MeasuredRecord],
+    least: float,
+    newest: str = "",
+    *,
+    alone: bool = True,
+) -> Fit:
+    """Take out every cause, the newest included, that the others do without.
+
+    With `alone` the last one, too: a fit with a cause in it goes on where the fit without it had
+    stopped, and what it gains may be the nuisances' doing.
+    """
+    best = found
+    for label in sorted(found.hypothesis.labels, key=lambda text: text == newest):
+        if len(best.hypothesis.labels) < 2 and not alone:
+            break
+        without = fit(problem, best.hypothesis.minus(label), records, None, iterations=5)
+        if score(without) < score(best) + least:
+            best = without
+    return best
+
+
+def with_latent(problem: Problem, best: Fit, newest: str) -> Fit:
+    """What earlier causes draw anew in every record, looked for again beside the newest cause."""
+    for cause in best.hypothesis.causes:
+        if cause.label != newest and cause.name in LATENT and cause.name != "mains_hum":
+            kind = type(cause)
+            # From the start: without the newest cause some numbers may have been far off.
+            start = replace(best, hypothesis=with_hidden(best.hypothesis, kind, {}))
+            again = fit_latent(problem, start, kind, cause.target)
+            best = again if again.cost < best.cost else best
+    return best
+
+
+def exchange(
+    problem: Problem,
+    best: Fit,
+    steps: Sequence[Sequence[Trial]],
+    records: Sequence[MeasuredRecord],
+    least: float,
+) -> Fit:
+    """The best fit, with an earlier cause replaced by a close rival where that now does better.
+
+    The first cause is chosen while the others still disturb: a rival may have been the right one.
+
+    Args:
+        problem: data and noise.
+        best: the fit.
+        steps: the trials of every step, the one that was chosen first.
+        records: that are fitted.
+        least: fall of BIC that is asked for.
+    """
+    for step in steps[:-1]:
+        for rival in step[1:]:
+            chosen = step[0].label
+            if chosen not in best.hypothesis.labels or not rival.finished(records):
+                continue
+            if rival.label in best.hypothesis.labels or rival.label.split(":")[0] in LATENT:
+                continue
+            joined = rival.fit.hypothesis
+            for cause in best.hypothesis.causes:
+                if cause.label not in (chosen, *joined.labels):
+                    joined = joined.joined(cause)
+            other = fit(problem, joined, records, None, iterations=6, rival=best.cost)
+            if score(other) < score(best) - least:
+                best = other
+    return best
+
+
+def replaced(
+    problem: Problem,
+    best: Fit,
+    candidates: Sequence[tuple[type[Effect], str]],
+    scales: Scales,
+    records: Sequence[MeasuredRecord],
+    least: float,
+) -> Fit:
+    """The best fit with every cause in turn replaced by whichever does better, until noise is left.
+
+    What was added one by one need not be the best set: the first stands for several at once.
+    """
+    for cause in best.hypothesis.causes:
+        if cause.label not in best.hypothesis.labels:  # taken out since
+            continue
+        trials = try_candidates(
+            problem, best.hypothesis.minus(cause.label), candidates, scales, records,
+            cause=cause.label, best=best,
+        )  # fmt: skip
+        if trials and trials[0].score < score(best) - least:
+            newest = trials[0].label
+            best = prune(problem, trials[0].fit, records, least, newest)
+            best = with_latent(problem, best, newest)
+            if weigh(problem, best.residuals, best.records).is_noise:
+                break
+    return best
