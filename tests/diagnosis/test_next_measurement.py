@@ -1,0 +1,60 @@
+"""What to measure next: it is asked for, taken in the world, and tells the rivals apart."""
+
+from __future__ import annotations
+
+import follow_up
+import pytest
+import trial
+
+import picchio
+from picchio.diagnosis.percussion.diagnose import diagnose_percussion
+
+FEW = {"robot": "fanuc_like_3dof", "kind": "few", "snr": 40, "draw": 0}
+CLEAR = 30.0  # chi-square
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return picchio.load_robot("fanuc_like_3dof")
+
+
+def both(diagnosis):
+    """Every set of causes that is told."""
+    claimed = frozenset((c.effect, c.target) for c in diagnosis.causes)
+    return {claimed, *(frozenset(tuple(p) for p in each) for each in diagnosis.alternatives)}
+
+
+@pytest.mark.parametrize("effect", ["force_amplitude", "sensor_gain"])
+def test_what_is_asked_for_tells_force_from_gain(effect, arm):
+    """One accelerometer cannot tell a harder blow from a sensor that reads too much."""
+    campaign, truth = trial.make({**FEW, "effect": effect})
+    first = diagnose_percussion(arm, campaign).diagnosis
+    assert first.verdict == "ambiguous"
+    force, gain = ("force_amplitude", "tool"), ("sensor_gain", "accelerometer.tool")
+    assert both(first) == {frozenset([force]), frozenset([gain])}
+    ask = first.next_measurement
+    assert ask["sensor"] == "deflection"
+    assert min(rival["chi_square"] for rival in ask["rivals"]) > CLEAR
+    after = diagnose_percussion(arm, follow_up.taken(ask, campaign, truth, 5)).diagnosis
+    assert after.verdict == "named"
+    assert [(c.effect, c.target) for c in after.causes] == [force if effect in force else gain]
+    assert not after.alternatives
+
+
+def test_what_no_measurement_tells_apart_is_said(arm):
+    """Joint 1 turns its link about one fixed axis: the link's mass is an inertia there."""
+    campaign, _ = trial.make({**FEW, "effect": "joint_inertia"})
+    found = diagnose_percussion(arm, campaign).diagnosis
+    assert found.verdict == "ambiguous"
+    assert both(found) == {
+        frozenset([("joint_inertia", "joint_1")]), frozenset([("link_mass", "link_1")])
+    }  # fmt: skip
+    ask = found.next_measurement
+    assert ask["why"].startswith("nothing that was tried tells")
+    assert max(rival["chi_square"] for rival in ask["rivals"]) < CLEAR
+
+
+@pytest.mark.parametrize("draw", range(5))
+def test_noise_known_from_little_quiet_time_raises_no_alarm(draw, arm):
+    campaign, _ = trial.make({**FEW, "kind": "few-null", "draw": draw})
+    assert diagnose_percussion(arm, campaign).diagnosis.verdict == "nothing-wrong"
