@@ -12,6 +12,7 @@ from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.screen import Screen
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model.effects import effect_class
+from worlds import campaign as worlds
 
 ARM = "fanuc_like_3dof"
 CASE = {"robot": ARM, "kind": "null", "snr": 40, "draw": 0, "records": 3}
@@ -84,6 +85,44 @@ def test_confidence_is_of_the_poses_not_of_their_sum(problem, base):
         rows = [np.full((1, 4), np.sqrt(s / 4.0)) for s in sums]
         return Fit(base.hypothesis, rows, None, sum(sums), tuple(records), None)
 
-    assert confidence(like([100.0] * 3), like([120.0] * 3), 8.0) > 0.99
-    assert confidence(like([100.0] * 3), like([1100.0, 100.0, 100.0]), 8.0) < 0.9
-    assert confidence(like([100.0] * 3), like([100.0] * 3), 8.0) == pytest.approx(0.5)
+    assert confidence(like([100.0] * 3), like([120.0] * 3)) > 0.99
+    assert confidence(like([100.0] * 3), like([1100.0, 100.0, 100.0])) < 0.9
+    assert confidence(like([100.0] * 3), like([100.0] * 3)) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("less", "sure"), [(30.0, 0.5), (70.0, 1.0)])
+def test_a_single_pose_counts_only_beyond_doubt(problem, base, less, sure):
+    record = problem.records[0]
+
+    def like(total):
+        rows = [np.full((1, 4), np.sqrt(total / 4.0))]
+        return Fit(base.hypothesis, rows, None, total, (record,), None)
+
+    assert confidence(like(100.0), like(100.0 + less)) == sure
+
+
+def test_a_first_look_drops_only_what_promises_nothing():
+    """What is worth a fit by all records is not lost by a glance at every third."""
+    payload = ("payload", "tool", {"mass": 0.1})
+    campaign, _ = worlds.make(
+        robot=ARM, seed=3, causes=(payload,), sensors=("accelerometer.tool",), records=6
+    )
+    problem = Problem(picchio.load_robot(ARM), campaign)
+    base = fit(problem, Hypothesis.baseline(problem.robot, campaign.tolerance), with_jacobian=True)
+    effects = base.hypothesis.effects
+    scales = measure_scales(problem, effects, problem.predictions(effects))
+    plain = Screen(problem, base, scales, faint=True)
+    quick = Screen(problem, base, scales, faint=True, enough=40.0)
+    assert plain.first is None and quick.first is not None
+    dropped, kept = [], []
+    for candidate in all_candidates(problem):
+        whole, glance = plain.suspect(candidate), quick.suspect(candidate)
+        if whole is None or glance is None:
+            assert whole is None
+        elif glance.gain == whole.gain:
+            kept.append(whole.label)
+        else:
+            assert whole.gain < 40.0
+            dropped.append(whole.label)
+    assert "payload:tool" in kept
+    assert len(dropped) > 2

@@ -10,7 +10,7 @@ import numpy as np
 from picchio.diagnosis.percussion.confidence import confidence
 from picchio.diagnosis.percussion.fit import Fit
 from picchio.diagnosis.percussion.problem import MeasuredRecord
-from picchio.diagnosis.percussion.select import LEAST_GAIN, Search
+from picchio.diagnosis.percussion.select import EXACT, Search
 from picchio.diagnosis.percussion.trials import Trial, score
 from picchio.diagnosis.percussion.unknowns import NUISANCE_KEYS, Hypothesis
 from picchio.diagnosis.result import Cause, Value
@@ -23,7 +23,10 @@ def told_causes(
     rivals: Sequence[Trial],
     train: Sequence[MeasuredRecord],
 ) -> tuple[Cause, ...]:
-    """The causes with their values, spreads and confidence."""
+    """The causes with their values, spreads and confidence.
+
+    The spread is that of the fit, larger where more than noise is left, and that of the model.
+    """
     covariance = whole.covariance()
     unknowns, vector = whole.hypothesis.unknowns(), whole.hypothesis.vector()
     inflate = max(1.0, math.sqrt(whole.chi_square / max(whole.samples, 1)))
@@ -36,7 +39,9 @@ def told_causes(
             for k, unknown in enumerate(unknowns):
                 if unknown.effect == index and unknown.name == p.name:
                     std = abs(unknown.slope(vector[k])) * math.sqrt(max(covariance[k, k], 0.0))
-            values[p.name] = Value(effect.values[p.name], std * inflate, effect.unit(p.name))
+            value = effect.values[p.name]
+            spread = math.hypot(std * inflate, _inexact(value, p.neutral)) if std > 0.0 else 0.0
+            values[p.name] = Value(value, spread, effect.unit(p.name))
         result.append(
             Cause(
                 effect.name,
@@ -46,6 +51,11 @@ def told_causes(
             )
         )
     return tuple(result)
+
+
+def _inexact(value: float, neutral: float) -> float:
+    """What the forward model's own inexactness leaves open: its share of the effect's size."""
+    return EXACT * abs(value - (neutral if math.isfinite(neutral) else 0.0))
 
 
 def _confidence(
@@ -60,7 +70,7 @@ def _confidence(
     rival = min((r.fit for r in others), key=score, default=None)
     if rival is None or len(rival.records) != len(best.records):
         return 0.5 if len(train) < 3 else 1.0
-    return confidence(best, rival, LEAST_GAIN)
+    return confidence(best, rival)
 
 
 def told_nuisances(found: Fit) -> dict[str, Value]:

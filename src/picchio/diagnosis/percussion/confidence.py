@@ -12,15 +12,15 @@ _DECISIVE = 60.0
 _CHANCE = 2.0
 
 
-def confidence(better: Fit, other: Fit, least: float) -> float:
+def confidence(better: Fit, other: Fit) -> float:
     """That a fit is better than another one of the same records.
 
-    From the differences of the poses' scores and their spread (Student's t).
+    From the differences of the poses' scores and their spread (Student's t). A single pose has no
+    spread: what it says counts only where it decides beyond doubt on its own.
 
     Args:
         better: the one with less left.
         other: the rival.
-        least: with a single pose, more than twice this decides.
     """
     from scipy.stats import t as student
 
@@ -29,7 +29,7 @@ def confidence(better: Fit, other: Fit, least: float) -> float:
     for record, a, b in zip(better.records, better.residuals, other.residuals, strict=True):
         difference[poses.index(record.pose)] += float((b * b).sum() - (a * a).sum())
     if len(poses) < 2:
-        return 1.0 if difference.sum() > 2.0 * least else 0.5
+        return 1.0 if difference.sum() > _DECISIVE else 0.5
     # A pose that decides beyond doubt on its own counts as one: how far beyond says nothing.
     difference = np.clip(difference, -_DECISIVE, _DECISIVE)
     total, spread = difference.mean(), difference.std(ddof=1) / math.sqrt(len(poses))

@@ -102,7 +102,7 @@ def search(
                 break
             # What the model itself is not exact to may look like a last small cause in some pose.
             known = bool(here.hypothesis.labels)
-            if quiet and known and confidence(best.fit, here, LEAST_GAIN) < BEYOND_DOUBT:
+            if quiet and known and confidence(best.fit, here) < BEYOND_DOUBT:
                 break
             found.best = prune(
                 problem, best.fit, records, least, best.label, alone=gain <= _CLEAR * least
