@@ -146,7 +146,8 @@ def test_every_name_is_escaped(case):
         alternatives=(((HOSTILE, HOSTILE),),),
         leads=((HOSTILE, HOSTILE),),
         next_measurement={"why": HOSTILE, "pose": {HOSTILE: 0.1}, "direction": [0, 0, 1],
-                          "force": 300.0, "sensor": HOSTILE},
+                          "force": 300.0, "sensor": HOSTILE,
+                          "rivals": [{"causes": [[HOSTILE, HOSTILE]], "chi_square": 12.0}]},
         scores=({"step": 1, "effect": HOSTILE, "target": HOSTILE, "bic": 1.0,
                  "screened_gain": 1.0, "chi_square_per_sample": 2.0},),
     )  # fmt: skip

@@ -103,14 +103,18 @@ def next_measurement(
         "sensor": shot.sensor,
         "separation": float(shot.told.max()),
         "rivals": [
-            {"causes": name, "chi_square": float(value)}
-            for name, value in zip(names, shot.told, strict=True)
+            {
+                "causes": [label.split(":", 1) for label in sorted(fit.hypothesis.labels)],
+                "chi_square": float(value),
+            }
+            for fit, value in zip(chosen, shot.told, strict=True)
         ],
     }
 
 
 def _name(hypothesis: Hypothesis) -> str:
-    return " + ".join(sorted(hypothesis.labels)) or "the nominal model"
+    labels = sorted(label.replace(":", " of ") for label in hypothesis.labels)
+    return " + ".join(labels) or "the nominal model"
 
 
 def _force(problem: Problem) -> float:

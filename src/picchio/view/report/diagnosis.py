@@ -271,4 +271,8 @@ def _ask(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         rows.append(("force", f"{number(float(ask['force']))} N"))
     if ask.get("sensor"):
         rows.append(("sensors", str(ask["sensor"])))
+    for rival in ask.get("rivals", ()):
+        pairs = [(str(effect), str(target)) for effect, target in rival["causes"]]
+        fall = f"chi-square {float(rival['chi_square']):.3g}"
+        rows.append(("tells it from", f"{_set(pairs)} ({fall})"))
     return rows
