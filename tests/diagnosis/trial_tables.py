@@ -71,21 +71,28 @@ def print_rates(rows):
 
 def print_parameters(rows):
     """Errors of the causes' parameters, and what their intervals cover."""
-    named = [row for row in rows if row["right"] and row["snr"] == 40]
-    errors = [(key, *e) for row in named for key, e in row["errors"].items()]
-    if not errors:
-        return
+    right = [row for row in rows if row["right"] and row["snr"] == 40]
+    for name, picked in (
+        ("18 records", [row for row in right if row["kind"] != "few"]),
+        ("3 records", [row for row in right if row["kind"] == "few"]),
+    ):
+        errors = [(key, *e) for row in picked for key, e in row["errors"].items()]
+        if errors:
+            _print_errors(name, errors)
+
+
+def _print_errors(name, errors):
     size = sorted(abs(e[1]) for e in errors)
     print(
-        f"\nparameters at 40 dB: {len(size)}, median error {100 * quantile(size, 0.5):.2g} %, "
-        f"95th percentile {100 * quantile(size, 0.95):.2g} %"
+        f"\nparameters at 40 dB, {name}: {len(size)}, median error {100 * quantile(size, 0.5):.2g} "
+        f"%, 95th percentile {100 * quantile(size, 0.95):.2g} %"
     )
     pulls = [e[2] for e in errors if math.isfinite(e[2])]
     for level, z in ((50, 0.674), (95, 1.960)):
         inside = sum(p <= z for p in pulls)
         low, high = (100 * x for x in proportion(inside, len(pulls)))
         print(f"{level} % intervals cover {inside} of {len(pulls)}: {low:.0f} to {high:.0f} %")
-    for key, error, pull in sorted(errors, key=lambda e: -abs(e[1]))[:8]:
+    for key, error, pull in sorted(errors, key=lambda e: -abs(e[1]))[:5]:
         print(f"  largest: {key} {100 * error:+.2g} %, {pull:.1f} standard deviations")
 
 

@@ -251,6 +251,11 @@ def _show(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
         )
     if life is not None:
         _show_life(life)
+        if found.alternatives:
+            out.print(
+                '  "after" is with the cause named above; with another of the sets the life is '
+                "another: until they are told apart, neither may be promised"
+            )
     ask = found.next_measurement
     if ask:
         direction = ", ".join(f"{c:.2f}" for c in ask.get("direction", ()))
