@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 import picchio
+from picchio.diagnosis.percussion import select
 from picchio.diagnosis.percussion.candidates import all_candidates
 from picchio.diagnosis.percussion.exchange import exchange
 from picchio.diagnosis.percussion.fit import fit, fit_growing
@@ -99,3 +100,23 @@ def test_late_blows_and_what_is_common_are_found_at_once(arm):
     for i, record in enumerate(problem.records):
         late = truth["world"].bench(i).blows.late
         assert max(abs(a - b) for a, b in zip(cause.hidden[record.name], late, strict=True)) < 1e-4
+
+
+@pytest.mark.parametrize("holds", [True, False])
+def test_what_replaces_a_cause_must_hold_on_poses_held_out(holds, two_causes, arm, monkeypatch):
+    """Trials and replacement are given; what is tested is who has the last word."""
+    problem, wrong, right, best = two_causes
+    better = exchange(
+        problem, best, [[wrong, right], [Trial("", best, 0.0, 0.0)]], problem.records, 8.0
+    )
+    rounds = iter([[wrong], [Trial("force_amplitude:tool", best, score(best), 0.0)], [], []])
+    monkeypatch.setattr(select, "try_candidates", lambda *_, **__: next(rounds))
+    monkeypatch.setattr(select, "prune", lambda problem, found, *_, **__: found)
+    monkeypatch.setattr(select, "exchange", lambda *_: better)
+    monkeypatch.setattr(select, "replaced", lambda problem, best, *_: best)
+    start = fit(problem, Hypothesis.baseline(arm, problem.campaign.tolerance))
+    found = select.search(
+        problem, [], None, problem.records, start,
+        confirmed=lambda before, after: holds or after is not better,
+    )  # fmt: skip
+    assert found.best is (better if holds else best)

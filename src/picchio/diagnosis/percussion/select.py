@@ -80,6 +80,11 @@ def search(
     found = Search(baseline, baseline)
     least = max(LEAST_GAIN, EXACT**2 * signal_power(records))
 
+    def accepted(other: Fit) -> Fit:
+        if other is found.best or confirmed is None or confirmed(found.best, other):
+            return other
+        return found.best
+
     def grow(stack: ExitStack) -> None:
         for _ in range(MOST_CAUSES):
             here = found.best
@@ -111,7 +116,7 @@ def search(
                 break
             found.best = with_latent(problem, found.best, best.label)
             if known and not weigh(problem, found.best.residuals, found.best.records).is_noise:
-                found.best = exchange(problem, found.best, found.steps, records, least)
+                found.best = accepted(exchange(problem, found.best, found.steps, records, least))
             if len(found.best.hypothesis.labels) >= MOST_CAUSES:
                 break
 
@@ -125,7 +130,7 @@ def search(
             if weigh(problem, best.residuals, best.records).is_noise:
                 break
             say("looking whether the causes chosen first were the right ones")
-            found.best = replaced(problem, best, candidates, scales, records, least)
+            found.best = accepted(replaced(problem, best, candidates, scales, records, least))
             if found.best is best:
                 break
             if len(found.best.hypothesis.labels) < MOST_CAUSES:
