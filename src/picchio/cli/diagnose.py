@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -98,7 +99,7 @@ def diagnose(
         with _telling() as say:
             percussion = _percussion(loaded, campaign, without or (), gravity_stiffness, say)
         found, effects = percussion.diagnosis, percussion.extended.hypothesis.effects
-        life, notes = _life(loaded, task, effects, found), "found by picchio diagnose"
+        life, notes = _life(loaded, task, percussion), "found by picchio diagnose"
     text = _model_text(robot, flex, tool, effects, model, [*loaded.files, *campaign.files], notes)
     content = found.to_dict() | {"life": life} | (motion.extra() if motion is not None else {})
     content["scores"] = [dict(row) for row in found.scores]
@@ -167,18 +168,17 @@ def _telling() -> Iterator[Callable[[str], None]]:
 
 
 def _life(
-    robot: FlexibleRobot, task: Path | None, effects: tuple[Effect, ...], found: Diagnosis
+    robot: FlexibleRobot, task: Path | None, percussion: PercussionDiagnosis
 ) -> dict[str, Any] | None:
     """Life before and after; None where there is no task or nothing was found."""
     from picchio.cli.output import say_warning
-    from picchio.diagnosis.life import life_before_and_after
     from picchio.studies import load_task
 
     path = task or robot.task_path
-    if path is None or found.verdict in ("nothing-wrong", "unexplained"):
+    if path is None or percussion.diagnosis.verdict in ("nothing-wrong", "unexplained"):
         return None
     try:
-        return life_before_and_after(robot, load_task(path, robot), effects)
+        return percussion.life(load_task(path, robot))
     except InputError as error:
         if task is not None:
             raise
@@ -218,6 +218,7 @@ def _show(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
     from picchio.diagnosis.alternatives import differences, in_words
     from picchio.diagnosis.result import VERDICTS
     from picchio.model.effects import effect_class
+    from picchio.studies.verdict import format_count
 
     out = console()
     out.print(f"[bold]{found.verdict}[/bold]: {VERDICTS[found.verdict]}.")
@@ -251,11 +252,15 @@ def _show(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
         )
     if life is not None:
         _show_life(life)
-        if found.alternatives:
+        others = life.get("alternatives") or ()
+        for pairs, other in zip(found.alternatives, others, strict=False):
+            names = " and ".join(f"{effect} of {target}" for effect, target in pairs)
             out.print(
-                '  "after" is with the cause named above; with another of the sets the life is '
-                "another: until they are told apart, neither may be promised"
+                f"  with {names} instead: rivets {format_count(other['rivets_to_failure'])}, "
+                f"utilisation {100 * other['utilisation']:.4g} %"
             )
+        if found.alternatives:
+            out.print("  until the sets are told apart, only the worst of these may be promised")
     ask = found.next_measurement
     if ask:
         direction = ", ".join(f"{c:.2f}" for c in ask.get("direction", ()))
@@ -274,14 +279,33 @@ def _show_life(life: Mapping[str, Any]) -> None:
     table = Table(box=None, pad_edge=False, header_style="dim", title="Life", title_justify="left")
     for name in ("joint", "rivets before", "after", "utilisation before %", "after %"):
         table.add_column(name, justify="left" if name == "joint" else "right")
+
+    def rivets(joint: Mapping[str, Any]) -> str:
+        return format_count(joint["rivets_to_failure"])
+
+    def used(joint: Mapping[str, Any]) -> str:
+        return f"{100 * joint['utilisation']:.4g}"
+
+    def between(joint: Mapping[str, Any], key: str, show: Callable[[float], str]) -> str:
+        """The interval, where it says more than the value."""
+        low, high = (show(end) for end in joint.get(key, (math.nan, math.nan)))
+        return "" if low == high else f"[dim]{low} to {high}[/dim]"
+
     before, after = life["baseline"]["joints"], life["extended"]["joints"]
     for name, old in before.items():
-        new = after[name]
-        table.add_row(
-            name,
-            format_count(old["rivets_to_failure"]),
-            format_count(new["rivets_to_failure"]),
-            f"{100 * old['utilisation']:.4g}",
-            f"{100 * new['utilisation']:.4g}",
+        sides = (old, after[name])
+        table.add_row(name, *map(rivets, sides), *map(used, sides))
+        spans = [between(side, "rivets_interval", format_count) for side in sides]
+        spans += [
+            between(side, "utilisation_interval", lambda u: f"{100 * u:.4g}") for side in sides
+        ]
+        if any(spans):
+            table.add_row("", *spans)
+    out = console()
+    out.print(table)
+    if "interval_level" in life:
+        out.print(
+            f"  [dim]{100 * life['interval_level']:g} % intervals: before, of the stated "
+            "tolerance; after, of what was fitted. The material's scatter is not in them (picchio "
+            "assess --uncertainty)[/dim]"
         )
-    console().print(table)

@@ -2,17 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from statistics import NormalDist
 from typing import Any
 
+import numpy as np
+
+from picchio.core.arrays import FloatArray
 from picchio.model import Effect
 from picchio.robot import FlexibleRobot
-from picchio.studies import Task, assess
+from picchio.studies import Assessment, Task, assess
+
+LEVEL = 0.90
+"""Of the two-sided intervals, as `picchio fit-sn` has them."""
+
+# Poses of each operation and joint that the interval looks at, the most strained ones.
+_WORST = 2
+# Directions in which less is unknown than that do not move a life.
+_KNOWN = 1e-7
+
+
+@dataclass(frozen=True, eq=False)
+class Unsure:
+    """Effects whose values are known up to a spread.
+
+    Attributes:
+        effects: coordinates (k,) -> the effects there.
+        centre: (k,) where they stand.
+        covariance: (k, k) of the coordinates.
+    """
+
+    effects: Callable[[FloatArray], Sequence[Effect]]
+    centre: FloatArray
+    covariance: FloatArray
 
 
 def life_before_and_after(
-    robot: FlexibleRobot, task: Task, effects: Sequence[Effect], **options: Any
+    robot: FlexibleRobot,
+    task: Task,
+    effects: Sequence[Effect],
+    *,
+    before: Unsure | None = None,
+    after: Unsure | None = None,
+    others: Sequence[Sequence[Effect]] = (),
+    **options: Any,
 ) -> dict[str, Any]:
     """The task's life by the robot's files, and with the effects that were found.
 
@@ -20,20 +56,33 @@ def life_before_and_after(
         robot: as its files have it.
         task: its work.
         effects: of the extended model, fitted nuisances included.
+        before: how well the nominal values are known, for an interval.
+        after: the same of the extended model.
+        others: effects of other models that the data cannot tell from this one.
         **options: of `picchio.studies.assess`.
 
     Returns:
         {"baseline": {...}, "extended": {...}}, each with rivets_to_failure (infinite where there
         is no end), utilisation (of the joint that has most), limiting_joint, and every joint's
-        rivets_to_failure, utilisation and peak_deflection (rad).
+        rivets_to_failure, utilisation and peak_deflection (rad). With a spread there are
+        rivets_interval and utilisation_interval, too, of the robot and of every joint: two-sided,
+        `LEVEL`, of what the model leaves open; how strong the material is, is not in them. With
+        `others`, "alternatives" has a life like these, without intervals, for each.
 
     Raises:
         InputError: as `assess`.
     """
-    return {
-        "baseline": _life(robot, task, options),
-        "extended": _life(with_effects(robot, effects), task, options),
+    found: dict[str, Any] = {
+        "baseline": _life(robot, task, options, before),
+        "extended": _life(with_effects(robot, effects), task, options, after, robot),
     }
+    if before is not None or after is not None:
+        found["interval_level"] = LEVEL
+    if others:
+        found["alternatives"] = [
+            _life(with_effects(robot, other), task, options) for other in others
+        ]
+    return found
 
 
 def with_effects(robot: FlexibleRobot, effects: Sequence[Effect]) -> FlexibleRobot:
@@ -42,9 +91,15 @@ def with_effects(robot: FlexibleRobot, effects: Sequence[Effect]) -> FlexibleRob
     return replace(robot, effect_tables=(*robot.effect_tables, *tables))
 
 
-def _life(robot: FlexibleRobot, task: Task, options: dict[str, Any]) -> dict[str, Any]:
+def _life(
+    robot: FlexibleRobot,
+    task: Task,
+    options: dict[str, Any],
+    unsure: Unsure | None = None,
+    bare: FlexibleRobot | None = None,
+) -> dict[str, Any]:
     found = assess(robot, task, **options)
-    return {
+    told: dict[str, Any] = {
         "rivets_to_failure": found.rivets_to_failure,
         "utilisation": max((joint.utilisation for joint in found.joints), default=0.0),
         "limiting_joint": found.limiting_joint,
@@ -57,3 +112,110 @@ def _life(robot: FlexibleRobot, task: Task, options: dict[str, Any]) -> dict[str
             for joint in found.joints
         },
     }
+    if unsure is None:
+        return told
+    intervals = life_intervals(bare or robot, task, found, unsure, options)
+    for name, each in intervals.items():
+        told["joints"][name] |= each
+    if found.limiting_joint in intervals:
+        told |= intervals[found.limiting_joint]
+    return told
+
+
+def life_intervals(
+    robot: FlexibleRobot,
+    task: Task,
+    found: Assessment,
+    unsure: Unsure,
+    options: dict[str, Any] | None = None,
+    level: float = LEVEL,
+) -> dict[str, dict[str, tuple[float, float]]]:
+    """Intervals of every joint's life and utilisation, from how well a model's values are known.
+
+    The most probable values at which the joint fares as badly (and as well) as the level asks
+    for, by first-order reliability (Hasofer and Lind, J. Eng. Mech. Div. ASCE 100 (1974) 111):
+    the slope of ln utilisation (and of ln damage), one standard deviation in every principal
+    direction of the covariance, says where they lie; both are then computed there.
+
+    Args:
+        robot: without the effects.
+        task: its work.
+        found: the assessment at the centre.
+        unsure: the effects and how well they are known.
+        options: of `picchio.studies.assess`.
+        level: two-sided.
+
+    Returns:
+        joint -> {"rivets_interval": (low, high), "utilisation_interval": (low, high)}, of joints
+        with an S-N curve; a life without end is infinite.
+
+    Raises:
+        InputError: as `assess`.
+    """
+    worst = _most_strained(task, found)
+    z = NormalDist().inv_cdf(0.5 + 0.5 * level)
+
+    def at(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
+        other = with_effects(robot, unsure.effects(vector))
+        with warnings.catch_warnings():  # said once already, of the centre
+            warnings.simplefilter("ignore")
+            return _strain(assess(other, worst, **{**(options or {}), "steady_check": False}))
+
+    reference, spent = at(unsure.centre)
+    sizes, directions = np.linalg.eigh(unsure.covariance)
+    spread = directions * np.sqrt(np.maximum(sizes, 0.0))
+    spread = spread[:, np.sqrt(np.maximum(sizes, 0.0)) > _KNOWN]
+    slopes = np.zeros((2, spread.shape[1], reference.size))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for i, step in enumerate(spread.T):
+            used, damaged = at(unsure.centre + step)
+            slopes[:, i] = np.log(used / reference), np.log(damaged / spent)
+    # Where there is no damage its slope is none: utilisation's leads to where there may be some.
+    slopes[1] = np.where(np.isfinite(slopes[1]).all(axis=0), slopes[1], slopes[0])
+    slopes[~np.isfinite(slopes)] = 0.0
+    told = {}
+    for j, joint in enumerate(found.joints):
+        if not joint.sn_curve:
+            continue
+        utilisations, lives = [joint.utilisation], [joint.rivets_to_failure]
+        for used, _ in map(at, _design_points(unsure.centre, spread, slopes[0, :, j], z)):
+            utilisations.append(joint.utilisation * float(used[j] / reference[j]))
+        for _, damaged in map(at, _design_points(unsure.centre, spread, slopes[1, :, j], z)):
+            whole = joint.damage_per_rivet
+            if spent[j] > 0.0:
+                whole *= float(damaged[j] / spent[j])
+            else:
+                whole += float(damaged[j]) / task.rivets_per_pass
+            lives.append(1.0 / whole if whole > 0.0 else math.inf)
+        told[joint.name] = {
+            "rivets_interval": (min(lives), max(lives)),
+            "utilisation_interval": (min(utilisations), max(utilisations)),
+        }
+    return told
+
+
+def _design_points(
+    centre: FloatArray, spread: FloatArray, slope: FloatArray, z: float
+) -> list[FloatArray]:
+    """Where what has this slope (per column of the spread) is as large, as small, as z says."""
+    size = float(np.linalg.norm(slope))
+    if size == 0.0:
+        return []
+    return [centre + side * spread @ (slope / size) for side in (z, -z)]
+
+
+def _strain(found: Assessment) -> tuple[FloatArray, FloatArray]:
+    """Every joint's largest utilisation and its damage in a pass, (n,) each."""
+    used = np.max([r.utilisation.max(axis=0) for r in found.operations], axis=0)
+    spent = np.sum([r.damage_per_rivet.sum(axis=0) * r.rivets for r in found.operations], axis=0)
+    return used, spent
+
+
+def _most_strained(task: Task, found: Assessment) -> Task:
+    """The task with every operation's and joint's most strained poses alone."""
+    operations = []
+    for operation, result in zip(task.operations, found.operations, strict=True):
+        ranked = np.argsort(np.nan_to_num(result.utilisation), axis=0)[-_WORST:]
+        kept = np.unique(ranked)
+        operations.append(replace(operation, poses=operation.poses[kept]))
+    return replace(task, operations=tuple(operations))

@@ -169,7 +169,12 @@ class Rivet:
 
 
 def loads_at(
-    model: Model, operation: Operation, pose: FloatArray, *, need: str | None = None
+    model: Model,
+    operation: Operation,
+    pose: FloatArray,
+    *,
+    need: str | None = None,
+    both: bool = True,
 ) -> PoseLoads:
     """What one rivet of an operation does at a pose.
 
@@ -179,17 +184,18 @@ def loads_at(
         pose: (nv,) rad or m.
         need: "rest" or "steady", whichever must be there: without damping the other is left
             out, and this one raises what is wrong.
+        both: False: leave out what is not needed.
 
     Raises:
         InputError: a resonance without damping, a ring-down without end.
     """
     state = model.robot.state(pose)
     if model.moving:
-        return _extended_loads(model, operation, pose, state, need)
+        return _extended_loads(model, operation, pose, state, need, both)
     rivet = Rivet.at(model, operation, state, pose)
     modes = modal_analysis(rivet.system)
     return PoseLoads(
-        rivet.loads(modes, need=need),
+        rivet.loads(modes, need=need, both=both),
         modes.natural_frequencies,
         state.tool_position,
         model.holding_torque(state),
@@ -198,14 +204,21 @@ def loads_at(
 
 
 def _extended_loads(
-    model: Model, operation: Operation, pose: FloatArray, state: RobotState, need: str | None
+    model: Model,
+    operation: Operation,
+    pose: FloatArray,
+    state: RobotState,
+    need: str | None,
+    both: bool,
 ) -> PoseLoads:
     """As `loads_at`, by a model whose effects change the motion."""
     from picchio.studies.extended_loads import ExtendedRivet
 
     extended = ExtendedRivet(model, operation, pose)
-    found: dict[str, list[FloatArray] | None] = {}
+    found: dict[str, list[FloatArray] | None] = {"rest": None, "steady": None}
     for name in ("rest", "steady"):
+        if not both and name != need:
+            continue
         try:
             found[name] = extended.turning_points(steady=name == "steady")
         except InputError:

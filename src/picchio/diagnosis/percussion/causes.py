@@ -7,6 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from picchio.campaign import Tolerance
+from picchio.core.arrays import FloatArray
+from picchio.diagnosis.life import Unsure
 from picchio.diagnosis.percussion.confidence import confidence
 from picchio.diagnosis.percussion.fit import Fit
 from picchio.diagnosis.percussion.problem import MeasuredRecord
@@ -15,6 +18,7 @@ from picchio.diagnosis.percussion.trials import Trial, score
 from picchio.diagnosis.percussion.unknowns import NUISANCE_KEYS, Hypothesis
 from picchio.diagnosis.result import Cause, Value
 from picchio.model import Effect
+from picchio.robot import FlexibleRobot
 
 
 def told_causes(
@@ -27,9 +31,8 @@ def told_causes(
 
     The spread is that of the fit, larger where more than noise is left, and that of the model.
     """
-    covariance = whole.covariance()
+    variance = told_covariance(whole).diagonal()
     unknowns, vector = whole.hypothesis.unknowns(), whole.hypothesis.vector()
-    inflate = max(1.0, math.sqrt(whole.chi_square / max(whole.samples, 1)))
     result = []
     for effect in whole.hypothesis.causes:
         index = whole.hypothesis.effects.index(effect)
@@ -38,10 +41,8 @@ def told_causes(
             std = 0.0
             for k, unknown in enumerate(unknowns):
                 if unknown.effect == index and unknown.name == p.name:
-                    std = abs(unknown.slope(vector[k])) * math.sqrt(max(covariance[k, k], 0.0))
-            value = effect.values[p.name]
-            spread = math.hypot(std * inflate, _inexact(value, p.neutral)) if std > 0.0 else 0.0
-            values[p.name] = Value(value, spread, effect.unit(p.name))
+                    std = abs(unknown.slope(vector[k])) * math.sqrt(max(variance[k], 0.0))
+            values[p.name] = Value(effect.values[p.name], std, effect.unit(p.name))
         result.append(
             Cause(
                 effect.name,
@@ -51,6 +52,41 @@ def told_causes(
             )
         )
     return tuple(result)
+
+
+def told_covariance(whole: Fit) -> FloatArray:
+    """(unknowns, unknowns) of the transformed unknowns, as it is told.
+
+    That of the fit, larger where more than noise is left, and that of the model's exactness.
+    """
+    inflate = max(1.0, whole.chi_square / max(whole.samples, 1))
+    covariance = whole.covariance() * inflate
+    hypothesis, vector = whole.hypothesis, whole.hypothesis.vector()
+    for k, unknown in enumerate(hypothesis.unknowns()):
+        effect = hypothesis.effects[unknown.effect]
+        if effect.label in hypothesis.labels and covariance[k, k] > 0.0:
+            neutral = next(p.neutral for p in effect.parameters if p.name == unknown.name)
+            slope = abs(unknown.slope(vector[k]))
+            left = _inexact(effect.values[unknown.name], neutral)
+            covariance[k, k] += (left / slope) ** 2 if slope > 0.0 else 0.0
+    return covariance
+
+
+def told_spread(whole: Fit) -> Unsure:
+    """How well all values of a fit are known, for the life."""
+    hypothesis = whole.hypothesis
+    return Unsure(
+        lambda vector: hypothesis.at(vector).effects, hypothesis.vector(), told_covariance(whole)
+    )
+
+
+def stated_spread(robot: FlexibleRobot, tolerance: Tolerance) -> Unsure:
+    """How well the nominal values are known before anything was measured."""
+    hypothesis = Hypothesis.baseline(robot, tolerance)
+    spread = np.array([u.prior[1] if u.prior else 0.0 for u in hypothesis.unknowns()])
+    return Unsure(
+        lambda vector: hypothesis.at(vector).effects, hypothesis.vector(), np.diag(spread**2)
+    )
 
 
 def _inexact(value: float, neutral: float) -> float:

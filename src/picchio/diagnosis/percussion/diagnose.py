@@ -4,13 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from picchio.campaign import Campaign
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.life import life_before_and_after
 from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
-from picchio.diagnosis.percussion.causes import told_causes, told_nuisances, with_hum
+from picchio.diagnosis.percussion.causes import (
+    stated_spread,
+    told_causes,
+    told_nuisances,
+    told_spread,
+    with_hum,
+)
 from picchio.diagnosis.percussion.evidence import Evidence, weigh
 from picchio.diagnosis.percussion.fit import Fit, fit, fit_growing
 from picchio.diagnosis.percussion.gain import held_out, measure_gain
@@ -24,13 +32,14 @@ from picchio.diagnosis.percussion.select import (
     refit,
     search,
 )
-from picchio.diagnosis.percussion.trials import score
+from picchio.diagnosis.percussion.trials import Trial, score
 from picchio.diagnosis.percussion.unknowns import TOLERATED, Hypothesis
 from picchio.diagnosis.result import Cause, Diagnosis, Verdict
 from picchio.diagnosis.verdict_rules import BEYOND_DOUBT, MOSTLY
 from picchio.model.effects import Scales
 from picchio.prediction.noise_level import Noise
 from picchio.robot import FlexibleRobot
+from picchio.studies import Task
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +54,7 @@ class PercussionDiagnosis:
         search: the way there.
         before, after: tests of what the two leave.
         scales: sizes in this campaign.
+        others: models with the alternative sets, in the order of the diagnosis's.
     """
 
     diagnosis: Diagnosis
@@ -55,6 +65,23 @@ class PercussionDiagnosis:
     before: Evidence
     after: Evidence
     scales: Scales
+    others: tuple[Hypothesis, ...] = ()
+
+    def life(self, task: Task) -> dict[str, Any]:
+        """A task's life before and after, with intervals, and with every alternative set.
+
+        Raises:
+            InputError: as `picchio.diagnosis.life.life_before_and_after`.
+        """
+        robot = self.problem.robot
+        return life_before_and_after(
+            robot,
+            task,
+            self.extended.hypothesis.effects,
+            before=stated_spread(robot, self.problem.campaign.tolerance),
+            after=told_spread(self.extended),
+            others=[other.effects for other in self.others],
+        )
 
 
 def diagnose_percussion(
@@ -111,7 +138,7 @@ def diagnose_percussion(
     before = weigh(problem, nominal.residuals)
     after = weigh(problem, whole.residuals)
     gain = measure_gain(problem, baseline.hypothesis, found.best.hypothesis, train, kept)
-    same: list[tuple[frozenset[str], float]] = []
+    same: list[Trial] = []
     rivals = [
         t
         for t in (found.steps[0] if found.steps else [])
@@ -126,11 +153,10 @@ def diagnose_percussion(
     verdict = _verdict(whole, causes, before, after, same, gain.explained)
     if any(e.name == "mains_hum" for e in whole.hypothesis.effects):
         causes = with_hum(causes, hum_lines(problem, whole))
-    others = tuple(
-        tuple(sorted(_pair(label) for label in labels))
-        for labels, _ in same
-        if labels != whole.hypothesis.labels
-    )
+    others: dict[tuple[tuple[str, str], ...], Hypothesis] = {}
+    for t in same:
+        pairs = tuple(sorted(_pair(label) for label in t.fit.hypothesis.labels))
+        others.setdefault(pairs, t.fit.hypothesis)
     leads = () if verdict != "unexplained" else tuple(_leads(found))
     ask = None
     if verdict in ("ambiguous", "unexplained", "partial"):
@@ -140,14 +166,17 @@ def diagnose_percussion(
     diagnosis = Diagnosis(
         verdict=verdict,
         causes=causes if claimed else (),
-        alternatives=tuple(dict.fromkeys(others)) if claimed else (),
+        alternatives=tuple(others) if claimed else (),
         leads=leads,
         nuisances=told_nuisances(whole if claimed or verdict == "nothing-wrong" else nominal),
         gain=gain,
         next_measurement=ask,
         scores=tuple(_scores(found)),
     )
-    return PercussionDiagnosis(diagnosis, problem, nominal, whole, found, before, after, scales)
+    return PercussionDiagnosis(
+        diagnosis, problem, nominal, whole, found, before, after, scales,
+        tuple(others.values()) if claimed else (),
+    )  # fmt: skip
 
 
 def _pair(label: str) -> tuple[str, str]:

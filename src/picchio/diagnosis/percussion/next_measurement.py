@@ -55,7 +55,7 @@ def next_measurement(
     problem: Problem,
     best: Fit,
     rivals: Sequence[Trial],
-    same: Sequence[tuple[frozenset[str], float]],
+    same: Sequence[Trial],
 ) -> dict[str, Any] | None:
     """The pose, direction and sensors that best separate the best model from its rivals.
 
@@ -68,7 +68,7 @@ def next_measurement(
         as in the JSON, with `rivals` (what it would tell the best from, and what it would not);
         None where there is no rival to be told apart.
     """
-    tied = {labels for labels, _ in same}
+    tied = {trial.fit.hypothesis.labels for trial in same}
     others: dict[frozenset[str], Fit] = {}
     for trial in sorted(rivals, key=lambda t: t.fit.cost):
         labels = trial.fit.hypothesis.labels

@@ -145,14 +145,15 @@ def alternatives(
     candidates: Sequence[tuple[type[Effect], str]],
     scales: Scales,
     records: Sequence[MeasuredRecord],
-) -> tuple[list[tuple[frozenset[str], float]], list[Trial]]:
+) -> tuple[list[Trial], list[Trial]]:
     """Other sets of causes that explain as much: each cause replaced by every other suspect.
 
     Returns:
-        sets with how much worse their BIC is; and all trials.
+        those within `SAME`, and all that were fitted to the end.
     """
     best = found.best
-    same, tried = [], []
+    same: list[Trial] = []
+    tried: list[Trial] = []
     reference = score(best)
     for cause in best.hypothesis.causes:
         if len(best.hypothesis.causes) == 1 and found.steps:
@@ -166,7 +167,7 @@ def alternatives(
         for trial in trials:
             worse = trial.score - reference
             if worse < SAME and trial.fit.hypothesis.labels != best.hypothesis.labels:
-                same.append((trial.fit.hypothesis.labels, worse))
+                same.append(trial)
     return same, tried
 
 

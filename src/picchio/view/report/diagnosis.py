@@ -21,6 +21,9 @@ _LIFE = {
     "rivets_to_failure": "rivets to failure",
     "utilisation": "utilisation, %",
     "damage_per_rivet": "damage a rivet",
+    "limiting_joint": "joint that governs",
+    "rivets_interval": "rivets to failure, interval",
+    "utilisation_interval": "utilisation, %, interval",
 }
 
 
@@ -70,6 +73,8 @@ def diagnosis_report(
         poses=_poses(found),
         life=_life(life if life is not None else diagnosis.life),
         life_joints=_life_joints(life if life is not None else diagnosis.life),
+        life_others=_life_others(life if life is not None else diagnosis.life, diagnosis),
+        interval_level=((life if life is not None else diagnosis.life) or {}).get("interval_level"),
         ask=_ask(diagnosis),
         sets=[_set(each) for each in diagnosis.alternatives],
         leads=[f"{words(effect)}, {target}" for effect, target in diagnosis.leads],
@@ -212,13 +217,44 @@ def _life(life: Mapping[str, Any] | None) -> list[tuple[str, str, str]]:
     for key in dict.fromkeys([*before, *after]):
         if isinstance(before.get(key, after.get(key)), Mapping):
             continue
+        if key == "rivets_interval" and not _open(before, key) and not _open(after, key):
+            continue
         was, now = (_life_cell(key, side.get(key), key in side) for side in (before, after))
         rows.append((_LIFE.get(key, words(str(key))), was, now))
     return rows
 
 
-def _life_joints(life: Mapping[str, Any] | None) -> list[tuple[str, ...]]:
-    """Joint; peak deflection, utilisation, rivets, each before and after."""
+def _open(side: Mapping[str, Any], key: str) -> bool:
+    """Whether an interval says more than the value."""
+    low, high = side.get(key) or (0.0, 0.0)
+    return bool(low != high)
+
+
+def _life_others(
+    life: Mapping[str, Any] | None, diagnosis: Diagnosis
+) -> list[tuple[str, str, str, str]]:
+    """Every set of causes that the data cannot tell apart: causes, rivets, utilisation, joint."""
+    others = (life or {}).get("alternatives") or ()
+    if not life or not others:
+        return []
+    claimed = tuple((cause.effect, cause.target) for cause in diagnosis.causes)
+    sets = [
+        (claimed, life.get("extended") or {}),
+        *zip(diagnosis.alternatives, others, strict=False),
+    ]
+    return [
+        (
+            _set(pairs),
+            _life_cell("rivets_to_failure", side.get("rivets_to_failure"), True),
+            _life_cell("utilisation", side.get("utilisation"), True),
+            str(side.get("limiting_joint") or "\N{EN DASH}"),
+        )
+        for pairs, side in sets
+    ]
+
+
+def _life_joints(life: Mapping[str, Any] | None) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Joint; peak deflection, utilisation, rivets, each before and after, with its interval."""
     if not life:
         return []
     before, after = (
@@ -226,15 +262,17 @@ def _life_joints(life: Mapping[str, Any] | None) -> list[tuple[str, ...]]:
     )
     rows = []
     for joint in before:
-        cells = [joint]
+        cells: list[tuple[str, str]] = []
         for key in ("peak_deflection", "utilisation", "rivets_to_failure"):
             for side in (before[joint], after.get(joint, {})):
                 value = side.get(key)
                 if key == "peak_deflection":
-                    cells.append(number(None if value is None else 1e3 * value))
-                else:
-                    cells.append(_life_cell(key, value, key in side))
-        rows.append(tuple(cells))
+                    cells.append((number(None if value is None else 1e3 * value), ""))
+                    continue
+                span = "rivets_interval" if "rivets" in key else f"{key}_interval"
+                told = _life_cell(span, side[span], True) if _open(side, span) else ""
+                cells.append((_life_cell(key, value, key in side), told))
+        rows.append((joint, cells))
     return rows
 
 
@@ -249,7 +287,7 @@ def _life_cell(key: str, value: Any, given: bool) -> str:
         return str(value)
     if "rivets" in key:
         return format_count(float(value))
-    return percent(value) if key == "utilisation" else number(float(value))
+    return percent(value) if key.startswith("utilisation") else number(float(value))
 
 
 def _set(pairs: Sequence[tuple[str, str]]) -> str:
