@@ -101,7 +101,10 @@ def plain_bic(robot, campaign):
             if effect.label in chosen:
                 continue
             try:
-                tried = fit(problem, known.hypothesis.plus(effect), iterations=5, near=known)
+                # A fit that stays far above the best one so far is given up: it cannot win.
+                rival = best[2].cost if best else math.inf
+                start = known.hypothesis.plus(effect)
+                tried = fit(problem, start, iterations=5, near=known, rival=rival)
             except InputError:
                 continue
             bic = tried.cost + len(effect.parameters) * math.log(tried.samples)

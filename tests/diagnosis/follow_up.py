@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import timedelta
 
 import numpy as np
 
@@ -22,9 +23,12 @@ def taken(ask, campaign, truth, seed):
     world = truth["world"]
     nominal = robots.load(world.plan.robot)
     pose = np.array([ask["pose"][joint] for joint in nominal.joints])
+    last = world.plan.shots[-1]
     shot = replace(
-        world.plan.shots[-1],
+        last,
         pose=pose, direction=np.array(ask["direction"]), force=float(ask["force"]),
+        temperature=float(ask.get("temperature", last.temperature)),
+        when=float(ask.get("days", last.when)),
     )  # fmt: skip
     groups = tuple(truth["noise"])
     extra = worlds.groups_of((ask["sensor"],), nominal)
@@ -39,11 +43,11 @@ def taken(ask, campaign, truth, seed):
         read = data[group] + levels[group] * worlds.noise(data[group].shape, rng)
         names = worlds.channels(group, nominal)
         arrays |= {n: np.ascontiguousarray(v) for n, v in zip(names, read.T, strict=True)}
-    last = campaign.records[-1]
     record = Record.from_arrays(
         f"r{number + 1:02d}.csv", times, arrays,
         pose=ask["pose"], direction=ask["direction"], force=shot.force,
-        time=last.table.time, temperature=last.table.temperature,
+        time=campaign.records[0].table.time + timedelta(days=shot.when - world.plan.shots[0].when),
+        temperature=shot.temperature,
     )  # fmt: skip
     table = campaign.table
     return Campaign.from_records(

@@ -8,6 +8,8 @@ import trial
 
 import picchio
 from picchio.diagnosis.percussion.diagnose import diagnose_percussion
+from picchio.prediction.plan import read_plan
+from picchio.prediction.simulate import simulate
 
 FEW = {"robot": "fanuc_like_3dof", "kind": "few", "snr": 40, "draw": 0}
 CLEAR = 30.0  # chi-square
@@ -25,7 +27,7 @@ def both(diagnosis):
 
 
 @pytest.mark.parametrize("effect", ["force_amplitude", "sensor_gain"])
-def test_what_is_asked_for_tells_force_from_gain(effect, arm):
+def test_what_is_asked_for_tells_force_from_gain(effect, arm, tmp_path):
     """One accelerometer cannot tell a harder blow from a sensor that reads too much."""
     campaign, truth = trial.make({**FEW, "effect": effect})
     first = diagnose_percussion(arm, campaign).diagnosis
@@ -39,6 +41,39 @@ def test_what_is_asked_for_tells_force_from_gain(effect, arm):
     assert after.verdict == "named"
     assert [(c.effect, c.target) for c in after.causes] == [force if effect in force else gain]
     assert not after.alternatives
+    file = tmp_path / "next.toml"
+    file.write_text(ask["plan"])
+    (record,) = simulate(arm, read_plan(file)).records
+    assert {c.partition(".")[0] for c in record.channels} == {"accelerometer", "deflection"}
+    assert record.hits == campaign.records[0].hits
+    assert record.clock.step == pytest.approx(campaign.records[0].clock.step)
+    assert list(record.direction) == pytest.approx(ask["direction"])
+    assert record.excitation.force == pytest.approx(ask["force"])
+
+
+def test_what_differs_by_the_day_or_by_the_weather_is_asked_for_on_such_a_day(arm):
+    """Between two records of one day it grew warmer as time went by."""
+    campaign, truth = trial.make({**FEW, "effect": "stiffness_drift", "records": 2}, 1)
+    first = diagnose_percussion(arm, campaign).diagnosis
+    drift, thermal = ("stiffness_drift", "joint_2"), ("thermal_stiffness", "joint_2")
+    assert both(first) == {frozenset([drift]), frozenset([thermal])}
+    ask = first.next_measurement
+    assert {"temperature", "days"} & set(ask)
+    assert min(rival["chi_square"] for rival in ask["rivals"]) > CLEAR
+    assert ("temperatures" in ask["plan"], "times" in ask["plan"]) == (
+        "temperature" in ask, "days" in ask
+    )  # fmt: skip
+    after = diagnose_percussion(arm, follow_up.taken(ask, campaign, truth, 5)).diagnosis
+    assert after.verdict == "named" and not after.alternatives
+    assert [(c.effect, c.target) for c in after.causes] == [drift]
+
+
+def test_what_a_record_held_out_tells_apart_is_no_alternative(arm):
+    """Two records that are fitted leave drift and warmth alike; the third, held out, does not."""
+    campaign, _ = trial.make({**FEW, "effect": "stiffness_drift"}, 1)
+    found = diagnose_percussion(arm, campaign).diagnosis
+    assert found.verdict == "named"
+    assert both(found) == {frozenset([("stiffness_drift", "joint_3")])}
 
 
 def test_what_no_measurement_tells_apart_is_said(arm):

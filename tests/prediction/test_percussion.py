@@ -1,12 +1,16 @@
 """The prediction against an independent nonlinear simulator of the arm (`tests/worlds`)."""
 
 import sys
+import warnings
 
 import numpy as np
 import pytest
 
+import picchio
+from picchio.campaign import Campaign, Record, load_campaign
+from picchio.core.errors import InputError
 from picchio.prediction.noise_tests import whiteness
-from picchio.prediction.percussion import predict
+from picchio.prediction.percussion import percussion_setups, predict
 from picchio.robot import load_robot
 
 GROUPS = ("force", "deflection", "acceleration.tool", "accelerometer.tool", "velocity.tool",
@@ -84,3 +88,36 @@ def test_what_the_model_leaves_grows_with_the_square_of_the_force_or_faster(worl
         rows = [r[n] - found[r.file][n] for r in campaign for n in r.channels]
         left.append(float(np.sqrt(np.mean(np.square(rows)))))
     assert left[1] > 10.0 * left[0]
+
+
+def _campaign(pose, **blows):
+    time = np.arange(-50, 200) * 1e-3
+    record = Record.from_arrays(
+        "r01.csv", time, {"deflection.joint_1": np.zeros(time.size)},
+        pose=pose, direction=[0.0, 1.0, 0.0],
+    )  # fmt: skip
+    excitation = {"force": 300.0, "period": 0.04, "width": 0.004, "hits": 3} | blows
+    return Campaign.from_records([record], robot="fanuc_like_3dof", excitation=excitation)
+
+
+def test_a_pose_the_robot_cannot_have_is_told_with_its_file_and_record(tmp_path):
+    arm = picchio.load_robot("fanuc_like_3dof")
+    campaign = _campaign({"joint_1": 0.1, "joint_9": 0.2})
+    campaign.save(tmp_path / "measured")
+    for given, place in (
+        (campaign, "record[0].pose"),
+        (load_campaign(tmp_path / "measured"), "campaign.toml: record[0].pose"),
+    ):
+        with pytest.raises(InputError, match="joint_9") as caught:
+            percussion_setups(arm, given)
+        assert place in str(caught.value)
+
+
+def test_a_burst_that_outlasts_its_record_is_warned_of():
+    arm = picchio.load_robot("fanuc_like_3dof")
+    pose = {"joint_1": 0.1, "joint_2": 0.2, "joint_3": 0.3}
+    with pytest.warns(picchio.PicchioWarning, match="is the period of 40 s right"):
+        percussion_setups(arm, _campaign(pose, period=40.0))  # milliseconds, written as seconds
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        percussion_setups(arm, _campaign(pose))

@@ -54,6 +54,10 @@ def diagnose(
     report: Annotated[
         Path | None, typer.Option("--report", metavar="OUT.html", help="One page to read.")
     ] = None,
+    plan: Annotated[
+        Path | None,
+        typer.Option("--plan", metavar="OUT.toml", help="What to measure next, for `simulate`."),
+    ] = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
     gravity_stiffness: Annotated[
@@ -79,7 +83,7 @@ def diagnose(
     from picchio.model.effects import effect_class
     from picchio.robot import load_robot
 
-    for target in (json, report, model):
+    for target in (json, report, model, plan):
         check_target(target, [robot, flex, task])
     for name in without or ():
         effect_class(name)
@@ -87,7 +91,7 @@ def diagnose(
     kinds = {record.kind for record in campaign}
     # What a drive's torque tells needs no stiffness.
     loaded = load_robot(robot, flex=flex, tool=tool, allow_rigid=kinds == {"motion"})
-    for target in (json, report, model):
+    for target in (json, report, model, plan):
         check_target(target, [*loaded.files, *campaign.files])
     percussion: PercussionDiagnosis | None = None
     motion: MotionAnswer | None = None
@@ -116,12 +120,18 @@ def diagnose(
             page = _page(percussion, text, command, life)
         with atomic_write(report) as stream:
             stream.write(page)
+    asked = (found.next_measurement or {}).get("plan")
+    if plan is not None and asked is not None:
+        with atomic_write(plan) as stream:
+            stream.write(asked)
     if json is not None:
         write_json(content, json)
     if json != "-":
         _show(found, life)
         if motion is not None:
             console().print(f"Life: {motion.life.why}.")
+        if plan is not None and asked is None:
+            console().print(f"Nothing to measure next that a plan could say: {plan} not written.")
 
 
 def _page(
@@ -265,7 +275,7 @@ def _show(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
     if ask:
         direction = ", ".join(f"{c:.2f}" for c in ask.get("direction", ()))
         pose = ", ".join(f"{name} {value:.2f}" for name, value in ask.get("pose", {}).items())
-        out.print(f"Measure next: {ask['why']}")
+        out.print(f"Measure next: {ask['why']}", highlight=False)
         if pose:
             out.print(f"  pose {pose}; force along ({direction}), {ask.get('force', 0):g} N")
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from picchio.campaign import Campaign, Channel, Record
+from picchio.campaign.tables import CAMPAIGN_FILE
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, PicchioWarning
 from picchio.model import Model
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
@@ -53,7 +56,7 @@ def percussion_setups(
     warm = [r.temperature for r in chosen if r.temperature is not None]
     setups = []
     for record in chosen:
-        pose = robot.pose(record.pose)  # type: ignore[arg-type]
+        pose = _pose(robot, campaign, record)
         geometry = geometries.setdefault(pose.tobytes(), Geometry(chain, pose))
         days = (
             (record.taken - min(taken)).total_seconds() / _SECONDS_A_DAY if record.taken else None
@@ -64,6 +67,7 @@ def percussion_setups(
         clock = record.clock
         rotation = geometry.motion(robot.tool_frame).rotation
         blows = _blows(record).change(tool_rotation=rotation)
+        _warn_of_blows_beyond(record)
         setups.append(
             PercussionSetup(
                 record.file,
@@ -75,6 +79,37 @@ def percussion_setups(
             )
         )
     return setups
+
+
+def _pose(robot: FlexibleRobot, campaign: Campaign, record: Record) -> FloatArray:
+    try:
+        return robot.pose(record.pose)  # type: ignore[arg-type]
+    except InputError as error:
+        number = next((i for i, r in enumerate(campaign.records) if r is record), None)
+        place = "record" if number is None else f"record[{number}]"
+        shown: dict[str, Any] = {} if error.value is None else {"value": error.value}
+        raise InputError(
+            error.problem,
+            file=None if campaign.folder is None else campaign.folder / CAMPAIGN_FILE,
+            key=f"{place}.pose",
+            choices=error.choices,
+            hint=error.hint,
+            **shown,
+        ) from None
+
+
+def _warn_of_blows_beyond(record: Record) -> None:
+    """Say that a burst goes on after its record's end: milliseconds given as seconds, often."""
+    period, hits = record.excitation.period, record.hits
+    end = record.clock.start + record.clock.step * (record.clock.samples - 1)
+    if period is None or hits is None or (hits - 1) * period <= end:
+        return
+    warnings.warn(
+        f"{record.file} ends at {end:.3g} s, before the last of {hits} blows at "
+        f"{(hits - 1) * period:.3g} s: is the period of {period:g} s right?",
+        PicchioWarning,
+        stacklevel=3,
+    )
 
 
 def _blows(record: Record) -> Blows:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,7 @@ from picchio.diagnosis.percussion.select import (
     refit,
     search,
 )
-from picchio.diagnosis.percussion.trials import Trial, score
+from picchio.diagnosis.percussion.trials import SAME, Trial, score
 from picchio.diagnosis.percussion.unknowns import TOLERATED, Hypothesis
 from picchio.diagnosis.result import Cause, Diagnosis, Verdict
 from picchio.diagnosis.verdict_rules import BEYOND_DOUBT, MOSTLY
@@ -150,6 +150,7 @@ def diagnose_percussion(
         say("looking for other causes that would do as well")
         same, rivals = alternatives(problem, found, candidates, scales, train)
         causes = told_causes(whole, found, rivals, train)
+        same = _still_alike(problem, whole, same)
     verdict = _verdict(whole, causes, before, after, same, gain.explained)
     if any(e.name == "mains_hum" for e in whole.hypothesis.effects):
         causes = with_hum(causes, hum_lines(problem, whole))
@@ -177,6 +178,16 @@ def diagnose_percussion(
         diagnosis, problem, nominal, whole, found, before, after, scales,
         tuple(others.values()) if claimed else (),
     )  # fmt: skip
+
+
+def _still_alike(problem: Problem, whole: Fit, same: Sequence[Trial]) -> list[Trial]:
+    """Rivals that do as well on all records, those held out included."""
+    kept = []
+    for trial in same:
+        there = refit(problem, trial.fit.hypothesis, problem.records)
+        if score(there) - score(whole) < SAME:
+            kept.append(replace(trial, fit=there, score=score(there)))
+    return kept
 
 
 def _pair(label: str) -> tuple[str, str]:

@@ -19,8 +19,10 @@ _MODEL_FLOOR = 0.01
 # many quiet samples of a group or more; from fewer it is known less well.
 _COLOUR_ERROR = 0.12
 _PLENTY = 8000.0
-# Samples that say as much of a noise's slow part as one of white noise says of all.
+# Samples that say as much of a noise's slow part as one of white noise says of all; and where
+# colour was not worth its two numbers: up to 2.4 standard deviations of it may hide there.
 _SLOW = 12.0
+_SLOW_UNSEEN = 50.0
 BAND_LIMIT = 4.5
 POSE_LIMIT = 5.0
 
@@ -127,7 +129,8 @@ def _colour(problem: Problem, group: str) -> Callable[[float], float]:
     noise = record.noise[name]
     samples = _channels_of(problem, group) / (2.0 * max(noise.error, 1e-6) ** 2)
     # Colour that so few samples did not show may be there all the same.
-    unseen = float(np.sqrt(max(_SLOW / samples - _SLOW / _PLENTY, 0.0)))
+    slow = _SLOW_UNSEEN if noise.white else _SLOW
+    unseen = float(np.sqrt(max(slow / samples - slow / _PLENTY, 0.0)))
     if noise.white:
         return lambda frequency: unseen
     white = float(np.median(noise.psd))

@@ -11,6 +11,7 @@ import numpy as np
 from picchio.campaign import parse_channel
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.asked_plan import asked_plan
 from picchio.diagnosis.percussion.fit import Fit
 from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.trials import SAME, Trial
@@ -27,14 +28,18 @@ _SEED = 20160401
 _ENOUGH = 3.0 * SAME
 # Relative noise of a sensor that the campaign does not have.
 _NEW_SENSOR = 0.01
+# The best records are tried with softer blows, in a warmer or cooler room, later as well.
+_TRIED_AGAIN = 2
+_SOFTER = 0.3
+_OTHERWISE = 15.0
 
 
 @dataclass(frozen=True, eq=False)
 class _Shot:
     """One record that might be taken, and by how much chi-square would tell each rival."""
 
-    geometry: Geometry
-    direction: FloatArray
+    setup: PercussionSetup
+    usual: bool
     sensor: str
     at_hand: bool
     told: FloatArray
@@ -46,9 +51,10 @@ class _Shot:
         return float(self.told[clear].min()) if clear.any() else 0.0
 
     @property
-    def worth(self) -> tuple[int, bool, float, float]:
-        """Rivals told apart; no new sensor needed; the least of them; all of them."""
-        return int((self.told >= _ENOUGH).sum()), self.at_hand, self.least, float(self.told.sum())
+    def worth(self) -> tuple[int, bool, bool, float, float]:
+        """Rivals told apart; no new sensor, no other conditions; the least of them; all."""
+        told = int((self.told >= _ENOUGH).sum())
+        return told, self.at_hand, self.usual, self.least, float(self.told.sum())
 
 
 def next_measurement(
@@ -60,23 +66,24 @@ def next_measurement(
     """The pose, direction and sensors that best separate the best model from its rivals.
 
     Each rival's best fit is simulated against the best one in records that were not taken: other
-    poses and directions, the most force that was used, the sensors at hand and those missing. A
-    difference counts as far as the best model's own unknowns, known as well as they are by now,
-    could not make up for it.
+    poses and directions, the most force that was used and less, the sensors at hand and those
+    missing, another temperature and a later day where records say theirs. A difference counts as
+    far as the best model's own unknowns, known as well as they are by now, could not make up for
+    it.
 
     Returns:
-        as in the JSON, with `rivals` (what it would tell the best from, and what it would not);
-        None where there is no rival to be told apart.
+        as in the JSON, with `rivals` (what it would tell the best from, and what it would not),
+        `plan` (the record as a `picchio-plan/1` file), and, where they matter, `temperature`
+        (deg C) and `days` (after the first record); None where there is no rival to be told apart.
     """
-    tied = {trial.fit.hypothesis.labels for trial in same}
     others: dict[frozenset[str], Fit] = {}
-    for trial in sorted(rivals, key=lambda t: t.fit.cost):
+    for trial in sorted(same or rivals, key=lambda t: t.fit.cost):
         labels = trial.fit.hypothesis.labels
-        if (not tied or labels in tied) and labels != best.hypothesis.labels:
+        if labels != best.hypothesis.labels:
             others.setdefault(labels, trial.fit)
     if not others:
         return None
-    chosen = list(others.values())[: _RIVALS if tied else 1]
+    chosen = list(others.values())[: _RIVALS if same else 1]
     shots = _shots(problem, best, [fit.hypothesis for fit in chosen])
     if not shots:
         return None
@@ -84,7 +91,9 @@ def next_measurement(
     names = [_name(fit.hypothesis) for fit in chosen]
     told = [name for name, value in zip(names, shot.told, strict=True) if value >= _ENOUGH]
     alike = [name for name in names if name not in told]
-    why = f"{_name(best.hypothesis)} is best told here, by the {shot.sensor}, "
+    how = _conditions(problem, shot)
+    where = "here" if shot.usual else f"here, {' and '.join(how.words)}"
+    why = f"{_name(best.hypothesis)} is best told {where}, by the {shot.sensor}, "
     if told:
         why += f"from {' or '.join(told)}: chi-square would fall by {shot.least:.3g}"
         if alike:
@@ -94,13 +103,14 @@ def next_measurement(
             f"nothing that was tried tells {_name(best.hypothesis)} from {' or '.join(alike)}; "
             f"this comes nearest (chi-square {float(shot.told.max()):.3g}, {shot.sensor})"
         )
-    pose = zip(problem.robot.joint_names, shot.geometry.pose, strict=True)
-    return {
+    pose = zip(problem.robot.joint_names, shot.setup.geometry.pose, strict=True)
+    ask: dict[str, Any] = {
         "why": why,
         "pose": {name: round(float(q), 6) for name, q in pose},
-        "direction": [round(float(c), 6) for c in shot.direction],
-        "force": _force(problem),
+        "direction": [round(float(c), 6) for c in shot.setup.blows.direction],
+        "force": round(float(np.abs(shot.setup.blows.height).max()), 6),
         "sensor": shot.sensor,
+        **how.values,
         "separation": float(shot.told.max()),
         "rivals": [
             {
@@ -110,16 +120,13 @@ def next_measurement(
             for fit, value in zip(chosen, shot.told, strict=True)
         ],
     }
+    text = asked_plan(problem, ask, shot.setup)
+    return ask if text is None else ask | {"plan": text}
 
 
 def _name(hypothesis: Hypothesis) -> str:
     labels = sorted(label.replace(":", " of ") for label in hypothesis.labels)
     return " + ".join(labels) or "the nominal model"
-
-
-def _force(problem: Problem) -> float:
-    """N, the most that was used."""
-    return max(float(np.abs(r.setup.blows.height).max()) for r in problem.records)
 
 
 def _shots(problem: Problem, best: Fit, rivals: Sequence[Hypothesis]) -> list[_Shot]:
@@ -129,18 +136,91 @@ def _shots(problem: Problem, best: Fit, rivals: Sequence[Hypothesis]) -> list[_S
     poses = [r.setup.geometry for r in problem.records[::every]]
     chain = some.setup.geometry.chain
     poses += [Geometry(chain, _pose(problem, rng)) for _ in range(_POSES)]
-    shots = []
+    # What is measured next without a word on the weather is measured as the last record was.
+    last = max(problem.records, key=lambda r: r.setup.conditions.days or 0.0).setup.conditions
+    like = replace(some.setup, conditions=replace(last, record="next"))
+    shots: list[_Shot] = []
     for geometry in poses:
         for direction in _directions(rng):
-            setup = _setup(problem, some.setup, geometry, direction)
-            try:
-                told = _told(problem, setup, best, rivals)
-            except InputError:  # one of the models is none there
-                continue
-            for name, value in told.items():
-                at_hand = any(group.split(".")[0] == name for group in problem.groups)
-                shots.append(_Shot(geometry, direction, name, at_hand, value))
+            setup = _setup(problem, like, geometry, direction)
+            shots += _taken(problem, setup, best, rivals)
+    again = sorted(shots, key=lambda s: s.worth)[-_TRIED_AGAIN:]
+    for setup in dict.fromkeys(shot.setup for shot in again):
+        for other in _varied(setup, _span(problem)):
+            shots += _taken(problem, other, best, rivals, usual=False)
     return shots
+
+
+def _taken(
+    problem: Problem,
+    setup: PercussionSetup,
+    best: Fit,
+    rivals: Sequence[Hypothesis],
+    *,
+    usual: bool = True,
+) -> list[_Shot]:
+    """The record with every sensor; none where one of the models is none there."""
+    try:
+        told = _told(problem, setup, best, rivals)
+    except InputError:
+        return []
+    hand = {group.split(".")[0] for group in problem.groups}
+    return [_Shot(setup, usual, name, name in hand, value) for name, value in told.items()]
+
+
+def _span(problem: Problem) -> float:
+    """Days from the first record to the last."""
+    known = [r.setup.conditions.days for r in problem.records]
+    days = [day for day in known if day is not None]
+    return max(days) - min(days) if days else 0.0
+
+
+def _varied(setup: PercussionSetup, span: float) -> list[PercussionSetup]:
+    """The same record with softer blows, in a warmer or cooler room, later."""
+    now = setup.conditions
+    blows = setup.blows.change(height=_SOFTER * setup.blows.height)
+    found = [_fresh(setup, blows=blows)]
+    if now.temperature is not None:
+        kelvin = now.temperature + _OTHERWISE * (-1.0 if now.temperature > 0.0 else 1.0)
+        found.append(_fresh(setup, conditions=replace(now, temperature=kelvin)))
+    if now.days is not None and span > 0.0:  # as long again: what drifts is known no further
+        found.append(_fresh(setup, conditions=replace(now, days=now.days + span)))
+    return found
+
+
+def _fresh(setup: PercussionSetup, **changes: Any) -> PercussionSetup:
+    """A setup with changes, and nothing remembered of the old one."""
+    return replace(setup, **changes, _motions={}, _forces={}, _systems={}, _plans={})
+
+
+@dataclass(frozen=True)
+class _How:
+    """What is unlike the campaign's own conditions."""
+
+    words: tuple[str, ...]
+    values: dict[str, float]
+
+
+def _conditions(problem: Problem, shot: _Shot) -> _How:
+    words: list[str] = []
+    values: dict[str, float] = {}
+    if shot.usual:
+        return _How((), values)
+    here = shot.setup.conditions
+    most = max(float(np.abs(r.setup.blows.height).max()) for r in problem.records)
+    force = float(np.abs(shot.setup.blows.height).max())
+    if force < 0.999 * most:
+        words.append(f"with soft blows ({force:.3g} N)")
+    known = [r.setup.conditions for r in problem.records]
+    if here.temperature is not None and here.temperature not in {c.temperature for c in known}:
+        warm = [r.temperature for r in problem.campaign if r.temperature is not None]
+        values["temperature"] = round(float(np.mean(warm)) + here.temperature, 3)
+        words.append(f"at {values['temperature']:.3g} deg C")
+    if here.days is not None and here.days not in {c.days for c in known}:
+        values["days"] = round(here.days, 3)
+        late = f"{here.days:.3g} days" if here.days >= 2.0 else f"{24.0 * here.days:.3g} hours"
+        words.append(f"{late} after the first record")
+    return _How(tuple(words), values)
 
 
 def _pose(problem: Problem, rng: np.random.Generator) -> FloatArray:
@@ -166,13 +246,12 @@ def _setup(
     channels = {c.name: c for c in like.channels}
     channels |= {name: parse_channel(name)[0] for name in names}
     rotation = geometry.motion(frame).rotation
-    return replace(
+    return _fresh(
         like,
         geometry=geometry,
         blows=like.blows.change(direction=direction, tool_rotation=rotation),
         channels=tuple(channels.values()),
-        _motions={}, _forces={}, _systems={},
-    )  # fmt: skip
+    )
 
 
 def _told(

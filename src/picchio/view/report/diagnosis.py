@@ -76,6 +76,7 @@ def diagnosis_report(
         life_others=_life_others(life if life is not None else diagnosis.life, diagnosis),
         interval_level=((life if life is not None else diagnosis.life) or {}).get("interval_level"),
         ask=_ask(diagnosis),
+        plan=(diagnosis.next_measurement or {}).get("plan"),
         sets=[_set(each) for each in diagnosis.alternatives],
         leads=[f"{words(effect)}, {target}" for effect, target in diagnosis.leads],
         warnings=list(dict.fromkeys(warnings)),
@@ -307,6 +308,12 @@ def _ask(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         rows.append(("force along", direction_label(ask["direction"])))
     if ask.get("force") is not None:
         rows.append(("force", f"{number(float(ask['force']))} N"))
+    if ask.get("temperature") is not None:
+        rows.append(("temperature", f"{number(float(ask['temperature']))} deg C"))
+    if ask.get("days") is not None:
+        days = float(ask["days"])
+        late = f"{number(days)} days" if days >= 2.0 else f"{number(24.0 * days)} hours"
+        rows.append(("when", f"{late} after the first record"))
     if ask.get("sensor"):
         rows.append(("sensors", str(ask["sensor"])))
     for rival in ask.get("rivals", ()):

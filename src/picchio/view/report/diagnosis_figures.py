@@ -188,10 +188,12 @@ class DiagnosisFigures:
         """Power by frequency against the noise, a picture a channel group."""
         modes = self._natural_frequencies()
         made = []
-        for group in dict.fromkeys(level.group for level in self.found.before.bands):
+        groups = list(dict.fromkeys(level.group for level in self.found.before.bands))
+        width = 5.2 if len(groups) > 1 else 9.4
+        for group in groups:
             before = [x for x in self.found.before.bands if x.group == group]
             after = [x for x in self.found.after.bands if x.group == group and self.changed]
-            ax = plot_bands(before, after, blank_figure(5.2, 3.0), natural_frequencies=modes)
+            ax = plot_bands(before, after, blank_figure(width, 3.0), natural_frequencies=modes)
             most = max(before, key=lambda level: level.power)
             made.append(self._picture(ax, f"Residual power of {group} by frequency",
                         f"{group}: most is left at {most.part}, {number(most.power, 3)} times "

@@ -49,6 +49,9 @@ def themed_svg(ax: Axes, alt: str, name: str) -> Markup:
     return Markup(drawn.replace(BLUE, "var(--accent)").replace(VERMILION, "var(--bad)"))
 
 
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
 def number(value: float | None, digits: int = 4) -> str:
     """A number with few digits; a dash where there is none."""
     if value is None or math.isnan(value):
@@ -59,8 +62,9 @@ def number(value: float | None, digits: int = 4) -> str:
     mantissa, e, power = text.partition("e")
     if not e:
         return text
-    sign = "\N{MINUS SIGN}" if power.startswith("\N{MINUS SIGN}") else ""
-    return f"{mantissa} × 10^{sign}{int(power.lstrip('+' + chr(0x2212)))}"
+    sign = "-" if power.startswith("\N{MINUS SIGN}") else ""
+    exponent = f"{sign}{int(power.lstrip('+' + chr(0x2212)))}"
+    return f"{mantissa} × 10{exponent.translate(_RAISED)}"
 
 
 def percent(value: float | None, digits: int = 3) -> str:
