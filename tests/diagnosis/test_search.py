@@ -112,6 +112,7 @@ def test_what_replaces_a_cause_must_hold_on_poses_held_out(holds, two_causes, ar
     rounds = iter([[wrong], [Trial("force_amplitude:tool", best, score(best), 0.0)], [], []])
     monkeypatch.setattr(select, "try_candidates", lambda *_, **__: next(rounds))
     monkeypatch.setattr(select, "prune", lambda problem, found, *_, **__: found)
+    monkeypatch.setattr(select, "unstuck", lambda problem, best, *_: best)
     monkeypatch.setattr(select, "exchange", lambda *_: better)
     monkeypatch.setattr(select, "replaced", lambda problem, best, *_: best)
     start = fit(problem, Hypothesis.baseline(arm, problem.campaign.tolerance))

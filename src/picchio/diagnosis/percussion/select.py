@@ -14,6 +14,7 @@ from picchio.diagnosis.percussion.fit import Fit, fit
 from picchio.diagnosis.percussion.latent import LATENT
 from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem, signal_power
+from picchio.diagnosis.percussion.stuck import unstuck
 from picchio.diagnosis.percussion.trials import SAME, Trial, score, try_candidates
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.diagnosis.verdict_rules import BEYOND_DOUBT
@@ -114,7 +115,12 @@ def search(
             )
             if found.best.hypothesis.labels == here.hypothesis.labels:
                 break
-            found.best = with_latent(problem, found.best, best.label)
+            found.best = unstuck(problem, found.best, scales, records)
+            # Times of blows may have been missed: then they are looked for once more.
+            noise = weigh(problem, found.best.residuals, found.best.records).is_noise
+            again = with_latent(problem, found.best, best.label if noise else "")
+            if again.cost < found.best.cost:
+                found.best = prune(problem, again, records, least, best.label, alone=False)
             if known and not weigh(problem, found.best.residuals, found.best.records).is_noise:
                 found.best = accepted(exchange(problem, found.best, found.steps, records, least))
             if len(found.best.hypothesis.labels) >= MOST_CAUSES:
