@@ -11,6 +11,7 @@ from picchio.core.errors import InputError
 from picchio.excitation import PiecewiseForce
 from picchio.model.elements import ElementKind
 from picchio.model.system import VibratingSystem
+from picchio.vibration.jumps import jump_corrections
 
 # Longest steps, s: the linear part is exact, so these resolve only what comes on top.
 SMOOTH_STEP = 1e-3
@@ -78,7 +79,8 @@ def integrate(
         force: an endless history from t = 0 (burst), or one period.
         samples: when; before t = 0 a burst finds the system at rest.
         longest_step: s; by default fine enough for what the system holds.
-        middle: at a jump give the mean acceleration of before and after, as a filter wants it.
+        middle: for a filter that takes straight lines between the samples: accelerations beside
+            a jump are such that its response is right; see `picchio.vibration.jumps`.
         plan: of a burst, where it was made before from the same force, samples and step.
 
     Returns:
@@ -148,6 +150,9 @@ def make_plan(
     if middle:
         before = _at(force, points - 2 * _EDGE)
         after = 0.5 * (before + after)
+        jumps = _at(force, edges + 2 * _EDGE) - _at(force, edges - 2 * _EDGE)
+        added = jump_corrections(samples.start, samples.step, samples.count, first, edges, jumps)
+        after = after + np.where(sample >= 0, added[np.maximum(sample, 0)], 0.0)
     regular = np.abs(lengths - fine) < 1e-9 * fine + 2 * _EDGE
     same = np.full(lengths.size, -1)
     same[~regular] = np.unique(np.round(lengths[~regular], 12), return_inverse=True)[1]
