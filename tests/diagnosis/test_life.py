@@ -61,10 +61,12 @@ def test_intervals_of_a_life_are_those_of_draws(arm, task):
             assert (high - low) / 2.0 == pytest.approx(1.645 * spread, rel=0.2), (name, key)
             assert (high + low) / 2.0 == pytest.approx(centre, abs=0.4 * spread), (name, key)
     assert "rivets_interval" not in found["baseline"]
-    governs = found["extended"]["limiting_joint"]
-    of_robot = found["extended"]["rivets_interval"]
-    assert of_robot == found["extended"]["joints"][governs]["rivets_interval"]
-    assert of_robot[0] < found["extended"]["rivets_to_failure"] < of_robot[1]
+    told = found["extended"]
+    ends = [joint["rivets_interval"] for joint in told["joints"].values()]
+    assert told["rivets_interval"] == (min(e[0] for e in ends), min(e[1] for e in ends))
+    for key, interval in (("rivets_to_failure", "rivets"), ("utilisation", "utilisation")):
+        low, high = told[f"{interval}_interval"]
+        assert low < told[key] < high
 
 
 def test_an_interval_may_reach_from_a_life_with_an_end_to_one_without(arm, task):
@@ -94,3 +96,51 @@ def test_what_is_known_exactly_has_no_interval_and_other_sets_have_their_own_lif
         assert low == high == found[side]["utilisation"]
     (instead,) = found["alternatives"]
     assert instead["utilisation"] == pytest.approx(1.5 * found["extended"]["utilisation"], rel=1e-6)
+
+
+def _stronger(vector):
+    return (effect_class("force_amplitude")("tool").with_values(scale=float(np.exp(vector[0]))),)
+
+
+@pytest.mark.parametrize("share", [0.9, 1.05])
+def test_poses_that_only_stronger_blows_damage_count_in_the_interval(share, arm):
+    """Near the endurance limit more poses take part at the low end than in the middle."""
+    whole = picchio.load_task(arm.task_path, arm)
+    operation = dataclasses.replace(whole.operations[0], poses=whole.operations[0].poses[:6])
+    task = dataclasses.replace(whole, operations=(operation,))
+    used = life_before_and_after(arm, task, ())["baseline"]["utilisation"]
+    centre, sigma = np.array([np.log(share / used)]), 0.15
+    unsure = Unsure(_stronger, centre, np.array([[sigma**2]]))
+    found = life_before_and_after(arm, task, _stronger(centre), after=unsure)["extended"]
+    worst = centre + 1.6448536 * sigma
+    there = life_before_and_after(arm, task, _stronger(worst))["extended"]
+    assert found["rivets_interval"][0] == pytest.approx(there["rivets_to_failure"], rel=1e-6)
+
+
+def test_a_value_at_its_bound_still_has_an_interval(arm, task):
+    def bounded(vector):
+        return _stronger(np.minimum(vector, 0.0))
+
+    unsure = Unsure(
+        bounded, np.zeros(1), np.array([[0.1**2]]), np.array([-1.0]), np.array([0.0])
+    )  # fmt: skip
+    found = life_before_and_after(arm, task, bounded(np.zeros(1)), after=unsure)["extended"]
+    low, high = found["utilisation_interval"]
+    assert high == pytest.approx(found["utilisation"])
+    assert low == pytest.approx(np.exp(-0.16449) * found["utilisation"], rel=0.01)
+
+
+def test_where_a_model_ends_the_interval_does_too_and_nothing_is_lost(arm, task):
+    damper = effect_class("joint_damping")
+
+    def weak(vector):  # below nothing the joint would drive itself
+        return (damper("joint_3").with_values(damping=float(vector[0])),)
+
+    unsure = Unsure(weak, np.array([-30.0]), np.array([[60.0**2]]))
+    found = life_before_and_after(
+        arm, task, weak(unsure.centre), after=unsure, others=[weak([-500.0])]
+    )
+    low, high = found["extended"]["utilisation_interval"]
+    assert low <= found["extended"]["utilisation"] <= high
+    (instead,) = found["alternatives"]
+    assert "damping" in instead["why"]

@@ -74,6 +74,7 @@ def test_what_a_record_held_out_tells_apart_is_no_alternative(arm):
     found = diagnose_percussion(arm, campaign).diagnosis
     assert found.verdict == "named"
     assert both(found) == {frozenset([("stiffness_drift", "joint_3")])}
+    assert found.causes[0].confidence > 0.99
 
 
 def test_what_no_measurement_tells_apart_is_said(arm):

@@ -182,9 +182,14 @@ def _life(
 ) -> dict[str, Any] | None:
     """Life before and after; None where there is no task or nothing was found."""
     from picchio.cli.output import say_warning
+    from picchio.diagnosis.life import NO_SHAFT
     from picchio.studies import load_task
 
     path = task or robot.task_path
+    if not any(j.shaft is not None or j.reducer is not None for j in robot.flexible_joints):
+        if task is not None:
+            say_warning(NO_SHAFT)
+        return None
     if path is None or percussion.diagnosis.verdict in ("nothing-wrong", "unexplained"):
         return None
     try:
@@ -265,12 +270,18 @@ def _show(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
         others = life.get("alternatives") or ()
         for pairs, other in zip(found.alternatives, others, strict=False):
             names = " and ".join(f"{effect} of {target}" for effect, target in pairs)
-            out.print(
-                f"  with {names} instead: rivets {format_count(other['rivets_to_failure'])}, "
+            told = other.get("why") or (
+                f"rivets {format_count(other['rivets_to_failure'])}, "
                 f"utilisation {100 * other['utilisation']:.4g} %"
             )
-        if found.alternatives:
+            out.print(f"  with {names} instead: {told}")
+        if others:
             out.print("  until the sets are told apart, only the worst of these may be promised")
+        elif found.alternatives:
+            out.print(
+                '  "after" is with the cause named above; with another of the sets the life is '
+                "another: until they are told apart, neither may be promised"
+            )
     ask = found.next_measurement
     if ask:
         direction = ", ".join(f"{c:.2f}" for c in ask.get("direction", ()))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
 from picchio.model import Effect
 from picchio.robot import FlexibleRobot
 from picchio.studies import Assessment, Task, assess
@@ -19,7 +20,10 @@ from picchio.studies import Assessment, Task, assess
 LEVEL = 0.90
 """Of the two-sided intervals, as `picchio fit-sn` has them."""
 
-# Poses of each operation and joint that the interval looks at, the most strained ones.
+NO_SHAFT = "no joint has a shaft or a reducer, so no life can be told: give them in the sidecar"
+"""Why there is no life where there is none."""
+
+# Poses of each operation and joint that slopes are taken at, the most strained ones.
 _WORST = 2
 # Directions in which less is unknown than that do not move a life.
 _KNOWN = 1e-7
@@ -33,11 +37,22 @@ class Unsure:
         effects: coordinates (k,) -> the effects there.
         centre: (k,) where they stand.
         covariance: (k, k) of the coordinates.
+        lower, upper: (k,) bounds; beyond them the effects stay as they are there.
     """
 
     effects: Callable[[FloatArray], Sequence[Effect]]
     centre: FloatArray
     covariance: FloatArray
+    lower: FloatArray | None = None
+    upper: FloatArray | None = None
+
+    def room(self, step: FloatArray) -> float:
+        """How many such steps there are to the nearest bound."""
+        if self.lower is None or self.upper is None:
+            return math.inf
+        ends = np.where(step > 0.0, self.upper - self.centre, self.centre - self.lower)
+        moved = np.abs(step) > 1e-12
+        return float((ends[moved] / np.abs(step[moved])).min()) if moved.any() else math.inf
 
 
 def life_before_and_after(
@@ -67,7 +82,8 @@ def life_before_and_after(
         rivets_to_failure, utilisation and peak_deflection (rad). With a spread there are
         rivets_interval and utilisation_interval, too, of the robot and of every joint: two-sided,
         `LEVEL`, of what the model leaves open; how strong the material is, is not in them. With
-        `others`, "alternatives" has a life like these, without intervals, for each.
+        `others`, "alternatives" has a life like these, without intervals, for each; {"why": ...}
+        where a model has none.
 
     Raises:
         InputError: as `assess`.
@@ -76,13 +92,20 @@ def life_before_and_after(
         "baseline": _life(robot, task, options, before),
         "extended": _life(with_effects(robot, effects), task, options, after, robot),
     }
-    if before is not None or after is not None:
+    if any("rivets_interval" in found[side] for side in ("baseline", "extended")):
         found["interval_level"] = LEVEL
     if others:
-        found["alternatives"] = [
-            _life(with_effects(robot, other), task, options) for other in others
-        ]
+        found["alternatives"] = [_life_or_why(robot, other, task, options) for other in others]
     return found
+
+
+def _life_or_why(
+    robot: FlexibleRobot, effects: Sequence[Effect], task: Task, options: dict[str, Any]
+) -> dict[str, Any]:
+    try:
+        return _life(with_effects(robot, effects), task, options)
+    except InputError as error:  # this set's model is none for this task
+        return {"why": str(error)}
 
 
 def with_effects(robot: FlexibleRobot, effects: Sequence[Effect]) -> FlexibleRobot:
@@ -117,8 +140,12 @@ def _life(
     intervals = life_intervals(bare or robot, task, found, unsure, options)
     for name, each in intervals.items():
         told["joints"][name] |= each
-    if found.limiting_joint in intervals:
-        told |= intervals[found.limiting_joint]
+    known = [joint for joint in found.joints if joint.name in intervals]
+    if known:
+        most = max(known, key=lambda joint: joint.utilisation)
+        told["utilisation_interval"] = intervals[most.name]["utilisation_interval"]
+        ends = [intervals[joint.name]["rivets_interval"] for joint in known]
+        told["rivets_interval"] = (min(e[0] for e in ends), min(e[1] for e in ends))
     return told
 
 
@@ -154,44 +181,75 @@ def life_intervals(
     """
     worst = _most_strained(task, found)
     z = NormalDist().inv_cdf(0.5 + 0.5 * level)
+    settings = {**(options or {}), "steady_check": False}
 
-    def at(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
-        other = with_effects(robot, unsure.effects(vector))
-        with warnings.catch_warnings():  # said once already, of the centre
-            warnings.simplefilter("ignore")
-            return _strain(assess(other, worst, **{**(options or {}), "steady_check": False}))
+    def at(vector: FloatArray, task: Task = worst) -> tuple[FloatArray, FloatArray] | None:
+        """Utilisation and damage there; None where the model is none."""
+        try:
+            with warnings.catch_warnings():  # said once already, of the centre
+                warnings.simplefilter("ignore")
+                return _strain(
+                    assess(with_effects(robot, unsure.effects(vector)), task, **settings)
+                )
+        except InputError:
+            return None
 
-    reference, spent = at(unsure.centre)
+    centre = at(unsure.centre)
+    if centre is None:
+        return {}
+    reference, spent = centre
     sizes, directions = np.linalg.eigh(unsure.covariance)
     spread = directions * np.sqrt(np.maximum(sizes, 0.0))
     spread = spread[:, np.sqrt(np.maximum(sizes, 0.0)) > _KNOWN]
-    slopes = np.zeros((2, spread.shape[1], reference.size))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        for i, step in enumerate(spread.T):
-            used, damaged = at(unsure.centre + step)
-            slopes[:, i] = np.log(used / reference), np.log(damaged / spent)
-    # Where there is no damage its slope is none: utilisation's leads to where there may be some.
-    slopes[1] = np.where(np.isfinite(slopes[1]).all(axis=0), slopes[1], slopes[0])
-    slopes[~np.isfinite(slopes)] = 0.0
+    slopes = _slopes(unsure, spread, at, reference, spent)
     told = {}
     for j, joint in enumerate(found.joints):
         if not joint.sn_curve:
             continue
-        utilisations, lives = [joint.utilisation], [joint.rivets_to_failure]
-        for used, _ in map(at, _design_points(unsure.centre, spread, slopes[0, :, j], z)):
-            utilisations.append(joint.utilisation * float(used[j] / reference[j]))
-        for _, damaged in map(at, _design_points(unsure.centre, spread, slopes[1, :, j], z)):
-            whole = joint.damage_per_rivet
-            if spent[j] > 0.0:
-                whole *= float(damaged[j] / spent[j])
-            else:
-                whole += float(damaged[j]) / task.rivets_per_pass
-            lives.append(1.0 / whole if whole > 0.0 else math.inf)
+        used, lives = [joint.utilisation], [joint.rivets_to_failure]
+        for point in _design_points(unsure.centre, spread, slopes[0, :, j], z):
+            there = at(point)
+            used.append(
+                math.inf if there is None else joint.utilisation * there[0][j] / reference[j]
+            )
+        for point in _design_points(unsure.centre, spread, slopes[1, :, j], z):
+            there = at(point)
+            # The most strained pose is the first to be damaged: no damage there, none at all.
+            if there is not None and there[1][j] > 0.0:
+                there = at(point, task)
+            damage = math.inf if there is None else there[1][j] / task.rivets_per_pass
+            lives.append(1.0 / damage if damage > 0.0 else math.inf)
         told[joint.name] = {
-            "rivets_interval": (min(lives), max(lives)),
-            "utilisation_interval": (min(utilisations), max(utilisations)),
+            "rivets_interval": (float(min(lives)), float(max(lives))),
+            "utilisation_interval": (float(min(used)), float(max(used))),
         }
     return told
+
+
+def _slopes(
+    unsure: Unsure,
+    spread: FloatArray,
+    at: Callable[[FloatArray], tuple[FloatArray, FloatArray] | None],
+    reference: FloatArray,
+    spent: FloatArray,
+) -> FloatArray:
+    """(2, directions, joints): of ln utilisation and ln damage, a standard deviation each."""
+    slopes = np.zeros((2, spread.shape[1], reference.size))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for i, step in enumerate(spread.T):
+            # Away from a bound, and less far where the model is none or bounds are near.
+            side = 1.0 if unsure.room(step) >= min(unsure.room(-step), 1.0) else -1.0
+            for share in (side, -side, 0.25 * side, -0.25 * side):
+                share *= min(unsure.room(np.sign(share) * step), 1.0)
+                there = at(unsure.centre + share * step) if abs(share) > 1e-3 else None
+                if there is not None:
+                    slopes[0, i] = np.log(there[0] / reference) / share
+                    slopes[1, i] = np.log(there[1] / spent) / share
+                    break
+    # Where there is no damage its slope is none: utilisation's leads to where there may be some.
+    slopes[1] = np.where(np.isfinite(slopes[1]).all(axis=0), slopes[1], slopes[0])
+    slopes[~np.isfinite(slopes)] = 0.0
+    return slopes
 
 
 def _design_points(

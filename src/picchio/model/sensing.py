@@ -44,6 +44,11 @@ class SensorChain:
         return self.mount is not None or self.highpass is not None or self.lowpass is not None
 
     @property
+    def smooth(self) -> bool:
+        """Whether its filters let no jump through at once."""
+        return self.mount is not None or self.lowpass is not None
+
+    @property
     def timing(self) -> tuple[float, float]:
         """(delay, clock rate): what changes the times at which the motion is needed."""
         return self.delay, self.clock_rate

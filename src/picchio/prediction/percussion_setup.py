@@ -20,6 +20,7 @@ from picchio.model.system import VibratingSystem
 from picchio.prediction.filters import apply_filters
 from picchio.prediction.readings import reading
 from picchio.vibration.integrate import (
+    AtJumps,
     CoordinateMotion,
     Plan,
     Samples,
@@ -114,7 +115,10 @@ class PercussionSetup:
         if kind == "force":
             values = _history(self.struck(model)[1], samples.times)[None]
         else:
-            system, motion = self._motion(model, samples, middle=chain.filters)
+            at_jumps: AtJumps = "after"
+            if chain.filters:
+                at_jumps = "moments" if chain.smooth else "mean"
+            system, motion = self._motion(model, samples, at_jumps)
             values = reading(kind, members[0].subject, system, motion)
         if chain.filters:
             values = apply_filters(chain, values, samples.step)[:, factor * lead :: factor]
@@ -164,16 +168,16 @@ class PercussionSetup:
         return int(min(2.0 / step, 20000))
 
     def _motion(
-        self, model: Model, samples: Samples, *, middle: bool
+        self, model: Model, samples: Samples, at_jumps: AtJumps = "after"
     ) -> tuple[VibratingSystem, CoordinateMotion]:
         moving = tuple(e.key for e in model.effects if e.where not in ("sensor", "motion"))
-        key = (moving, model.gravity_stiffness, samples, middle)
+        key = (moving, model.gravity_stiffness, samples, at_jumps)
         blows, force = self.struck(model)
         if key not in self._motions:
             system = self._system(model, blows)
             _forget(self._motions)
-            plan = None if self.steady else self._plan(model, force, samples, system, middle)
-            motion = integrate(system, force, samples, middle=middle, plan=plan)
+            plan = None if self.steady else self._plan(model, force, samples, system, at_jumps)
+            motion = integrate(system, force, samples, at_jumps=at_jumps, plan=plan)
             self._motions[key] = (system, motion)
         return self._motions[key]
 
@@ -183,14 +187,14 @@ class PercussionSetup:
         force: PiecewiseForce,
         samples: Samples,
         system: VibratingSystem,
-        middle: bool,
+        at_jumps: AtJumps,
     ) -> Plan:
         """The steps, which most effects leave as they are."""
         step = default_step(system)
-        key = (_blow_key(model), samples, step, middle)
+        key = (_blow_key(model), samples, step, at_jumps)
         if key not in self._plans:
             _forget(self._plans)
-            self._plans[key] = make_plan(force, samples, step, middle=middle)
+            self._plans[key] = make_plan(force, samples, step, at_jumps=at_jumps)
         return self._plans[key]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -19,6 +20,7 @@ KINKED_STEP = 4e-4
 ROUGH_STEP = 2e-4
 _ROUGH = (ElementKind.BOUC_WEN,)
 _EDGE = 1e-10
+AtJumps = Literal["after", "mean", "moments"]
 _GAUSS = 0.5 - np.sqrt(3.0) / 6.0
 _SHOOTING = 40
 _MASSLESS = "something that the model lets move has no mass"
@@ -69,7 +71,7 @@ def integrate(
     samples: Samples,
     *,
     longest_step: float | None = None,
-    middle: bool = False,
+    at_jumps: AtJumps = "after",
     plan: Plan | None = None,
 ) -> CoordinateMotion:
     """The system's motion from rest under a burst, or its steady motion under a periodic force.
@@ -79,12 +81,14 @@ def integrate(
         force: an endless history from t = 0 (burst), or one period.
         samples: when; before t = 0 a burst finds the system at rest.
         longest_step: s; by default fine enough for what the system holds.
-        middle: for a filter that takes straight lines between the samples: accelerations beside
-            a jump are such that its response is right; see `picchio.vibration.jumps`.
+        at_jumps: the acceleration at a jump of the force: "after", "mean" of before and after, or,
+            for a filter that takes straight lines between the samples and lets no jump through,
+            accelerations beside the jump by which its response is right ("moments"; see
+            `picchio.vibration.jumps`).
         plan: of a burst, where it was made before from the same force, samples and step.
 
     Returns:
-        the motion at the samples; at a jump of the force the acceleration is that just after.
+        the motion at the samples.
 
     Raises:
         InputError: a periodic motion that does not settle.
@@ -92,10 +96,10 @@ def integrate(
     longest = longest_step or default_step(system)
     if np.isfinite(force.end):
         try:
-            return _periodic(system, force, samples, longest, middle)
+            return _periodic(system, force, samples, longest, at_jumps)
         except np.linalg.LinAlgError:
             raise InputError(_MASSLESS) from None
-    plan = plan or make_plan(force, samples, longest, middle=middle)
+    plan = plan or make_plan(force, samples, longest, at_jumps=at_jumps)
     try:
         return _run(system, plan, samples.count, _rest(system))[0]
     except np.linalg.LinAlgError:
@@ -119,7 +123,7 @@ def make_plan(
     longest: float,
     until: float | None = None,
     *,
-    middle: bool = False,
+    at_jumps: AtJumps = "after",
 ) -> Plan:
     """Steps from t = 0 to the last sample (or `until`), split at the force's edges."""
     times = samples.times
@@ -147,9 +151,10 @@ def make_plan(
     inside = index < points.size
     sample[index[inside]] = first + np.flatnonzero(inside)
     after = _at(force, points + 2 * _EDGE)
-    if middle:
+    if at_jumps != "after":
         before = _at(force, points - 2 * _EDGE)
         after = 0.5 * (before + after)
+    if at_jumps == "moments":
         jumps = _at(force, edges + 2 * _EDGE) - _at(force, edges - 2 * _EDGE)
         added = jump_corrections(samples.start, samples.step, samples.count, first, edges, jumps)
         after = after + np.where(sample >= 0, added[np.maximum(sample, 0)], 0.0)
@@ -208,7 +213,11 @@ def _run(
 
 
 def _periodic(
-    system: VibratingSystem, force: PiecewiseForce, samples: Samples, longest: float, middle: bool
+    system: VibratingSystem,
+    force: PiecewiseForce,
+    samples: Samples,
+    longest: float,
+    at_jumps: AtJumps,
 ) -> CoordinateMotion:
     """Shooting for the state that repeats, with the linear system's own map as its Jacobian."""
     from picchio.vibration._exponential_kernel import step_matrices
@@ -233,7 +242,7 @@ def _periodic(
     if origin < -_EDGE:  # a steady record may begin before its t = 0
         shift = period * np.ceil(-origin / period)
         samples = Samples(origin + shift, samples.step, samples.count)
-    plan = make_plan(force, samples, longest, middle=middle)
+    plan = make_plan(force, samples, longest, at_jumps=at_jumps)
     return _run(system, plan, samples.count, state)[0]
 
 

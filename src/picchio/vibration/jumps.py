@@ -45,15 +45,15 @@ def jump_corrections(
     even = second_moment - area / 6.0
     left, right = 0.5 * (even - first_moment), 0.5 * (even + first_moment)
     middle = area - even
-    # Where nothing stands on the left, two samples keep area and first moment.
+    # Where nothing stands on the left, two samples keep area and first moment: the first two.
     alone = centre - 1 < first
-    left, middle, right = (
-        np.where(alone, two, three)
-        for two, three in ((0.0, left), (area - first_moment, middle), (first_moment, right))
-    )
-    _add(found, centre - 1, heights * left)
-    _add(found, centre, heights * middle)
-    _add(found, centre + 1, heights * right)
+    beyond = centre < first  # the first is then one step right of where moments are taken
+    two_middle = np.where(beyond, 0.0, area - first_moment)
+    two_right = np.where(beyond, 2.0 * area - first_moment, first_moment)
+    _add(found, centre - 1, heights * np.where(alone, 0.0, left))
+    _add(found, centre, heights * np.where(alone, two_middle, middle))
+    _add(found, centre + 1, heights * np.where(alone, two_right, right))
+    _add(found, centre + 2, heights * np.where(beyond, first_moment - area, 0.0))
     found[:first] = 0.0
     return found
 

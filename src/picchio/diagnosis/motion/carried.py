@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from picchio.diagnosis.life import life_before_and_after
+from picchio.diagnosis.life import NO_SHAFT, life_before_and_after
 from picchio.diagnosis.motion.state import State
 from picchio.diagnosis.motion.system import System
 from picchio.diagnosis.result import Diagnosis
@@ -20,7 +20,6 @@ CARRIES = "carries part of the weight, which a blow meets as a mean load alone: 
 READS = "is in the readings, not in the robot"
 NO_CAUSE = "no cause is claimed: the life is what picchio assess says of the nominal robot"
 NO_TASK = "no task is known whose life could be told: give one with --task"
-NO_SHAFT = "no joint has a shaft or a reducer, so no life can be told: give them in the sidecar"
 NONE_ACTS = "nothing that was found acts while the tool hits: the life is the nominal robot's"
 
 

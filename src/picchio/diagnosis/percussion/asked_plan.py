@@ -6,47 +6,63 @@ from collections.abc import Mapping
 from datetime import timedelta
 from typing import Any
 
-import numpy as np
-
+from picchio.campaign import Record
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.problem import Problem
 from picchio.prediction.percussion_setup import PercussionSetup
 from picchio.prediction.plan import Plan, SensorTable, plan_toml
 
 
-def asked_plan(problem: Problem, ask: Mapping[str, Any], setup: PercussionSetup) -> str | None:
+def percussion_records(problem: Problem) -> list[Record]:
+    """The campaign's records that the diagnosis is of."""
+    return [record for record in problem.campaign if record.kind == "percussion"]
+
+
+def sensor_group(problem: Problem, kind: str) -> str:
+    """The channel group that a kind of sensor is asked for as: at the tool, or on every joint."""
+    return kind if kind == "deflection" else f"{kind}.{problem.robot.tool_frame}"
+
+
+def asked_plan(
+    problem: Problem, ask: Mapping[str, Any], setup: PercussionSetup, like: str
+) -> str | None:
     """The record as a `picchio-plan/1` file, for the bench and for `picchio simulate`.
 
-    The sensors of the campaign with their noise, and the one that is asked for.
+    The channels of the campaign with their noise, and those that are asked for.
 
     Args:
         problem: the campaign.
         ask: pose, direction, force, sensor and, where they matter, temperature and days.
         setup: of the record.
+        like: file of the record whose blows these are.
 
     Returns:
         TOML; None where the blows are not those of a plan (a measured force).
     """
-    table = problem.campaign.table.excitation
+    records = percussion_records(problem)
+    table = next(record for record in records if record.file == like).excitation
     if table.kind == "measured":
         return None
     samples = setup.samples
     quiet = max(-samples.start, 0.0)
-    taken = [record.taken for record in problem.campaign if record.taken is not None]
-    sensors = []
-    for group in problem.groups:
-        own = [c.name for r in problem.records for c in r.setup.channels if c.group == group]
-        levels = [problem.noise[name].std for name in own if name in problem.noise]
-        sensors.append(SensorTable(channels=group, noise=float(f"{np.mean(levels):.4g}")))
-    if not any(group.split(".")[0] == ask["sensor"] for group in problem.groups):
-        sensors.append(SensorTable(channels=ask["sensor"]))
+    taken = [record.taken for record in records if record.taken is not None]
     times = [min(taken) + timedelta(days=ask["days"])] if "days" in ask else None
+    names = {c.name: None for r in problem.records for c in r.setup.channels}
+    sensors = [
+        SensorTable(
+            channels=name,
+            noise=float(f"{problem.noise[name].std:.4g}") if name in problem.noise else 0.0,
+        )
+        for name in names
+    ]
+    wanted = sensor_group(problem, ask["sensor"])
+    if wanted not in problem.groups:
+        sensors.append(SensorTable(channels=wanted))
     try:
         plan = Plan(
             poses=[ask["pose"]],
             directions=[ask["direction"]],
             levels=[ask["force"]],
-            hits=None if table.hits is not None else _hits(setup),
             sample_rate=float(f"{1.0 / samples.step:.9g}"),
             quiet=quiet,
             length=samples.count * samples.step - quiet,
@@ -61,8 +77,3 @@ def asked_plan(problem: Problem, ask: Mapping[str, Any], setup: PercussionSetup)
     except (InputError, ValueError):
         return None
     return plan_toml(plan)
-
-
-def _hits(setup: PercussionSetup) -> int | None:
-    """Blows of the record's burst; None of a steady one."""
-    return None if setup.steady else len(setup.blows.height)

@@ -97,7 +97,7 @@ def measure_scales(
         setup = record.setup
         geometry = setup.geometry
         stiffness = geometry.stiffness
-        system, motion = setup._motion(model, setup.samples, middle=False)
+        system, motion = setup._motion(model, setup.samples)
         deflection = system.deflections @ motion.position.T
         peak = np.maximum(peak, np.abs(deflection).max(axis=1))
         rate = np.maximum(rate, np.abs(system.deflections @ motion.velocity.T).max(axis=1))

@@ -26,11 +26,21 @@ def told_causes(
     found: Search,
     rivals: Sequence[Trial],
     train: Sequence[MeasuredRecord],
+    refuted: Sequence[Trial] = (),
 ) -> tuple[Cause, ...]:
     """The causes with their values, spreads and confidence.
 
     The spread is that of the fit, larger where more than noise is left, and that of the model.
+
+    Args:
+        whole: the fit to all records.
+        found: the way there.
+        rivals: other sets, fitted to the records of the search.
+        train: those records.
+        refuted: rivals that only the records held out told apart, fitted to all.
     """
+    unsettled = {trial.fit.hypothesis.labels for trial in refuted}
+    rivals = [r for r in rivals if r.fit.hypothesis.labels not in unsettled]
     variance = told_covariance(whole).diagonal()
     unknowns, vector = whole.hypothesis.unknowns(), whole.hypothesis.vector()
     result = []
@@ -47,7 +57,7 @@ def told_causes(
             Cause(
                 effect.name,
                 effect.target,
-                _confidence(found, rivals, effect, train),
+                _confidence(found, rivals, effect, train, whole, refuted),
                 values,
             )
         )
@@ -75,17 +85,24 @@ def told_covariance(whole: Fit) -> FloatArray:
 def told_spread(whole: Fit) -> Unsure:
     """How well all values of a fit are known, for the life."""
     hypothesis = whole.hypothesis
-    return Unsure(
-        lambda vector: hypothesis.at(vector).effects, hypothesis.vector(), told_covariance(whole)
-    )
+    return _unsure(hypothesis, told_covariance(whole))
 
 
 def stated_spread(robot: FlexibleRobot, tolerance: Tolerance) -> Unsure:
     """How well the nominal values are known before anything was measured."""
     hypothesis = Hypothesis.baseline(robot, tolerance)
     spread = np.array([u.prior[1] if u.prior else 0.0 for u in hypothesis.unknowns()])
+    return _unsure(hypothesis, np.diag(spread**2))
+
+
+def _unsure(hypothesis: Hypothesis, covariance: FloatArray) -> Unsure:
+    unknowns = hypothesis.unknowns()
     return Unsure(
-        lambda vector: hypothesis.at(vector).effects, hypothesis.vector(), np.diag(spread**2)
+        lambda vector: hypothesis.at(vector).effects,
+        hypothesis.vector(),
+        covariance,
+        np.array([u.lower for u in unknowns]),
+        np.array([u.upper for u in unknowns]),
     )
 
 
@@ -99,14 +116,24 @@ def _confidence(
     rivals: Sequence[Trial],
     effect: Effect,
     train: Sequence[MeasuredRecord],
+    whole: Fit,
+    refuted: Sequence[Trial],
 ) -> float:
     """From the poses' score differences to the best rival, and their spread (Student's t)."""
     best = found.best
-    others = [r for r in rivals if effect.label not in r.fit.hypothesis.labels]
-    rival = min((r.fit for r in others), key=score, default=None)
-    if rival is None or len(rival.records) != len(best.records):
+    told = [
+        confidence(whole, r.fit) for r in refuted if effect.label not in r.fit.hypothesis.labels
+    ]
+    others = [
+        r.fit
+        for r in rivals
+        if effect.label not in r.fit.hypothesis.labels and r.finished(best.records)
+    ]
+    if others:
+        told.append(confidence(best, min(others, key=score)))
+    if not told:
         return 0.5 if len(train) < 3 else 1.0
-    return confidence(best, rival)
+    return min(told)
 
 
 def told_nuisances(found: Fit) -> dict[str, Value]:

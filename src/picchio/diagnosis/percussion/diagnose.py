@@ -149,8 +149,8 @@ def diagnose_percussion(
     if causes and (after.is_noise or (_mostly(gain.explained) and _sure(causes))):
         say("looking for other causes that would do as well")
         same, rivals = alternatives(problem, found, candidates, scales, train)
-        causes = told_causes(whole, found, rivals, train)
-        same = _still_alike(problem, whole, same)
+        same, refuted = _on_all_records(problem, whole, same)
+        causes = told_causes(whole, found, rivals, train, refuted)
     verdict = _verdict(whole, causes, before, after, same, gain.explained)
     if any(e.name == "mains_hum" for e in whole.hypothesis.effects):
         causes = with_hum(causes, hum_lines(problem, whole))
@@ -180,14 +180,17 @@ def diagnose_percussion(
     )  # fmt: skip
 
 
-def _still_alike(problem: Problem, whole: Fit, same: Sequence[Trial]) -> list[Trial]:
-    """Rivals that do as well on all records, those held out included."""
-    kept = []
+def _on_all_records(
+    problem: Problem, whole: Fit, same: Sequence[Trial]
+) -> tuple[list[Trial], list[Trial]]:
+    """Rivals that do as well on all records, those held out included; and those that don't."""
+    kept: list[Trial] = []
+    refuted: list[Trial] = []
     for trial in same:
         there = refit(problem, trial.fit.hypothesis, problem.records)
-        if score(there) - score(whole) < SAME:
-            kept.append(replace(trial, fit=there, score=score(there)))
-    return kept
+        alike = score(there) - score(whole) < SAME
+        (kept if alike else refuted).append(replace(trial, fit=there, score=score(there)))
+    return kept, refuted
 
 
 def _pair(label: str) -> tuple[str, str]:

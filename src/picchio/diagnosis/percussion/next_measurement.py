@@ -11,9 +11,13 @@ import numpy as np
 from picchio.campaign import parse_channel
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.asked_plan import asked_plan
+from picchio.diagnosis.percussion.asked_plan import (
+    asked_plan,
+    percussion_records,
+    sensor_group,
+)
 from picchio.diagnosis.percussion.fit import Fit
-from picchio.diagnosis.percussion.problem import Problem
+from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.trials import SAME, Trial
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model.geometry import Geometry
@@ -39,7 +43,7 @@ class _Shot:
     """One record that might be taken, and by how much chi-square would tell each rival."""
 
     setup: PercussionSetup
-    usual: bool
+    varied: str
     sensor: str
     at_hand: bool
     told: FloatArray
@@ -54,7 +58,7 @@ class _Shot:
     def worth(self) -> tuple[int, bool, bool, float, float]:
         """Rivals told apart; no new sensor, no other conditions; the least of them; all."""
         told = int((self.told >= _ENOUGH).sum())
-        return told, self.at_hand, self.usual, self.least, float(self.told.sum())
+        return told, self.at_hand, not self.varied, self.least, float(self.told.sum())
 
 
 def next_measurement(
@@ -84,7 +88,8 @@ def next_measurement(
     if not others:
         return None
     chosen = list(others.values())[: _RIVALS if same else 1]
-    shots = _shots(problem, best, [fit.hypothesis for fit in chosen])
+    some = max(problem.records, key=lambda r: float(np.abs(r.setup.blows.height).max()))
+    shots = _shots(problem, best, [fit.hypothesis for fit in chosen], some)
     if not shots:
         return None
     shot = max(shots, key=lambda s: s.worth)
@@ -92,7 +97,7 @@ def next_measurement(
     told = [name for name, value in zip(names, shot.told, strict=True) if value >= _ENOUGH]
     alike = [name for name in names if name not in told]
     how = _conditions(problem, shot)
-    where = "here" if shot.usual else f"here, {' and '.join(how.words)}"
+    where = "here" if not how.words else f"here, {' and '.join(how.words)}"
     why = f"{_name(best.hypothesis)} is best told {where}, by the {shot.sensor}, "
     if told:
         why += f"from {' or '.join(told)}: chi-square would fall by {shot.least:.3g}"
@@ -120,7 +125,7 @@ def next_measurement(
             for fit, value in zip(chosen, shot.told, strict=True)
         ],
     }
-    text = asked_plan(problem, ask, shot.setup)
+    text = asked_plan(problem, ask, shot.setup, some.setup.name)
     return ask if text is None else ask | {"plan": text}
 
 
@@ -129,9 +134,10 @@ def _name(hypothesis: Hypothesis) -> str:
     return " + ".join(labels) or "the nominal model"
 
 
-def _shots(problem: Problem, best: Fit, rivals: Sequence[Hypothesis]) -> list[_Shot]:
+def _shots(
+    problem: Problem, best: Fit, rivals: Sequence[Hypothesis], some: MeasuredRecord
+) -> list[_Shot]:
     rng = np.random.default_rng(_SEED)
-    some = max(problem.records, key=lambda r: float(np.abs(r.setup.blows.height).max()))
     every = max(1, len(problem.records) // 3)
     poses = [r.setup.geometry for r in problem.records[::every]]
     chain = some.setup.geometry.chain
@@ -144,10 +150,10 @@ def _shots(problem: Problem, best: Fit, rivals: Sequence[Hypothesis]) -> list[_S
         for direction in _directions(rng):
             setup = _setup(problem, like, geometry, direction)
             shots += _taken(problem, setup, best, rivals)
-    again = sorted(shots, key=lambda s: s.worth)[-_TRIED_AGAIN:]
-    for setup in dict.fromkeys(shot.setup for shot in again):
-        for other in _varied(setup, _span(problem)):
-            shots += _taken(problem, other, best, rivals, usual=False)
+    again = dict.fromkeys(s.setup for s in sorted(shots, key=lambda s: s.worth, reverse=True))
+    for setup in list(again)[:_TRIED_AGAIN]:
+        for what, other in _varied(setup, _span(problem)).items():
+            shots += _taken(problem, other, best, rivals, what)
     return shots
 
 
@@ -156,16 +162,17 @@ def _taken(
     setup: PercussionSetup,
     best: Fit,
     rivals: Sequence[Hypothesis],
-    *,
-    usual: bool = True,
+    varied: str = "",
 ) -> list[_Shot]:
     """The record with every sensor; none where one of the models is none there."""
     try:
         told = _told(problem, setup, best, rivals)
     except InputError:
         return []
-    hand = {group.split(".")[0] for group in problem.groups}
-    return [_Shot(setup, usual, name, name in hand, value) for name, value in told.items()]
+    return [
+        _Shot(setup, varied, name, sensor_group(problem, name) in problem.groups, value)
+        for name, value in told.items()
+    ]
 
 
 def _span(problem: Problem) -> float:
@@ -175,16 +182,15 @@ def _span(problem: Problem) -> float:
     return max(days) - min(days) if days else 0.0
 
 
-def _varied(setup: PercussionSetup, span: float) -> list[PercussionSetup]:
+def _varied(setup: PercussionSetup, span: float) -> dict[str, PercussionSetup]:
     """The same record with softer blows, in a warmer or cooler room, later."""
     now = setup.conditions
-    blows = setup.blows.change(height=_SOFTER * setup.blows.height)
-    found = [_fresh(setup, blows=blows)]
+    found = {"force": _fresh(setup, blows=setup.blows.change(height=_SOFTER * setup.blows.height))}
     if now.temperature is not None:
         kelvin = now.temperature + _OTHERWISE * (-1.0 if now.temperature > 0.0 else 1.0)
-        found.append(_fresh(setup, conditions=replace(now, temperature=kelvin)))
+        found["temperature"] = _fresh(setup, conditions=replace(now, temperature=kelvin))
     if now.days is not None and span > 0.0:  # as long again: what drifts is known no further
-        found.append(_fresh(setup, conditions=replace(now, days=now.days + span)))
+        found["days"] = _fresh(setup, conditions=replace(now, days=now.days + span))
     return found
 
 
@@ -202,25 +208,18 @@ class _How:
 
 
 def _conditions(problem: Problem, shot: _Shot) -> _How:
-    words: list[str] = []
-    values: dict[str, float] = {}
-    if shot.usual:
-        return _How((), values)
     here = shot.setup.conditions
-    most = max(float(np.abs(r.setup.blows.height).max()) for r in problem.records)
-    force = float(np.abs(shot.setup.blows.height).max())
-    if force < 0.999 * most:
-        words.append(f"with soft blows ({force:.3g} N)")
-    known = [r.setup.conditions for r in problem.records]
-    if here.temperature is not None and here.temperature not in {c.temperature for c in known}:
-        warm = [r.temperature for r in problem.campaign if r.temperature is not None]
-        values["temperature"] = round(float(np.mean(warm)) + here.temperature, 3)
-        words.append(f"at {values['temperature']:.3g} deg C")
-    if here.days is not None and here.days not in {c.days for c in known}:
-        values["days"] = round(here.days, 3)
+    if shot.varied == "force":
+        force = float(np.abs(shot.setup.blows.height).max())
+        return _How((f"with soft blows ({force:.3g} N)",), {})
+    if shot.varied == "temperature" and here.temperature is not None:
+        warm = [r.temperature for r in percussion_records(problem) if r.temperature is not None]
+        degrees = round(float(np.mean(warm)) + here.temperature, 3)
+        return _How((f"at {degrees:.3g} deg C",), {"temperature": degrees})
+    if shot.varied == "days" and here.days is not None:
         late = f"{here.days:.3g} days" if here.days >= 2.0 else f"{24.0 * here.days:.3g} hours"
-        words.append(f"{late} after the first record")
-    return _How(tuple(words), values)
+        return _How((f"{late} after the first record",), {"days": round(here.days, 3)})
+    return _How((), {})
 
 
 def _pose(problem: Problem, rng: np.random.Generator) -> FloatArray:

@@ -44,8 +44,8 @@ class Trial:
     promise: float
 
     def finished(self, records: Sequence[MeasuredRecord]) -> bool:
-        """Whether it was fitted to all of these records."""
-        return len(self.fit.records) == len(records)
+        """Whether it was fitted to all of these records, to their ends."""
+        return len(self.fit.records) == len(records) and self.fit.end is None
 
 
 def score(found: Fit) -> float:

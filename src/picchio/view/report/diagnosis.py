@@ -246,8 +246,8 @@ def _life_others(
     return [
         (
             _set(pairs),
-            _life_cell("rivets_to_failure", side.get("rivets_to_failure"), True),
-            _life_cell("utilisation", side.get("utilisation"), True),
+            _life_cell("rivets_to_failure", side.get("why", side.get("rivets_to_failure")), True),
+            _life_cell("utilisation", side.get("utilisation"), "why" not in side),
             str(side.get("limiting_joint") or "\N{EN DASH}"),
         )
         for pairs, side in sets
