@@ -131,6 +131,8 @@ def _confidence(
     ]
     if others:
         told.append(confidence(best, min(others, key=score)))
+    if not told and len(best.hypothesis.causes) == 1 and found.baseline is not best:
+        return confidence(best, found.baseline)
     if not told:
         return 0.5 if len(train) < 3 else 1.0
     return min(told)

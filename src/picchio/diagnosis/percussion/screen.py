@@ -119,7 +119,7 @@ class Screen:
             return None
         if kind.name in LATENT:
             return latent_gain(self.problem, self.fit, kind, target, self.project, self.left)
-        if kind.discrete and self.fit.end is None:
+        if kind.discrete and self.faint:
             return None  # what has no small size would have been seen before
         if self.first is not None:
             glance = self.first.suspect(candidate)

@@ -102,10 +102,14 @@ def search(
             if not trials:
                 break
             found.steps.append(trials)
-            best = trials[0]
-            gain = score(here) - best.score
-            if gain < least or (confirmed is not None and not confirmed(here, best.fit)):
+            # Of those that do as well, the records held out have the first word.
+            tied = [t for t in trials if t.score - trials[0].score < SAME]
+            held = (t for t in tied if confirmed is None or confirmed(here, t.fit))
+            best = next(held, None)
+            gain = score(here) - best.score if best is not None else 0.0
+            if best is None or gain < least:
                 break
+            trials.sort(key=lambda t: t is not best)
             # What the model itself is not exact to may look like a last small cause in some pose.
             known = bool(here.hypothesis.labels)
             if quiet and known and confidence(best.fit, here) < BEYOND_DOUBT:

@@ -30,6 +30,8 @@ _HOPE = 0.1
 _HOPE_LATENT = 0.5
 _RIVALS = 2
 _MOST_RIVALS = 5
+# Chi-square per sample up to which the first part of a part of the records shows nothing.
+_LITTLE = 1.2
 # Sets whose BIC is within this cannot be told apart.
 SAME = 10.0
 
@@ -89,6 +91,10 @@ def try_candidates(
     some = list(records) if whole else spread_out(records)
     window = None if whole else SCREEN_WINDOW
     start = fit(problem, known, some, window, iterations=4, with_jacobian=True)
+    if not whole and start.chi_square < _LITTLE * start.samples:
+        # What is wrong shows only later, or in other records.
+        some, window = list(records), None
+        start = fit(problem, known, some, window, iterations=4, with_jacobian=True)
     look = Screen(problem, start, scales, faint=whole, enough=_SHORT * least if whole else 0.0)
 
     def short_fit(effect: Effect) -> Fit | None:
