@@ -33,6 +33,8 @@ def wrong(row):
     """Whether a case counts against the method."""
     if row["kind"] in UNNAMEABLE:
         return row["verdict"] == "named" or row["verdict"].startswith("failed")
+    if row["kind"] in ("null", "few-null"):
+        return row["verdict"] != "nothing-wrong"
     return not row["right"]
 
 
@@ -113,16 +115,19 @@ def print_gains(rows):
 
 def print_bursts(rows):
     """Peak and life of a burst that nobody measured, before and after."""
-    for snr in (40, 20):
-        found = [row["burst"] for row in rows if row["snr"] == snr and row.get("burst")]
+    for snr, few in ((40, False), (20, False), (40, True)):
+        found = [
+            row["burst"] for row in rows
+            if row["snr"] == snr and (row["kind"] == "few") == few and row.get("burst")
+        ]  # fmt: skip
         for model in ("baseline", "extended"):
             for what, limit in WITHIN.items():
                 size = sorted(abs(e) for told in found for e in told.get(model, {}).get(what, ()))
                 if size:
                     inside = sum(e <= limit for e in size)
                     print(
-                        f"burst at {snr} dB, {model}, {what}: median error "
-                        f"{100 * quantile(size, 0.5):.2g} %, 95th percentile "
+                        f"burst at {snr} dB{', 3 records' if few else ''}, {model}, {what}: median "
+                        f"error {100 * quantile(size, 0.5):.2g} %, 95th percentile "
                         f"{100 * quantile(size, 0.95):.2g} %; {inside} of {len(size)} within "
                         f"{100 * limit:g} %"
                     )

@@ -32,6 +32,7 @@ class TransverseCompliance(Effect):
             )
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """Four times as stiff as the joint."""
-        k, m = 4.0 * scales.stiffness[self.target], scales.inertia[self.target]
-        return [{"stiffness": k, "damping": 0.04 * (k * m) ** 0.5}]
+        """Four and sixteen times as stiff as the joint: what is stiff leaves slowly."""
+        k, m = scales.stiffness[self.target], scales.inertia[self.target]
+        stiff = (4.0 * k, 16.0 * k)
+        return [{"stiffness": s, "damping": 0.04 * (s * m) ** 0.5} for s in stiff]
