@@ -87,9 +87,7 @@ def simulate(
     except InputError as error:
         if error.file is not None:
             raise
-        shown = {} if error.value is None else {"value": error.value}
-        raise InputError(error.problem, file=plan, key=error.key, choices=error.choices,
-                         hint=error.hint, **shown) from None  # type: ignore[arg-type]  # fmt: skip
+        raise error.placed(file=plan) from None
     written = write_campaign(made, to, overwrite=overwrite)
     if json is not None:
         write_json(

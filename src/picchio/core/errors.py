@@ -53,6 +53,12 @@ class InputError(PicchioError):
         self.hint = hint
         super().__init__(self._line(value))
 
+    def placed(self, *, file: str | Path | None = None, key: str | None = None) -> InputError:
+        """The same error, told with the file or key that only the caller knows."""
+        value: dict[str, Any] = {} if self.value is None else {"value": self.value}
+        return InputError(self.problem, file=file or self.file, key=key or self.key,
+                          choices=self.choices, hint=self.hint, **value)  # fmt: skip
+
     def _line(self, value: Any) -> str:
         place = [part for part in (self.file, self.key) if part]
         line = (": ".join(place) + ": " if place else "") + self.problem

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -87,15 +86,8 @@ def _pose(robot: FlexibleRobot, campaign: Campaign, record: Record) -> FloatArra
     except InputError as error:
         number = next((i for i, r in enumerate(campaign.records) if r is record), None)
         place = "record" if number is None else f"record[{number}]"
-        shown: dict[str, Any] = {} if error.value is None else {"value": error.value}
-        raise InputError(
-            error.problem,
-            file=None if campaign.folder is None else campaign.folder / CAMPAIGN_FILE,
-            key=f"{place}.pose",
-            choices=error.choices,
-            hint=error.hint,
-            **shown,
-        ) from None
+        file = None if campaign.folder is None else campaign.folder / CAMPAIGN_FILE
+        raise error.placed(file=file, key=f"{place}.pose") from None
 
 
 def _warn_of_blows_beyond(record: Record) -> None:

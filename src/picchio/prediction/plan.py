@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -242,15 +242,8 @@ def read_plan(path: str | Path) -> Plan:
     try:
         plan.check()
     except InputError as error:
-        raise _at(error, path) from None
+        raise error.placed(file=path) from None
     return plan
-
-
-def _at(error: InputError, path: str | Path) -> InputError:
-    """The same error with the file's name."""
-    value: dict[str, Any] = {} if error.value is None else {"value": error.value}
-    return InputError(error.problem, file=path, key=error.key, choices=error.choices,
-                      hint=error.hint, **value)  # fmt: skip
 
 
 def plan_toml(plan: Plan) -> str:

@@ -29,6 +29,7 @@ from picchio.robot import FlexibleRobot
 from picchio.studies.assess_checks import (
     reducer_checks,
     reducer_of,
+    steady_state_checks,
     warn_about_shafts,
     warn_about_yield,
 )
@@ -36,7 +37,6 @@ from picchio.studies.assessment import (
     Assessment,
     JointLife,
     OperationResult,
-    SteadyStateCheck,
 )
 from picchio.studies.assumptions import assumptions_of
 from picchio.studies.curves import curves_of
@@ -141,7 +141,7 @@ def assess(
         operations=tuple(results),
         limiting_joint=limiting.name if limiting else None,
         rivets_to_failure=limiting.life if limiting else math.inf,
-        steady_state=_steady_state_checks(joints, task, results, checks),
+        steady_state=steady_state_checks(joints, task, results, checks),
         origins=robot.origins,
         provenance=provenance([*robot.files, *task.files]),
     )
@@ -277,27 +277,3 @@ def _limiting(joints: tuple[JointLife, ...]) -> JointLife | None:
     if not known:
         return None
     return min(known, key=lambda joint: (joint.life, -joint.governing_utilisation))
-
-
-def _steady_state_checks(
-    joints: tuple[JointLife, ...],
-    task: Task,
-    results: list[OperationResult],
-    checks: list[FloatArray],
-) -> tuple[SteadyStateCheck, ...]:
-    """Peaks and lives over the whole task, whatever the method."""
-    rivets = [operation.rivets for operation in task.operations]
-    found = []
-    for j, joint in enumerate(joints):
-        spent = sum(c[:, j].sum(axis=0) * r for c, r in zip(checks, rivets, strict=True))
-        paper, counted = np.asarray(spent) / task.rivets_per_pass
-        found.append(
-            SteadyStateCheck(
-                joint.name,
-                float(max(r.steady_peak_deflection[:, j].max() for r in results)),
-                float(max(r.rest_peak_deflection[:, j].max() for r in results)),
-                life(float(paper)) if np.isfinite(paper) else math.nan,
-                life(float(counted)) if np.isfinite(counted) else math.nan,
-            )
-        )
-    return tuple(found)

@@ -1,18 +1,20 @@
-"""What an assessment warns of: parts that cannot be, or that no life holds for."""
+"""What an assessment checks: parts that cannot be, lives that do not hold, the steady state."""
 
 from __future__ import annotations
 
+import math
 import warnings
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, PicchioWarning
-from picchio.fatigue import SNCurve, check_shaft
+from picchio.fatigue import SNCurve, check_shaft, life
 from picchio.fatigue.reducer import Reducer, ReducerCheck
 from picchio.fatigue.reducer_library import load_reducer
 from picchio.robot import FlexibleRobot, Joint
-from picchio.studies.assessment import JointLife
+from picchio.studies.assessment import JointLife, OperationResult, SteadyStateCheck
+from picchio.studies.task import Task
 
 # A shaft that disagrees with its joint's stiffness by more than this is worth a warning.
 _SHAFT_TOLERANCE = 0.05
@@ -98,3 +100,27 @@ def warn_about_yield(joints: tuple[JointLife, ...], curves: tuple[SNCurve | None
                 PicchioWarning,
                 stacklevel=3,
             )
+
+
+def steady_state_checks(
+    joints: tuple[JointLife, ...],
+    task: Task,
+    results: list[OperationResult],
+    checks: list[FloatArray],
+) -> tuple[SteadyStateCheck, ...]:
+    """Peaks and lives over the whole task, whatever the method."""
+    rivets = [operation.rivets for operation in task.operations]
+    found = []
+    for j, joint in enumerate(joints):
+        spent = sum(c[:, j].sum(axis=0) * r for c, r in zip(checks, rivets, strict=True))
+        paper, counted = np.asarray(spent) / task.rivets_per_pass
+        found.append(
+            SteadyStateCheck(
+                joint.name,
+                float(max(r.steady_peak_deflection[:, j].max() for r in results)),
+                float(max(r.rest_peak_deflection[:, j].max() for r in results)),
+                life(float(paper)) if np.isfinite(paper) else math.nan,
+                life(float(counted)) if np.isfinite(counted) else math.nan,
+            )
+        )
+    return tuple(found)

@@ -23,6 +23,12 @@ def sensor_group(problem: Problem, kind: str) -> str:
     return kind if kind == "deflection" else f"{kind}.{problem.robot.tool_frame}"
 
 
+def when(days: float) -> str:
+    """A time after the campaign's first record, in words."""
+    late = f"{days:.3g} days" if days >= 2.0 else f"{24.0 * days:.3g} hours"
+    return f"{late} after the first record"
+
+
 def asked_plan(
     problem: Problem, ask: Mapping[str, Any], setup: PercussionSetup, like: str
 ) -> str | None:

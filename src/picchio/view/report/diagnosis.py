@@ -7,24 +7,21 @@ from dataclasses import dataclass
 from typing import Any
 
 from picchio.core.provenance import provenance
+from picchio.diagnosis.percussion.asked_plan import when
 from picchio.diagnosis.percussion.diagnose import PercussionDiagnosis
 from picchio.diagnosis.percussion.unknowns import NUISANCE_KEYS
 from picchio.diagnosis.result import Cause, Diagnosis
 from picchio.model.effects import catalogue
-from picchio.studies.verdict import format_count
 from picchio.view.plots.diagnosis_place import place_in_words
 from picchio.view.plots.style import direction_label
 from picchio.view.report.diagnosis_figures import DiagnosisFigures
+from picchio.view.report.diagnosis_life import (
+    life_by_joint,
+    life_by_set,
+    life_rows,
+    set_words,
+)
 from picchio.view.report.page import number, percent, render, spread, words
-
-_LIFE = {
-    "rivets_to_failure": "rivets to failure",
-    "utilisation": "utilisation, %",
-    "damage_per_rivet": "damage a rivet",
-    "limiting_joint": "joint that governs",
-    "rivets_interval": "rivets to failure, interval",
-    "utilisation_interval": "utilisation, %, interval",
-}
 
 
 def diagnosis_report(
@@ -71,13 +68,13 @@ def diagnosis_report(
         claimed=bool(diagnosis.causes),
         nuisances=_nuisances(found),
         poses=_poses(found),
-        life=_life(life if life is not None else diagnosis.life),
-        life_joints=_life_joints(life if life is not None else diagnosis.life),
-        life_others=_life_others(life if life is not None else diagnosis.life, diagnosis),
+        life=life_rows(life if life is not None else diagnosis.life),
+        life_joints=life_by_joint(life if life is not None else diagnosis.life),
+        life_others=life_by_set(life if life is not None else diagnosis.life, diagnosis),
         interval_level=((life if life is not None else diagnosis.life) or {}).get("interval_level"),
         ask=_ask(diagnosis),
         plan=(diagnosis.next_measurement or {}).get("plan"),
-        sets=[_set(each) for each in diagnosis.alternatives],
+        sets=[set_words(each) for each in diagnosis.alternatives],
         leads=[f"{words(effect)}, {target}" for effect, target in diagnosis.leads],
         warnings=list(dict.fromkeys(warnings)),
         model_toml=model_toml,
@@ -209,92 +206,6 @@ def _poses(found: PercussionDiagnosis) -> list[tuple[str, str, str, str]]:
     return rows
 
 
-def _life(life: Mapping[str, Any] | None) -> list[tuple[str, str, str]]:
-    """Quantity, before, after."""
-    if not life:
-        return []
-    before, after = life.get("baseline") or {}, life.get("extended") or {}
-    rows = []
-    for key in dict.fromkeys([*before, *after]):
-        if isinstance(before.get(key, after.get(key)), Mapping):
-            continue
-        if key == "rivets_interval" and not _open(before, key) and not _open(after, key):
-            continue
-        was, now = (_life_cell(key, side.get(key), key in side) for side in (before, after))
-        rows.append((_LIFE.get(key, words(str(key))), was, now))
-    return rows
-
-
-def _open(side: Mapping[str, Any], key: str) -> bool:
-    """Whether an interval says more than the value."""
-    low, high = side.get(key) or (0.0, 0.0)
-    return bool(low != high)
-
-
-def _life_others(
-    life: Mapping[str, Any] | None, diagnosis: Diagnosis
-) -> list[tuple[str, str, str, str]]:
-    """Every set of causes that the data cannot tell apart: causes, rivets, utilisation, joint."""
-    others = (life or {}).get("alternatives") or ()
-    if not life or not others:
-        return []
-    claimed = tuple((cause.effect, cause.target) for cause in diagnosis.causes)
-    sets = [
-        (claimed, life.get("extended") or {}),
-        *zip(diagnosis.alternatives, others, strict=False),
-    ]
-    return [
-        (
-            _set(pairs),
-            _life_cell("rivets_to_failure", side.get("why", side.get("rivets_to_failure")), True),
-            _life_cell("utilisation", side.get("utilisation"), "why" not in side),
-            str(side.get("limiting_joint") or "\N{EN DASH}"),
-        )
-        for pairs, side in sets
-    ]
-
-
-def _life_joints(life: Mapping[str, Any] | None) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Joint; peak deflection, utilisation, rivets, each before and after, with its interval."""
-    if not life:
-        return []
-    before, after = (
-        (life.get(side) or {}).get("joints") or {} for side in ("baseline", "extended")
-    )
-    rows = []
-    for joint in before:
-        cells: list[tuple[str, str]] = []
-        for key in ("peak_deflection", "utilisation", "rivets_to_failure"):
-            for side in (before[joint], after.get(joint, {})):
-                value = side.get(key)
-                if key == "peak_deflection":
-                    cells.append((number(None if value is None else 1e3 * value), ""))
-                    continue
-                span = "rivets_interval" if "rivets" in key else f"{key}_interval"
-                told = _life_cell(span, side[span], True) if _open(side, span) else ""
-                cells.append((_life_cell(key, value, key in side), told))
-        rows.append((joint, cells))
-    return rows
-
-
-def _life_cell(key: str, value: Any, given: bool) -> str:
-    if not given:
-        return "\N{EN DASH}"
-    if value is None:
-        return "no end" if "rivets" in key else "\N{EN DASH}"
-    if isinstance(value, (list, tuple)):
-        return " to ".join(_life_cell(key, part, True) for part in value)
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return str(value)
-    if "rivets" in key:
-        return format_count(float(value))
-    return percent(value) if key.startswith("utilisation") else number(float(value))
-
-
-def _set(pairs: Sequence[tuple[str, str]]) -> str:
-    return " and ".join(f"{words(effect)}, {target}" for effect, target in pairs)
-
-
 def _ask(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     """The next measurement, a line each."""
     ask = diagnosis.next_measurement
@@ -311,13 +222,9 @@ def _ask(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     if ask.get("temperature") is not None:
         rows.append(("temperature", f"{number(float(ask['temperature']))} deg C"))
     if ask.get("days") is not None:
-        days = float(ask["days"])
-        late = f"{number(days)} days" if days >= 2.0 else f"{number(24.0 * days)} hours"
-        rows.append(("when", f"{late} after the first record"))
-    if ask.get("sensor"):
-        rows.append(("sensors", str(ask["sensor"])))
+        rows.append(("when", when(float(ask["days"]))))
     for rival in ask.get("rivals", ()):
         pairs = [(str(effect), str(target)) for effect, target in rival["causes"]]
         fall = f"chi-square {float(rival['chi_square']):.3g}"
-        rows.append(("tells it from", f"{_set(pairs)} ({fall})"))
+        rows.append(("tells it from", f"{set_words(pairs)} ({fall})"))
     return rows
