@@ -71,8 +71,11 @@ class PiecewiseForce:
         """The force (N) of piece `index` at `u` seconds after that piece's start."""
         i = np.asarray(index)
         u = np.asarray(u, dtype=float)
+        line = self.constant[i] + self.slope[i] * u
+        if not self.amplitude.any():
+            return np.asarray(line)
         wave = self.amplitude[i] * np.exp(1j * self.angular_frequency[i] * u)
-        return self.constant[i] + self.slope[i] * u + wave.real
+        return np.asarray(line + wave.real)
 
     def convolve(self, pole: ComplexArray, index: IndexArray, u: FloatArray) -> ComplexArray:
         """The integral of exp(pole (u - v)) F(v) dv over v from 0 to u, within a piece.

@@ -103,9 +103,11 @@ class Blows:
         since = middle[:, None] - start
         on = (since >= 0.0) & (since < self.width)
         omega = np.pi / self.width
-        phase = np.exp(1j * omega * (edges[:, None] - start))
         constant = (1.0 - self.blend) * (on * height).sum(axis=1)
-        amplitude = self.blend * (on * height * -1j * phase).sum(axis=1)
+        amplitude = np.zeros(edges.size, dtype=np.complex128)
+        if self.blend != 0.0:
+            phase = np.exp(1j * omega * (edges[:, None] - start))
+            amplitude = self.blend * (on * height * -1j * phase).sum(axis=1)
         return PiecewiseForce(
             edges,
             end,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,9 +12,13 @@ from picchio.core.arrays import FloatArray
 from picchio.robot import FlexibleRobot
 from picchio.robot.expansion import Inertia, Motion, WideChain
 
+if TYPE_CHECKING:
+    from picchio.model.plant import Plant
+
 Mass = tuple[float, str, tuple[float, ...] | None]
 # How many sums of inertias are kept: those of a robot with a few payloads tried in turn.
 _KEPT_TOTALS = 32
+_KEPT_PLANTS = 4
 
 
 class Geometry:
@@ -29,6 +35,7 @@ class Geometry:
         self._inertias: dict[object, Inertia] = {}
         self._motions: dict[object, Motion] = {}
         self._totals: dict[object, Inertia] = {}
+        self._plants: dict[object, Plant] = {}
         state = chain.robot.state(pose)
         self.stiffness = state.stiffness
         self.gravity_torque = state.gravity_torque
@@ -75,6 +82,16 @@ class Geometry:
             if len(self._totals) >= _KEPT_TOTALS:
                 self._totals = {}
             self._totals[key] = found
+        return found
+
+    def plant(self, key: object, make: Callable[[], Plant]) -> Plant:
+        """The plant of a key, made where it is not known: records of one pose share theirs."""
+        found = self._plants.get(key)
+        if found is None:
+            found = make()
+            while len(self._plants) >= _KEPT_PLANTS:
+                self._plants.pop(next(iter(self._plants)))
+            self._plants[key] = found
         return found
 
     def motion(self, frame: str, taken: tuple[int, ...] | None = None) -> Motion:

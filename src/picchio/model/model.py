@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect
+from picchio.model.effects.effect import Effect, Where
 from picchio.model.effects.registry import from_dict
 from picchio.model.linear_system import LinearSystem, modal_damping_matrix
 
@@ -72,7 +73,11 @@ class Model:
             np.zeros_like(state.gravity_torque) if self.gravity_balanced else state.gravity_torque
         )
 
-    @property
+    def key(self, *where: Where) -> tuple[object, ...]:
+        """What the effects of some kinds are: models with the same key do the same there."""
+        return tuple(e.key for e in self.effects if e.where in where)
+
+    @cached_property
     def ordered(self) -> list[Effect]:
         """The effects in the order in which they are applied."""
         return sorted(self.effects, key=lambda effect: _ORDER.index(effect.where))

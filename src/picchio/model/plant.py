@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from picchio.model.elements import Element
 from picchio.model.geometry import Geometry
 from picchio.model.linear_system import undamped_modes
 from picchio.model.system import VibratingSystem
+from picchio.robot.expansion import Motion
 
 Row = dict[str, float]
 
@@ -139,7 +141,7 @@ class Plant:
     # What comes of it ------------------------------------------------------------------------
 
     def build(self, direction: FloatArray) -> VibratingSystem:
-        """The equations of motion.
+        """The equations of motion; what effects do to the plant after the first call is not seen.
 
         Args:
             direction: (3,) unit vector of the force, world.
@@ -147,24 +149,52 @@ class Plant:
         Raises:
             InputError: a mass matrix that is not positive definite, an unknown link.
         """
+        unloaded, point = self._unloaded
+        force = unloaded.force_jacobian.T @ direction
+        gradient = np.zeros_like(unloaded.mass)
+        change = (direction @ point.gradient[:, :3]).T
+        gradient[np.ix_(unloaded.wide, unloaded.wide)] = change
+        elements = (*unloaded.elements, *self._contacts)
+        rows = [*unloaded.rows, *[force for _ in self._contacts]]
+        return replace(
+            unloaded,
+            force=force,
+            force_gradient=gradient,
+            elements=elements,
+            rows=np.array(rows).reshape(len(elements), force.size),
+        )
+
+    @cached_property
+    def _unloaded(self) -> tuple[VibratingSystem, Motion]:
+        """All that does not depend on the force's direction, and how the force's point moves."""
         geometry, names = self.geometry, self.coordinates
         size = len(names)
         wide = [i for i, name in enumerate(names) if name in geometry.chain.coordinates]
         taken = [geometry.chain.index(names[i]) for i in wide]
-        at = np.ix_(wide, wide)
-        at3 = np.ix_(wide, wide, wide)
-        mass, gradient = np.zeros((size, size)), np.zeros((size, size, size))
-        gravity, curvature = np.zeros((size, size)), np.zeros((size, size, size))
+
+        def among_all(values: FloatArray) -> FloatArray:
+            """Of the chain's coordinates, as rows and columns of all: nothing on the others."""
+            if len(wide) == size:
+                return values
+            out = np.zeros((size,) * values.ndim)
+            out[np.ix_(*[wide] * values.ndim)] = values
+            return out
+
         inertia = geometry.total(tuple(self._masses), tuple(taken))
-        mass[at], gradient[at3] = inertia.mass, inertia.mass_gradient
+        mass, gradient = among_all(inertia.mass), among_all(inertia.mass_gradient)
+        gravity, curvature = np.zeros((size, size)), np.zeros((size, size, size))
         if self.gravity_stiffness:
-            gravity[at], curvature[at3] = inertia.gravity_gradient, inertia.gravity_curvature
+            gravity = among_all(inertia.gravity_gradient)
+            curvature = among_all(inertia.gravity_curvature)
         for row, value in self._added_inertia:
             vector = self._vector(row)
-            mass += value * np.outer(vector, vector)
+            mass = mass + value * np.outer(vector, vector)
 
-        deflections = np.array([self._vector(self.deflection(j)) for j in self.springs])
         joints = np.array(list(self.springs.values()))
+        deflections = np.eye(len(joints), size)  # the joints' coordinates are the first
+        for row_of, joint in zip(deflections, self.springs, strict=True):
+            if joint in self._motors:
+                row_of[:] = self._vector(self.deflection(joint))
         springs = deflections.T @ (joints[:, None] * deflections)
         stiffness = springs.copy()
         dampers = np.zeros((size, size))
@@ -182,19 +212,14 @@ class Plant:
 
         robot = geometry.robot
         # The force acts at the tool point; an offset is given in the tool frame.
-        motion = geometry.motion(robot.tool_point)
+        motion = geometry.motion(robot.tool_point, tuple(taken))
         if self.force_offset.any():
             turn = motion.rotation.T @ geometry.motion(robot.tool_frame).rotation
             motion = motion.at(turn @ self.force_offset)
-        force_gradient = np.zeros((size, size))
         jacobian = np.zeros((3, size))
-        jacobian[:, wide] = motion.jacobian[:3, taken]
-        force = jacobian.T @ direction
-        force_gradient[at] = (direction @ motion.gradient[:, :3]).T[np.ix_(taken, taken)]
-
-        elements = [(e, self._vector(self.deflection(joint))) for e, joint in self._elements]
-        elements += [(e, force) for e in self._contacts]
-        return VibratingSystem(
+        jacobian[:, wide] = motion.jacobian[:3]
+        rows = [self._vector(self.deflection(joint)) for _, joint in self._elements]
+        system = VibratingSystem(
             coordinates=tuple(names),
             mass=mass,
             mass_gradient=gradient,
@@ -202,15 +227,16 @@ class Plant:
             stiffness=stiffness + 0.5 * (gravity + gravity.T),
             gravity_curvature=curvature,
             force_jacobian=jacobian,
-            force=force,
-            force_gradient=force_gradient,
+            force=np.zeros(size),
+            force_gradient=np.zeros((size, size)),
             deflections=deflections,
             wide=tuple(wide),
             taken=tuple(taken),
-            elements=tuple(element for element, _ in elements),
-            rows=np.array([row for _, row in elements]).reshape(len(elements), size),
+            elements=tuple(element for element, _ in self._elements),
+            rows=np.array(rows).reshape(len(rows), size),
             geometry=geometry,
         )
+        return system, motion
 
     def _vector(self, row: Row) -> FloatArray:
         vector = np.zeros(len(self.coordinates))

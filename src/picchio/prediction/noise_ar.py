@@ -66,7 +66,7 @@ class AutoRegression:
         if not self.variance > 0.0:
             raise InputError("noise without variance cannot whiten")
         out = np.empty_like(x)
-        table, deviation = self._table
+        table, deviation = self.filters
         for row, clean in zip(
             x.reshape(-1, x.shape[-1]), out.reshape(-1, x.shape[-1]), strict=True
         ):
@@ -74,7 +74,7 @@ class AutoRegression:
         return out
 
     @cached_property
-    def _table(self) -> tuple[FloatArray, FloatArray]:
+    def filters(self) -> tuple[FloatArray, FloatArray]:
         """(p + 1, p) predictors, a row for each number of samples known; (p + 1,) their errors."""
         table = np.zeros((self.order + 1, self.order))
         for row, predictor in zip(table, self.predictors, strict=True):

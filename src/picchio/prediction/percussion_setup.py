@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,14 @@ class PercussionSetup:
     @property
     def groups(self) -> tuple[str, ...]:
         """Its channel groups."""
-        return tuple(dict.fromkeys(channel.group for channel in self.channels))
+        return tuple(self._members)
+
+    @cached_property
+    def _members(self) -> dict[str, list[Channel]]:
+        found: dict[str, list[Channel]] = {}
+        for channel in self.channels:
+            found.setdefault(channel.group, []).append(channel)
+        return found
 
     def cut(self, end: float) -> PercussionSetup:
         """The same record up to a time, s."""
@@ -91,10 +99,8 @@ class PercussionSetup:
         """
         sensors = model.sensors(self.conditions)
         out: dict[str, FloatArray] = {}
-        for group in self.groups:
-            chain = sensors.get(group)
-            members = [channel for channel in self.channels if channel.group == group]
-            out |= self._group(model, chain, members)
+        for group, members in self._members.items():
+            out |= self._group(model, sensors.get(group), members)
         if self.steady:
             out = {name: values - values.mean() for name, values in out.items()}
         return out
@@ -121,7 +127,8 @@ class PercussionSetup:
             system, motion = self._motion(model, samples, at_jumps)
             values = reading(kind, members[0].subject, system, motion)
         if chain.filters:
-            values = apply_filters(chain, values, samples.step)[:, factor * lead :: factor]
+            filtered = apply_filters(chain, values, samples.step)
+            values = np.ascontiguousarray(filtered[:, factor * lead :: factor])
         axes = "xyz"
         if len(values) == 3 and members[0].axis is not None:
             values = chain.gain * (chain.turn @ values)
@@ -132,7 +139,8 @@ class PercussionSetup:
             rows = {c.name: values[names.index(c.subject or "")] for c in members}
         else:
             rows = {c.name: chain.gain * values[0] for c in members}
-        rows = {name: np.clip(row, -chain.limit, chain.limit) for name, row in rows.items()}
+        if np.isfinite(chain.limit):
+            rows = {name: np.clip(row, -chain.limit, chain.limit) for name, row in rows.items()}
         for frequency, cosine, sine in chain.hum:
             phase = 2.0 * np.pi * frequency * self.samples.times
             line = cosine * np.cos(phase) + sine * np.sin(phase)
@@ -141,7 +149,7 @@ class PercussionSetup:
 
     def struck(self, model: Model) -> tuple[Blows, PiecewiseForce]:
         """The blows with the model's effects in them, and the force they make."""
-        key = _blow_key(model)
+        key = model.key("blows")
         if key not in self._forces:
             blows = model.blows(self.blows, self.conditions)
             _forget(self._forces)
@@ -149,12 +157,16 @@ class PercussionSetup:
         return self._forces[key]
 
     def _system(self, model: Model, blows: Blows) -> VibratingSystem:
-        inside = ("structure", "over-time", "nonlinear")
-        moving = tuple(e.key for e in model.effects if e.where in inside)
+        moving = model.key("structure", "over-time", "nonlinear")
         key = (moving, model.gravity_stiffness, blows.direction.tobytes())
         if key not in self._systems:
             _forget(self._systems)
-            plant = model.plant(self.geometry, self.conditions)
+            # Only what drifts asks for more than the pose.
+            when = self.conditions if model.key("over-time") else None
+            plant = self.geometry.plant(
+                (moving, model.gravity_stiffness, when),
+                lambda: model.plant(self.geometry, self.conditions),
+            )
             self._systems[key] = plant.build(blows.direction)
         return self._systems[key]
 
@@ -170,7 +182,7 @@ class PercussionSetup:
     def _motion(
         self, model: Model, samples: Samples, at_jumps: AtJumps = "after"
     ) -> tuple[VibratingSystem, CoordinateMotion]:
-        moving = tuple(e.key for e in model.effects if e.where not in ("sensor", "motion"))
+        moving = model.key("structure", "over-time", "nonlinear", "blows")
         key = (moving, model.gravity_stiffness, samples, at_jumps)
         blows, force = self.struck(model)
         if key not in self._motions:
@@ -191,16 +203,11 @@ class PercussionSetup:
     ) -> Plan:
         """The steps, which most effects leave as they are."""
         step = default_step(system)
-        key = (_blow_key(model), samples, step, at_jumps)
+        key = (model.key("blows"), samples, step, at_jumps)
         if key not in self._plans:
             _forget(self._plans)
             self._plans[key] = make_plan(force, samples, step, at_jumps=at_jumps)
         return self._plans[key]
-
-
-def _blow_key(model: Model) -> object:
-    """What the force depends on."""
-    return tuple(e.key for e in model.effects if e.where == "blows")
 
 
 def _history(force: PiecewiseForce, times: FloatArray) -> FloatArray:

@@ -126,6 +126,8 @@ def make_plan(
     at_jumps: AtJumps = "after",
 ) -> Plan:
     """Steps from t = 0 to the last sample (or `until`), split at the force's edges."""
+    from picchio.vibration._plan_kernel import force_beside, force_lines, merged, sample_numbers
+
     times = samples.times
     first = int(np.searchsorted(times, -_EDGE))
     times = times[first:]
@@ -135,24 +137,21 @@ def make_plan(
     back = int(np.floor((times[0] if times.size else 0.0) / fine + 1e-9))
     start = (times[0] if times.size else 0.0) - back * fine
     count = int(np.floor((end - start) / fine + 1e-6)) + 1
-    grid = start + fine * np.arange(max(count, 0))
     edges = _edges(force, end)
-    points = np.concatenate([[0.0, end], grid, edges])
-    points = np.sort(points[(points >= -_EDGE) & (points <= end + _EDGE)])
-    keep = np.concatenate([[True], np.diff(points) > _EDGE])
-    points = points[keep]
-    points[0] = 0.0
+    extra = np.sort(np.concatenate([[0.0, end], edges]))
+    pieces = (force.start, force.end, force.constant, force.slope, force.amplitude,
+              force.angular_frequency)  # fmt: skip
+    points = merged(start, fine, max(count, 0), extra, end, _EDGE)
     lengths = np.diff(points)
-    a = _at(force, points[:-1] + _GAUSS * lengths)
-    b = _at(force, points[1:] - _GAUSS * lengths)
-    mean, slope = 0.5 * (a + b), (b - a) / (1.0 - 2.0 * _GAUSS)
-    sample = np.full(points.size, -1)
-    index = np.searchsorted(points, times - 2 * _EDGE)
-    inside = index < points.size
-    sample[index[inside]] = first + np.flatnonzero(inside)
-    after = _at(force, points + 2 * _EDGE)
+    force0, force1 = np.empty(lengths.size), np.empty(lengths.size)
+    force_lines(points, _GAUSS, *pieces, force0, force1)
+    sample = np.empty(points.size, dtype=np.int64)
+    sample_numbers(points, times, 2 * _EDGE, first, sample)
+    after = np.empty(points.size)
+    force_beside(points, 2 * _EDGE, *pieces, after)
     if at_jumps != "after":
-        before = _at(force, points - 2 * _EDGE)
+        before = np.empty(points.size)
+        force_beside(points, -2 * _EDGE, *pieces, before)
         after = 0.5 * (before + after)
     if at_jumps == "moments":
         jumps = _at(force, edges + 2 * _EDGE) - _at(force, edges - 2 * _EDGE)
@@ -166,8 +165,8 @@ def make_plan(
         lengths=lengths,
         regular=regular,
         same=same,
-        force0=mean - 0.5 * slope,
-        force1=mean + 0.5 * slope,
+        force0=force0,
+        force1=force1,
         sample=sample,
         force_after=after,
         first=first,
@@ -188,27 +187,34 @@ def _at(force: PiecewiseForce, times: FloatArray) -> FloatArray:
 def _run(
     system: VibratingSystem, plan: Plan, count: int, start: FloatArray
 ) -> tuple[CoordinateMotion, FloatArray]:
-    from picchio.vibration._integrate_kernel import integrate as kernel
-
     n = len(system.coordinates)
-    kinds = np.array([int(e.kind) for e in system.elements], dtype=np.int64)
-    parameters = np.zeros((kinds.size, 6))
-    for row, element in zip(parameters, system.elements, strict=True):
-        row[: len(element.parameters)] = element.parameters
     x, v, a = (np.zeros((count, n)) for _ in range(3))
-    end = np.empty(2 * n + kinds.size)
+    end = np.empty(2 * n + len(system.elements))
     if plan.sample[0] >= 0:
         k = plan.sample[0]
         x[k], v[k] = start[:n], start[n : 2 * n]
         held = system.damping @ v[k] + system.stiffness @ x[k]
         a[k] = np.linalg.solve(system.mass, system.force * plan.force_after[0] - held)
-    kernel(
+    equations = (
         start[: 2 * n], system.mass, system.mass_gradient, system.gravity_curvature,
         system.damping, system.stiffness, system.force, system.force_gradient,
-        kinds, parameters, system.rows, start[2 * n :],
-        plan.step, plan.lengths, plan.regular, plan.same, plan.force0, plan.force1,
-        plan.sample[1:], plan.force_after[1:], x, v, a, end,
     )  # fmt: skip
+    steps = (
+        plan.step, plan.lengths, plan.regular, plan.same, plan.force0, plan.force1,
+        plan.sample[1:], plan.force_after[1:],
+    )  # fmt: skip
+    if not system.elements:
+        from picchio.vibration._smooth_kernel import integrate as smooth
+
+        smooth(*equations, *steps, x, v, a, end)
+        return CoordinateMotion(x, v, a), end
+    from picchio.vibration._integrate_kernel import integrate as kernel
+
+    kinds = np.array([int(e.kind) for e in system.elements], dtype=np.int64)
+    parameters = np.zeros((kinds.size, 6))
+    for row, element in zip(parameters, system.elements, strict=True):
+        row[: len(element.parameters)] = element.parameters
+    kernel(*equations, kinds, parameters, system.rows, start[2 * n :], *steps, x, v, a, end)
     return CoordinateMotion(x, v, a), end
 
 

@@ -14,6 +14,9 @@ from picchio.diagnosis.percussion.trials import Trial, score, try_candidates
 from picchio.model import Effect
 from picchio.model.effects import Scales
 
+# Label of a cause -> the fit it was replaced in, and the trials.
+Tried = dict[str, tuple[Fit, list[Trial]]]
+
 
 def prune(
     problem: Problem,
@@ -86,6 +89,36 @@ def exchange(
     return best
 
 
+def rivals_of(
+    label: str,
+    problem: Problem,
+    best: Fit,
+    candidates: Sequence[tuple[type[Effect], str]],
+    scales: Scales,
+    records: Sequence[MeasuredRecord],
+    tried: Tried,
+) -> list[Trial]:
+    """The best fit with one cause replaced by each of its rivals, the best first.
+
+    Args:
+        label: of the cause.
+        problem: data and noise.
+        best: the fit.
+        candidates: effects and targets.
+        scales: sizes that matter.
+        records: that are fitted.
+        tried: what was tried before; what is found is added.
+    """
+    known = tried.get(label)
+    if known is None or known[0] is not best:
+        others = best.hypothesis.minus(label)
+        trials = try_candidates(
+            problem, others, candidates, scales, records, cause=label, best=best
+        )
+        known = tried[label] = (best, trials)
+    return known[1]
+
+
 def replaced(
     problem: Problem,
     best: Fit,
@@ -93,18 +126,17 @@ def replaced(
     scales: Scales,
     records: Sequence[MeasuredRecord],
     least: float,
+    tried: Tried,
 ) -> Fit:
     """The best fit with every cause in turn replaced by whichever does better, until noise is left.
 
     What was added one by one need not be the best set: the first stands for several at once.
+    What is tried is kept in `tried`.
     """
     for cause in best.hypothesis.causes:
         if cause.label not in best.hypothesis.labels:  # taken out since
             continue
-        trials = try_candidates(
-            problem, best.hypothesis.minus(cause.label), candidates, scales, records,
-            cause=cause.label, best=best,
-        )  # fmt: skip
+        trials = rivals_of(cause.label, problem, best, candidates, scales, records, tried)
         if trials and trials[0].score < score(best) - least:
             newest = trials[0].label
             best = prune(problem, trials[0].fit, records, least, newest)

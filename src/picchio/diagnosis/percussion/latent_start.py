@@ -11,15 +11,16 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from picchio.core.arrays import FloatArray
+from picchio.core.arrays import BoolArray, FloatArray
 from picchio.diagnosis.percussion.fit import Fit, fit
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 
-# How far a blow is looked for, and how finely at first, in intervals of the blows.
+# How far a blow is looked for, in intervals of the blows; how finely at first, parts of a sample;
+# and how often the model is asked on either side of where that leads.
 _SPAN = 0.2
-_SPACING = 1.0 / 32.0
-_HALVINGS = 4
+_FINER = 4
+_MOVES = 3
 # After so many blows the rest is fitted again.
 _REFIT = (1, 2, 4, 8)
 
@@ -63,44 +64,94 @@ def _best_times(
     late: Mapping[str, FloatArray],
     hit: int,
 ) -> FloatArray:
-    """(records,) s: when this blow came, by a grid that is halved about its best point."""
+    """(records,) s: when this blow came.
+
+    A blow's response is nearly its own, whatever moves already: so it is found once, and moved
+    about to see where it fits best. Then the model has the word, at a few times about that one.
+    """
     interval = np.array([r.setup.blows.interval for r in struck])
     end = float(((hit + 1 - _SPAN) * interval).max())
 
-    def cost(times: FloatArray) -> FloatArray:
+    def at(times: FloatArray) -> Hypothesis:
         trial = dict(late)
         for record, time in zip(struck, times, strict=True):
             trial[record.name] = late[record.name].copy()
             trial[record.name][hit] = time
-        there = problem.residuals(hypothesis_with(here, _frozen(trial)).effects, struck, end)
+        return hypothesis_with(here, _frozen(trial))
+
+    def cost(times: FloatArray) -> FloatArray:
+        there = problem.residuals(at(times).effects, struck, end)
         out = np.empty(len(struck))
         for i, (record, residual) in enumerate(zip(struck, there, strict=True)):
-            clock = record.until(end).samples.times
-            own = (clock >= (hit - _SPAN) * interval[i]) & (clock < (hit + 1 - _SPAN) * interval[i])
+            own = _window(record.until(end).samples.times, hit, interval[i])
             out[i] = float((residual[:, own] ** 2).sum())
         return np.where(np.isfinite(out), out, np.inf)
 
-    best, lowest = np.zeros(len(struck)), np.full(len(struck), np.inf)
-    steps = round(_SPAN / _SPACING)
-    for place in range(-steps, steps + 1):
-        best, lowest = _better(best, lowest, place * _SPACING * interval, cost)
-    for halving in range(1, _HALVINGS + 1):
-        middle = best.copy()
-        for side in (-1.0, 1.0):
-            step = side * _SPACING * interval / 2.0**halving
-            best, lowest = _better(best, lowest, middle + step, cost)
+    # Without it: so late that nothing of it is seen. A sample is known or not in both alike.
+    never = at(np.full(len(struck), 2.0 * end))
+    longer = end + _SPAN * float(interval.max())
+    with problem.pinned(never.effects):
+        gone = problem.residuals(never.effects, struck, longer)
+        there = problem.residuals(at(np.zeros(len(struck))).effects, struck, longer)
+    middle, spacing = np.empty(len(struck)), np.empty(len(struck))
+    for i, (record, without, with_it) in enumerate(zip(struck, gone, there, strict=True)):
+        samples = record.setup.samples
+        own = _window(record.until(longer).samples.times, hit, interval[i])
+        most = int(np.ceil(_SPAN * interval[i] / samples.step))
+        place = _place(without, without - with_it, own, most)
+        middle[i], spacing[i] = place * samples.step, samples.step / _FINER
+    return _refined(cost, middle, spacing)
+
+
+def _window(times: FloatArray, hit: int, interval: float) -> BoolArray:
+    """Which samples tell when a blow came: from when it may have to when the next may."""
+    first, last = (hit - _SPAN) * interval, (hit + 1 - _SPAN) * interval
+    return np.asarray((times >= first) & (times < last))
+
+
+def _place(without: FloatArray, response: FloatArray, own: BoolArray, most: int) -> float:
+    """By how many samples a response is to be moved to explain most of what is seen without it.
+
+    Args:
+        without: (channels, m) residual without the blow.
+        response: (channels, m) what the blow adds to the prediction, in the same units.
+        own: (m,) where it is looked for.
+        most: samples, to either side.
+    """
+    index = np.flatnonzero(own)
+    if not index.size or not (np.isfinite(without).all() and np.isfinite(response).all()):
+        return 0.0
+    room = most + 1
+    padded = np.pad(response, ((0, 0), (room, room)))
+    seen = without[:, index]
+    best, lowest = 0.0, np.inf
+    for step in range(-most * _FINER, most * _FINER + 1):
+        whole = step // _FINER
+        part = step / _FINER - whole
+        here = index + room - whole
+        moved = (1.0 - part) * padded[:, here] + part * padded[:, here - 1]
+        value = float(((seen - moved) ** 2).sum())
+        if value < lowest:
+            best, lowest = step / _FINER, value
     return best
 
 
-def _better(
-    best: FloatArray,
-    lowest: FloatArray,
-    times: FloatArray,
-    cost: Callable[[FloatArray], FloatArray],
-) -> tuple[FloatArray, FloatArray]:
-    value = cost(times)
-    lower = value < lowest
-    return np.where(lower, times, best), np.where(lower, value, lowest)
+def _refined(
+    cost: Callable[[FloatArray], FloatArray], middle: FloatArray, spacing: FloatArray
+) -> FloatArray:
+    """The lowest point of a parabola about the best of three times, (records,) s."""
+    for _ in range(_MOVES):
+        before, here, after = cost(middle - spacing), cost(middle), cost(middle + spacing)
+        with np.errstate(all="ignore"):
+            bend = before - 2.0 * here + after
+            vertex = np.where(bend > 0.0, 0.5 * (before - after) / bend, 0.0)
+        lowest = np.minimum(np.minimum(before, here), after)
+        side = np.where(lowest == here, 0.0, np.where(lowest == before, -1.0, 1.0))
+        inside = (side == 0.0) & np.isfinite(vertex)
+        middle = middle + spacing * np.where(inside, vertex, side)
+        if inside.all():
+            break
+    return middle
 
 
 def _frozen(late: Mapping[str, FloatArray]) -> dict[str, tuple[float, ...]]:

@@ -6,10 +6,11 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from picchio.campaign import Campaign
+from picchio.campaign import Campaign, Channel
 from picchio.core.arrays import BoolArray, FloatArray
 from picchio.core.errors import InputError
 from picchio.model import Effect, Model
@@ -54,6 +55,12 @@ class MeasuredRecord:
     def name(self) -> str:
         """Its file."""
         return self.setup.name
+
+    @cached_property
+    def channels(self) -> list[Channel]:
+        """The channels of `values`, in their order."""
+        known = {channel.name: channel for channel in self.setup.channels}
+        return [known[name] for name in self.values]
 
     def filler(self, channel: str) -> FloatArray:
         """(m,) of +-1 without a pattern, always the same: in place of what is not known."""
@@ -198,29 +205,34 @@ def _noise(
 
 def residual(record: MeasuredRecord, model: Model, end: float | None = None) -> FloatArray:
     """One record's whitened residual (channels, m) up to a time."""
+    from picchio.diagnosis.percussion._residual_kernel import whitened
+
     setup = record.until(end)
     predicted = setup.predict(model)
     count = setup.samples.count
-    rows = {name: values[:count] - predicted[name] for name, values in record.values.items()}
-    steady = setup.steady
-    for channel in setup.channels:
-        if channel.name in rows and (steady or channel.kind.name in POSITION_KINDS):
-            rows[channel.name] = rows[channel.name] - rows[channel.name].mean()
     hums = [e for e in model.effects if e.name == "mains_hum" and setup.name not in e.hidden]
-    for hum in hums:
-        take_out_line(rows, setup, hum.target, hum.values["frequency"])
+    if hums:
+        rows = {name: values[:count] - predicted[name] for name, values in record.values.items()}
+        for hum in hums:
+            take_out_line(rows, setup, hum.target, hum.values["frequency"])
+        predicted = {name: record.values[name][:count] - row for name, row in rows.items()}
     masked = _kept_edges(record, setup, model)
-    out = np.empty((len(rows), count))
-    kinds = {c.name: c for c in setup.channels}
-    for i, (name, row) in enumerate(rows.items()):
-        if masked is not None and kinds[name].kind.name in _JUMPING:
-            # Before the filter, which would spread what is not known, and after it.
-            unknown = masked[kinds[name].group]
-            row = np.where(unknown, 0.0, row)
-            # As large as noise, lest a fit gain by moving edges towards samples it misses.
-            out[i] = np.where(unknown, record.filler(name)[:count], record.noise[name].whiten(row))
-        else:
-            out[i] = record.noise[name].whiten(row)
+    out, room, known = np.empty((len(record.values), count)), np.empty(count), np.zeros(0, bool)
+    for i, channel in enumerate(record.channels):
+        name = channel.name
+        foretold = predicted[name]
+        offset = 0.0
+        if setup.steady or channel.kind.name in POSITION_KINDS:
+            offset = float((record.values[name][:count] - foretold).mean())
+        unknown = known
+        if masked is not None and channel.kind.name in _JUMPING:
+            # Before the filter, which would spread what is not known, and after it; there as
+            # large as noise, lest a fit gain by moving edges towards samples it misses.
+            unknown = masked[channel.group]
+        whitened(
+            record.values[name], foretold, offset, unknown, record.filler(name),
+            *record.noise[name].model.filters, room, out[i],
+        )  # fmt: skip
     return out
 
 
@@ -263,8 +275,7 @@ def _kept_edges(
         fixed = record._pinned[-1]
         count = setup.samples.count
         return None if fixed is None else {g: mask[:count] for g, mask in fixed.items()}
-    blind = ("structure", "over-time", "nonlinear", "motion")
-    key = (setup.samples, tuple(e.key for e in model.effects if e.where not in blind))
+    key = (setup.samples, model.key("blows", "sensor"))
     if key not in record._edges:
         if len(record._edges) >= _KEPT_EDGES:
             record._edges.pop(next(iter(record._edges)), None)
@@ -274,6 +285,8 @@ def _kept_edges(
 
 def _near_edges(setup: PercussionSetup, model: Model) -> dict[str, BoolArray] | None:
     """Which samples of each group stand so near a jump that either side may be meant."""
+    from picchio.diagnosis.percussion._residual_kernel import near_edges
+
     _, force = setup.struck(model)
     edges = force.start
     if edges.size > 400:  # a measured history has no jumps
@@ -285,15 +298,11 @@ def _near_edges(setup: PercussionSetup, model: Model) -> dict[str, BoolArray] | 
     if np.isfinite(force.end):
         last = setup.samples.times[-1]
         edges = (edges + force.end * np.arange(int(last / force.end) + 2)[:, None]).ravel()
-    sensors = model.sensors(setup.conditions)
+    sensors, clock = model.sensors(setup.conditions), setup.samples
     found = {}
     for group in setup.groups:
         delay, rate = sensors.get(group).timing
-        times = setup.samples.times * (1.0 + rate) - delay
-        place = np.searchsorted(edges, times)
-        before = np.abs(times - edges[np.clip(place - 1, 0, edges.size - 1)])
-        after = np.abs(times - edges[np.clip(place, 0, edges.size - 1)])
-        distance = np.minimum(before, after)
-        near = max(_NEAR_EDGE, _SMEARED * setup.samples.step) + _MARGIN
-        found[group] = distance < near
+        near = max(_NEAR_EDGE, _SMEARED * clock.step) + _MARGIN
+        found[group] = np.empty(clock.count, dtype=bool)
+        near_edges(clock.start, clock.step, rate, delay, edges, near, found[group])
     return found

@@ -9,7 +9,14 @@ from typing import Any
 
 from picchio.diagnosis.percussion.confidence import confidence
 from picchio.diagnosis.percussion.evidence import Evidence, weigh
-from picchio.diagnosis.percussion.exchange import exchange, prune, replaced, with_latent
+from picchio.diagnosis.percussion.exchange import (
+    Tried,
+    exchange,
+    prune,
+    replaced,
+    rivals_of,
+    with_latent,
+)
 from picchio.diagnosis.percussion.fit import Fit, fit
 from picchio.diagnosis.percussion.latent import LATENT
 from picchio.diagnosis.percussion.latent_fit import fit_latent
@@ -46,6 +53,7 @@ class Search:
         steps: per step the trials, the best first.
         evidence: on all records used for fitting.
         pinned: whether noise was all that was left, and what is known is held fixed since.
+        replacements: what was tried in place of a cause.
     """
 
     baseline: Fit
@@ -54,6 +62,7 @@ class Search:
     scores: list[dict[str, Any]] = field(default_factory=list)
     evidence: Evidence | None = None
     pinned: bool = False
+    replacements: Tried = field(default_factory=dict)
 
 
 def search(
@@ -140,7 +149,8 @@ def search(
             if weigh(problem, best.residuals, best.records).is_noise:
                 break
             say("looking whether the causes chosen first were the right ones")
-            found.best = accepted(replaced(problem, best, candidates, scales, records, least))
+            other = replaced(problem, best, candidates, scales, records, least, found.replacements)
+            found.best = accepted(other)
             if found.best is best:
                 break
             if len(found.best.hypothesis.labels) < MOST_CAUSES:
@@ -169,9 +179,8 @@ def alternatives(
         if len(best.hypothesis.causes) == 1 and found.steps:
             trials = [t for t in found.steps[0] if t.label != cause.label]
         else:
-            others = best.hypothesis.minus(cause.label)
-            trials = try_candidates(
-                problem, others, candidates, scales, records, cause=cause.label, best=best
+            trials = rivals_of(
+                cause.label, problem, best, candidates, scales, records, found.replacements
             )
         tried += [t for t in trials if t.finished(records)]
         for trial in trials:

@@ -12,6 +12,7 @@ import math
 from abc import ABC
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 from picchio.core.errors import InputError
@@ -110,7 +111,7 @@ class Effect(ABC):
     def __hash__(self) -> int:
         return hash(self.key)
 
-    @property
+    @cached_property
     def key(self) -> tuple[Any, ...]:
         """What tells this effect from another."""
         return (self.name, self.target, *self.values.items(), *self.hidden.items())
