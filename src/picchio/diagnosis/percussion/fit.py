@@ -148,7 +148,7 @@ def fit(
                 break
             damping *= 6.0
         if not improved:
-            if fresh and (refined or not _kinked(here)):
+            if fresh and (refined or not kinked(here)):
                 break
             # Carried too far; or differences were too coarse for a motion that a kink makes rough.
             refined = fresh
@@ -176,7 +176,7 @@ def fit(
     return Fit(here, residuals, slopes if with_jacobian else None, cost, chosen, end)
 
 
-def _kinked(hypothesis: Hypothesis) -> bool:
+def kinked(hypothesis: Hypothesis) -> bool:
     """Whether a small change of an unknown may change the motion a lot."""
     return any(effect.where == "nonlinear" for effect in hypothesis.effects)
 

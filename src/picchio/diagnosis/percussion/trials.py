@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.fit import Fit, fit, fit_growing
+from picchio.diagnosis.percussion.fit import Fit, fit, fit_growing, kinked
 from picchio.diagnosis.percussion.latent import hidden_numbers
 from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
@@ -19,6 +19,7 @@ from picchio.model import Effect
 from picchio.model.effects import Scales
 
 SCREEN_WINDOW = 0.3
+_ON_THE_WAY = (SCREEN_WINDOW, 2.0 * SCREEN_WINDOW)
 _LEAN = 6
 SHORT_LIST = 7
 LONG_FITS = 3
@@ -254,4 +255,6 @@ def _fit_long(
         turns = 0 if effect.name == "pulse_jitter" else 3
         long = fit(problem, short, records, None, iterations=turns)
         return fit_latent(problem, long, type(effect), effect.target)
+    if kinked(short):  # a small error early is a large one late: not all at once
+        short = fit_growing(problem, short, records, windows=_ON_THE_WAY, iterations=3).hypothesis
     return fit(problem, short, records, None, iterations=6, rival=rival)
