@@ -59,13 +59,58 @@ _POINTS = 16
 
 
 @njit(cache=True, nogil=True)
+def _straight(kind, parameters, d0, rate0, d1, rate1, length, out):
+    """Whether the path stays on one side of every kink; `kink_correction` is then known.
+
+    The force is a spring's and a damper's there, and the path a cubic, which lies within the hull
+    of its four control points, as its rate lies within that of three.
+    """
+    a, b = d0 + length * rate0 / 3.0, d1 - length * rate1 / 3.0
+    low, high = min(min(d0, d1), min(a, b)), max(max(d0, d1), max(a, b))
+    rise = d1 - d0
+    spring, damper = 0.0, 0.0
+    if kind == 0:
+        stiffness, half, rest = parameters[0], 0.5 * parameters[1], parameters[2]
+        if low + rest >= -half and high + rest <= half:
+            spring = stiffness
+        elif not (low + rest >= half or high + rest <= -half):
+            return False
+    else:
+        middle = 3.0 * rise / length - rate0 - rate1
+        slow, fast = min(min(rate0, rate1), middle), max(max(rate0, rate1), middle)
+        stiffness, damping = parameters[0], parameters[1]
+        if parameters[2] - stiffness * high - damping * fast >= 0.0:
+            spring, damper = -stiffness, -damping
+        elif parameters[2] - stiffness * low - damping * slow > 0.0:
+            return False
+    mean = spring * length * (rate0 - rate1) / 12.0
+    moment = spring * (rise / 60.0 + length * (rate0 / 30.0 - rate1 / 20.0))
+    if damper != 0.0:
+        average = 0.5 * rise + length * (rate0 - rate1) / 12.0
+        mean += damper * (rise / length - 0.5 * (rate0 + rate1))
+        moment += damper * ((rise - average) / length - rate0 / 6.0 - rate1 / 3.0)
+    _line(mean, moment, out)
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _line(mean, moment, out):
+    """The straight line on [0, 1] of a mean and first moment: its values at both ends."""
+    out[0] = 4.0 * mean - 6.0 * moment
+    out[1] = 6.0 * moment - 2.0 * mean
+
+
+@njit(cache=True, nogil=True)
 def kink_correction(kind, parameters, d0, rate0, d1, rate1, length, out):
     """What the best straight line through a force with a kink has above its two ends' values.
 
     Over a step the force is taken as a straight line in time. Where the path from (d0, rate0) to
     (d1, rate1), a cubic, crosses a kink, the line with the force's own mean and first moment is
-    better than the one through its ends. Into `out` (2,): to be added at start and end.
+    better than the one through its ends. Into `out` (2,): to be added at start and end. Returns
+    whether the path stays clear of all kinks.
     """
+    if _straight(kind, parameters, d0, rate0, d1, rate1, length, out):
+        return True
     f0 = element_force(kind, parameters, d0, rate0, 0.0)
     f1 = element_force(kind, parameters, d1, rate1, 0.0)
     mean = 0.0
@@ -85,5 +130,5 @@ def kink_correction(kind, parameters, d0, rate0, d1, rate1, length, out):
         above = element_force(kind, parameters, path, rate, 0.0) - f0 - (f1 - f0) * s
         mean += above / _POINTS
         moment += above * s / _POINTS
-    out[0] = 4.0 * mean - 6.0 * moment
-    out[1] = 6.0 * moment - 2.0 * mean
+    _line(mean, moment, out)
+    return False

@@ -1,9 +1,10 @@
-"""Compiled time integration of systems without nonlinear elements: one look a step.
+"""Compiled time integration of systems in which nothing sticks: one look a step.
 
 As `picchio.vibration._integrate_kernel`, but what the linear equations lack is smooth here but
-where the force jumps. So over a step it is first taken to go on as it did over the last one, looked
-at where that leads, and the step corrected: half the work of looking twice. All is in units of
-acceleration, M^-1 times the forces.
+where the force jumps, or something touches or lets go. So over a step it is first taken to go on
+as it did over the last one, looked at where that leads, and the step corrected: half the work of
+looking twice. About a jump or a kink there are two looks. All is in units of acceleration, M^-1
+times the forces.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -12,10 +13,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from picchio.vibration._element_kernel import advance_state, element_force, kink_correction
 from picchio.vibration._exponential_kernel import fastest_rate, step_matrices, taylor
 
 # From so many time constants of the fastest mode on, matrices are cheaper than a series.
 _STIFF = 30.0
+_BACKLASH, _BOUC_WEN, _CONTACT = 0, 2, 4
 
 
 @njit(cache=True, nogil=True)
@@ -49,12 +52,16 @@ def packed(inverse, gradient, curvature):
     return inverse @ forces, tilts
 
 
-@njit(cache=True, nogil=True)
-def _lacking(y, force, own, push, held, quadratic, tilts, products, square, rest, out, a):
+@njit(cache=True, nogil=True, inline="always")
+def _lacking(
+    y, force, own, push, held, quadratic, tilts, kinds, parameters, rows, pulls, states,
+    products, square, rest, out, a,
+):  # fmt: skip
     """What the linear equations lack, as an acceleration: into `out` (N,); all of it into `a`.
 
     y is (2N,); own (N,) is the force's own acceleration per newton, push (N, N) its change with y;
-    held (N, 2N) springs beside dampers; quadratic and tilts as `packed` makes them;
+    held (N, 2N) springs beside dampers; quadratic and tilts as `packed` makes them; kinds,
+    parameters, rows and states the elements', pulls (elements, N) M^-1 times their rows;
     products (N (N + 1),), square (N, N) and rest (N,) are room to work in.
     """
     n = own.size
@@ -80,6 +87,16 @@ def _lacking(y, force, own, push, held, quadratic, tilts, products, square, rest
             square[i, j] = tilt
         rest[i] = total + pushed * force
         a[i] = linear
+    if kinds is not None:
+        for e in range(kinds.size):
+            d = 0.0
+            rate = 0.0
+            for j in range(n):
+                d += rows[e, j] * y[j]
+                rate += rows[e, j] * y[n + j]
+            pull = element_force(kinds[e], parameters[e], d, rate, states[e])
+            for j in range(n):
+                rest[j] += pulls[e, j] * pull
     for i in range(n):
         out[i] = a[i] + rest[i]
     # x'' stands on both sides; two rounds leave (dM/M)^3.
@@ -98,14 +115,45 @@ def _lacking(y, force, own, push, held, quadratic, tilts, products, square, rest
 
 
 @njit(cache=True, nogil=True)
+def _advance(kinds, parameters, rows, before, after, states, new_states):
+    """The elements' inner states after the motion from one state (2N,) to another."""
+    for e in range(kinds.size):
+        new_states[e] = states[e]
+        if kinds[e] == _BOUC_WEN:
+            change = 0.0
+            for j in range(rows.shape[1]):
+                change += rows[e, j] * (after[j] - before[j])
+            new_states[e] = advance_state(parameters[e], change, states[e])
+
+
+@njit(cache=True, nogil=True)
+def _bent(start, end, length, row, pull, kind, parameters, bend, first, final):
+    """Put what an element does between two states (2N,) into its line; whether it has no kink."""
+    n = row.size
+    d0, rate0, d1, rate1 = 0.0, 0.0, 0.0, 0.0
+    for j in range(n):
+        d0 += row[j] * start[j]
+        rate0 += row[j] * start[n + j]
+        d1 += row[j] * end[j]
+        rate1 += row[j] * end[n + j]
+    straight = kink_correction(kind, parameters, d0, rate0, d1, rate1, length, bend)
+    for j in range(n):
+        first[j] += pull[j] * bend[0]
+        final[j] += pull[j] * bend[1]
+    return straight
+
+
+@njit(cache=True, nogil=True)
 def integrate(
     start, mass, gradient, curvature, damping, stiffness, b, b_gradient,
+    kinds, parameters, rows, start_states,
     step, lengths, regular, same, force0, force1, sample, force_after,
     x_out, v_out, a_out, end,
 ):  # fmt: skip
     """Advance from `start` over all steps and write the samples.
 
-    As `picchio.vibration._integrate_kernel.integrate`, without elements; `end` is (2N,).
+    As `picchio.vibration._integrate_kernel.integrate`; kinds None where there are no elements, for
+    which this is compiled once more, without them.
     """
     n = b.size
     inverse = np.linalg.inv(mass)
@@ -114,7 +162,8 @@ def integrate(
     whole, from_start, from_end = step_matrices(inverse, damping, stiffness, step)
     exponential, by_start, by_end = whole, from_start @ mass, from_end @ mass
     quadratic, tilts = packed(inverse, gradient, curvature)
-    own, push = inverse @ b, inverse @ b_gradient
+    own, push, pulls = inverse @ b, inverse @ b_gradient, rows @ inverse
+    states, new_states = start_states.copy(), start_states.copy()
     held = np.empty((n, 2 * n))
     held[:, :n] = ik
     held[:, n:] = ic
@@ -126,24 +175,30 @@ def integrate(
     short = np.empty((kept, 2 * n, 2 * n))
     short_start, short_end = np.empty((kept, 2 * n, n)), np.empty((kept, 2 * n, n))
     y, new, there = start.copy(), np.empty(2 * n), np.empty(2 * n)
-    p0, p1, p2, f0, f1 = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    p0, p1, f0, f1, bend = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(2)
+    at_first, at_last, first, final = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     products, square, rest, a = np.empty(n * (n + 1)), np.empty((n, n)), np.empty(n), np.empty(n)
     last = 0.0  # length of the step over which nothing jumped; 0 where something did
     for k in range(lengths.size):
         length = lengths[k]
         if last == 0.0:
-            _lacking(y, force0[k], own, push, held, quadratic, tilts, products, square, rest, p1, a)
+            _lacking(
+                y, force0[k], own, push, held, quadratic, tilts, kinds, parameters, rows, pulls,
+                states, products, square, rest, p1, a,
+            )  # fmt: skip
             for i in range(n):
                 p0[i] = p1[i]
         share = length / last if last > 0.0 else 0.0
         for i in range(n):
             # p1 is what was lacking at the end of the last step, p0 at its start.
-            p2[i] = p1[i] + share * (p1[i] - p0[i])
+            at_first[i] = p1[i]
+            at_last[i] = p1[i] + share * (p1[i] - p0[i])
             p0[i] = p1[i]
-            f0[i] = own[i] * force0[k] + p0[i]
-            f1[i] = own[i] * force1[k] + p2[i]
-        # Two looks after a jump, where nothing is known of how it goes on.
-        for _look in range(1 if share > 0.0 else 2):
+        # Two looks after a jump, where nothing is known of how it goes on, and about a kink.
+        for _look in range(2):
+            for i in range(n):
+                f0[i] = own[i] * force0[k] + at_first[i]
+                f1[i] = own[i] * force1[k] + at_last[i]
             matrix, at_start, at_end = exponential, by_start, by_end
             by_matrix = regular[k]
             if not by_matrix and length * fastest > _STIFF:
@@ -162,25 +217,46 @@ def integrate(
                     new[i] = total
             else:
                 taylor(y, f0, f1, length, eye, ik, ic, fastest, new)
+            if kinds is not None:
+                _advance(kinds, parameters, rows, y, new, states, new_states)
             _lacking(
-                new, force1[k], own, push, held, quadratic, tilts, products, square, rest, p1, a
-            )
+                new, force1[k], own, push, held, quadratic, tilts, kinds, parameters, rows, pulls,
+                new_states, products, square, rest, p1, a,
+            )  # fmt: skip
+            for i in range(n):
+                first[i], final[i] = p0[i], p1[i]
+            crossed = False
+            if kinds is not None:
+                for e in range(kinds.size):
+                    if kinds[e] == _BACKLASH or kinds[e] == _CONTACT:
+                        straight = _bent(
+                        y, new, length, rows[e], pulls[e], kinds[e], parameters[e], bend, first,
+                        final,
+                    )  # fmt: skip
+                        crossed = crossed or not straight
             if by_matrix:
                 for i in range(2 * n):
                     total = new[i]
                     for j in range(n):
-                        total += at_end[i, j] * (p1[j] - p2[j])
+                        total += at_start[i, j] * (first[j] - at_first[j])
+                        total += at_end[i, j] * (final[j] - at_last[j])
                     there[i] = total
             else:
                 for i in range(n):
-                    f1[i] = own[i] * force1[k] + p1[i]
+                    f0[i] = own[i] * force0[k] + first[i]
+                    f1[i] = own[i] * force1[k] + final[i]
                 taylor(y, f0, f1, length, eye, ik, ic, fastest, there)
+            if share > 0.0 and not crossed:
+                break
             for i in range(n):
-                p2[i] = p1[i]
-                f1[i] = own[i] * force1[k] + p1[i]
+                at_first[i], at_last[i] = first[i], final[i]
+        if kinds is not None:
+            _advance(kinds, parameters, rows, y, there, states, new_states)
+            for e in range(kinds.size):
+                states[e] = new_states[e]
         for i in range(2 * n):
             y[i] = there[i]
-        jumped = force_after[k] != force1[k]
+        jumped = crossed or force_after[k] != force1[k]
         if k + 1 < lengths.size:
             jumped = jumped or force0[k + 1] != force1[k]
         last = 0.0 if jumped else length
@@ -188,8 +264,8 @@ def integrate(
         if s >= 0:
             if jumped:
                 _lacking(
-                    y, force_after[k], own, push, held, quadratic, tilts, products, square, rest,
-                    p1, a,
+                    y, force_after[k], own, push, held, quadratic, tilts, kinds, parameters, rows,
+                    pulls, states, products, square, rest, p1, a,
                 )  # fmt: skip
             else:
                 for i in range(n):
@@ -203,3 +279,6 @@ def integrate(
                 a_out[s, i] = a[i]
     for i in range(2 * n):
         end[i] = y[i]
+    if kinds is not None:
+        for e in range(kinds.size):
+            end[2 * n + e] = states[e]

@@ -16,9 +16,11 @@ from picchio.vibration.jumps import jump_corrections
 
 # Longest steps, s: the linear part is exact, so these resolve only what comes on top.
 SMOOTH_STEP = 1e-3
-KINKED_STEP = 4e-4
+KINKED_STEP = 5e-4
+STICKING_STEP = 4e-4
 ROUGH_STEP = 2e-4
 _ROUGH = (ElementKind.BOUC_WEN,)
+_STICKING = (ElementKind.COULOMB,)
 _EDGE = 1e-10
 AtJumps = Literal["after", "mean", "moments"]
 _GAUSS = 0.5 - np.sqrt(3.0) / 6.0
@@ -110,6 +112,8 @@ def default_step(system: VibratingSystem) -> float:
     """How fine the steps should be, s."""
     if any(element.kind in _ROUGH for element in system.elements):
         return ROUGH_STEP
+    if any(element.kind in _STICKING for element in system.elements):
+        return STICKING_STEP
     return KINKED_STEP if system.elements else SMOOTH_STEP
 
 
@@ -203,18 +207,19 @@ def _run(
         plan.step, plan.lengths, plan.regular, plan.same, plan.force0, plan.force1,
         plan.sample[1:], plan.force_after[1:],
     )  # fmt: skip
-    if not system.elements:
-        from picchio.vibration._smooth_kernel import integrate as smooth
-
-        smooth(*equations, *steps, x, v, a, end)
-        return CoordinateMotion(x, v, a), end
-    from picchio.vibration._integrate_kernel import integrate as kernel
-
     kinds = np.array([int(e.kind) for e in system.elements], dtype=np.int64)
     parameters = np.zeros((kinds.size, 6))
     for row, element in zip(parameters, system.elements, strict=True):
         row[: len(element.parameters)] = element.parameters
-    kernel(*equations, kinds, parameters, system.rows, start[2 * n :], *steps, x, v, a, end)
+    elements = (kinds if kinds.size else None, parameters, system.rows, start[2 * n :])
+    if any(element.kind in _STICKING for element in system.elements):
+        from picchio.vibration._integrate_kernel import integrate as with_friction
+
+        with_friction(*equations, *elements, *steps, x, v, a, end)
+    else:
+        from picchio.vibration._smooth_kernel import integrate as without_friction
+
+        without_friction(*equations, *elements, *steps, x, v, a, end)
     return CoordinateMotion(x, v, a), end
 
 

@@ -112,6 +112,11 @@ class Screen:
         if enough * _FIRST / _EVERY > _CHANCE and len(fit.records) > _EVERY:
             self.first = Screen(problem, _part(fit), scales, faint)
 
+    @property
+    def total(self) -> float:
+        """Chi-square that is left to explain."""
+        return float(self.left @ self.left)
+
     def suspect(self, candidate: tuple[type[Effect], str]) -> Suspect | None:
         """What an effect at a target promises; None where it can't act, or is known already."""
         kind, target = candidate

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +20,10 @@ from picchio.model.effects import Scales
 
 SCREEN_WINDOW = 0.3
 _ON_THE_WAY = (SCREEN_WINDOW, 2.0 * SCREEN_WINDOW)
+# Where nothing explains half of what is left there, this much of it is screened as well, s.
+_EARLY = 0.08
+_HALF = 0.5
+_MOST_EARLY = 3
 _LEAN = 6
 SHORT_LIST = 7
 LONG_FITS = 3
@@ -70,7 +74,7 @@ def _numbers(effect: Effect) -> int:
 def try_candidates(
     problem: Problem,
     known: Hypothesis,
-    candidates: Iterable[tuple[type[Effect], str]],
+    candidates: Sequence[tuple[type[Effect], str]],
     scales: Scales,
     records: Sequence[MeasuredRecord],
     *,
@@ -97,6 +101,10 @@ def try_candidates(
         some, window = list(records), None
         start = fit(problem, known, some, window, iterations=4, with_jacobian=True)
     look = Screen(problem, start, scales, faint=whole, enough=_SHORT * least if whole else 0.0)
+    early = None
+    if window is not None:
+        begun = fit(problem, known, some, _EARLY, iterations=4, with_jacobian=True)
+        early = Screen(problem, begun, scales)
 
     def short_fit(effect: Effect) -> Fit | None:
         return _light(_fit_short(problem, start, effect, some, window))
@@ -106,6 +114,8 @@ def try_candidates(
 
     functions: dict[str, Callable[[Any], Any]]
     functions = {"screen": look.suspect, "short": short_fit, "long": long_fit}
+    if early is not None:
+        functions["early"] = early.suspect
     with Workers(problem.workers, functions) as pool:
         suspects = look.ranked(pool.map("screen", candidates))
         logarithm = math.log(max(start.samples, 2))
@@ -119,6 +129,9 @@ def try_candidates(
         if cause:
             suspects = _rivals(suspects, cause)
         chosen = _short_list(suspects, min(short_list, _MOST_RIVALS) if cause else short_list)
+        if early is not None and not cause and _promised(suspects) < _HALF * look.total:
+            # What makes a motion differ ever more is only like itself while it differs little.
+            chosen = _joined(chosen, early.ranked(pool.map("early", candidates)))
         tried = [(suspect, effect) for suspect in chosen for effect in suspect.starts]
         fits = pool.map("short", [effect for _, effect in tried])
         short = _best_of_each(tried, fits, some)
@@ -127,6 +140,22 @@ def try_candidates(
         own = fit(problem, best.hypothesis, some, window, iterations=2)
         mark = min(score(own), short[0][2])
         return _long_trials(pool, short, list(records), long_fits, mark, best.cost)
+
+
+def _promised(suspects: Sequence[Suspect]) -> float:
+    """What the best of them explains."""
+    return max((s.gain for s in suspects), default=0.0)
+
+
+def _joined(chosen: Sequence[Suspect], early: Sequence[Suspect]) -> list[Suspect]:
+    """Those chosen, with the best of another screening and the sizes that it would start from."""
+    best = {s.label: s for s in _short_list(early, _MOST_EARLY)}
+    joined = []
+    for suspect in chosen:
+        other = best.pop(suspect.label, None)
+        starts = other.starts[:1] if other and suspect.effect.latent is None else ()
+        joined.append(replace(suspect, starts=(*suspect.starts, *starts)))
+    return [*joined, *best.values()]
 
 
 def _rivals(suspects: Sequence[Suspect], cause: str) -> list[Suspect]:
