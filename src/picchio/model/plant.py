@@ -151,9 +151,12 @@ class Plant:
         """
         unloaded, point = self._unloaded
         force = unloaded.force_jacobian.T @ direction
-        gradient = np.zeros_like(unloaded.mass)
         change = (direction @ point.gradient[:, :3]).T
-        gradient[np.ix_(unloaded.wide, unloaded.wide)] = change
+        gradient = np.zeros_like(unloaded.mass)
+        if change.shape == gradient.shape:
+            gradient[:] = change
+        else:
+            gradient[np.ix_(unloaded.wide, unloaded.wide)] = change
         elements = (*unloaded.elements, *self._contacts)
         rows = [*unloaded.rows, *[force for _ in self._contacts]]
         return replace(

@@ -54,6 +54,9 @@ class SensorChain:
         return self.delay, self.clock_rate
 
 
+_IDEAL = SensorChain()
+
+
 class Sensors:
     """The chains of all channel groups; those that nothing has changed are ideal."""
 
@@ -66,4 +69,4 @@ class Sensors:
 
     def get(self, group: str) -> SensorChain:
         """The chain of a group, to be read."""
-        return self._chains.get(group) or SensorChain()
+        return self._chains.get(group, _IDEAL)

@@ -182,7 +182,8 @@ def kinked(hypothesis: Hypothesis) -> bool:
 
 
 def _square(residuals: Sequence[FloatArray]) -> float:
-    total = float(sum((r * r).sum() for r in residuals))
+    with np.errstate(over="ignore", invalid="ignore"):  # of a trial far off
+        total = float(sum((r * r).sum() for r in residuals))
     return total if np.isfinite(total) else np.inf
 
 
