@@ -19,7 +19,9 @@ def modal_damping(mass, springs, ratio):
     return weighted @ np.diag(2.0 * ratio * np.sqrt(squared)) @ weighted.T
 
 
-def integrate_aba(urdf, springs, ratio, pose, direction, pulse, period, width, hits, times):
+def integrate_aba(
+    urdf, springs, ratio, pose, direction, pulse, period, width, hits, times, rtol=1e-10
+):
     """Deflections (n, k) of the nonlinear arm at `times`, from rest, by Runge-Kutta of order 8."""
     model = pin.buildModelFromUrdf(str(urdf))
     data = model.createData()
@@ -53,8 +55,8 @@ def integrate_aba(urdf, springs, ratio, pose, direction, pulse, period, width, h
             (a, b),
             y,
             method="DOP853",
-            rtol=1e-10,
-            atol=1e-14,
+            rtol=rtol,
+            atol=1e-4 * rtol,
             t_eval=np.append(times[here], b),
             args=(force,),
         )
