@@ -213,11 +213,11 @@ def _run(
         row[: len(element.parameters)] = element.parameters
     elements = (kinds if kinds.size else None, parameters, system.rows, start[2 * n :])
     if any(element.kind in _STICKING for element in system.elements):
-        from picchio.vibration._integrate_kernel import integrate as with_friction
+        from picchio.vibration._sticking_kernel import integrate as with_friction
 
         with_friction(*equations, *elements, *steps, x, v, a, end)
     else:
-        from picchio.vibration._smooth_kernel import integrate as without_friction
+        from picchio.vibration._integrate_kernel import integrate as without_friction
 
         without_friction(*equations, *elements, *steps, x, v, a, end)
     return CoordinateMotion(x, v, a), end
