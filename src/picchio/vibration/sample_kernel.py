@@ -11,7 +11,7 @@ from picchio.core.arrays import ComplexArray, FloatArray
 from picchio.vibration.oscillator_kernel import exponential
 
 # Samples a cycle of the fastest mode. |g|^2 swings twice as fast: a top between two samples is
-# at most 10 % above both, and at most 2.5 % above the parabola through it and its neighbours.
+# at most 10 % above both, unless modes nearly cancel (see `top_kernel`).
 _PER_CYCLE = 10.0
 _FAST = {"contract", "reassoc", "nsz", "arcp"}
 
