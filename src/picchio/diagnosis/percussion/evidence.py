@@ -35,7 +35,7 @@ class Level:
         group: channel group.
         part: "3-9 Hz", "pose 2".
         power: mean.
-        z: how many standard deviations above 1.
+        z: how many standard deviations above 1, of a normal variable as likely.
     """
 
     group: str
@@ -149,8 +149,21 @@ def _level(group: str, part: str, picked: Sequence[FloatArray], error: float) ->
     if values.size < 8:
         return None
     power = float(values.mean())
-    scatter = np.sqrt(1.0 / values.size + error**2 + _MODEL_FLOOR**2)
-    return Level(group, part, power, float((power - 1.0) / scatter))
+    scatter = float(np.sqrt(1.0 / values.size + error**2 + _MODEL_FLOOR**2))
+    return Level(group, part, power, standard_deviations(power, scatter))
+
+
+def standard_deviations(power: float, scatter: float) -> float:
+    """By how many standard deviations a mean of squares stands above 1.
+
+    A mean of few squares has a longer upper than lower tail: its cube root is nearly normal (Wilson
+    and Hilferty, PNAS 17 (1931) 684, doi:10.1073/pnas.17.12.684).
+
+    Args:
+        power: the mean, 1 expected.
+        scatter: its standard deviation.
+    """
+    return float(3.0 / scatter * (np.cbrt(max(power, 0.0)) - 1.0 + scatter**2 / 9.0))
 
 
 def _channels_of(problem: Problem, group: str) -> int:
