@@ -56,15 +56,16 @@ def packed(inverse, gradient, curvature):
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _lacking(
-    y, force, own, push, held, quadratic, tilts, kinds, parameters, rows, pulls, states,
+def lacking(
+    y, force, own, push, held, quadratic, tilts, kinds, parameters, rows, pulls, states, given,
     products, square, rest, out, a,
 ):  # fmt: skip
     """What the linear equations lack, as an acceleration: into `out` (N,); all of it into `a`.
 
     y is (2N,); own (N,) is the force's own acceleration per newton, push (N, N) its change with y;
     held (N, 2N) springs beside dampers; quadratic and tilts as `packed` makes them; kinds,
-    parameters, rows and states the elements', pulls (elements, N) M^-1 times their rows;
+    parameters, rows and states the elements', pulls (elements, N) M^-1 times their rows, given
+    (elements,) forces that are known already;
     products (N (N + 1),), square (N, N) and rest (N,) are room to work in.
     """
     n = own.size
@@ -97,7 +98,7 @@ def _lacking(
             for j in range(n):
                 d += rows[e, j] * y[j]
                 rate += rows[e, j] * y[n + j]
-            pull = element_force(kinds[e], parameters[e], d, rate, states[e])
+            pull = given[e] + element_force(kinds[e], parameters[e], d, rate, states[e])
             for j in range(n):
                 rest[j] += pulls[e, j] * pull
     for i in range(n):
@@ -118,7 +119,7 @@ def _lacking(
 
 
 @njit(cache=True, nogil=True)
-def _advance(kinds, parameters, rows, before, after, states, new_states):
+def advance(kinds, parameters, rows, before, after, states, new_states):
     """The elements' inner states after the motion from one state (2N,) to another."""
     for e in range(kinds.size):
         new_states[e] = states[e]
@@ -130,7 +131,7 @@ def _advance(kinds, parameters, rows, before, after, states, new_states):
 
 
 @njit(cache=True, nogil=True)
-def _bent(start, end, length, row, pull, kind, parameters, bend, first, final):
+def add_kink(start, end, length, row, pull, kind, parameters, bend, first, final):
     """Put what an element does between two states (2N,) into its line; whether it has no kink."""
     n = row.size
     d0, rate0, d1, rate1 = 0.0, 0.0, 0.0, 0.0
@@ -173,6 +174,7 @@ def integrate(
     quadratic, tilts = packed(inverse, gradient, curvature)
     own, push, pulls = inverse @ b, inverse @ b_gradient, rows @ inverse
     states, new_states = start_states.copy(), start_states.copy()
+    given = np.zeros(states.size)
     held = np.empty((n, 2 * n))
     held[:, :n] = ik
     held[:, n:] = ic
@@ -191,9 +193,9 @@ def integrate(
     for k in range(lengths.size):
         length = lengths[k]
         if last == 0.0:
-            _lacking(
+            lacking(
                 y, force0[k], own, push, held, quadratic, tilts, kinds, parameters, rows, pulls,
-                states, products, square, rest, p1, a,
+                states, given, products, square, rest, p1, a,
             )  # fmt: skip
             for i in range(n):
                 p0[i] = p1[i]
@@ -227,10 +229,10 @@ def integrate(
             else:
                 taylor(y, f0, f1, length, eye, ik, ic, fastest, new)
             if kinds is not None:
-                _advance(kinds, parameters, rows, y, new, states, new_states)
-            _lacking(
+                advance(kinds, parameters, rows, y, new, states, new_states)
+            lacking(
                 new, force1[k], own, push, held, quadratic, tilts, kinds, parameters, rows, pulls,
-                new_states, products, square, rest, p1, a,
+                new_states, given, products, square, rest, p1, a,
             )  # fmt: skip
             for i in range(n):
                 first[i], final[i] = p0[i], p1[i]
@@ -238,10 +240,10 @@ def integrate(
             if kinds is not None:
                 for e in range(kinds.size):
                     if kinds[e] == _BACKLASH or kinds[e] == _CONTACT:
-                        straight = _bent(
-                        y, new, length, rows[e], pulls[e], kinds[e], parameters[e], bend, first,
-                        final,
-                    )  # fmt: skip
+                        straight = add_kink(
+                            y, new, length, rows[e], pulls[e], kinds[e], parameters[e], bend,
+                            first, final,
+                        )  # fmt: skip
                         crossed = crossed or not straight
             if by_matrix:
                 for i in range(2 * n):
@@ -260,7 +262,7 @@ def integrate(
             for i in range(n):
                 at_first[i], at_last[i] = first[i], final[i]
         if kinds is not None:
-            _advance(kinds, parameters, rows, y, there, states, new_states)
+            advance(kinds, parameters, rows, y, there, states, new_states)
             for e in range(kinds.size):
                 states[e] = new_states[e]
         for i in range(2 * n):
@@ -272,9 +274,9 @@ def integrate(
         s = sample[k]
         if s >= 0:
             if jumped:
-                _lacking(
+                lacking(
                     y, force_after[k], own, push, held, quadratic, tilts, kinds, parameters, rows,
-                    pulls, states, products, square, rest, p1, a,
+                    pulls, states, given, products, square, rest, p1, a,
                 )  # fmt: skip
             else:
                 for i in range(n):

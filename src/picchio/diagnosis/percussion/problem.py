@@ -13,21 +13,13 @@ import numpy as np
 from picchio.campaign import Campaign, Channel
 from picchio.core.arrays import BoolArray, FloatArray
 from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.edges import near_edges
 from picchio.model import Effect, Model
 from picchio.prediction.noise_level import Noise
 from picchio.prediction.percussion import POSITION_KINDS, PercussionSetup, percussion_setups
 from picchio.robot import FlexibleRobot
 
 _JUMPING = ("force", "acceleration", "accelerometer")
-# A sample this near a jump of the force, but not on it, holds neither side for sure: a sensor of
-# finite bandwidth smears a jump, and what keeps it from aliasing by about half a sample.
-_NEAR_EDGE = 1.8e-4
-# s, more: two samples that stand alike on either side of an edge are to be both in or both out,
-# whatever a fit does to the clock; else it gains by moving one of them out.
-_MARGIN = 2e-5
-_SMEARED = 0.5
-_ON_EDGE = 1e-7
-_SMALL_JUMP = 0.05
 _KEPT_EDGES = 8
 
 
@@ -171,7 +163,7 @@ class Problem:
         """
         model = self.model.with_effects(effects)
         for record in self.records:
-            record._pinned.append(_near_edges(record.setup, model))
+            record._pinned.append(near_edges(record.setup, model))
         try:
             yield
         finally:
@@ -270,7 +262,7 @@ def take_out_line(
 def _kept_edges(
     record: MeasuredRecord, setup: PercussionSetup, model: Model
 ) -> dict[str, BoolArray] | None:
-    """As `_near_edges`, which most trials leave as it was, or as it was pinned."""
+    """As `near_edges`, which most trials leave as it was, or as it was pinned."""
     if record._pinned:
         fixed = record._pinned[-1]
         count = setup.samples.count
@@ -279,30 +271,5 @@ def _kept_edges(
     if key not in record._edges:
         if len(record._edges) >= _KEPT_EDGES:
             record._edges.pop(next(iter(record._edges)), None)
-        record._edges[key] = _near_edges(setup, model)
+        record._edges[key] = near_edges(setup, model)
     return record._edges[key]
-
-
-def _near_edges(setup: PercussionSetup, model: Model) -> dict[str, BoolArray] | None:
-    """Which samples of each group stand so near a jump that either side may be meant."""
-    from picchio.diagnosis.percussion._residual_kernel import near_edges
-
-    _, force = setup.struck(model)
-    edges = force.start
-    if edges.size > 400:  # a measured history has no jumps
-        return None
-    jump = np.abs(force(edges + _ON_EDGE) - force(edges - _ON_EDGE))
-    edges = edges[jump > _SMALL_JUMP * max(float(jump.max()), 1e-300)]
-    if not edges.size:
-        return None
-    if np.isfinite(force.end):
-        last = setup.samples.times[-1]
-        edges = (edges + force.end * np.arange(int(last / force.end) + 2)[:, None]).ravel()
-    sensors, clock = model.sensors(setup.conditions), setup.samples
-    found = {}
-    for group in setup.groups:
-        delay, rate = sensors.get(group).timing
-        near = max(_NEAR_EDGE, _SMEARED * clock.step) + _MARGIN
-        found[group] = np.empty(clock.count, dtype=bool)
-        near_edges(clock.start, clock.step, rate, delay, edges, near, found[group])
-    return found
