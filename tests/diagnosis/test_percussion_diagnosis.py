@@ -157,11 +157,31 @@ def test_what_is_not_in_the_catalogue_is_not_named(kind):
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("effect", ["backlash"])
+@pytest.mark.parametrize("effect", ["backlash", "force_amplitude"])
 def test_with_the_true_cause_taken_out_no_other_is_named(effect):
     """The cause's whole class is taken out of the catalogue: `trial.class_of`."""
     row = trial.run(_case("left-out", effect))
     assert row["verdict"] != "named", row
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(
+    ("effect", "draw"),
+    [
+        ("cable", 1),  # noise in the poses that are looked at first
+        ("workpiece_contact", 1),  # a tenth as stiff as the contacts that are screened
+        ("base_compliance", 1),  # a fit that stopped short, and late blows that moved it on
+        ("pulse_jitter", 1),  # blows hardly late, each by itself not worth a number
+        ("mains_hum", 0),
+    ],
+)
+def test_a_weak_effect_is_found_in_noise(effect, draw):
+    """A sixth of the typical size, 20 dB, accelerometer alone: each was missed once."""
+    case = {"robot": ARM, "kind": "weak", "effect": effect, "snr": 20, "draw": draw}
+    row = trial.run(case, 1)
+    assert row["verdict"] in ("named", "ambiguous"), row
+    assert row["right"], row
 
 
 def test_a_nuisance_that_is_no_cause_any_more_stays_where_it_was():

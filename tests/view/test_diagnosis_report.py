@@ -58,7 +58,7 @@ def case(repository):
     )  # fmt: skip
     robot = load_robot("fanuc_like_3dof")
     problem = Problem(robot, campaign)
-    train, kept = held_out(problem)
+    train, kept = held_out(problem)[0]
     start = Hypothesis.baseline(robot, campaign.tolerance)
     baseline = fit_growing(problem, start, train)
     best = fit(problem, baseline.hypothesis.plus(effect_class("payload")("tool", mass=3.0)), train)

@@ -40,6 +40,8 @@ def show_diagnosis(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
             out.print(f"  {name}: {effect_class(name).meaning}")
     for each in differences(found):
         out.print(f"  these data cannot tell it from {in_words(each)}")
+    if found.note:
+        out.print(f"  {found.note}", highlight=False)
     for effect, target in found.leads:
         out.print(f"  helped, but is not the cause: {effect} of {target}")
     gain = found.gain

@@ -107,6 +107,7 @@ class Diagnosis:
         gain: on held-out records; None where nothing was fitted.
         life: {"baseline": {...}, "extended": {...}}; None where it can't be known.
         next_measurement: what to measure to know more; None where there is nothing to ask.
+        note: what the verdict leaves to be said, half a sentence; empty where there is nothing.
         scores: every candidate's score, for the report: dicts with effect, target, numbers.
         details: anything else that the report shows; not part of the JSON contract.
     """
@@ -119,6 +120,7 @@ class Diagnosis:
     gain: Gain | None = None
     life: Mapping[str, Any] | None = None
     next_measurement: Mapping[str, Any] | None = None
+    note: str = ""
     scores: tuple[Mapping[str, Any], ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)
 
@@ -135,4 +137,5 @@ class Diagnosis:
             "gain": self.gain.to_dict() if self.gain else None,
             "life": self.life,
             "next_measurement": self.next_measurement,
+            "note": self.note or None,
         }

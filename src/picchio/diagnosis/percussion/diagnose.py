@@ -11,18 +11,21 @@ import numpy as np
 from picchio.campaign import Campaign
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.life import life_before_and_after
-from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.candidates import all_candidates
 from picchio.diagnosis.percussion.causes import (
     stated_spread,
     told_causes,
+    told_covariance,
     told_nuisances,
     told_spread,
     with_hum,
 )
-from picchio.diagnosis.percussion.evidence import Evidence, weigh
-from picchio.diagnosis.percussion.fit import Fit, fit, fit_growing
+from picchio.diagnosis.percussion.common_fault import common_faults
+from picchio.diagnosis.percussion.evidence import Evidence
+from picchio.diagnosis.percussion.fit import Fit
 from picchio.diagnosis.percussion.gain import held_out, measure_gain
-from picchio.diagnosis.percussion.latent import LATENT, hum_lines
+from picchio.diagnosis.percussion.latent import hum_lines
+from picchio.diagnosis.percussion.look import look, weighed
 from picchio.diagnosis.percussion.next_measurement import next_measurement
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.select import (
@@ -30,7 +33,6 @@ from picchio.diagnosis.percussion.select import (
     Search,
     alternatives,
     refit,
-    search,
 )
 from picchio.diagnosis.percussion.trials import SAME, Trial, score
 from picchio.diagnosis.percussion.unknowns import TOLERATED, Hypothesis
@@ -111,32 +113,23 @@ def diagnose_percussion(
     say = progress or (lambda text: None)
     say("reading the records and their noise")
     problem = Problem(robot, campaign, noise, gravity_stiffness=gravity_stiffness, workers=workers)
-    train, kept = held_out(problem)
-    start = Hypothesis.baseline(robot, campaign.tolerance)
-    say("fitting the nominal model within its tolerance")
-    baseline = fit_growing(problem, start, train)
-    effects = baseline.hypothesis.effects
-    scales = measure_scales(problem, effects, problem.predictions(effects))
+    ways = held_out(problem)
     candidates = all_candidates(problem, without)
-
-    def confirmed(before: Fit, after: Fit) -> bool:
-        names = {e.name for e in after.hypothesis.causes}
-        if not kept or names & set(LATENT):
-            return True
-        old = _chi_square(problem, before.hypothesis, kept)
-        return _chi_square(problem, after.hypothesis, kept) < old
-
-    found = search(
-        problem, candidates, scales, train, baseline, confirmed=confirmed, progress=progress
-    )
+    looked = look(problem, candidates, ways[0], progress)
+    nominal, before = looked.nominal(problem)
+    if looked.found.pinned and not looked.found.best.hypothesis.labels and not before.is_noise:
+        # Noise in the poses that were looked at, and more in all: they hide what is wrong.
+        say("looking at other poses")
+        again = [look(problem, candidates, way, progress) for way in ways[1:]]
+        told = [other for other in again if other.found.best.hypothesis.labels]
+        looked = max(told, key=lambda other: other.gained, default=looked)
+    found, train, kept = looked.found, looked.train, looked.kept
+    baseline, scales = looked.baseline, looked.scales
     say("fitting what was found to all records")
-    whole = refit(problem, found.best.hypothesis, problem.records)
-    if not found.best.hypothesis.labels:
-        nominal = whole
-    else:
-        nominal = fit(problem, baseline.hypothesis, problem.records, None, iterations=3)
-    before = weigh(problem, nominal.residuals)
-    after = weigh(problem, whole.residuals)
+    whole = nominal
+    if found.best.hypothesis.labels:
+        whole = refit(problem, found.best.hypothesis, problem.records)
+    after = weighed(problem, whole)
     gain = measure_gain(problem, baseline.hypothesis, found.best.hypothesis, train, kept)
     same: list[Trial] = []
     rivals = [
@@ -151,14 +144,19 @@ def diagnose_percussion(
         same, rivals = alternatives(problem, found, candidates, scales, train)
         same, refuted = _on_all_records(problem, whole, same)
         causes = told_causes(whole, found, rivals, train, refuted)
-    verdict = _verdict(whole, causes, before, after, same, gain.explained)
+    common = common_faults(whole.hypothesis, told_covariance(whole), problem.groups)
+    verdict = _verdict(whole, causes, before, after, same, gain.explained, common)
     if any(e.name == "mains_hum" for e in whole.hypothesis.effects):
         causes = with_hum(causes, hum_lines(problem, whole))
     others: dict[tuple[tuple[str, str], ...], Hypothesis] = {}
     for t in same:
         pairs = tuple(sorted(_pair(label) for label in t.fit.hypothesis.labels))
         others.setdefault(pairs, t.fit.hypothesis)
-    leads = () if verdict != "unexplained" else tuple(_leads(found))
+    leads: tuple[tuple[str, str], ...] = ()
+    if common:
+        leads = tuple((c.effect, c.target) for c in causes)
+    elif verdict == "unexplained":
+        leads = tuple(_leads(found))
     ask = None
     if verdict in ("ambiguous", "unexplained", "partial"):
         say("looking for the measurement that would tell most")
@@ -173,6 +171,7 @@ def diagnose_percussion(
         gain=gain,
         next_measurement=ask,
         scores=tuple(_scores(found)),
+        note=_why_common(common) if common else "",
     )
     return PercussionDiagnosis(
         diagnosis, problem, nominal, whole, found, before, after, scales,
@@ -198,12 +197,6 @@ def _pair(label: str) -> tuple[str, str]:
     return name, target
 
 
-def _chi_square(
-    problem: Problem, hypothesis: Hypothesis, records: Sequence[MeasuredRecord]
-) -> float:
-    return float(sum((r * r).sum() for r in problem.residuals(hypothesis.effects, records)))
-
-
 def _mostly(explained: float | None) -> bool:
     return explained is not None and explained >= MOSTLY
 
@@ -215,9 +208,12 @@ def _verdict(
     after: Evidence,
     same: Sequence[object],
     explained: float | None,
+    common: Sequence[str],
 ) -> Verdict:
     if not whole.hypothesis.labels:
         return "nothing-wrong" if before.is_noise else "unexplained"
+    if common:
+        return "unexplained"
     if after.is_noise:
         return "ambiguous" if same else "named"
     if _sure(causes) and _mostly(explained) and not same:
@@ -227,6 +223,15 @@ def _verdict(
 
 def _sure(causes: Sequence[Cause]) -> bool:
     return all(cause.confidence >= BEYOND_DOUBT for cause in causes)
+
+
+def _why_common(names: Sequence[str]) -> str:
+    said = " and ".join(name.replace("_", " ") for name in names)
+    return (
+        f"{said} would explain it, but by the same amount in all sensors: then it is not they that "
+        "are wrong but something before them, in the blows or in the clock that starts the "
+        "records, which no known cause describes; a force sensor at the tool would tell"
+    )
 
 
 def _leads(found: Search) -> list[tuple[str, str]]:

@@ -52,16 +52,22 @@ class Evidence:
         bands: by group and frequency.
         poses: by group and pose.
         chi_square: per sample, all together.
+        unsteady: by how many standard deviations the unknowns differ from pose to pose.
     """
 
     bands: tuple[Level, ...]
     poses: tuple[Level, ...]
     chi_square: float
+    unsteady: float = 0.0
 
     @property
     def is_noise(self) -> bool:
-        """No part stands out."""
-        return self.worst_band < BAND_LIMIT and self.worst_pose < POSE_LIMIT
+        """No part stands out, and what was fitted is the same at every pose."""
+        return (
+            self.worst_band < BAND_LIMIT
+            and self.worst_pose < POSE_LIMIT
+            and self.unsteady < BAND_LIMIT
+        )
 
     @property
     def worst_band(self) -> float:

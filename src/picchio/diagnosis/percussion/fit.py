@@ -17,7 +17,8 @@ from picchio.diagnosis.percussion.unknowns import Hypothesis
 WINDOWS = (0.06, 0.16, 0.4, None)
 _CONVERGED = 1e-5
 _INSIDE = 1e-9
-_HOPELESS = 1.5
+# Times a rival's cost: what is still above that after two rounds is given up.
+HOPELESS = 1.5
 # A step that gains less than this share of what was foretold asks for a new Jacobian.
 _TRUSTED = 0.25
 
@@ -114,7 +115,7 @@ def fit(
     slopes: list[FloatArray] | None = None
     steps: FloatArray | None = None
     fresh, refined, turn = False, False, 0
-    while turn < iterations and not (turn > 1 and cost > _HOPELESS * rival):
+    while turn < iterations and not (turn > 1 and cost > HOPELESS * rival):
         unknowns = here.unknowns()
         if not unknowns:
             break

@@ -19,15 +19,24 @@ from picchio.prediction.percussion import POSITION_KINDS
 _EVERY = 3
 
 
-def held_out(problem: Problem) -> tuple[list[MeasuredRecord], list[MeasuredRecord]]:
-    """Records to fit, and records held out: whole poses, every third; else every third record."""
-    if problem.n_poses >= _EVERY:
-        kept = [r for r in problem.records if r.pose % _EVERY == _EVERY - 1]
-    elif len(problem.records) >= _EVERY:
-        kept = problem.records[_EVERY - 1 :: _EVERY]
-    else:
-        kept = []
-    return [r for r in problem.records if r not in kept], kept
+Split = tuple[list[MeasuredRecord], list[MeasuredRecord]]
+
+
+def held_out(problem: Problem) -> list[Split]:
+    """Ways to choose records to fit and records held out, the usual one first.
+
+    Whole poses are held out, every third; of fewer poses every third record; of fewer records none.
+    """
+    ways: list[Split] = []
+    for offset in reversed(range(_EVERY)):
+        if problem.n_poses >= _EVERY:
+            kept = [r for r in problem.records if r.pose % _EVERY == offset]
+        elif len(problem.records) >= _EVERY:
+            kept = problem.records[offset::_EVERY]
+        else:
+            return [(list(problem.records), [])]
+        ways.append(([r for r in problem.records if r not in kept], kept))
+    return ways
 
 
 def measure_gain(

@@ -10,6 +10,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.drawn_numbers import drawn_cost
 from picchio.diagnosis.percussion.fit import Fit, fit
 from picchio.diagnosis.percussion.latent_start import blow_by_blow
 from picchio.diagnosis.percussion.problem import Problem
@@ -47,7 +48,7 @@ def latent_gain(
             fall = known.chi_square - sum(float((r * r).sum()) for r in there)
             if fall > gain:
                 best, gain = hum, fall
-        return Suspect(best, gain, 2 * len(known.records), (best,))
+        return _promise(best, gain, 2 * len(known.records), known.samples)
     start = kind(target)
     fall, numbers = 0.0, 0
     for residual, columns in zip(
@@ -60,7 +61,17 @@ def latent_gain(
         numbers += columns.shape[1]
     if kind.name == "pulse_jitter" and known.end is not None:
         fall = max(fall, _late_share(problem, known, kind) * float(left @ left))
-    return Suspect(start, fall, numbers, (start,))
+    if kind.discrete:
+        return Suspect(start, fall, numbers, (start,))
+    return _promise(start, fall, numbers, known.samples)
+
+
+def _promise(start: Effect, fall: float, count: int, samples: int) -> Suspect:
+    """A suspect with numbers that are drawn: they cost less than as many free ones."""
+    from picchio.diagnosis.percussion.screen import Suspect
+
+    cost = drawn_cost(fall, count, samples)
+    return Suspect(start, fall, 1 + cost / math.log(max(samples, 2)), (start,))
 
 
 def _late_share(problem: Problem, known: Fit, kind: type[Effect]) -> float:
@@ -127,17 +138,20 @@ def with_hidden(
     return replace(hypothesis, effects=effects)
 
 
-def hidden_numbers(hypothesis: Hypothesis, n_records: int) -> float:
-    """How many hidden numbers the causes hold, counted as BIC counts parameters."""
+def hidden_cost(hypothesis: Hypothesis, n_records: int, samples: int) -> float:
+    """What the causes' hidden numbers cost, in units of chi-square."""
+    known = dict(hypothesis.drawn)
     total = 0.0
     for effect in hypothesis.causes:
+        count = 0.0
         if effect.name == "mains_hum":
-            total += 2 * n_records
+            count = 2 * n_records
         elif effect.name == "pulse_jitter":
-            total += sum(max(len(v) - 1, 0) for v in effect.hidden.values())
+            count = sum(max(len(v) - 1, 0) for v in effect.hidden.values())
         elif effect.name == "missed_hits":  # yes or no: a bit each, not a number
             bits = sum(max(len(v) - 1, 0) for v in effect.hidden.values())
-            total += bits * math.log(2.0)
+            total += bits * math.log(2.0) * math.log(max(samples, 2))
+        total += min(known.get(effect.label, math.inf), count * math.log(max(samples, 2)))
     return total
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -9,7 +10,15 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.fit import Fit, bounded_step, fit, prior_cost, prior_weights
+from picchio.diagnosis.percussion.drawn_numbers import drawn_cost, with_drawn_cost
+from picchio.diagnosis.percussion.fit import (
+    HOPELESS,
+    Fit,
+    bounded_step,
+    fit,
+    prior_cost,
+    prior_weights,
+)
 from picchio.diagnosis.percussion.latent import current_hidden, hidden_columns, with_hidden
 from picchio.diagnosis.percussion.latent_start import blow_by_blow
 from picchio.diagnosis.percussion.problem import Problem
@@ -22,14 +31,17 @@ _CONVERGED = 1e-4
 _SMALLEST = 1e-6  # of the singular values of what a record's blows can do
 
 
-def fit_latent(problem: Problem, start: Fit, kind: type[Effect], target: str) -> Fit:
+def fit_latent(
+    problem: Problem, start: Fit, kind: type[Effect], target: str, rival: float = np.inf
+) -> Fit:
     """Fit the hidden numbers of every record and the unknowns common to all.
 
     Blows' times are looked for blow by blow first, unless they are known in all of these records.
-    Then all are moved at once, by Gauss and Newton's step, where that helps; else in turns.
+    Then all are moved at once, by Gauss and Newton's step, where that helps; else in turns. What
+    stays far above the cost of a `rival` is given up.
     """
     if kind.name == "mains_hum":
-        return start
+        return _priced_hum(problem, start, target)
     here = start
     jitter = kind.name == "pulse_jitter"
     known_in = set(current_hidden(start.hypothesis, kind.name))
@@ -38,27 +50,56 @@ def fit_latent(problem: Problem, start: Fit, kind: type[Effect], target: str) ->
         here = fit(problem, begun, start.records, start.end, iterations=2)
     for turn in range(_ROUNDS):
         before = here.cost
+        if turn > 1 and before > HOPELESS * rival:
+            break
         columns = hidden_columns(problem, here, kind)
         together = _together(problem, here, kind, columns) if jitter else None
         here = together or _in_turns(problem, here, kind, columns)
         if (turn or together) and before - here.cost < _CONVERGED * here.cost:
             break
-    return _told(here, kind)
+    return _told_times(here, kind, columns) if jitter else _told_share(here, kind)
 
 
-def _told(here: Fit, kind: type[Effect]) -> Fit:
-    """With the effect's own parameter as its hidden numbers have it."""
+def _told_times(here: Fit, kind: type[Effect], columns: Sequence[FloatArray]) -> Fit:
+    """With the width of the blows' times, without what noise adds to it, and what they cost."""
+    known = _numbers(here, kind)
+    moved, fall, count = 0.0, 0.0, 0
+    for record, own in zip(here.records, columns, strict=True):
+        numbers = known[record.name][1 : 1 + own.shape[1]]
+        moved += float(numbers @ numbers)
+        fall += float(((own @ numbers) ** 2).sum())
+        count += own.shape[1]
+    std = math.sqrt(moved / max(count, 1) * max(1.0 - count / max(fall, 1e-300), 0.0))
+    return _priced(_with_own(here, kind, std=std), f"{kind.name}:tool", fall, count)
+
+
+def _told_share(here: Fit, kind: type[Effect]) -> Fit:
+    """With the share of the blows that are missing."""
     hidden = current_hidden(here.hypothesis, kind.name)
     numbers = np.concatenate([np.array(v)[1:] for v in hidden.values()])
-    value = (
-        {"std": float(np.sqrt(np.mean(numbers**2)))}
-        if kind.name == "pulse_jitter"
-        else {"fraction": float(numbers.mean())}
-    )
+    return _with_own(here, kind, fraction=float(numbers.mean()))
+
+
+def _with_own(here: Fit, kind: type[Effect], **values: float) -> Fit:
+    """With the effect's own parameter as its hidden numbers have it."""
     effects = tuple(
-        e.with_values(**value) if e.name == kind.name else e for e in here.hypothesis.effects
+        e.with_values(**values) if e.name == kind.name else e for e in here.hypothesis.effects
     )
     return replace(here, hypothesis=replace(here.hypothesis, effects=effects))
+
+
+def _priced_hum(problem: Problem, here: Fit, target: str) -> Fit:
+    """With what the lines' sines and cosines cost, by how much chi-square falls by them."""
+    label = f"mains_hum:{target}"
+    effects = tuple(e for e in here.hypothesis.effects if e.label != label)
+    without = problem.residuals(effects, here.records, here.end)
+    fall = sum(float((r * r).sum()) for r in without) - here.chi_square
+    return _priced(here, label, fall, 2 * len(here.records))
+
+
+def _priced(here: Fit, label: str, fall: float, count: int) -> Fit:
+    cost = drawn_cost(fall, count, here.samples)
+    return replace(here, hypothesis=with_drawn_cost(here.hypothesis, label, cost))
 
 
 def _in_turns(

@@ -28,6 +28,8 @@ _SOME = 3
 _EVERY = 3
 _FIRST = 0.6
 _CHANCE = 4.0
+# A trial that changes the data by so many times what is left beyond noise is tried smaller, too.
+_LARGE = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +39,13 @@ class Suspect:
     Attributes:
         effect: at the size it was tried.
         gain: fall of chi-square that the screening promises.
-        numbers: how many free numbers the effect has.
+        numbers: how many free numbers the effect has; what costs less counts as a part of one.
         starts: other sizes to start the fit from, the best first.
     """
 
     effect: Effect
     gain: float
-    numbers: int
+    numbers: float
     starts: tuple[Effect, ...]
 
     @property
@@ -117,6 +119,12 @@ class Screen:
         """Chi-square that is left to explain."""
         return float(self.left @ self.left)
 
+    @property
+    def beyond(self) -> float:
+        """Standard deviations that are left beyond noise, all in all."""
+        count = self.left.size
+        return math.sqrt(max(self.total - count, 3.0 * math.sqrt(2.0 * count)))
+
     def suspect(self, candidate: tuple[type[Effect], str]) -> Suspect | None:
         """What an effect at a target promises; None where it can't act, or is known already."""
         kind, target = candidate
@@ -133,7 +141,9 @@ class Screen:
         trials = [kind(target, **values) for values in kind(target).trials(self.scales)]
         if self.faint:
             trials = [self._faint(trial) for trial in trials]
-        return _suspect(self.problem, self.fit, trials, self.project, self.left, self.faint)
+        return _suspect(
+            self.problem, self.fit, trials, self.project, self.left, self.faint, self.beyond
+        )
 
     def _faint(self, trial: Effect) -> Effect:
         """The trial so small that it changes the data by some standard deviations all in all."""
@@ -176,16 +186,32 @@ def _suspect(
     project: Projector,
     left: FloatArray,
     faint: bool,
+    beyond: float,
 ) -> Suspect | None:
     base, columns, kept = flat(fit.residuals), [], []
-    for trial in trials:
-        changed = fit.hypothesis.plus(trial)
+
+    def change(trial: Effect) -> FloatArray | None:
         try:
-            there = flat(problem.residuals(changed.effects, fit.records, fit.end))
+            effects = fit.hypothesis.plus(trial).effects
+            return flat(problem.residuals(effects, fit.records, fit.end)) - base
         except InputError:  # at this size the model is none
+            return None
+
+    several = _vector(trials)
+    for trial in trials:
+        moved = change(trial)
+        if moved is None:
             continue
-        columns.append(project((there - base)[:, None])[:, 0])
-        kept.append(trial)
+        tried = [(trial, moved)]
+        large = float(np.linalg.norm(moved)) / beyond
+        if large > _LARGE and not faint and not trial.discrete:
+            smaller = type(trial)(trial.target, **_resized(trial, 1.0 / large))
+            moved = change(smaller) if smaller.values != trial.values else None
+            if moved is not None:
+                tried = [(smaller, moved)] if several else [*tried, (smaller, moved)]
+        for one, moved in tried:
+            columns.append(project(moved[:, None])[:, 0])
+            kept.append(one)
     if not kept:
         return None
     moves = np.stack(columns, axis=1)
@@ -213,7 +239,7 @@ def _suspect(
         order = np.argsort(-gains)
         starts = tuple(kept[i] for i in order[:2])
         return Suspect(starts[0], float(gains[order[0]]), 4, starts)
-    if _vector(kept):
+    if several and _vector(kept):
         weights = np.linalg.lstsq(moves, -left, rcond=None)[0]
         total = float(left @ left - ((left + moves @ weights) ** 2).sum())
         values: dict[str, float] = {}

@@ -9,7 +9,7 @@ from typing import Any
 
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.fit import Fit, fit, fit_growing, kinked
-from picchio.diagnosis.percussion.latent import hidden_numbers
+from picchio.diagnosis.percussion.latent import hidden_cost
 from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.screen import Screen, Suspect
@@ -56,11 +56,14 @@ class Trial:
 
 
 def score(found: Fit) -> float:
-    """BIC: chi-square and priors, plus ln(samples) for every number the causes hold."""
+    """BIC: chi-square and priors, plus ln(samples) for every number the causes hold.
+
+    What numbers cost that are drawn anew in every record says `drawn_numbers`.
+    """
     causes = found.hypothesis.causes
     numbers = sum(_numbers(effect) for effect in causes)
-    numbers_hidden = hidden_numbers(found.hypothesis, len(found.records))
-    return found.cost + (numbers + numbers_hidden) * math.log(max(found.samples, 2))
+    hidden = hidden_cost(found.hypothesis, len(found.records), found.samples)
+    return found.cost + numbers * math.log(max(found.samples, 2)) + hidden
 
 
 def _numbers(effect: Effect) -> int:
@@ -283,7 +286,7 @@ def _fit_long(
     if effect.latent is not None:
         turns = 0 if effect.name == "pulse_jitter" else 3
         long = fit(problem, short, records, None, iterations=turns)
-        return fit_latent(problem, long, type(effect), effect.target)
+        return fit_latent(problem, long, type(effect), effect.target, rival)
     if kinked(short):  # a small error early is a large one late: not all at once
         short = fit_growing(problem, short, records, windows=_ON_THE_WAY, iterations=3).hypothesis
     return fit(problem, short, records, None, iterations=6, rival=rival)

@@ -86,6 +86,7 @@ class Hypothesis:
         n_nuisances: how many.
         freed: labels of nuisances that may leave their tolerance: they are causes then.
         scales: label.parameter -> size of a linear parameter.
+        drawn: label -> what its numbers, drawn anew in every record, cost (`drawn_numbers`).
     """
 
     effects: tuple[Effect, ...]
@@ -93,6 +94,7 @@ class Hypothesis:
     n_nuisances: int
     freed: frozenset[str] = frozenset()
     scales: tuple[tuple[str, float], ...] = ()
+    drawn: tuple[tuple[str, float], ...] = ()
 
     @classmethod
     def baseline(cls, robot: FlexibleRobot, tolerance: Tolerance) -> Hypothesis:
@@ -147,7 +149,8 @@ class Hypothesis:
         kept = tuple(
             e for i, e in enumerate(self.effects) if i < self.n_nuisances or e.label != label
         )
-        return replace(self, effects=kept)
+        drawn = tuple(item for item in self.drawn if item[0] != label)
+        return replace(self, effects=kept, drawn=drawn)
 
     def _tolerated(self, nuisance: Effect) -> Effect:
         """At the tolerated value nearest to where it is: a jump from there would skip cycles."""

@@ -7,6 +7,9 @@ from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
+# Hz: a tool's bracket is soft, wax and a stud are stiffer.
+_FREQUENCIES = (50.0, 70.0, 100.0, 140.0, 200.0, 300.0, 450.0)
+
 
 class MountResonance(Effect):
     """Each axis passes w^2 / (s^2 + 2 zeta w s + w^2)."""
@@ -36,4 +39,4 @@ class MountResonance(Effect):
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """All over the frequencies where mounts are."""
-        return [{"frequency": f, "damping_ratio": 0.06} for f in (50.0, 70.0, 100.0, 140.0, 200.0)]
+        return [{"frequency": f, "damping_ratio": 0.06} for f in _FREQUENCIES]

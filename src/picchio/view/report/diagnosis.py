@@ -132,6 +132,8 @@ def headline(diagnosis: Diagnosis) -> str:
                 f"Part of what is wrong: {named}. It explains {most} of the error; more than "
                 f"noise is left, and nothing known explains that.{effect}"
             )
+    if diagnosis.note:
+        return f"The simulation is wrong. {diagnosis.note[:1].upper()}{diagnosis.note[1:]}."
     lead = f" What helped a little stands below: {len(diagnosis.leads)} leads, no more."
     return (
         "The simulation is wrong, and no known cause explains it: none is claimed."
