@@ -70,7 +70,15 @@ def _left(left: FloatArray, slopes: FloatArray | None, covariance: FloatArray) -
     total = float(left @ left)
     if slopes is None:
         return total
-    root = np.linalg.cholesky(covariance + 1e-18 * np.eye(len(covariance)) * covariance.max())
-    scaled = slopes @ root
+    scaled = slopes @ _root(covariance)
     right = scaled.T @ left
-    return total - float(right @ np.linalg.solve(np.eye(len(root)) + scaled.T @ scaled, right))
+    return total - float(right @ np.linalg.solve(np.eye(right.size) + scaled.T @ scaled, right))
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """(n, n) whose product with its transpose is the covariance, singular or not."""
+    scale = np.sqrt(np.maximum(covariance.diagonal(), 0.0))
+    outer = np.outer(scale, scale)
+    related = np.where(outer > 0.0, covariance / np.where(outer > 0.0, outer, 1.0), 0.0)
+    values, vectors = np.linalg.eigh(0.5 * (related + related.T))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
