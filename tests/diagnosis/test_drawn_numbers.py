@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 from scipy.stats import norm
 
@@ -10,13 +9,10 @@ from picchio.diagnosis.percussion.drawn_numbers import drawn_cost
 
 
 def deviance(seen, width):
-    """-2 log of the likelihood of numbers seen with unit noise, each integrated by quadrature."""
-
-    def one(x):
-        likelihood = lambda z: norm.pdf(x - width * z) * norm.pdf(z)  # noqa: E731
-        return quad(likelihood, -12.0, 12.0, points=[0.0, x / width], limit=200)[0]
-
-    return -2.0 * sum(np.log(one(x)) for x in seen)
+    """-2 log of the likelihood of numbers seen with unit noise, each integrated numerically."""
+    z = np.linspace(-12.0, 12.0, 8001)
+    likelihood = norm.pdf(seen[:, None] - width * z) * norm.pdf(z)
+    return -2.0 * np.log(np.trapezoid(likelihood, z, axis=1)).sum()
 
 
 @pytest.mark.parametrize("spread", [0.8, 2.0, 6.0])

@@ -13,6 +13,7 @@ import pytest
 from lxml import html as lxml_html
 
 from picchio.campaign import Campaign
+from picchio.cli.diagnose_tables import show_diagnosis
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.candidates import measure_scales
 from picchio.diagnosis.percussion.diagnose import PercussionDiagnosis
@@ -190,6 +191,24 @@ def test_every_verdict_has_its_page(case, verdict):
     assert ("payload" in said) == (verdict in ("partial", "ambiguous"))
     assert ("cable" in text(html)) == (verdict in ("unexplained", "ambiguous"))
     assert ("Candidates of step 1" in html) == (verdict != "nothing-wrong")
+
+
+def test_what_all_sensors_have_alike_is_said_and_not_called_noise(case, capsys):
+    why = "sensor gain would explain it, but by the same amount in all sensors"
+    leads = tuple(("sensor_gain", group) for group in ("accelerometer.tool", "deflection"))
+    diagnosis = replace(
+        case.found.diagnosis, verdict="unexplained", causes=(), leads=leads, note=why
+    )
+    html = diagnosis_report(replace(case.found, diagnosis=diagnosis))
+    assert why[1:] in text(html, "//*[@id='verdict']")
+    assert "hardly the cause" in text(html) and "force at the tool" in text(html)
+    assert "helped a little" not in text(html)
+    show_diagnosis(diagnosis, None)
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"unexplained: {why}." in said
+    assert "hardly the cause: sensor_gain of deflection" in said
+    assert "more than noise" not in said
+    assert diagnosis.to_dict()["note"] == why
 
 
 def test_the_residual_page_names_no_cause_but_shows_where(case):

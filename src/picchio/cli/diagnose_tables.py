@@ -21,7 +21,7 @@ def show_diagnosis(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
     from picchio.studies.verdict import format_count
 
     out = console()
-    out.print(f"[bold]{found.verdict}[/bold]: {VERDICTS[found.verdict]}.")
+    out.print(f"[bold]{found.verdict}[/bold]: {found.note or VERDICTS[found.verdict]}.")
     if found.causes:
         table = Table(box=None, pad_edge=False, header_style="dim")
         for name in ("cause", "where", "confidence", "value", "std", "unit"):
@@ -40,10 +40,11 @@ def show_diagnosis(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
             out.print(f"  {name}: {effect_class(name).meaning}")
     for each in differences(found):
         out.print(f"  these data cannot tell it from {in_words(each)}")
-    if found.note:
-        out.print(f"  {found.note}", highlight=False)
+    helped = (
+        "explains it, but is hardly the cause" if found.note else "helped, but is not the cause"
+    )
     for effect, target in found.leads:
-        out.print(f"  helped, but is not the cause: {effect} of {target}")
+        out.print(f"  {helped}: {effect} of {target}")
     gain = found.gain
     if gain is not None:
         count = len(gain.held_out_records)

@@ -107,7 +107,7 @@ class Diagnosis:
         gain: on held-out records; None where nothing was fitted.
         life: {"baseline": {...}, "extended": {...}}; None where it can't be known.
         next_measurement: what to measure to know more; None where there is nothing to ask.
-        note: what the verdict leaves to be said, half a sentence; empty where there is nothing.
+        note: why, where it is not what `VERDICTS` says; empty otherwise.
         scores: every candidate's score, for the report: dicts with effect, target, numbers.
         details: anything else that the report shows; not part of the JSON contract.
     """

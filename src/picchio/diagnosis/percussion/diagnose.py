@@ -158,7 +158,7 @@ def diagnose_percussion(
     elif verdict == "unexplained":
         leads = tuple(_leads(found))
     ask = None
-    if verdict in ("ambiguous", "unexplained", "partial"):
+    if verdict in ("ambiguous", "unexplained", "partial") and not common:
         say("looking for the measurement that would tell most")
         ask = next_measurement(problem, whole, rivals, same)
     claimed = verdict in ("named", "ambiguous", "partial")
