@@ -1,18 +1,24 @@
 """What numbers of one distribution cost, against the likelihood integrated over them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 from scipy.optimize import minimize_scalar
 from scipy.stats import norm
 
-from picchio.diagnosis.percussion.drawn_numbers import drawn_cost
+from picchio.diagnosis.percussion.causes import with_hum
+from picchio.diagnosis.percussion.drawn_numbers import drawn_cost, width_spread
+from picchio.diagnosis.result import Cause, Value
+from picchio.model.effects import effect_class
 
 
 def deviance(seen, width):
     """-2 log of the likelihood of numbers seen with unit noise, each integrated numerically."""
     z = np.linspace(-12.0, 12.0, 8001)
     likelihood = norm.pdf(seen[:, None] - width * z) * norm.pdf(z)
-    return -2.0 * np.log(np.trapezoid(likelihood, z, axis=1)).sum()
+    return -2.0 * np.log(trapezoid(likelihood, z, axis=1)).sum()
 
 
 @pytest.mark.parametrize("spread", [0.8, 2.0, 6.0])
@@ -42,3 +48,36 @@ def test_what_chance_gives_is_paid_back():
 
 def test_numbers_that_are_told_well_cost_no_more_than_free_ones():
     assert drawn_cost(1e9, 40, 10_000) == pytest.approx(40 * np.log(10_000))
+
+
+@pytest.mark.parametrize("width", [1.5, 5.0, 50.0])
+def test_the_width_is_known_as_well_as_is_said(width):
+    """Forty numbers seen with unit noise, many times over."""
+    rng = np.random.default_rng(9)
+    seen = np.hypot(1.0, width) * rng.standard_normal((4000, 40))
+    falls = (seen**2).sum(axis=1)
+    found = np.sqrt(np.maximum((seen**2).mean(axis=1) - 1.0, 0.0))
+    told = np.array([width_spread(w, f, 40) for w, f in zip(found, falls, strict=True)])
+    assert np.median(told) == pytest.approx(found.std(), rel=0.08)
+    assert found.mean() == pytest.approx(width, rel=0.03)
+
+
+def test_a_hum_is_as_strong_as_it_is_without_noise():
+    """Lines of one amplitude and any phase, seen with unit noise of their sines and cosines."""
+    rng = np.random.default_rng(10)
+    records, amplitude = 18, 3.0
+    hum = effect_class("mains_hum")
+    cause = Cause("mains_hum", "deflection", 1.0, {"amplitude": Value(0.0, 0.0, "rad")})
+    told = []
+    for _ in range(1500):
+        phase = rng.uniform(0.0, 2.0 * np.pi, records)
+        lines = amplitude * np.array([np.cos(phase), np.sin(phase)])
+        lines = lines + rng.standard_normal(lines.shape)
+        seen = float(np.sqrt((lines**2).sum() / records))
+        label = ("mains_hum:deflection", float((lines**2).sum()), 2 * records)
+        found = SimpleNamespace(effects=(hum("deflection", amplitude=seen),), drawn=(label,))
+        told.append(with_hum([cause], found)[0].parameters["amplitude"])
+    values = np.array([t.value for t in told])
+    assert values.mean() == pytest.approx(amplitude, rel=0.01)
+    assert np.median([t.std for t in told]) == pytest.approx(values.std(), rel=0.1)
+    assert told[0].unit == "rad"

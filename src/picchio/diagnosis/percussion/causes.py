@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from picchio.campaign import Tolerance
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.life import Unsure
 from picchio.diagnosis.percussion.confidence import confidence
+from picchio.diagnosis.percussion.drawn_numbers import width_spread
 from picchio.diagnosis.percussion.fit import Fit
 from picchio.diagnosis.percussion.problem import MeasuredRecord
 from picchio.diagnosis.percussion.select import EXACT, Search
@@ -18,6 +20,7 @@ from picchio.diagnosis.percussion.trials import Trial, score
 from picchio.diagnosis.percussion.unknowns import NUISANCE_KEYS, Hypothesis
 from picchio.diagnosis.result import Cause, Value
 from picchio.model import Effect
+from picchio.model.effects.effect import CHANNEL_UNIT
 from picchio.robot import FlexibleRobot
 
 
@@ -52,7 +55,9 @@ def told_causes(
             for k, unknown in enumerate(unknowns):
                 if unknown.effect == index and unknown.name == p.name:
                     std = abs(unknown.slope(vector[k])) * math.sqrt(max(variance[k], 0.0))
-            values[p.name] = Value(effect.values[p.name], std, effect.unit(p.name))
+            if effect.name == "pulse_jitter":
+                std = _width_spread(whole, effect)
+            values[p.name] = Value(effect.values[p.name], std, _unit(whole, effect, p.name))
         result.append(
             Cause(
                 effect.name,
@@ -62,6 +67,25 @@ def told_causes(
             )
         )
     return tuple(result)
+
+
+def _unit(whole: Fit, effect: Effect, parameter: str) -> str:
+    """The unit of a parameter; a sensor's range is in the unit that the sensor reads."""
+    unit = effect.unit(parameter)
+    if unit != CHANNEL_UNIT:
+        return unit
+    for record in whole.records:
+        for channel in record.setup.channels:
+            if channel.group == effect.target and channel.name in record.noise:
+                return record.noise[channel.name].unit
+    return "1"
+
+
+def _width_spread(whole: Fit, effect: Effect) -> float:
+    for label, fall, count in whole.hypothesis.drawn:
+        if label == effect.label:
+            return width_spread(next(iter(effect.values.values())), fall, count)
+    return 0.0
 
 
 def told_covariance(whole: Fit) -> FloatArray:
@@ -167,16 +191,20 @@ def told_nuisances(found: Fit) -> dict[str, Value]:
 
 
 def with_hum(causes: Sequence[Cause], lines: Hypothesis) -> tuple[Cause, ...]:
-    """The causes with the hum's amplitude, which is not fitted but taken out of the residual."""
-    amplitude = {e.target: e.values["amplitude"] for e in lines.effects if e.name == "mains_hum"}
-    return tuple(
-        Cause(
-            c.effect,
-            c.target,
-            c.confidence,
-            {**c.parameters, "amplitude": Value(amplitude[c.target], 0.0, "1")},
-        )
-        if c.effect == "mains_hum"
-        else c
-        for c in causes
-    )
+    """The causes with the hum's amplitude, which is not fitted but taken out of the residual.
+
+    What noise adds to the lines' power is taken out of it.
+    """
+    told = []
+    gains = {label: (fall, count) for label, fall, count in lines.drawn}
+    for cause in causes:
+        found = {e.target: e for e in lines.effects if e.name == "mains_hum"}.get(cause.target)
+        if cause.effect == "mains_hum" and found is not None:
+            seen, unit = found.values["amplitude"], cause.parameters["amplitude"].unit
+            fall, count = gains.get(found.label, (math.inf, 0))
+            amplitude = seen * math.sqrt(max(1.0 - count / max(fall, 1e-300), 0.0))
+            std = seen / math.sqrt(max(fall, 1e-300))
+            value = Value(amplitude, std, unit)
+            cause = replace(cause, parameters={**cause.parameters, "amplitude": value})
+        told.append(cause)
+    return tuple(told)

@@ -30,7 +30,20 @@ def drawn_cost(fall: float, count: int, samples: int) -> float:
     return count * min(1.0 + math.log(fall / count), math.log(max(samples, 2)))
 
 
-def with_drawn_cost(hypothesis: Hypothesis, label: str, cost: float) -> Hypothesis:
-    """The hypothesis with what an effect's drawn numbers cost written down."""
+def with_drawn(hypothesis: Hypothesis, label: str, fall: float, count: int) -> Hypothesis:
+    """The hypothesis with what an effect's drawn numbers gain written down."""
     others = tuple(item for item in hypothesis.drawn if item[0] != label)
-    return replace(hypothesis, drawn=(*others, (label, cost)))
+    return replace(hypothesis, drawn=(*others, (label, fall, count)))
+
+
+def width_spread(width: float, fall: float, count: int) -> float:
+    """Standard deviation of the width of a distribution, from numbers drawn from it.
+
+    Args:
+        width: of the distribution, without what noise adds.
+        fall: of chi-square, by the numbers together.
+        count: of the numbers.
+    """
+    if fall <= count or count < 1:
+        return width
+    return width * fall / (fall - count) / math.sqrt(2.0 * count)

@@ -140,7 +140,7 @@ def with_hidden(
 
 def hidden_cost(hypothesis: Hypothesis, n_records: int, samples: int) -> float:
     """What the causes' hidden numbers cost, in units of chi-square."""
-    known = dict(hypothesis.drawn)
+    known = {label: drawn_cost(fall, count, samples) for label, fall, count in hypothesis.drawn}
     total = 0.0
     for effect in hypothesis.causes:
         count = 0.0

@@ -10,7 +10,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.drawn_numbers import drawn_cost, with_drawn_cost
+from picchio.diagnosis.percussion.drawn_numbers import with_drawn
 from picchio.diagnosis.percussion.fit import (
     HOPELESS,
     Fit,
@@ -98,8 +98,7 @@ def _priced_hum(problem: Problem, here: Fit, target: str) -> Fit:
 
 
 def _priced(here: Fit, label: str, fall: float, count: int) -> Fit:
-    cost = drawn_cost(fall, count, here.samples)
-    return replace(here, hypothesis=with_drawn_cost(here.hypothesis, label, cost))
+    return replace(here, hypothesis=with_drawn(here.hypothesis, label, fall, count))
 
 
 def _in_turns(

@@ -86,7 +86,7 @@ class Hypothesis:
         n_nuisances: how many.
         freed: labels of nuisances that may leave their tolerance: they are causes then.
         scales: label.parameter -> size of a linear parameter.
-        drawn: label -> what its numbers, drawn anew in every record, cost (`drawn_numbers`).
+        drawn: (label, fall of chi-square, count) of numbers drawn anew in every record.
     """
 
     effects: tuple[Effect, ...]
@@ -94,7 +94,7 @@ class Hypothesis:
     n_nuisances: int
     freed: frozenset[str] = frozenset()
     scales: tuple[tuple[str, float], ...] = ()
-    drawn: tuple[tuple[str, float], ...] = ()
+    drawn: tuple[tuple[str, float, int], ...] = ()
 
     @classmethod
     def baseline(cls, robot: FlexibleRobot, tolerance: Tolerance) -> Hypothesis:

@@ -173,6 +173,10 @@ class Effect(ABC):
         return [{}]
 
 
+# A parameter in the unit of whatever its group of channels reads.
+CHANNEL_UNIT = "channel"
+
+
 def parameter(
     name: str,
     unit: str = "1",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import CHANNEL_UNIT, Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
@@ -18,7 +18,9 @@ class MainsHum(Effect):
     where = "sensor"
     target_kind = "channel group"
     parameters = (
-        parameter("amplitude", lower=0.0, upper=1e12, meaning="in the channel's unit"),
+        parameter(
+            "amplitude", CHANNEL_UNIT, lower=0.0, upper=1e12, meaning="in the channel's unit"
+        ),
         parameter("frequency", "Hz", neutral=50.0, lower=40.0, upper=70.0, meaning="of the mains"),
     )
     meaning = "the mains leak into the cable"

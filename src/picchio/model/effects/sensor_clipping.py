@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import CHANNEL_UNIT, Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
@@ -17,11 +17,12 @@ class SensorClipping(Effect):
     parameters = (
         parameter(
             "limit",
+            CHANNEL_UNIT,
             neutral=float("inf"),
             lower=1e-12,
             upper=1e12,
             log=True,
-            meaning="largest reading, in the channel's unit",
+            meaning="largest reading",
         ),
     )
     meaning = "the reading ends at the sensor's range"
