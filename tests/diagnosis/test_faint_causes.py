@@ -126,3 +126,27 @@ def test_a_first_look_drops_only_what_promises_nothing():
             dropped.append(whole.label)
     assert "payload:tool" in kept
     assert len(dropped) > 2
+
+
+def test_a_trial_far_too_large_is_tried_as_small_as_what_is_left(problem, base):
+    """A contact a tenth as stiff as the trials: at their size it no longer looks like itself."""
+    effects = base.hypothesis.effects
+    scales = measure_scales(problem, effects, problem.predictions(effects))
+    look = Screen(problem, base, scales)
+    contact = effect_class("workpiece_contact")
+    typical = [contact("tool", **values) for values in contact("tool").trials(scales)]
+    kept, changes = look._changes(typical)
+    assert len(kept) == 2 * len(typical)
+    for one, large, small in zip(typical, kept[::2], kept[1::2], strict=True):
+        assert large.values == one.values
+        assert small.values["stiffness"] < 0.3 * one.values["stiffness"]
+    assert all(np.linalg.norm(c) < 10.0 * look.beyond for c in changes[1::2])
+    # A vector's components stay one each; an on-off effect has but one size.
+    offset = effect_class("tool_offset")
+    kept, _ = look._changes([offset("tool", **v) for v in offset("tool").trials(scales)])
+    assert len(kept) == 3
+    axes = effect_class("sensor_axes")
+    place = "accelerometer.tool"
+    swapped = [axes(place, **values) for values in axes(place).trials(scales)]
+    assert swapped[0].discrete
+    assert [e.values for e in look._changes(swapped)[0]] == [e.values for e in swapped]

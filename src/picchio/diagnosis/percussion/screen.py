@@ -18,6 +18,7 @@ from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.fit import Fit, prior_weights
 from picchio.diagnosis.percussion.latent import LATENT, latent_gain
 from picchio.diagnosis.percussion.problem import Problem
+from picchio.diagnosis.percussion.trial_sizes import bounded, moves_one_each, resized, scaled
 from picchio.model import Effect
 from picchio.model.effects import Scales
 
@@ -141,9 +142,37 @@ class Screen:
         trials = [kind(target, **values) for values in kind(target).trials(self.scales)]
         if self.faint:
             trials = [self._faint(trial) for trial in trials]
-        return _suspect(
-            self.problem, self.fit, trials, self.project, self.left, self.faint, self.beyond
-        )
+        return _judged(*self._changes(trials), self.left, self.faint)
+
+    def _changes(self, trials: Sequence[Effect]) -> tuple[list[Effect], list[FloatArray]]:
+        """The trials, smaller ones where they are far too large, and what they change."""
+        fit, base = self.fit, flat(self.fit.residuals)
+
+        def change(trial: Effect) -> FloatArray | None:
+            try:
+                effects = fit.hypothesis.plus(trial).effects
+                return flat(self.problem.residuals(effects, fit.records, fit.end)) - base
+            except InputError:  # at this size the model is none
+                return None
+
+        components = moves_one_each(trials)
+        kept: list[Effect] = []
+        columns: list[FloatArray] = []
+        for trial in trials:
+            moved = change(trial)
+            if moved is None:
+                continue
+            tried = [(trial, moved)]
+            large = float(np.linalg.norm(moved)) / self.beyond
+            if large > _LARGE and not self.faint and not trial.discrete:
+                smaller = type(trial)(trial.target, **resized(trial, 1.0 / large))
+                moved = change(smaller) if smaller.values != trial.values else None
+                if moved is not None:  # of a vector's components one size each
+                    tried = [(smaller, moved)] if components else [*tried, (smaller, moved)]
+            for one, moved in tried:
+                columns.append(self.project(moved[:, None])[:, 0])
+                kept.append(one)
+        return kept, columns
 
     def _faint(self, trial: Effect) -> Effect:
         """The trial so small that it changes the data by some standard deviations all in all."""
@@ -159,7 +188,7 @@ class Screen:
         change *= math.sqrt(len(fit.records) / len(some))
         if not change > _FAINT:
             return trial
-        values = _resized(trial, _FAINT / change)
+        values = resized(trial, _FAINT / change)
         return type(trial)(trial.target, **values)
 
     def ranked(self, suspects: Iterable[Suspect | None]) -> list[Suspect]:
@@ -179,39 +208,10 @@ def _part(fit: Fit) -> Fit:
     )
 
 
-def _suspect(
-    problem: Problem,
-    fit: Fit,
-    trials: Sequence[Effect],
-    project: Projector,
-    left: FloatArray,
-    faint: bool,
-    beyond: float,
+def _judged(
+    kept: Sequence[Effect], columns: Sequence[FloatArray], left: FloatArray, faint: bool
 ) -> Suspect | None:
-    base, columns, kept = flat(fit.residuals), [], []
-
-    def change(trial: Effect) -> FloatArray | None:
-        try:
-            effects = fit.hypothesis.plus(trial).effects
-            return flat(problem.residuals(effects, fit.records, fit.end)) - base
-        except InputError:  # at this size the model is none
-            return None
-
-    several = _vector(trials)
-    for trial in trials:
-        moved = change(trial)
-        if moved is None:
-            continue
-        tried = [(trial, moved)]
-        large = float(np.linalg.norm(moved)) / beyond
-        if large > _LARGE and not faint and not trial.discrete:
-            smaller = type(trial)(trial.target, **_resized(trial, 1.0 / large))
-            moved = change(smaller) if smaller.values != trial.values else None
-            if moved is not None:
-                tried = [(smaller, moved)] if several else [*tried, (smaller, moved)]
-        for one, moved in tried:
-            columns.append(project(moved[:, None])[:, 0])
-            kept.append(one)
+    """What the trials of one effect explain of what is left, by the change each makes."""
     if not kept:
         return None
     moves = np.stack(columns, axis=1)
@@ -239,7 +239,7 @@ def _suspect(
         order = np.argsort(-gains)
         starts = tuple(kept[i] for i in order[:2])
         return Suspect(starts[0], float(gains[order[0]]), 4, starts)
-    if several and _vector(kept):
+    if moves_one_each(kept):
         weights = np.linalg.lstsq(moves, -left, rcond=None)[0]
         total = float(left @ left - ((left + moves @ weights) ** 2).sum())
         values: dict[str, float] = {}
@@ -247,10 +247,10 @@ def _suspect(
             for p in trial.parameters:
                 if trial.values[p.name] != p.neutral:
                     values[p.name] = float(np.clip(weight, -6.0, 6.0)) * trial.values[p.name]
-        start = _bounded(kept[0], values)
+        start = bounded(kept[0], values)
         return Suspect(start, total, numbers, (start,))
     order = np.argsort(-gains)
-    starts = tuple(_scaled(kept[i], float(alone[i]), linear) for i in order[:2])
+    starts = tuple(scaled(kept[i], float(alone[i]), linear) for i in order[:2])
     span = float(left @ left - _leave(moves, left))
     return Suspect(starts[0], max(float(gains[order[0]]), 0.7 * span), numbers, starts)
 
@@ -258,41 +258,3 @@ def _suspect(
 def _leave(moves: FloatArray, left: FloatArray) -> float:
     weights = np.linalg.lstsq(moves, -left, rcond=None)[0]
     return float(((left + moves @ weights) ** 2).sum())
-
-
-def _vector(trials: Sequence[Effect]) -> bool:
-    """Whether the trials move one parameter each, as a vector's components."""
-    moved = [tuple(p.name for p in t.parameters if t.values[p.name] != p.neutral) for t in trials]
-    return len(trials) > 1 and len(set(moved)) == len(moved) and all(len(m) == 1 for m in moved)
-
-
-def _scaled(trial: Effect, weight: float, signed: bool) -> Effect:
-    """The trial made larger or smaller as the residual asks."""
-    size = float(np.clip(abs(weight), 0.05, 8.0))
-    return _bounded(trial, _resized(trial, math.copysign(size, weight) if signed else size))
-
-
-def _resized(trial: Effect, size: float) -> dict[str, float]:
-    """A trial's values with its distance from doing nothing so many times as large."""
-    values = dict(trial.values)
-    for p in trial.parameters:
-        value = values[p.name]
-        if value == p.neutral or not math.isfinite(value):
-            continue
-        if p.neutral == 0.0 and not p.logarithmic:
-            new = value * size
-        elif p.neutral == 1.0 and p.logarithmic:
-            new = math.exp(math.log(value) * float(np.clip(size, -3.0, 3.0)))
-        elif math.isinf(p.neutral) and p.name in ("stiffness", "limit"):
-            new = value / size if p.name == "stiffness" else value
-        else:
-            continue
-        values[p.name] = min(max(new, p.lower), p.upper)
-    return {p.name: values[p.name] for p in trial.parameters if values[p.name] != p.neutral}
-
-
-def _bounded(trial: Effect, values: dict[str, float]) -> Effect:
-    """The effect with values brought within their bounds."""
-    bounds = {p.name: (p.lower, p.upper) for p in trial.parameters}
-    inside = {k: min(max(v, bounds[k][0]), bounds[k][1]) for k, v in values.items()}
-    return type(trial)(trial.target, **inside)
