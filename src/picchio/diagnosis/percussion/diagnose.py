@@ -153,12 +153,13 @@ def diagnose_percussion(
         pairs = tuple(sorted(_pair(label) for label in t.fit.hypothesis.labels))
         others.setdefault(pairs, t.fit.hypothesis)
     leads: tuple[tuple[str, str], ...] = ()
-    if common:
+    note = _why_common(common) if after.is_noise else ""
+    if note:
         leads = tuple((c.effect, c.target) for c in causes)
     elif verdict == "unexplained":
         leads = tuple(_leads(found))
     ask = None
-    if verdict in ("ambiguous", "unexplained", "partial") and not common:
+    if verdict in ("ambiguous", "unexplained", "partial") and not note:
         say("looking for the measurement that would tell most")
         ask = next_measurement(problem, whole, rivals, same)
     claimed = verdict in ("named", "ambiguous", "partial")
@@ -171,7 +172,7 @@ def diagnose_percussion(
         gain=gain,
         next_measurement=ask,
         scores=tuple(_scores(found)),
-        note=_why_common(common) if common else "",
+        note=note,
     )
     return PercussionDiagnosis(
         diagnosis, problem, nominal, whole, found, before, after, scales,
@@ -226,6 +227,8 @@ def _sure(causes: Sequence[Cause]) -> bool:
 
 
 def _why_common(names: Sequence[str]) -> str:
+    if not names:
+        return ""
     said = " and ".join(name.replace("_", " ") for name in names)
     return (
         f"{said} would explain it, but by the same amount in all sensors: then it is not they that "
