@@ -50,8 +50,9 @@ def cases(draws):
             yield {"robot": ARM, "kind": "null", "snr": 40, "draw": 40 * draw + n}
         for n in range(20):
             yield {"robot": ARM, "kind": "null", "snr": 20, "draw": 20 * draw + n}
-        for effect in EFFECTS:
-            yield {"robot": ARM, "kind": "left-out", "effect": effect, "snr": 40, "draw": draw}
+        for snr in (40, 20):
+            for effect in EFFECTS:
+                yield {"robot": ARM, "kind": "left-out", "effect": effect, "snr": snr, "draw": draw}
         for effect in EFFECTS:
             yield {"robot": ARM, "kind": "weak", "effect": effect, "snr": 20, "draw": draw}
         for effect in EFFECTS:
