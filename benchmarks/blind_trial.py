@@ -42,6 +42,8 @@ def cases(draws):
             yield {"robot": ARM, "kind": "single", "effect": effect, "snr": 40, "draw": draw}
         for kind in OUTSIDE:
             yield {"robot": ARM, "kind": "outside", "effect": kind, "snr": 40, "draw": draw}
+        for effect in EFFECTS:
+            yield {"robot": ARM, "kind": "mixed", "effect": effect, "snr": 40, "draw": draw}
         for n in range(12):
             yield {"robot": ARM, "kind": "pair", "snr": 40, "draw": 12 * draw + n}
         for n in range(4):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from picchio.diagnosis.percussion.steadiness import unsteadiness
+from picchio.diagnosis.percussion.steadiness import between_poses, unsteadiness
 
 POSES, RECORDS, SAMPLES, UNKNOWNS = 6, 3, 80, 4
 
@@ -26,7 +26,15 @@ def fitted(rng, moves=0.0, poses=POSES):
         (y - j @ x).reshape(2, SAMPLES) for y, j in zip(data, jacobians, strict=True)
     ]  # fmt: skip
     records = tuple(SimpleNamespace(pose=k // RECORDS) for k in range(len(data)))
-    return SimpleNamespace(records=records, jacobians=jacobians, residuals=residuals)
+    return SimpleNamespace(
+        records=records,
+        jacobians=[-j for j in jacobians],
+        residuals=residuals,
+        hypothesis=SimpleNamespace(unknowns=lambda: range(UNKNOWNS)),
+        normal_matrix=lambda: sum(j.T @ j for j in jacobians),
+        solution=x,
+        data=data,
+    )
 
 
 @pytest.mark.parametrize("poses", [1, 3, 6])
@@ -46,3 +54,32 @@ def test_an_unknown_that_differs_from_pose_to_pose_shows():
 
 def test_without_slopes_nothing_is_said():
     assert unsteadiness(SimpleNamespace(jacobians=None)) == 0.0
+
+
+def test_the_spread_between_poses_is_that_of_fits_without_one():
+    found = fitted(np.random.default_rng(7), moves=0.5)
+    without = []
+    for pose in range(POSES):
+        some = [k for k, r in enumerate(found.records) if r.pose != pose]
+        design = -np.concatenate([found.jacobians[k] for k in some])
+        data = np.concatenate([found.data[k] for k in some])
+        without.append(np.linalg.lstsq(design, data, rcond=None)[0])
+    covariance = (POSES - 1) / POSES * np.cov(np.array(without).T, ddof=0) * POSES
+    np.testing.assert_allclose(between_poses(found), covariance, rtol=1e-9, atol=1e-15)
+
+
+def test_where_noise_is_left_the_poses_agree_as_the_fit_says():
+    rng = np.random.default_rng(8)
+    ratios = []
+    for _ in range(100):
+        found = fitted(rng)
+        fits = np.linalg.inv(found.normal_matrix())
+        ratios.append(between_poses(found).diagonal() / fits.diagonal())
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.15)
+
+
+def test_one_pose_has_no_spread():
+    found = fitted(np.random.default_rng(9), poses=1)
+    found.records, found.jacobians = found.records[:1], found.jacobians[:1]
+    found.residuals = found.residuals[:1]
+    assert not between_poses(found).any()

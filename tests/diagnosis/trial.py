@@ -21,6 +21,7 @@ from ablations import METHODS  # noqa: E402
 
 import picchio  # noqa: E402
 from picchio.diagnosis.percussion.diagnose import diagnose_percussion  # noqa: E402
+from picchio.model.effects import catalogue  # noqa: E402
 from worlds import campaign as worlds  # noqa: E402
 from worlds import cases  # noqa: E402
 
@@ -64,6 +65,11 @@ def make(case, salt=0):
     kind = {"weak": "single", "left-out": "single", "few": "single", "few-null": "null"}
     kind = kind.get(case["kind"], case["kind"])
     options = {"sensors": tuple(sensors), "records": case.get("records", 3 if few else 18)}
+    if case["kind"] == "mixed":  # a catalogued cause, and a little of what no catalogue has
+        rest = {"robot": case["robot"], **options}
+        causes = cases.causes("single", seed, effect=case.get("effect"), **rest)
+        causes += cases.causes("outside", seed + 1, strength="weak", **rest)
+        return worlds.make(seed=seed, causes=causes, snr_db=float(case["snr"]), **rest)
     causes = cases.causes(
         kind,
         seed,
@@ -125,6 +131,8 @@ def judge(case, truth, found):
     said = found.diagnosis
     true = {(c["effect"], c["target"]) for c in truth["causes"]}
     claimed = {(c.effect, c.target) for c in said.causes}
+    if case["kind"] == "mixed":  # what no catalogue has can't be claimed
+        true = {pair for pair in true if pair[0] in catalogue()}
     sets = [claimed, *({tuple(p) for p in each} for each in said.alternatives)]
     right = any(true == each for each in sets)
     errors = {}

@@ -12,7 +12,7 @@ VERDICTS: dict[str, str] = {
     "nothing-wrong": "the residual is noise",
     "named": "the causes leave noise",
     "ambiguous": "two or more sets of causes leave noise and these data cannot tell them apart",
-    "partial": "the causes hold beyond doubt and explain most of it, but more than noise is left",
+    "partial": "the causes, or what acts much like them, explain most; more than noise is left",
     "unexplained": "more than noise is left and no cause may be claimed",
 }
 

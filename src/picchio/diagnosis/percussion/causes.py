@@ -16,6 +16,7 @@ from picchio.diagnosis.percussion.drawn_numbers import width_spread
 from picchio.diagnosis.percussion.fit import Fit
 from picchio.diagnosis.percussion.problem import MeasuredRecord
 from picchio.diagnosis.percussion.select import EXACT, Search
+from picchio.diagnosis.percussion.steadiness import between_poses
 from picchio.diagnosis.percussion.trials import Trial, score
 from picchio.diagnosis.percussion.unknowns import NUISANCE_KEYS, Hypothesis
 from picchio.diagnosis.result import Cause, Value
@@ -91,10 +92,11 @@ def _width_spread(whole: Fit, effect: Effect) -> float:
 def told_covariance(whole: Fit) -> FloatArray:
     """(unknowns, unknowns) of the transformed unknowns, as it is told.
 
-    That of the fit, larger where more than noise is left, and that of the model's exactness.
+    That of the fit, larger where more than noise is left: by how much more, and by how far the
+    poses then disagree. And that of the model's exactness.
     """
     inflate = max(1.0, whole.chi_square / max(whole.samples, 1))
-    covariance = whole.covariance() * inflate
+    covariance = whole.covariance() * inflate + (1.0 - 1.0 / inflate) * between_poses(whole)
     hypothesis, vector = whole.hypothesis, whole.hypothesis.vector()
     for k, unknown in enumerate(hypothesis.unknowns()):
         effect = hypothesis.effects[unknown.effect]

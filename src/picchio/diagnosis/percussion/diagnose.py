@@ -21,6 +21,7 @@ from picchio.diagnosis.percussion.causes import (
     with_hum,
 )
 from picchio.diagnosis.percussion.common_fault import common_faults
+from picchio.diagnosis.percussion.dominant import dominant
 from picchio.diagnosis.percussion.evidence import Evidence
 from picchio.diagnosis.percussion.fit import Fit
 from picchio.diagnosis.percussion.gain import held_out, measure_gain
@@ -130,6 +131,13 @@ def diagnose_percussion(
     if found.best.hypothesis.labels:
         whole = refit(problem, found.best.hypothesis, problem.records)
     after = weighed(problem, whole)
+    if len(found.best.hypothesis.labels) > 1 and not after.is_noise:
+        say("looking which of the causes stand far above what is left")
+        stands = dominant(problem, found.best, train)
+        if stands is not found.best:
+            found.best = stands
+            whole = refit(problem, stands.hypothesis, problem.records)
+            after = weighed(problem, whole)
     gain = measure_gain(problem, baseline.hypothesis, found.best.hypothesis, train, kept)
     same: list[Trial] = []
     rivals = [

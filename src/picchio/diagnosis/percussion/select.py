@@ -171,7 +171,9 @@ def _calm(problem: Problem, best: Fit, newest: str, records: Sequence[MeasuredRe
     """
     if newest not in best.hypothesis.labels or len(best.hypothesis.labels) < 2:
         return best
-    without = fit(problem, best.hypothesis.minus(newest), records, None, iterations=5)
+    without = fit(
+        problem, best.hypothesis.minus(newest), records, None, iterations=5, rival=best.cost
+    )
     return without if weigh(problem, without.residuals, records).is_noise else best
 
 
@@ -192,18 +194,24 @@ def alternatives(
     tried: list[Trial] = []
     reference = score(best)
     for cause in best.hypothesis.causes:
-        if len(best.hypothesis.causes) == 1 and found.steps:
-            trials = [t for t in found.steps[0] if t.label != cause.label]
-        else:
-            trials = rivals_of(
-                cause.label, problem, best, candidates, scales, records, found.replacements
-            )
+        trials = _tried_before(found, cause.label) or rivals_of(
+            cause.label, problem, best, candidates, scales, records, found.replacements
+        )
         tried += [t for t in trials if t.finished(records)]
         for trial in trials:
             worse = trial.score - reference
             if worse < SAME and trial.fit.hypothesis.labels != best.hypothesis.labels:
                 same.append(trial)
     return same, tried
+
+
+def _tried_before(found: Search, label: str) -> list[Trial]:
+    """What was tried beside the other causes alone, which is what was known in some step."""
+    others = found.best.hypothesis.labels - {label}
+    for step in reversed(found.steps):
+        if step[0].fit.hypothesis.labels - {step[0].label} == others:
+            return [t for t in step if t.label != label]
+    return []
 
 
 def refit(problem: Problem, hypothesis: Hypothesis, records: Sequence[MeasuredRecord]) -> Fit:

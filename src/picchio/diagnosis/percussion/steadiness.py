@@ -29,20 +29,12 @@ def unsteadiness(found: Fit) -> float:
     """
     from scipy.stats import chi2, norm
 
-    if found.jacobians is None:
-        return 0.0
-    poses = [r.pose for r in found.records]
-    units = poses if len(set(poses)) >= _POSES else list(range(len(poses)))
     fall, degrees = 0.0, 0
-    size = found.jacobians[0].shape[1] if found.jacobians else 0
-    normal, gradient = np.zeros((size, size)), np.zeros(size)
-    for unit in sorted(set(units)):
-        own = np.zeros((size, size))
-        right = np.zeros(size)
-        for k, jacobian, residual in zip(units, found.jacobians, found.residuals, strict=True):
-            if k == unit:
-                own += jacobian.T @ jacobian
-                right += jacobian.T @ residual.ravel()
+    parts = _by_pose(found)
+    if not parts:
+        return 0.0
+    normal, gradient = np.zeros_like(parts[0][0]), np.zeros_like(parts[0][1])
+    for own, right in parts:
         some, rank = _fall(own, right)
         fall, degrees = fall + some, degrees + rank
         normal, gradient = normal + own, gradient + right
@@ -51,6 +43,47 @@ def unsteadiness(found: Fit) -> float:
     if degrees < 1:
         return 0.0
     return float(np.clip(norm.isf(chi2.sf(fall - together, degrees)), -38.0, 38.0))
+
+
+def between_poses(found: Fit) -> FloatArray:
+    """(unknowns, unknowns) covariance by how the fit moves where one pose is left out.
+
+    To first order (the jackknife: Quenouille, doi:10.1093/biomet/43.3-4.353). Where more than noise
+    is left, the poses disagree by more than the fit's own covariance says.
+
+    Args:
+        found: a fit with its Jacobian, of all records.
+    """
+    parts = _by_pose(found)
+    size = len(found.hypothesis.unknowns())
+    if len(parts) < 2:
+        return np.zeros((size, size))
+    whole = found.normal_matrix()
+    moved = []
+    for own, right in parts:
+        left = whole - own
+        scale = np.sqrt(np.maximum(left.diagonal(), 1e-300))
+        solved = np.linalg.pinv(left / np.outer(scale, scale), rcond=_TOLD, hermitian=True)
+        # The fit stands where all gradients cancel: without one pose that one's pulls it back.
+        moved.append(solved @ (right / scale) / scale)
+    spread = np.array(moved) - np.mean(moved, axis=0)
+    count = len(parts)
+    return np.asarray((count - 1) / count * spread.T @ spread)
+
+
+def _by_pose(found: Fit) -> list[tuple[FloatArray, FloatArray]]:
+    """Normal matrix and gradient of every pose; of every record, where poses are few."""
+    if not found.jacobians:
+        return []
+    poses = [r.pose for r in found.records]
+    units = poses if len(set(poses)) >= _POSES else list(range(len(poses)))
+    parts: dict[int, tuple[FloatArray, FloatArray]] = {}
+    for unit, jacobian, residual in zip(units, found.jacobians, found.residuals, strict=True):
+        own, right = jacobian.T @ jacobian, jacobian.T @ residual.ravel()
+        if unit in parts:
+            own, right = own + parts[unit][0], right + parts[unit][1]
+        parts[unit] = own, right
+    return [parts[unit] for unit in sorted(parts)]
 
 
 def _fall(normal: FloatArray, gradient: FloatArray) -> tuple[float, int]:

@@ -129,8 +129,9 @@ def headline(diagnosis: Diagnosis) -> str:
             share = gain.explained if gain is not None else None
             most = "most" if share is None else f"{percent(share)} %"
             return (
-                f"Part of what is wrong: {named}. It explains {most} of the error; more than "
-                f"noise is left, and nothing known explains that.{effect}"
+                f"Part of what is wrong: {named}; or something that acts much like it. It explains "
+                f"{most} of the error; more than noise is left, and nothing known explains "
+                f"that.{effect}"
             )
     if diagnosis.note:
         return f"The simulation is wrong. {diagnosis.note[:1].upper()}{diagnosis.note[1:]}."

@@ -1,0 +1,94 @@
+"""How long a diagnosis takes: data sets of 18 records of independent simulators, one after another.
+
+    python benchmarks/diagnosis.py [--one-core] [--arms] [--json FILE]
+
+Wall time with all cores, from the campaign in memory to the verdict: effects alone, pairs, nothing
+wrong, as `blind_trial.py` draws them, at 40 dB on the 3-DoF arm. `--one-core` adds the same on one
+core, in turns, and the ratio; `--arms` a single and a null on the UR10 and the Kinova Gen3. Nothing
+else should run meanwhile.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+ROOT = Path(__file__).resolve().parent.parent
+# Not this folder, which has a rainflow.py of its own.
+sys.path[0] = str(ROOT / "tests" / "diagnosis")
+import trial  # noqa: E402
+
+import picchio  # noqa: E402
+from picchio.core.files import atomic_write  # noqa: E402
+from picchio.diagnosis.percussion.diagnose import diagnose_percussion  # noqa: E402
+
+ARM, OTHERS = "fanuc_like_3dof", ("ur10", "kinova_gen3")
+# An early draw of each, spread over what effects are: structure, contact, blows, sensors.
+SINGLES = (
+    "payload", "joint_stiffness", "cable", "backlash", "force_direction", "pulse_width",
+    "sensor_delay",
+)  # fmt: skip
+PAIRS = (0, 8, 16, 24, 32, 40, 48)
+SALT = 1
+
+
+def cases(arms: bool) -> Iterator[dict[str, Any]]:
+    common = {"robot": ARM, "snr": 40}
+    for effect in SINGLES:
+        yield {**common, "kind": "single", "effect": effect, "draw": 1}
+    for draw in PAIRS:
+        yield {**common, "kind": "pair", "draw": draw}
+    for draw in range(3):
+        yield {**common, "kind": "null", "draw": draw}
+    for robot in OTHERS if arms else ():
+        for kind in ("single", "null"):
+            yield {**common, "robot": robot, "kind": kind, "draw": 0}
+
+
+def timed(case: dict[str, Any], workers: int | None) -> tuple[float, str, bool]:
+    """(s, verdict, whether it is right)."""
+    campaign, truth = trial.make(case, SALT)
+    robot = picchio.load_robot(case["robot"])
+    began = time.perf_counter()
+    found = diagnose_percussion(robot, campaign, workers=workers)
+    took = time.perf_counter() - began
+    return took, found.diagnosis.verdict, trial.judge(case, truth, found)["right"]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--one-core", action="store_true", help="the same on one core, too")
+    parser.add_argument("--arms", action="store_true", help="the UR10 and the Gen3, too")
+    parser.add_argument("--json", type=Path, help="write the figures here")
+    given = parser.parse_args()
+    timed({"robot": ARM, "kind": "null", "snr": 40, "draw": 10**6}, None)  # compiles, or loads
+    rows = []
+    print(f"{'case':40} {'s':>6}" + (f" {'one core':>9} {'ratio':>6}" if given.one_core else ""))
+    for case in cases(given.arms):
+        took, verdict, right = timed(case, None)
+        row = {"case": trial.name_of(case), "kind": case["kind"], "robot": case["robot"]}
+        row |= {"seconds": took, "verdict": verdict, "right": right}
+        line = f"{row['case']:40} {took:6.1f}"
+        if given.one_core:
+            row["one_core_seconds"] = timed(case, 1)[0]
+            line += f" {row['one_core_seconds']:9.1f} {row['one_core_seconds'] / took:6.2f}"
+        rows.append(row)
+        print(line, f" {verdict}" + ("" if right else " (wrong)"), flush=True)
+    for kind in ("single", "pair", "null"):
+        seconds = [r["seconds"] for r in rows if r["kind"] == kind and r["robot"] == ARM]
+        print(f"{kind}: median {median(seconds):.1f} s, longest {max(seconds):.1f} s")
+    if given.json:
+        atomic_write(given.json, json.dumps({"cores": os.cpu_count(), "cases": rows}, indent=1))
+
+
+if __name__ == "__main__":
+    main()

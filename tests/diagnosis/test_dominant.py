@@ -1,0 +1,59 @@
+"""Where more than noise is left, only what stands far above it is claimed."""
+
+from __future__ import annotations
+
+import pytest
+
+import picchio
+from picchio.diagnosis.percussion.dominant import dominant, share
+from picchio.diagnosis.percussion.evidence import weigh
+from picchio.diagnosis.percussion.fit import fit, fit_growing
+from picchio.diagnosis.percussion.problem import Problem
+from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.model.effects import effect_class
+from worlds import campaign as worlds
+
+ROBOT = "fanuc_like_3dof"
+SOFTER = ("joint_stiffness", "joint_1", {"scale": 0.7})
+TILTED = ("sensor_misalignment", "accelerometer.tool", {"rx": 0.05, "ry": 0.03, "rz": 0.0})
+UNKNOWN = ("quadratic_damping", "joint_2", {"damping": 400.0})
+
+
+def fitted(causes, *suspects):
+    """(problem, fit of the suspects, truth)."""
+    robot = picchio.load_robot(ROBOT)
+    campaign, truth = worlds.make(
+        robot=ROBOT, seed=21, causes=causes, sensors=("accelerometer.tool", "deflection"), records=4
+    )
+    problem = Problem(robot, campaign)
+    known = fit_growing(problem, Hypothesis.baseline(robot, campaign.tolerance)).hypothesis
+    for effect, target, values in suspects:
+        known = known.plus(effect_class(effect)(target, **values))
+    return problem, fit_growing(problem, known), truth
+
+
+def test_what_imitates_the_unknown_rest_is_not_claimed():
+    imitation = ("hysteresis", "joint_2", {"torque": 5.0, "deflection": 1e-3})
+    problem, found, truth = fitted((SOFTER, UNKNOWN), SOFTER, imitation)
+    alone = fit(problem, found.hypothesis.minus("hysteresis:joint_2"))
+    # it helps a lot, and leaves much
+    assert found.cost < alone.cost - 100.0
+    assert not weigh(problem, found.residuals).is_noise
+    assert 0.1 < share(found, alone) < 0.9
+    stands = dominant(problem, found, problem.records)
+    assert stands.hypothesis.labels == {"joint_stiffness:joint_1"}
+    (softer,) = stands.hypothesis.causes
+    true = 0.7 * truth["nuisances"]["stiffness"]["joint_1"]
+    assert softer.values["scale"] == pytest.approx(true, rel=0.02)
+
+
+def test_causes_that_are_there_stay():
+    problem, found, _ = fitted((SOFTER, TILTED, UNKNOWN), SOFTER, TILTED)
+    assert not weigh(problem, found.residuals).is_noise
+    assert dominant(problem, found, problem.records) is found
+
+
+def test_where_noise_is_left_every_cause_explains_all():
+    problem, found, _ = fitted((SOFTER, TILTED), SOFTER, TILTED)
+    assert weigh(problem, found.residuals).is_noise
+    assert dominant(problem, found, problem.records) is found
