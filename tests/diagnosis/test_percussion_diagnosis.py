@@ -158,6 +158,14 @@ def test_what_is_not_in_the_catalogue_is_not_named(kind):
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
+def test_beside_a_little_of_what_is_unknown_the_known_cause_alone_is_claimed():
+    row = trial.run(_case("mixed", "sensor_delay"))
+    assert row["verdict"] == "partial", row
+    assert row["right"], row
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("effect", ["backlash", "force_amplitude"])
 def test_with_the_true_cause_taken_out_no_other_is_named(effect):
     """The cause's whole class is taken out of the catalogue: `trial.class_of`."""
