@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import replace
 
 from picchio.diagnosis.percussion.evidence import weigh
@@ -128,14 +128,15 @@ def replaced(
     records: Sequence[MeasuredRecord],
     least: float,
     tried: Tried,
+    settled: Set[str] = frozenset(),
 ) -> Fit:
     """The best fit with every cause in turn replaced by whichever does better, until noise is left.
 
     What was added one by one need not be the best set: the first stands for several at once.
-    What is tried is kept in `tried`.
+    What is tried is kept in `tried`. Causes that are `settled` were the best beside the others.
     """
     for cause in best.hypothesis.causes:
-        if cause.label not in best.hypothesis.labels:  # taken out since
+        if cause.label in settled or cause.label not in best.hypothesis.labels:  # taken out since
             continue
         trials = rivals_of(cause.label, problem, best, candidates, scales, records, tried)
         if trials and trials[0].score < score(best) - least:

@@ -153,7 +153,10 @@ def search(
             if weigh(problem, best.residuals, best.records).is_noise:
                 break
             say("looking whether the causes chosen first were the right ones")
-            other = replaced(problem, best, candidates, scales, records, least, found.replacements)
+            settled = {label for label in best.hypothesis.labels if _tried_before(found, label)}
+            other = replaced(
+                problem, best, candidates, scales, records, least, found.replacements, settled
+            )
             found.best = accepted(other)
             if found.best is best:
                 break
