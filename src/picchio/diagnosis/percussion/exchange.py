@@ -6,11 +6,18 @@ from collections.abc import Sequence, Set
 from dataclasses import replace
 
 from picchio.diagnosis.percussion.evidence import weigh
-from picchio.diagnosis.percussion.fit import Fit, fit
+from picchio.diagnosis.percussion.fit import HOPELESS, Fit, fit
 from picchio.diagnosis.percussion.latent import LATENT, with_hidden
 from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
-from picchio.diagnosis.percussion.trials import Trial, score, try_candidates
+from picchio.diagnosis.percussion.trials import (
+    SCREEN_WINDOW,
+    Trial,
+    score,
+    spread_out,
+    try_candidates,
+)
+from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model import Effect
 from picchio.model.effects import Scales
 
@@ -84,10 +91,23 @@ def exchange(
             for cause in best.hypothesis.causes:
                 if cause.label not in (chosen, *joined.labels):
                     joined = joined.joined(cause)
-            other = fit(problem, joined, records, None, iterations=6, rival=best.cost)
+            begun = _come_near(problem, joined, best, records)
+            if begun is None:
+                continue
+            other = fit(problem, begun, records, None, iterations=6, rival=best.cost)
             if score(other) < score(best) - least:
                 best = other
     return best
+
+
+def _come_near(
+    problem: Problem, hypothesis: Hypothesis, best: Fit, records: Sequence[MeasuredRecord]
+) -> Hypothesis | None:
+    """A hypothesis fitted to the first part of some records; None where that is hopeless."""
+    some = spread_out(records)
+    own = fit(problem, best.hypothesis, some, SCREEN_WINDOW, iterations=2)
+    begun = fit(problem, hypothesis, some, SCREEN_WINDOW, iterations=4, rival=own.cost)
+    return begun.hypothesis if begun.cost < HOPELESS * own.cost else None
 
 
 def rivals_of(
