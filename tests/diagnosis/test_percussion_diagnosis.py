@@ -142,6 +142,15 @@ def test_two_hidden_effects_are_both_named(draw):
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
+def test_three_effects_are_named_though_the_first_stood_for_two():
+    """Of the blind trial's seeds: the cause chosen first is another link's mass."""
+    row = trial.run(_case("triple", draw=3), salt=1)
+    assert row["verdict"] == "named", row
+    assert row["right"], row
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("draw", range(4))
 def test_no_alarm_where_nothing_is_wrong(draw):
     row = trial.run(_case("null", draw=draw))

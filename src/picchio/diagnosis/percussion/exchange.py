@@ -12,6 +12,7 @@ from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.trials import (
     SCREEN_WINDOW,
+    SHORT_LIST,
     Trial,
     score,
     spread_out,
@@ -118,6 +119,7 @@ def rivals_of(
     scales: Scales,
     records: Sequence[MeasuredRecord],
     tried: Tried,
+    short_list: int = SHORT_LIST,
 ) -> list[Trial]:
     """The best fit with one cause replaced by each of its rivals, the best first.
 
@@ -129,13 +131,15 @@ def rivals_of(
         scales: sizes that matter.
         records: that are fitted.
         tried: what was tried before; what is found is added.
+        short_list: how many suspects to fit.
     """
     known = tried.get(label)
     if known is None or known[0] is not best:
         others = best.hypothesis.minus(label)
         trials = try_candidates(
-            problem, others, candidates, scales, records, cause=label, best=best
-        )
+            problem, others, candidates, scales, records,
+            cause=label, best=best, short_list=short_list,
+        )  # fmt: skip
         known = tried[label] = (best, trials)
     return known[1]
 

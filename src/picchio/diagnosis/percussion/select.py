@@ -22,7 +22,13 @@ from picchio.diagnosis.percussion.latent import LATENT
 from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.stuck import unstuck
-from picchio.diagnosis.percussion.trials import SAME, Trial, score, try_candidates
+from picchio.diagnosis.percussion.trials import (
+    MOST_RIVALS,
+    SAME,
+    Trial,
+    score,
+    try_candidates,
+)
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.diagnosis.verdict_rules import BEYOND_DOUBT
 from picchio.model import Effect
@@ -198,7 +204,7 @@ def alternatives(
     reference = score(best)
     for cause in best.hypothesis.causes:
         trials = _tried_before(found, cause.label) or rivals_of(
-            cause.label, problem, best, candidates, scales, records, found.replacements
+            cause.label, problem, best, candidates, scales, records, found.replacements, MOST_RIVALS
         )
         tried += [t for t in trials if t.finished(records)]
         for trial in trials:

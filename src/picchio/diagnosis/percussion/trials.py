@@ -34,7 +34,7 @@ _HOPE = 0.1
 # Numbers that are drawn anew in every record are screened as free as they are: nothing to add.
 _HOPE_LATENT = 0.5
 _RIVALS = 2
-_MOST_RIVALS = 5
+MOST_RIVALS = 5
 # Chi-square per sample up to which the first part of a part of the records shows nothing.
 _LITTLE = 1.2
 # Sets whose BIC is within this cannot be told apart.
@@ -131,7 +131,7 @@ def try_candidates(
                 return []
         if cause:
             suspects = _rivals(suspects, cause)
-        chosen = _short_list(suspects, min(short_list, _MOST_RIVALS) if cause else short_list)
+        chosen = _short_list(suspects, short_list)
         if early is not None and not cause and _promised(suspects) < _HALF * look.total:
             # What makes a motion differ ever more is only like itself while it differs little.
             chosen = _joined(chosen, early.ranked(pool.map("early", candidates)))
