@@ -105,9 +105,14 @@ def test_explained_is_what_the_contract_says():
         (["--data", "nowhere"], "nowhere"),
         (["--data", "{data}", "--without", "backlsh"], "backlash"),
         (["--data", "{data}", "--json", "/no/such/folder/x.json"], "folder"),
+        (["--data", "{data}", "--task", "nowhere.toml"], "nowhere.toml"),
     ],
 )
-def test_bad_input_is_one_line(tmp_path, capsys, change, said):
+def test_bad_input_is_one_line_before_anything_is_done(tmp_path, capsys, monkeypatch, change, said):
+    def too_late(*_):
+        raise AssertionError("diagnosed before all input was read")
+
+    monkeypatch.setattr("picchio.cli.diagnose._percussion", too_late)
     time = np.arange(-50, 200) * 1e-3
     record = picchio.campaign.Record.from_arrays(
         "r01.csv", time, {"deflection.joint_1": np.zeros(time.size)},

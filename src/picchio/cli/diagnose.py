@@ -81,6 +81,7 @@ def diagnose(
     from picchio.core.provenance import provenance
     from picchio.model.effects import effect_class
     from picchio.robot import load_robot
+    from picchio.studies import load_task
 
     for target in (json, report, model, plan):
         check_target(target, [robot, flex, task])
@@ -92,6 +93,8 @@ def diagnose(
     loaded = load_robot(robot, flex=flex, tool=tool, allow_rigid=kinds == {"motion"})
     for target in (json, report, model, plan):
         check_target(target, [*loaded.files, *campaign.files])
+    if task is not None:
+        load_task(task, loaded)  # what is wrong with it is told now, not minutes later
     percussion: PercussionDiagnosis | None = None
     motion: MotionAnswer | None = None
     if kinds == {"motion"}:
@@ -193,9 +196,7 @@ def _life(
         return None
     try:
         return percussion.life(load_task(path, robot))
-    except InputError as error:
-        if task is not None:
-            raise
+    except InputError as error:  # what took minutes to find is told all the same
         say_warning(f"the life could not be computed: {error}")
         return None
 
