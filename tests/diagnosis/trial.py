@@ -131,7 +131,9 @@ def judge(case, truth, found):
     said = found.diagnosis
     true = {(c["effect"], c["target"]) for c in truth["causes"]}
     claimed = {(c.effect, c.target) for c in said.causes}
+    beside: list = []
     if case["kind"] == "mixed":  # what no catalogue has can't be claimed
+        beside = sorted(map(list, (pair for pair in true if pair[0] not in catalogue())))
         true = {pair for pair in true if pair[0] in catalogue()}
     sets = [claimed, *({tuple(p) for p in each} for each in said.alternatives)]
     right = any(true == each for each in sets)
@@ -155,6 +157,7 @@ def judge(case, truth, found):
     return {
         **_head(case),
         "truth": sorted(map(list, true)),
+        **({"beside": beside} if beside else {}),
         "verdict": said.verdict,
         "claimed": sorted(map(list, claimed)),
         "alternatives": [sorted(map(list, each)) for each in said.alternatives],
