@@ -44,8 +44,8 @@ def prune(
     for label in sorted(found.hypothesis.labels, key=lambda text: text == newest):
         if len(best.hypothesis.labels) < 2 and not alone:
             break
-        others = best.hypothesis.minus(label)
-        without = fit(problem, others, records, None, iterations=5, rival=best.cost)
+        # To the end, however far behind at first: the cause may have moved a stuck fit on.
+        without = fit(problem, best.hypothesis.minus(label), records, None, iterations=5)
         if score(without) < score(best) + least:
             best = without
     return best
@@ -58,7 +58,7 @@ def with_latent(problem: Problem, best: Fit, newest: str) -> Fit:
             kind = type(cause)
             # From the start: without the newest cause some numbers may have been far off.
             start = replace(best, hypothesis=with_hidden(best.hypothesis, kind, {}))
-            again = fit_latent(problem, start, kind, cause.target, best.cost)
+            again = fit_latent(problem, start, kind, cause.target)
             best = again if again.cost < best.cost else best
     return best
 

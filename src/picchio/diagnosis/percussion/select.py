@@ -180,9 +180,7 @@ def _calm(problem: Problem, best: Fit, newest: str, records: Sequence[MeasuredRe
     """
     if newest not in best.hypothesis.labels or len(best.hypothesis.labels) < 2:
         return best
-    without = fit(
-        problem, best.hypothesis.minus(newest), records, None, iterations=5, rival=best.cost
-    )
+    without = fit(problem, best.hypothesis.minus(newest), records, None, iterations=5)
     return without if weigh(problem, without.residuals, records).is_noise else best
 
 
