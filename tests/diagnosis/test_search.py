@@ -6,11 +6,13 @@ import pytest
 
 import picchio
 from picchio.diagnosis.percussion import select
-from picchio.diagnosis.percussion.candidates import all_candidates
+from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.evidence import weigh
 from picchio.diagnosis.percussion.exchange import exchange
 from picchio.diagnosis.percussion.fit import fit, fit_growing
 from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import Problem
+from picchio.diagnosis.percussion.stuck import unstuck
 from picchio.diagnosis.percussion.trials import Trial, score
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model.effects import effect_class
@@ -121,3 +123,23 @@ def test_what_replaces_a_cause_must_hold_on_poses_held_out(holds, two_causes, ar
         confirmed=lambda before, after: holds or after is not better,
     )  # fmt: skip
     assert found.best is (better if holds else best)
+
+
+def test_a_contact_that_a_fit_holds_shut_for_ever_is_opened_again(arm):
+    """With a preload far beyond the force it is a spring: no slope leads back to less."""
+    contact = ("workpiece_contact", "tool", {"stiffness": 1e5, "damping": 290.0, "preload": 34.0})
+    campaign, _ = worlds.make(robot=ROBOT, seed=14, causes=(contact,), sensors=SENSORS, records=3)
+    problem = Problem(arm, campaign)
+    start = Hypothesis.baseline(arm, campaign.tolerance)
+    baseline = fit_growing(problem, start)
+    shut = effect_class("workpiece_contact")(
+        "tool", stiffness=9e4, damping=300.0, preload=1000.0
+    )  # fmt: skip
+    held = fit(problem, baseline.hypothesis.plus(shut), iterations=8)
+    assert not weigh(problem, held.residuals).is_noise
+    effects = held.hypothesis.effects
+    scales = measure_scales(problem, effects, problem.predictions(effects))
+    opened = unstuck(problem, held, scales, problem.records)
+    assert weigh(problem, opened.residuals).is_noise
+    (found,) = opened.hypothesis.causes
+    assert found.values["preload"] == pytest.approx(34.0, rel=0.02)

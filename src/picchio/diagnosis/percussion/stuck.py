@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from picchio.diagnosis.percussion.fit import Fit, fit
+from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.evidence import weigh
+from picchio.diagnosis.percussion.fit import Fit, fit_growing, kinked
 from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
 from picchio.model import Effect
 from picchio.model.effects import Scales
@@ -13,10 +15,17 @@ from picchio.model.effects import Scales
 # So many times smaller or larger than its typical size, a logarithmic parameter has no slope left
 # that could lead a fit back.
 _FAR = 1e3
+# A parameter that, changed by this factor, changes chi-square by no more than one, does nothing.
+_MOVED = 1.3
+# Where there is a kink, a small error early is a large one late: not all at once, s.
+_GROWING = (0.16, 0.3, 0.6, None)
 
 
 def unstuck(problem: Problem, best: Fit, scales: Scales, records: Sequence[MeasuredRecord]) -> Fit:
-    """The fit, or a better one from where what has run off stands at its typical size again.
+    """The fit, or a better one from where what does nothing stands at one of its usual sizes again.
+
+    What is far off is put back always; where more than noise is left, so is what does nothing where
+    it is, such as the preload of a contact that never opens: it may have to be much smaller.
 
     Args:
         problem: data and noise.
@@ -24,26 +33,49 @@ def unstuck(problem: Problem, best: Fit, scales: Scales, records: Sequence[Measu
         scales: sizes in this campaign.
         records: that are fitted.
     """
-    effects = tuple(_returned(effect, scales) for effect in best.hypothesis.effects)
-    moved = {e.label for e, old in zip(effects, best.hypothesis.effects, strict=True) if e != old}
-    if not moved & best.hypothesis.labels:
-        return best
-    again = fit(problem, replace(best.hypothesis, effects=effects), records, None, iterations=8)
-    return again if again.cost < best.cost else best
+    found = best
+    noisy = not weigh(problem, best.residuals, best.records).is_noise
+    for effect in best.hypothesis.causes:
+        for name, sizes in _usual(effect, scales).items():
+            far = [not 1.0 / _FAR < effect.values[name] / size < _FAR for size in sizes]
+            off = all(far) and any(p.logarithmic for p in effect.parameters if p.name == name)
+            if not (off or (noisy and _does_nothing(problem, best, effect, name))):
+                continue
+            for size in sizes:
+                effects = tuple(
+                    e.with_values(**{name: size}) if e.label == effect.label else e
+                    for e in found.hypothesis.effects
+                )
+                start = replace(found.hypothesis, effects=effects)
+                windows = _GROWING if kinked(start) else (None,)
+                again = fit_growing(problem, start, records, windows=windows, iterations=8)
+                found = again if again.cost < found.cost else found
+    return found
 
 
-def _returned(effect: Effect, scales: Scales) -> Effect:
+def _usual(effect: Effect, scales: Scales) -> dict[str, list[float]]:
+    """The sizes above 0 at which an effect's parameters are tried, each once."""
+    sizes: dict[str, list[float]] = {}
     if effect.latent is not None or effect.discrete:
-        return effect
-    typical: dict[str, float] = {}
+        return sizes
     for trial in effect.trials(scales):
         for name, value in trial.items():
-            typical.setdefault(name, value)
-    gone = {}
-    for p in effect.parameters:
-        size = typical.get(p.name, 0.0)
-        if p.logarithmic and size > 0.0:
-            ratio = effect.values[p.name] / size
-            if not 1.0 / _FAR < ratio < _FAR:
-                gone[p.name] = size
-    return effect.with_values(**gone) if gone else effect
+            if value > 0.0 and value not in sizes.get(name, []):
+                sizes.setdefault(name, []).append(value)
+    return sizes
+
+
+def _does_nothing(problem: Problem, best: Fit, effect: Effect, name: str) -> bool:
+    """Whether the motion is the same with a parameter a little larger or smaller."""
+    for factor in (_MOVED, 1.0 / _MOVED):
+        try:
+            moved = effect.with_values(**{name: factor * effect.values[name]})
+            effects = tuple(moved if e is effect else e for e in best.hypothesis.effects)
+            there = problem.residuals(effects, best.records, best.end)
+        except InputError:  # beyond its bounds
+            continue
+        pairs = zip(there, best.residuals, strict=True)
+        change = sum(float(((a - b) ** 2).sum()) for a, b in pairs)
+        if change > 1.0:
+            return False
+    return True
