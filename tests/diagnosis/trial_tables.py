@@ -16,9 +16,11 @@ def summary(rows):
     rows = [row for row in rows if not _aside(row)]
     print_kinds(rows)
     print_rates(rows)
-    print_parameters(rows)
-    print_gains(rows)
-    print_bursts(rows)
+    # Where something unknown is left, what is fitted beside it says nothing of these.
+    known = [row for row in rows if row["kind"] != "mixed"]
+    print_parameters(known)
+    print_gains(known)
+    print_bursts(known)
     print_sets(rows)
     print_times(rows)
     print_confusion(rows)
