@@ -5,10 +5,14 @@ from __future__ import annotations
 import pytest
 
 import picchio
+from picchio.diagnosis.percussion import diagnose
+from picchio.diagnosis.percussion.candidates import measure_scales
 from picchio.diagnosis.percussion.dominant import dominant, share
 from picchio.diagnosis.percussion.evidence import weigh
 from picchio.diagnosis.percussion.fit import fit, fit_growing
+from picchio.diagnosis.percussion.look import Look
 from picchio.diagnosis.percussion.problem import Problem
+from picchio.diagnosis.percussion.select import Search
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model.effects import effect_class
 from worlds import campaign as worlds
@@ -19,12 +23,19 @@ TILTED = ("sensor_misalignment", "accelerometer.tool", {"rx": 0.05, "ry": 0.03, 
 UNKNOWN = ("quadratic_damping", "joint_2", {"damping": 400.0})
 
 
+IMITATION = ("hysteresis", "joint_2", {"torque": 5.0, "deflection": 1e-3})
+
+
+def made(causes):
+    """(campaign, truth)."""
+    sensors = ("accelerometer.tool", "deflection")
+    return worlds.make(robot=ROBOT, seed=21, causes=causes, sensors=sensors, records=4)
+
+
 def fitted(causes, *suspects):
     """(problem, fit of the suspects, truth)."""
     robot = picchio.load_robot(ROBOT)
-    campaign, truth = worlds.make(
-        robot=ROBOT, seed=21, causes=causes, sensors=("accelerometer.tool", "deflection"), records=4
-    )
+    campaign, truth = made(causes)
     problem = Problem(robot, campaign)
     known = fit_growing(problem, Hypothesis.baseline(robot, campaign.tolerance)).hypothesis
     for effect, target, values in suspects:
@@ -33,8 +44,7 @@ def fitted(causes, *suspects):
 
 
 def test_what_imitates_the_unknown_rest_is_not_claimed():
-    imitation = ("hysteresis", "joint_2", {"torque": 5.0, "deflection": 1e-3})
-    problem, found, truth = fitted((SOFTER, UNKNOWN), SOFTER, imitation)
+    problem, found, truth = fitted((SOFTER, UNKNOWN), SOFTER, IMITATION)
     alone = fit(problem, found.hypothesis.minus("hysteresis:joint_2"))
     # it helps a lot, and leaves much
     assert found.cost < alone.cost - 100.0
@@ -57,3 +67,28 @@ def test_where_noise_is_left_every_cause_explains_all():
     problem, found, _ = fitted((SOFTER, TILTED), SOFTER, TILTED)
     assert weigh(problem, found.residuals).is_noise
     assert dominant(problem, found, problem.records) is found
+
+
+def test_a_diagnosis_leaves_the_imitation_out(monkeypatch):
+    """Whatever the search ends with: here with a cause too many."""
+
+    def looked(problem, candidates, split, progress):
+        train, kept = split
+        start = Hypothesis.baseline(problem.robot, problem.campaign.tolerance)
+        baseline = fit_growing(problem, start, train)
+        known = baseline.hypothesis
+        for effect, target, values in (SOFTER, IMITATION):
+            known = known.plus(effect_class(effect)(target, **values))
+        effects = baseline.hypothesis.effects
+        scales = measure_scales(problem, effects, problem.predictions(effects))
+        return Look(
+            train, kept, baseline, scales, Search(baseline, fit_growing(problem, known, train))
+        )
+
+    monkeypatch.setattr(diagnose, "look", looked)
+    monkeypatch.setattr(diagnose, "alternatives", lambda *_: ([], []))
+    monkeypatch.setattr(diagnose, "next_measurement", lambda *_: None)
+    campaign, _ = made((SOFTER, UNKNOWN))
+    found = diagnose.diagnose_percussion(picchio.load_robot(ROBOT), campaign, workers=1)
+    assert found.extended.hypothesis.labels == {"joint_stiffness:joint_1"}
+    assert found.diagnosis.verdict in ("partial", "unexplained")

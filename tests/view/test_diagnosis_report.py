@@ -27,7 +27,7 @@ from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.diagnosis.result import Cause, Diagnosis, Value
 from picchio.model.effects import effect_class
 from picchio.robot import load_robot
-from picchio.view.report.diagnosis import diagnosis_report
+from picchio.view.report.diagnosis import diagnosis_report, headline
 from picchio.view.report.page import number, spread
 from picchio.view.report.residual import residual_report
 from picchio.view.scene import diagnosis_scene
@@ -269,3 +269,11 @@ def test_numbers():
     assert number(float("inf")) == "no end"
     assert number(None) == "\N{EN DASH}"
     assert number(6.49e4, 3) == "6.49 × 10⁴"
+
+
+def test_where_more_than_noise_is_left_the_cause_may_be_what_acts_like_it():
+    cause = Cause("payload", "tool", 1.0, {"mass": Value(4.6, 0.2, "kg")})
+    said = headline(Diagnosis("partial", (cause,)))
+    assert "payload" in said
+    assert "or something that acts much like it" in said
+    assert "acts much like" not in headline(Diagnosis("named", (cause,)))

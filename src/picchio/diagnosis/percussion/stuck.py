@@ -67,6 +67,7 @@ def _usual(effect: Effect, scales: Scales) -> dict[str, list[float]]:
 
 def _does_nothing(problem: Problem, best: Fit, effect: Effect, name: str) -> bool:
     """Whether the motion is the same with a parameter a little larger or smaller."""
+    told = False
     for factor in (_MOVED, 1.0 / _MOVED):
         try:
             moved = effect.with_values(**{name: factor * effect.values[name]})
@@ -78,4 +79,5 @@ def _does_nothing(problem: Problem, best: Fit, effect: Effect, name: str) -> boo
         change = sum(float(((a - b) ** 2).sum()) for a, b in pairs)
         if change > 1.0:
             return False
-    return True
+        told = True
+    return told
