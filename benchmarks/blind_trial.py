@@ -9,6 +9,8 @@ it goes, keyed by the case and the seeds' salt: run it again and it goes on wher
     python benchmarks/blind_trial.py --out trial.jsonl --summary  # only print the tables
     python benchmarks/blind_trial.py --out new.jsonl --fresh      # seeds never used before
     python benchmarks/blind_trial.py --out part.jsonl --only single --most 20
+    python benchmarks/blind_trial.py --out trial.jsonl --summary --since b3ad859  # later code only
+    python benchmarks/blind_trial.py --out trial.jsonl --summary --page docs/blind_trial.md
 """
 
 from __future__ import annotations
@@ -82,6 +84,17 @@ def one(case, salt, method="diagnose"):
         }  # fmt: skip
 
 
+def since(rows, commit):
+    """Rows of code that has this commit's change."""
+    told = subprocess.run(
+        ["git", "rev-list", f"{commit}^..HEAD"], cwd=ROOT, capture_output=True, text=True
+    )
+    if told.returncode:
+        raise SystemExit(f"--since {commit}: {told.stderr.strip()}")
+    later = told.stdout.split()
+    return [row for row in rows if any(full.startswith(row["commit"]) for full in later)]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True, help="one line of JSON a case")
@@ -93,6 +106,8 @@ def main():
     parser.add_argument("--development", action="store_true", help="the seeds used while building")
     parser.add_argument("--method", default="diagnose", help="or: score-test, plain-bic")
     parser.add_argument("--summary", action="store_true", help="run nothing")
+    parser.add_argument("--since", metavar="COMMIT", help="tables of rows since this change only")
+    parser.add_argument("--page", type=Path, help="a page whose tables to bring up to date")
     given = parser.parse_args()
     rows = []
     if given.out.exists():
@@ -131,7 +146,9 @@ def main():
                 print(f"{number}/{len(todo)}", *note, file=sys.stderr)
     import trial_tables
 
-    trial_tables.summary(rows)
+    if given.page:
+        trial_tables.into_page(rows, given.page)
+    trial_tables.summary(since(rows, given.since) if given.since else rows)
 
 
 if __name__ == "__main__":

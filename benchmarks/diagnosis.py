@@ -87,7 +87,8 @@ def main() -> None:
         seconds = [r["seconds"] for r in rows if r["kind"] == kind and r["robot"] == ARM]
         print(f"{kind}: median {median(seconds):.1f} s, longest {max(seconds):.1f} s")
     if given.json:
-        atomic_write(given.json, json.dumps({"cores": os.cpu_count(), "cases": rows}, indent=1))
+        with atomic_write(given.json) as stream:
+            json.dump({"cores": os.cpu_count(), "cases": rows}, stream, indent=1)
 
 
 if __name__ == "__main__":

@@ -97,7 +97,8 @@ def main() -> None:
         rows[name] = {"seconds": median(own), "times_ours": times_ours, "error": errors[name]}
         print(f"{name:<22} {1e3 * median(own):>9.2f} {times_ours:>11.1f} {errors[name]:>9.1e}")
     if options.json:
-        atomic_write(options.json, json.dumps(rows, indent=2) + "\n")
+        with atomic_write(options.json) as stream:
+            stream.write(json.dumps(rows, indent=2) + "\n")
 
 
 if __name__ == "__main__":

@@ -15,15 +15,11 @@ import trial
 import picchio
 from picchio.campaign import Tolerance
 from picchio.cli.main import run as command
-from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.diagnose import diagnose_percussion
 from picchio.diagnosis.percussion.evidence import weigh
-from picchio.diagnosis.percussion.fit import fit, fit_growing
+from picchio.diagnosis.percussion.fit import fit_growing
 from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.trials import try_candidates
 from picchio.diagnosis.percussion.unknowns import Hypothesis
-from picchio.diagnosis.percussion.workers import Workers
 from picchio.diagnosis.result import Gain
 from picchio.model.effects import effect_class
 from picchio.robot import load_robot
@@ -220,41 +216,3 @@ def test_a_nuisance_that_is_no_cause_any_more_stays_where_it_was():
         assert held.labels == frozenset()
         values = {e.label: e.values["scale"] for e in held.effects}
         assert values["joint_stiffness:joint_3"] == pytest.approx(back)
-
-
-def test_workers_change_nothing(arm):
-    """Processes or not: the same suspects, the same fits, to the last bit."""
-    campaign, _ = trial.make(
-        {**FEW, "kind": "single", "effect": "payload", "draw": 0, "records": 3}
-    )
-    names = ("payload", "joint_stiffness", "coulomb_friction", "sensor_gain", "mains_hum")
-    found = []
-    for workers in (1, 2):
-        problem = Problem(arm, campaign, workers=workers)
-        start = Hypothesis.baseline(arm, campaign.tolerance)
-        base = fit(problem, start, iterations=3)
-        scales = measure_scales(
-            problem, base.hypothesis.effects, problem.predictions(base.hypothesis.effects)
-        )
-        some = [c for c in all_candidates(problem) if c[0].name in names]
-        promises = []
-        trials = try_candidates(
-            problem, base.hypothesis, some, scales, problem.records, log=promises.append
-        )
-        assert all(t.fit.records for t in trials)
-        found.append((promises, [(t.label, t.score, t.fit.hypothesis) for t in trials]))
-    assert found[0] == found[1]
-    assert found[0][1][0][0] == "payload:tool"
-
-
-def test_an_error_in_a_worker_is_an_error_here():
-    def fail(item):
-        if item == 3:
-            raise InputError("broken", key="item", value=item)
-        return -item
-
-    for workers in (1, 2):
-        with Workers(workers, {"fail": fail}) as pool:
-            assert pool.map("fail", [1, 2, 4]) == [-1, -2, -4]
-            with pytest.raises(InputError, match="broken"):
-                pool.map("fail", [1, 3, 2])

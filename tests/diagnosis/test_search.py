@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import permutations
+from types import SimpleNamespace
+
 import pytest
 
 import picchio
+from picchio.diagnosis.percussion import exchange as exchange_module
 from picchio.diagnosis.percussion import select
 from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.evidence import weigh
-from picchio.diagnosis.percussion.exchange import exchange
+from picchio.diagnosis.percussion.exchange import exchange, prune
 from picchio.diagnosis.percussion.fit import fit, fit_growing
 from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import Problem
@@ -84,6 +88,28 @@ def test_what_is_right_is_not_replaced(two_causes):
     best = fit(problem, both, iterations=6)
     later = Trial("force_amplitude:tool", best, score(best), 0.0)
     assert exchange(problem, best, [[right, wrong], [later]], problem.records, 8.0) is best
+
+
+@pytest.mark.parametrize("order", list(permutations("abc")))
+def test_the_idlest_cause_goes_first_in_whatever_order_they_stand(order, monkeypatch):
+    """Either `a` or `b` will do; without `b` it is better."""
+    scores = {"abc": 100.0, "bc": 104.0, "ac": 101.0, "ab": 300.0}
+    scores |= {"a": 500.0, "b": 450.0, "c": 400.0, "": 900.0}
+
+    def of(names):
+        hypothesis = SimpleNamespace(
+            causes=[SimpleNamespace(label=name) for name in names],
+            minus=lambda name: of([other for other in names if other != name]).hypothesis,
+        )
+        return SimpleNamespace(hypothesis=hypothesis, score=scores["".join(sorted(names))])
+
+    def refitted(problem, hypothesis, *_, **__):
+        return of([cause.label for cause in hypothesis.causes])
+
+    monkeypatch.setattr(exchange_module, "fit", refitted)
+    monkeypatch.setattr(exchange_module, "score", lambda found: found.score)
+    left = prune(None, of(order), (), 8.0)
+    assert {cause.label for cause in left.hypothesis.causes} == {"a", "c"}
 
 
 def test_late_blows_and_what_is_common_are_found_at_once(arm):

@@ -1,12 +1,17 @@
-"""The tables of the blind trial: what docs/diagnosis.md says was printed by them."""
+"""The tables of the blind trial: what docs/blind_trial.md says was printed by them."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
+from contextlib import redirect_stdout
+from io import StringIO
+
+from picchio.core.files import atomic_write
 
 ARM = "fanuc_like_3dof"
 UNNAMEABLE = {"outside": "out of the catalogue", "left-out": "true cause taken out"}
+BEGIN, END = "<!-- tables: printed, not written -->", "<!-- end of the tables -->"
 ENOUGH = 30.0  # chi-square from which a measurement is foretold to tell causes apart
 WITHIN = {"peak": 0.01, "life": 0.05}  # of a burst that nobody measured
 
@@ -25,6 +30,21 @@ def summary(rows):
     print_times(rows)
     print_confusion(rows)
     print_wrong(rows)
+
+
+def printed(rows):
+    """What `summary` prints, as a block for a page."""
+    room = StringIO()
+    with redirect_stdout(room):
+        summary(rows)
+    return f"{BEGIN}\n```text\n{room.getvalue().rstrip()}\n```\n{END}"
+
+
+def into_page(rows, page):
+    """Put the tables between a page's marks."""
+    before, rest = page.read_text().split(BEGIN)
+    with atomic_write(page) as stream:
+        stream.write(before + printed(rows) + rest.split(END)[1])
 
 
 def _aside(row):
@@ -64,10 +84,15 @@ def print_rates(rows):
             bound = f"rate below {100 * upper_bound(alarms, len(nulls)):.2g} % (95 %)"
             print(f"false alarms at {snr} dB: {alarms} in {len(nulls)}; {bound}")
     for kind, what in UNNAMEABLE.items():
-        found = [row for row in rows if row["kind"] == kind]
-        if found:
-            named = sum(row["verdict"] == "named" for row in found)
-            print(f"{what}: {named} of {len(found)} named wrongly")
+        for snr in (40, 20):
+            found = [row for row in rows if row["kind"] == kind and row["snr"] == snr]
+            if found:
+                named = sum(row["verdict"] == "named" for row in found)
+                low, high = (100 * x for x in proportion(named, len(found)))
+                print(
+                    f"{what}, {snr} dB: {named} of {len(found)} named wrongly: "
+                    f"{low:.2g} to {high:.2g} % (95 %)"
+                )
     mixed = [row for row in rows if row["kind"] == "mixed"]
     if mixed:
         claimed = [row for row in mixed if row["claimed"]]

@@ -35,10 +35,13 @@ from picchio.diagnosis.percussion.select import (
     alternatives,
     refit,
 )
+from picchio.diagnosis.percussion.shared_records import shared_out
 from picchio.diagnosis.percussion.trials import SAME, Trial, score
 from picchio.diagnosis.percussion.unknowns import TOLERATED, Hypothesis
+from picchio.diagnosis.percussion.warm_up import warm_up
 from picchio.diagnosis.result import Cause, Diagnosis, Verdict
 from picchio.diagnosis.verdict_rules import BEYOND_DOUBT, MOSTLY
+from picchio.model import Effect
 from picchio.model.effects import Scales
 from picchio.prediction.noise_level import Noise
 from picchio.robot import FlexibleRobot
@@ -114,14 +117,24 @@ def diagnose_percussion(
     say = progress or (lambda text: None)
     say("reading the records and their noise")
     problem = Problem(robot, campaign, noise, gravity_stiffness=gravity_stiffness, workers=workers)
-    ways = held_out(problem)
     candidates = all_candidates(problem, without)
-    looked = look(problem, candidates, ways[0], progress)
+    warm_up(problem, candidates)
+    with shared_out(problem):
+        return _diagnosed(problem, candidates, say)
+
+
+def _diagnosed(
+    problem: Problem,
+    candidates: Sequence[tuple[type[Effect], str]],
+    say: Callable[[str], None],
+) -> PercussionDiagnosis:
+    ways = held_out(problem)
+    looked = look(problem, candidates, ways[0], say)
     nominal, before = looked.nominal(problem)
     if looked.found.pinned and not looked.found.best.hypothesis.labels and not before.is_noise:
         # Noise in the poses that were looked at, and more in all: they hide what is wrong.
         say("looking at other poses")
-        again = [look(problem, candidates, way, progress) for way in ways[1:]]
+        again = [look(problem, candidates, way, say) for way in ways[1:]]
         told = [other for other in again if other.found.best.hypothesis.labels]
         looked = max(told, key=lambda other: other.gained, default=looked)
     found, train, kept = looked.found, looked.train, looked.kept

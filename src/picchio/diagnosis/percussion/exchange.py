@@ -31,23 +31,25 @@ def prune(
     found: Fit,
     records: Sequence[MeasuredRecord],
     least: float,
-    newest: str = "",
     *,
     alone: bool = True,
 ) -> Fit:
-    """Take out every cause, the newest included, that the others do without.
+    """Take out every cause, the newest included, that the others do without; the idlest first.
 
     With `alone` the last one, too: a fit with a cause in it goes on where the fit without it had
     stopped, and what it gains may be the nuisances' doing.
     """
     best = found
-    for label in sorted(found.hypothesis.labels, key=lambda text: text == newest):
-        if len(best.hypothesis.labels) < 2 and not alone:
-            break
+    while len(best.hypothesis.causes) > (0 if alone else 1):
         # To the end, however far behind at first: the cause may have moved a stuck fit on.
-        without = fit(problem, best.hypothesis.minus(label), records, None, iterations=5)
-        if score(without) < score(best) + least:
-            best = without
+        fits = [
+            fit(problem, best.hypothesis.minus(cause.label), records, None, iterations=5)
+            for cause in best.hypothesis.causes
+        ]
+        idlest = min(fits, key=score)
+        if score(idlest) >= score(best) + least:
+            break
+        best = idlest
     return best
 
 
@@ -165,7 +167,7 @@ def replaced(
         trials = rivals_of(cause.label, problem, best, candidates, scales, records, tried)
         if trials and trials[0].score < score(best) - least:
             newest = trials[0].label
-            best = prune(problem, trials[0].fit, records, least, newest)
+            best = prune(problem, trials[0].fit, records, least)
             best = with_latent(problem, best, newest)
             if weigh(problem, best.residuals, best.records).is_noise:
                 break

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -19,6 +21,9 @@ from picchio.prediction.noise_level import Noise
 from picchio.prediction.percussion import POSITION_KINDS, PercussionSetup, percussion_setups
 from picchio.robot import FlexibleRobot
 
+# Effects whose edges are held fixed, with a number of their own.
+Pin = tuple[int, tuple[Effect, ...]]
+_numbers = itertools.count()
 _JUMPING = ("force", "acceleration", "accelerometer")
 _KEPT_EDGES = 8
 
@@ -71,6 +76,16 @@ class MeasuredRecord:
         return self._cuts[end]
 
 
+class Helpers(Protocol):
+    """Whoever predicts part of the records elsewhere (`shared_records`)."""
+
+    def residuals(
+        self, effects: Sequence[Effect], records: Sequence[MeasuredRecord], end: float | None
+    ) -> list[FloatArray] | None:
+        """As `Problem.residuals`; None where that is not worth it."""
+        ...
+
+
 class Problem:
     """A campaign's percussion records, a robot, and the noise between them.
 
@@ -95,6 +110,8 @@ class Problem:
         workers: int | None = 1,
     ) -> None:
         self.workers = workers
+        self.helpers: Helpers | None = None
+        self.pins: list[Pin] = []
         self.robot, self.campaign = robot, campaign
         self.model = Model(robot, gravity_stiffness)
         setups = percussion_setups(robot, campaign)
@@ -142,16 +159,20 @@ class Problem:
             records: all where None.
             end: s, look no further.
         """
-        model = self.model.with_effects(effects)
         chosen = self.records if records is None else records
+        wanted = tuple(effects)
+        shared = self.helpers.residuals(wanted, chosen, end) if self.helpers else None
+        return self.own_residuals(wanted, chosen, end) if shared is None else shared
 
-        def one(record: MeasuredRecord) -> FloatArray:
-            # A trial far off may diverge; its residual is then no number, and it is dropped.
-            with np.errstate(all="ignore"):
-                return residual(record, model, end)
-
+    def own_residuals(
+        self, effects: Iterable[Effect], records: Sequence[MeasuredRecord], end: float | None
+    ) -> list[FloatArray]:
+        """As `residuals`, by this process alone."""
+        model = self.model.with_effects(effects)
+        # A trial far off may diverge; its residual is then no number, and it is dropped.
         # One after the other: threads would wait for the interpreter most of the time.
-        return [one(record) for record in chosen]
+        with np.errstate(all="ignore"):
+            return [residual(record, model, end) for record in records]
 
     @contextmanager
     def pinned(self, effects: Iterable[Effect]) -> Iterator[None]:
@@ -161,14 +182,24 @@ class Problem:
         noise does on average, one that is not costs what it happens to: by a choice among
         thousands of them a fit gains as much as a small cause does.
         """
-        model = self.model.with_effects(effects)
-        for record in self.records:
-            record._pinned.append(near_edges(record.setup, model))
+        self.pin((next(_numbers), tuple(effects)))
         try:
             yield
         finally:
-            for record in self.records:
-                record._pinned.pop()
+            self.unpin()
+
+    def pin(self, pin: Pin) -> None:
+        """As `pinned`, until `unpin`."""
+        model = self.model.with_effects(pin[1])
+        self.pins.append(pin)
+        for record in self.records:
+            record._pinned.append(near_edges(record.setup, model))
+
+    def unpin(self) -> None:
+        """Undo the last `pin`."""
+        self.pins.pop()
+        for record in self.records:
+            record._pinned.pop()
 
     def predictions(
         self, effects: Iterable[Effect], records: Sequence[MeasuredRecord] | None = None

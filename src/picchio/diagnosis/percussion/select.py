@@ -129,9 +129,7 @@ def search(
             known = bool(here.hypothesis.labels)
             if quiet and known and confidence(best.fit, here) < BEYOND_DOUBT:
                 break
-            found.best = prune(
-                problem, best.fit, records, least, best.label, alone=gain <= _CLEAR * least
-            )
+            found.best = prune(problem, best.fit, records, least, alone=gain <= _CLEAR * least)
             if known and not quiet:
                 found.best = _calm(problem, found.best, best.label, records)
             if found.best.hypothesis.labels == here.hypothesis.labels:
@@ -143,7 +141,7 @@ def search(
             noise = weigh(problem, found.best.residuals, found.best.records).is_noise
             again = with_latent(problem, found.best, best.label if noise else "")
             if again.cost < found.best.cost:
-                found.best = prune(problem, again, records, least, best.label, alone=False)
+                found.best = prune(problem, again, records, least, alone=False)
             if known and not weigh(problem, found.best.residuals, found.best.records).is_noise:
                 found.best = accepted(exchange(problem, found.best, found.steps, records, least))
             if len(found.best.hypothesis.labels) >= MOST_CAUSES:
@@ -223,7 +221,7 @@ def _tried_before(found: Search, label: str) -> list[Trial]:
 
 def refit(problem: Problem, hypothesis: Hypothesis, records: Sequence[MeasuredRecord]) -> Fit:
     """A hypothesis refitted to some records, from where it stands, with its Jacobian."""
-    hidden = {e.name for e in hypothesis.effects if e.name in LATENT and e.name != "mains_hum"}
+    hidden = [e.name for e in hypothesis.effects if e.name in LATENT and e.name != "mains_hum"]
     # Blows' times in records that were held out are not known yet: nothing can be fitted to them.
     turns = 0 if "pulse_jitter" in hidden else 4
     found = fit(problem, hypothesis, records, None, iterations=turns, with_jacobian=not hidden)

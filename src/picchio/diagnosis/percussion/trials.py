@@ -115,6 +115,8 @@ def try_candidates(
     def long_fit(task: tuple[Hypothesis, Effect, float]) -> Fit | None:
         return _light(_fit_long(problem, *task, records))
 
+    # What takes long begins first, or all others would wait for it at the end.
+    candidates = sorted(candidates, key=lambda c: c[0].latent is None)
     functions: dict[str, Callable[[Any], Any]]
     functions = {"screen": look.suspect, "short": short_fit, "long": long_fit}
     if early is not None:
@@ -218,7 +220,8 @@ def _long_trials(
             trials.append(Trial(suspect.label, found, math.inf, suspect.gain))
         else:
             wanted.append((suspect, found))
-    # The first is the others' rival: a fit that stays far above it is given up.
+    # The first is the others' rival: a fit that stays far above it is given up. It is fitted here,
+    # where other processes may predict some of its records.
     for some in (wanted[:1], wanted[1:]):
         tasks = [(found.hypothesis, suspect.effect, rival) for suspect, found in some]
         for (suspect, _), light in zip(some, pool.map("long", tasks), strict=True):

@@ -24,6 +24,11 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
+def worker_count(workers: int | None) -> int:
+    """As many as are asked for; as many as cores where None, eight at most."""
+    return min(cores(), _MOST) if workers is None else workers
+
+
 class Workers:
     """Maps functions over items; a `with` block is as long as the processes live.
 
@@ -39,7 +44,7 @@ class Workers:
     def __init__(self, workers: int | None, functions: Mapping[str, Callable[[Any], Any]]) -> None:
         self._functions = functions
         self._number = next(_numbers)
-        wanted = min(cores(), _MOST) if workers is None else workers
+        wanted = worker_count(workers)
         able = sys.platform == "linux" and not multiprocessing.current_process().daemon
         self._workers = wanted if able else 1
         self._pool: ProcessPoolExecutor | None = None

@@ -1,0 +1,187 @@
+"""Work shared among processes: the same results to the last bit, whatever happens to them."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trial
+
+import picchio
+from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.fit import fit
+from picchio.diagnosis.percussion.problem import Problem
+from picchio.diagnosis.percussion.shared_records import shared_out
+from picchio.diagnosis.percussion.trials import try_candidates
+from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.diagnosis.percussion.workers import Workers
+from picchio.model.effects import effect_class
+
+ARM = "fanuc_like_3dof"
+CASE = {"robot": ARM, "kind": "single", "effect": "payload", "snr": 40, "draw": 0, "records": 3}
+
+linux = pytest.mark.skipif(sys.platform != "linux", reason="nothing is forked elsewhere")
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    return trial.make(CASE)[0]
+
+
+@pytest.fixture
+def problem(campaign):
+    return Problem(picchio.load_robot(ARM), campaign, workers=2)
+
+
+@pytest.fixture
+def start(problem):
+    return Hypothesis.baseline(problem.robot, problem.campaign.tolerance)
+
+
+def test_workers_change_nothing(campaign):
+    """Processes or not: the same suspects, the same fits."""
+    names = ("payload", "joint_stiffness", "coulomb_friction", "sensor_gain", "mains_hum")
+    found = []
+    for workers in (1, 2):
+        problem = Problem(picchio.load_robot(ARM), campaign, workers=workers)
+        start = Hypothesis.baseline(problem.robot, campaign.tolerance)
+        with shared_out(problem):
+            base = fit(problem, start, iterations=3)
+            scales = measure_scales(
+                problem, base.hypothesis.effects, problem.predictions(base.hypothesis.effects)
+            )
+            some = [c for c in all_candidates(problem) if c[0].name in names]
+            promises = []
+            trials = try_candidates(
+                problem, base.hypothesis, some, scales, problem.records, log=promises.append
+            )
+        assert all(t.fit.records for t in trials)
+        found.append((promises, [(t.label, t.score, t.fit.hypothesis) for t in trials]))
+    assert found[0] == found[1]
+    assert found[0][1][0][0] == "payload:tool"
+
+
+def test_an_error_in_a_worker_is_an_error_here():
+    def fail(item):
+        if item == 3:
+            raise InputError("broken", key="item", value=item)
+        return -item
+
+    for workers in (1, 2):
+        with Workers(workers, {"fail": fail}) as pool:
+            assert pool.map("fail", [1, 2, 4]) == [-1, -2, -4]
+            with pytest.raises(InputError, match="broken"):
+                pool.map("fail", [1, 3, 2])
+
+
+def _late(start, rate):
+    return start.plus(effect_class("clock_drift")("accelerometer.tool", rate=rate)).effects
+
+
+def _same(problem, effects, end=None):
+    """Whether shared residuals are those of this process alone; and that they were shared."""
+    told = problem.helpers.residuals(tuple(effects), problem.records, end)
+    assert told is not None
+    alone = problem.own_residuals(effects, problem.records, end)
+    return all(np.array_equal(a, b) for a, b in zip(told, alone, strict=True))
+
+
+@linux
+def test_shared_records_are_predicted_alike(problem, start):
+    drift = _late(start, 3e-4)
+    with shared_out(problem):
+        assert _same(problem, start.effects)
+        assert _same(problem, drift, 0.5)
+        free = problem.residuals(drift)
+        with problem.pinned(start.effects):
+            assert _same(problem, drift)
+            assert not np.array_equal(problem.residuals(drift)[-1], free[-1])
+            with problem.pinned(drift):
+                assert _same(problem, drift)
+            assert _same(problem, drift)
+        assert _same(problem, drift)
+        # Less than it costs to send.
+        assert problem.helpers.residuals(start.effects, problem.records, 0.05) is None
+    assert problem.helpers is None
+
+
+@linux
+def test_an_error_leaves_no_answer_behind(problem, start):
+    nowhere = (*start.effects, effect_class("joint_stiffness")("nowhere", scale=0.9))
+    with shared_out(problem):
+        for _ in range(2):
+            with pytest.raises(InputError, match="nowhere"):
+                problem.residuals(nowhere)
+            assert _same(problem, start.effects)
+
+
+@linux
+def test_it_goes_on_alone_when_a_helper_is_killed(problem, start):
+    alone = problem.own_residuals(start.effects, problem.records, None)
+    with shared_out(problem):
+        assert _same(problem, start.effects)
+        helper = problem.helpers._processes[0]
+        os.kill(helper.pid, signal.SIGKILL)
+        helper.join()
+        for _ in range(2):
+            told = problem.residuals(start.effects)
+            assert all(np.array_equal(a, b) for a, b in zip(told, alone, strict=True))
+
+
+LOADED = """
+import sys
+sys.path[:0] = {folders!r}
+import gc
+import numba
+import picchio, trial
+from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.problem import Problem
+from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.diagnosis.percussion.warm_up import warm_up
+
+def loaded():
+    found = [o for o in gc.get_objects() if isinstance(o, numba.core.registry.CPUDispatcher)]
+    ours = [len(o.signatures) for o in found if o.__module__.startswith("picchio")]
+    return sum(ours), len(sys.modules)
+
+campaign, _ = trial.make({case!r})
+problem = Problem(picchio.load_robot({arm!r}), campaign, workers={workers})
+candidates = all_candidates(problem)
+before = loaded()
+warm_up(problem, candidates)
+after = loaded()
+nominal = Hypothesis.baseline(problem.robot, campaign.tolerance)
+scales = measure_scales(problem, nominal.effects, problem.predictions(nominal.effects))
+for kind, target in candidates:
+    for values in kind(target).trials(scales):
+        try:
+            effects = nominal.plus(kind(target, **values)).effects
+            problem.own_residuals(effects, problem.records, None)
+        except picchio.InputError:
+            pass
+print(before, after, loaded(), sep=";")
+"""
+
+
+def _loaded(workers):
+    here = Path(__file__).resolve().parent
+    script = LOADED.format(
+        folders=[str(here), str(here.parent)], case=CASE, arm=ARM, workers=workers
+    )
+    told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert not told.returncode, told.stderr
+    return told.stdout.strip().splitlines()[-1].split(";")
+
+
+def test_what_effects_need_is_loaded_before_processes_are_forked():
+    before, after, end = _loaded(workers=2)
+    assert before != after == end
+
+
+def test_one_process_loads_when_it_needs():
+    before, after, end = _loaded(workers=1)
+    assert before == after != end
