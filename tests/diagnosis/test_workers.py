@@ -185,3 +185,36 @@ def test_what_effects_need_is_loaded_before_processes_are_forked():
 def test_one_process_loads_when_it_needs():
     before, after, end = _loaded(workers=1)
     assert before == after != end
+
+
+ANSWER = """
+import sys
+sys.path[:0] = {folders!r}
+import picchio, trial
+from picchio.diagnosis.percussion.diagnose import diagnose_percussion
+
+if __name__ == "__main__":
+    campaign, _ = trial.make({case!r})
+    found = diagnose_percussion(picchio.load_robot({arm!r}), campaign, workers={workers})
+    print(found.diagnosis)
+"""
+
+
+@pytest.mark.slow
+def test_the_same_data_get_the_same_answer():
+    """Whatever order Python's sets have in a run, and however many processes there are."""
+    here = Path(__file__).resolve().parent
+    case = {"robot": ARM, "kind": "pair", "snr": 40, "draw": 1, "records": 9}
+    answers = []
+    for seed, workers in (("1", 1), ("2", 2)):
+        script = ANSWER.format(
+            folders=[str(here), str(here.parent)], case=case, arm=ARM, workers=workers
+        )
+        told = subprocess.run(
+            [sys.executable, "-c", script],
+            capture_output=True, text=True, env={**os.environ, "PYTHONHASHSEED": seed},
+        )  # fmt: skip
+        assert not told.returncode, told.stderr
+        answers.append(told.stdout)
+    assert answers[0].startswith("Diagnosis(verdict=")
+    assert len(set(answers)) == 1
