@@ -17,6 +17,7 @@ if TESTS not in sys.path:
 
 import burst  # noqa: E402
 import follow_up  # noqa: E402
+import removed  # noqa: E402
 from ablations import METHODS  # noqa: E402
 
 import picchio  # noqa: E402
@@ -106,6 +107,7 @@ def run(case, salt=0, without=(), method="diagnose"):
             result["follow_up"] = follow(robot, case, campaign, truth, found, seed_of(case, salt))
         if truth["causes"] and result["right"]:
             result["burst"] = burst.errors(found, truth, seed_of(case, salt))
+            result["removed"] = removed.share(found, truth)
     else:
         result = judge_labels(case, truth, METHODS[method](robot, campaign))
     result["seconds"] = round(time.monotonic() - began, 1)
