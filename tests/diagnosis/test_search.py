@@ -17,7 +17,7 @@ from picchio.diagnosis.percussion.fit import fit, fit_growing
 from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.stuck import unstuck
-from picchio.diagnosis.percussion.trials import Trial, score
+from picchio.diagnosis.percussion.trials import SAME, Trial, score
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model.effects import effect_class
 from worlds import campaign as worlds
@@ -110,6 +110,33 @@ def test_the_idlest_cause_goes_first_in_whatever_order_they_stand(order, monkeyp
     monkeypatch.setattr(exchange_module, "score", lambda found: found.score)
     left = prune(None, of(order), (), 8.0)
     assert {cause.label for cause in left.hypothesis.causes} == {"a", "c"}
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_rivals_are_compared_over_the_same_samples(seed, arm):
+    """Blows at another rate, or a sensor's clock: each knows other samples, and stops early."""
+    late = ("pulse_rate", "tool", {"scale": 1.0046})
+    campaign, _ = worlds.make(
+        robot=ROBOT, seed=seed, causes=(late,), snr_db=20.0, sensors=SENSORS[:1], records=6
+    )
+    problem = Problem(arm, campaign)
+    baseline = fit_growing(problem, Hypothesis.baseline(arm, campaign.tolerance))
+
+    def trial_of(name, target, **values):
+        cause = effect_class(name)(target, **values)
+        found = fit_growing(problem, baseline.hypothesis.plus(cause))
+        return Trial(cause.label, found, score(found), 0.0)
+
+    trials = [
+        trial_of("clock_drift", SENSORS[0], rate=-0.0043),
+        trial_of("pulse_rate", "tool", scale=1.0043),
+    ]
+    trials.sort(key=lambda t: t.score)
+    again = select.over_the_same_samples(problem, trials, problem.records)
+    assert [t.score for t in again] == sorted(t.score for t in again)
+    assert abs(again[0].score - again[1].score) < SAME
+    rate = next(t for t in again if t.label == "pulse_rate:tool").fit.hypothesis.causes[0]
+    assert rate.values["scale"] == pytest.approx(1.0046, abs=1e-4)
 
 
 def test_late_blows_and_what_is_common_are_found_at_once(arm):

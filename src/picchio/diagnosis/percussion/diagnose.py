@@ -162,8 +162,11 @@ def _diagnosed(
     # More rivals can only lessen the confidence: what isn't sure by now won't be claimed.
     if causes and (after.is_noise or (_mostly(gain.explained) and _sure(causes))):
         say("looking for other causes that would do as well")
-        same, rivals = alternatives(problem, found, candidates, scales, train)
-        same, refuted = _on_all_records(problem, whole, same)
+        # Over the same samples: else a rival may lose, or win, by which of them it knows.
+        with problem.pinned(found.best.hypothesis.effects):
+            same, rivals = alternatives(problem, found, candidates, scales, train)
+        with problem.pinned(whole.hypothesis.effects):
+            same, refuted = _on_all_records(problem, whole, same)
         causes = told_causes(whole, found, rivals, train, refuted)
     common = common_faults(whole.hypothesis, told_covariance(whole), problem.groups)
     verdict = _verdict(whole, causes, before, after, same, gain.explained, common)

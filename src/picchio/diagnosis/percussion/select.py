@@ -43,6 +43,8 @@ LEAST_GAIN = 8.0
 EXACT = 3e-4
 # Of the least gain: beyond that no fit without the cause comes near.
 _CLEAR = 10.0
+# Fall of BIC up to which a rival may owe its place to the samples that it counts as known.
+_ROUGH = 100.0
 # How often every cause is replaced in turn, and up to what share of the baseline's cost that is
 # worth while.
 _SWEEPS = 2
@@ -116,6 +118,8 @@ def search(
             )  # fmt: skip
             if not trials:
                 break
+            if not found.pinned:
+                trials = over_the_same_samples(problem, trials, records)
             found.steps.append(trials)
             # Of those that do as well, the records held out have the first word.
             tied = [t for t in trials if t.score - trials[0].score < SAME]
@@ -168,6 +172,35 @@ def search(
                 grow(stack)
     found.evidence = weigh(problem, found.best.residuals, found.best.records)
     return found
+
+
+def over_the_same_samples(
+    problem: Problem, trials: Sequence[Trial], records: Sequence[MeasuredRecord]
+) -> list[Trial]:
+    """Trials, the best first; where that leaves noise, close rivals are compared with it anew.
+
+    Each was fitted with its own choice of which samples are known, by which its cost is rough: a
+    fit may stop early, or gain by what it leaves out. Now all count those of the best.
+    """
+    best = trials[0]
+    close = [
+        t
+        for t in trials
+        if t.finished(records)
+        and t.score - best.score < _ROUGH
+        and effect_class(t.label.split(":")[0]).latent is None
+    ]
+    if best not in close or len(close) < 2:
+        return list(trials)
+    if not weigh(problem, best.fit.residuals, best.fit.records).is_noise:
+        return list(trials)
+    with problem.pinned(best.fit.hypothesis.effects):
+        again = []
+        for t in close:
+            there = fit(problem, t.fit.hypothesis, records, None, iterations=6)
+            again.append(replace(t, fit=there, score=score(there)))
+    others = [t for t in trials if t not in close]
+    return sorted([*again, *others], key=lambda t: t.score)
 
 
 def _calm(problem: Problem, best: Fit, newest: str, records: Sequence[MeasuredRecord]) -> Fit:
