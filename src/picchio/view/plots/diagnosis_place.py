@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
@@ -97,6 +98,8 @@ def plot_place(
         dx, dz = seen(0.22 * size * unit / np.linalg.norm(unit))
         ax.annotate("", (x, z), xytext=(x - dx, z - dz), zorder=2,
                     arrowprops={"arrowstyle": "-|>", "color": BLUE, "linewidth": 1.6})  # fmt: skip
+    across = [seen(p)[0] for p in at.values()]
+    middle = 0.5 * (min(across) + max(across))
     taken: list[tuple[float, float]] = []
     for effect, target in causes:
         points = _points(robot, effect, target, all_frames, at)
@@ -107,9 +110,12 @@ def plot_place(
             x, z = seen(points[-1])
             shift = sum(abs(x - a) + abs(z - b) < 0.1 * size for a, b in taken)
             taken.append((x, z))
-            ax.annotate(plain(effect.replace("_", " ")), (x, z), xytext=(15, 9 - 12 * shift),
-                        textcoords="offset points", color=VERMILION, fontsize=9,
-                        fontweight="bold", zorder=5)  # fmt: skip
+            # On the side where there is room for it.
+            side = 1 if x <= middle else -1
+            ax.annotate(plain(effect.replace("_", " ")), (x, z), xytext=(15 * side, 9 - 12 * shift),
+                        textcoords="offset points", ha="left" if side > 0 else "right",
+                        color=VERMILION, fontsize=9, fontweight="bold", zorder=5,
+                        path_effects=[withStroke(linewidth=3.0, foreground=PAPER)])  # fmt: skip
     ax.set_aspect("equal", adjustable="datalim")
     ax.margins(0.22)
     ax.grid(False)
