@@ -184,6 +184,7 @@ def mark_places(ax: Axes, names: Sequence[str]) -> Axes:
             text.set_horizontalalignment("right")
             text.set_position((-12, 10))
         else:
+            text.set_horizontalalignment("left")
             text.set_position((12, 8))
         kept.append(text)
     return ax
