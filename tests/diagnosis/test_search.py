@@ -6,11 +6,13 @@ from itertools import permutations
 from types import SimpleNamespace
 
 import pytest
+import trial
 
 import picchio
 from picchio.diagnosis.percussion import exchange as exchange_module
 from picchio.diagnosis.percussion import select
 from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.diagnose import diagnose_percussion
 from picchio.diagnosis.percussion.evidence import weigh
 from picchio.diagnosis.percussion.exchange import exchange, prune
 from picchio.diagnosis.percussion.fit import fit, fit_growing
@@ -176,6 +178,43 @@ def test_what_replaces_a_cause_must_hold_on_poses_held_out(holds, two_causes, ar
         confirmed=lambda before, after: holds or after is not better,
     )  # fmt: skip
     assert found.best is (better if holds else best)
+
+
+def test_where_poses_held_out_refute_the_best_the_search_goes_wider(two_causes, arm, monkeypatch):
+    """The right cause had not been among the suspects that were fitted."""
+    problem, wrong, right, _ = two_causes
+    asked = []
+
+    def tried(*_, wide=False, **__):
+        asked.append(wide)
+        return [[wrong], [wrong, right], []][len(asked) - 1]
+
+    monkeypatch.setattr(select, "try_candidates", tried)
+    monkeypatch.setattr(select, "prune", lambda problem, found, *_, **__: found)
+    monkeypatch.setattr(select, "unstuck", lambda problem, best, *_: best)
+    start = fit(problem, Hypothesis.baseline(arm, problem.campaign.tolerance))
+    found = select.search(
+        problem, [], None, problem.records, start,
+        confirmed=lambda before, after: after is not wrong.fit,
+    )  # fmt: skip
+    assert asked == [False, True, False]
+    assert found.best is right.fit
+    assert found.steps[0][0] is right
+
+
+@pytest.mark.slow
+def test_a_tilting_bearing_is_found_though_others_promise_more(arm):
+    """Draw 3 of the weak ones: 23 times as stiff as the joint, and fourteen suspects before it."""
+    campaign, truth = trial.make(
+        {"robot": ROBOT, "kind": "weak", "effect": "transverse_compliance", "snr": 20, "draw": 3}, 1
+    )
+    found = diagnose_percussion(arm, campaign)
+    assert found.diagnosis.verdict == "named"
+    cause = found.diagnosis.causes[0]
+    true = truth["causes"][0]
+    assert (cause.effect, cause.target) == (true["effect"], true["target"])
+    stiffness = cause.parameters["stiffness"]
+    assert stiffness.value == pytest.approx(true["parameters"]["stiffness"], rel=0.005)
 
 
 def test_a_contact_that_a_fit_holds_shut_for_ever_is_opened_again(arm):

@@ -125,6 +125,15 @@ def search(
             tied = [t for t in trials if t.score - trials[0].score < SAME]
             held = (t for t in tied if confirmed is None or confirmed(here, t.fit))
             best = next(held, None)
+            if best is None and confirmed is not None and not quiet:
+                # What looked best is none; the right one may not have been among those fitted.
+                wider = try_candidates(
+                    problem, here.hypothesis, candidates, scales, records,
+                    wide=True, least=least, log=found.scores.append,
+                )  # fmt: skip
+                trials[:] = wider or trials
+                held = (t for t in trials if t.finished(records) and confirmed(here, t.fit))
+                best = next(held, None)
             gain = score(here) - best.score if best is not None else 0.0
             if best is None or gain < least:
                 break

@@ -84,6 +84,7 @@ def try_candidates(
     short_list: int = SHORT_LIST,
     long_fits: int = LONG_FITS,
     whole: bool = False,
+    wide: bool = False,
     least: float = 0.0,
     cause: str = "",
     best: Fit | None = None,
@@ -92,7 +93,8 @@ def try_candidates(
     """Screen all candidates, fit the best on growing windows; the best first.
 
     Where plenty is left to explain, the first part of a part of the records screens as well;
-    `whole` takes all there is, and stops where no candidate promises anything near `least`.
+    `whole` takes all there is, and stops where no candidate promises anything near `least`. `wide`
+    fits three times as many suspects, those included that look promising very early.
     With a `cause`, which is a label among the candidates, its rivals are looked for: it is screened
     to know what may be expected of them; `best` is the fit to all records that has it.
     """
@@ -133,8 +135,11 @@ def try_candidates(
                 return []
         if cause:
             suspects = _rivals(suspects, cause)
+        if wide:
+            short_list, long_fits = 3 * short_list, 2 * long_fits
         chosen = _short_list(suspects, short_list)
-        if early is not None and not cause and _promised(suspects) < _HALF * look.total:
+        little = wide or _promised(suspects) < _HALF * look.total
+        if early is not None and not cause and little:
             # What makes a motion differ ever more is only like itself while it differs little.
             chosen = _joined(chosen, early.ranked(pool.map("early", candidates)))
         tried = [(suspect, effect) for suspect in chosen for effect in suspect.starts]
