@@ -16,10 +16,11 @@ from picchio.diagnosis.percussion.diagnose import diagnose_percussion
 from picchio.diagnosis.percussion.evidence import weigh
 from picchio.diagnosis.percussion.exchange import exchange, prune
 from picchio.diagnosis.percussion.fit import fit, fit_growing
+from picchio.diagnosis.percussion.gain import held_out
 from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.stuck import unstuck
-from picchio.diagnosis.percussion.trials import SAME, Trial, score
+from picchio.diagnosis.percussion.trials import SAME, Trial, _fit_short, score, spread_out
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model.effects import effect_class
 from worlds import campaign as worlds
@@ -178,6 +179,38 @@ def test_what_replaces_a_cause_must_hold_on_poses_held_out(holds, two_causes, ar
         confirmed=lambda before, after: holds or after is not better,
     )  # fmt: skip
     assert found.best is (better if holds else best)
+
+
+def test_what_has_nothing_to_do_beside_a_rival_is_taken_out(two_causes, arm, monkeypatch):
+    problem, wrong, right, best = two_causes
+    idle = effect_class("joint_damping")("joint_3", damping=1e-3)
+    force = effect_class("force_amplitude")("tool", scale=0.8)
+    three = fit(problem, right.fit.hypothesis.plus(force).plus(idle), iterations=4)
+    rounds = iter([[wrong], [Trial("force_amplitude:tool", best, score(best), 0.0)], []])
+    monkeypatch.setattr(select, "try_candidates", lambda *_, **__: next(rounds))
+    monkeypatch.setattr(select, "unstuck", lambda problem, best, *_: best)
+    monkeypatch.setattr(select, "exchange", lambda *_: three)
+    start = fit(problem, Hypothesis.baseline(arm, problem.campaign.tolerance))
+    found = select.search(problem, [], None, problem.records, start)
+    assert found.best.hypothesis.labels == {"joint_stiffness:joint_1", "force_amplitude:tool"}
+
+
+def test_swapped_axes_are_fitted_with_their_own_slopes(arm):
+    """Slopes that are borrowed from a fit with other axes lead nowhere."""
+    campaign, truth = trial.make(
+        {"robot": ROBOT, "kind": "weak", "effect": "sensor_axes", "snr": 20, "draw": 3}, 1
+    )
+    problem = Problem(arm, campaign)
+    train, _ = held_out(problem)[0]
+    baseline = fit_growing(problem, Hypothesis.baseline(arm, campaign.tolerance), train)
+    some = spread_out(train)
+    known = fit(problem, baseline.hypothesis, some, 0.3, iterations=4, with_jacobian=True)
+    kind = effect_class("sensor_axes")
+    swapped = [kind(SENSORS[0], code=float(code)) for code in range(48)]
+    true = truth["causes"][0]["parameters"]["axes"]
+    right = next(effect for effect in swapped if effect.axes == true)
+    found = _fit_short(problem, known, right, some, 0.3)
+    assert found.chi_square / found.samples < 1.1
 
 
 def test_where_poses_held_out_refute_the_best_the_search_goes_wider(two_causes, arm, monkeypatch):

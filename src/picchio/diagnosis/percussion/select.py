@@ -156,7 +156,10 @@ def search(
             if again.cost < found.best.cost:
                 found.best = prune(problem, again, records, least, alone=False)
             if known and not weigh(problem, found.best.residuals, found.best.records).is_noise:
-                found.best = accepted(exchange(problem, found.best, found.steps, records, least))
+                other = exchange(problem, found.best, found.steps, records, least)
+                if other is not found.best:  # beside the right one, others may have nothing to do
+                    other = prune(problem, other, records, least, alone=False)
+                found.best = accepted(other)
             if len(found.best.hypothesis.labels) >= MOST_CAUSES:
                 break
 

@@ -269,6 +269,8 @@ def _fit_short(
     window: float | None,
 ) -> Fit | None:
     """A candidate fitted to the first part of the records."""
+    # What has no small size turns all slopes: those that are known say nothing beside it.
+    near = None if start.discrete else known
     try:
         hypothesis = known.hypothesis.plus(start)
         if start.latent is not None:
@@ -276,9 +278,9 @@ def _fit_short(
             first = fit(problem, hypothesis, records, window, iterations=turns)
             return fit_latent(problem, first, type(start), start.target)
         if window is None:
-            return fit(problem, hypothesis, records, None, iterations=3, near=known)
+            return fit(problem, hypothesis, records, None, iterations=3, near=near)
         windows = (0.06, 0.16, window)
-        return fit_growing(problem, hypothesis, records, windows=windows, iterations=4, near=known)
+        return fit_growing(problem, hypothesis, records, windows=windows, iterations=4, near=near)
     except InputError:
         return None
 
