@@ -72,12 +72,12 @@ def main() -> None:
     given = parser.parse_args()
     timed({"robot": ARM, "kind": "null", "snr": 40, "draw": 10**6}, None)  # compiles, or loads
     rows = []
-    print(f"{'case':40} {'s':>6}" + (f" {'one core':>9} {'ratio':>6}" if given.one_core else ""))
+    print(f"{'case':44} {'s':>6}" + (f" {'one core':>9} {'ratio':>6}" if given.one_core else ""))
     for case in cases(given.arms):
         took, verdict, right = timed(case, None)
         row = {"case": trial.name_of(case), "kind": case["kind"], "robot": case["robot"]}
         row |= {"seconds": took, "verdict": verdict, "right": right}
-        line = f"{row['case']:40} {took:6.1f}"
+        line = f"{row['case']:44} {took:6.1f}"
         if given.one_core:
             row["one_core_seconds"] = timed(case, 1)[0]
             line += f" {row['one_core_seconds']:9.1f} {row['one_core_seconds'] / took:6.2f}"
