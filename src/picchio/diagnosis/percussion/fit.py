@@ -80,6 +80,8 @@ def prior_cost(hypothesis: Hypothesis) -> float:
     return float(((w * (u - means)) ** 2).sum())
 
 
+# A trial far off may diverge: what is no number then ends it.
+@np.errstate(over="ignore", invalid="ignore")
 def fit(
     problem: Problem,
     hypothesis: Hypothesis,

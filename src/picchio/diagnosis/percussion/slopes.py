@@ -66,7 +66,9 @@ def fine_steps(parts: Sequence[FloatArray], unknowns: Sequence[Unknown]) -> Floa
     The time of a blow's edge is known to a microsecond: a step of a thousandth would carry late
     edges past samples, and its difference quotient would say nothing of the slope.
     """
-    norms = np.sqrt(sum((part**2).sum(axis=0) for part in parts))
+    with np.errstate(over="ignore", invalid="ignore"):  # of a motion that diverges
+        norms = np.sqrt(sum((part**2).sum(axis=0) for part in parts))
+    norms = np.where(np.isfinite(norms), norms, np.inf)
     own = np.array([u.step for u in unknowns])
     return np.asarray(np.clip(2.0 / np.maximum(norms, 1e-12), _LEAST_STEP, own))
 
