@@ -11,6 +11,7 @@ import trial
 import picchio
 from picchio.diagnosis.percussion import exchange as exchange_module
 from picchio.diagnosis.percussion import select
+from picchio.diagnosis.percussion.candidate_fit import fit_short
 from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.diagnose import diagnose_percussion
 from picchio.diagnosis.percussion.evidence import weigh
@@ -20,7 +21,7 @@ from picchio.diagnosis.percussion.gain import held_out
 from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.stuck import unstuck
-from picchio.diagnosis.percussion.trials import SAME, Trial, _fit_short, score, spread_out
+from picchio.diagnosis.percussion.trials import SAME, Trial, score, spread_out
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model.effects import effect_class
 from worlds import campaign as worlds
@@ -115,7 +116,7 @@ def test_the_idlest_cause_goes_first_in_whatever_order_they_stand(order, monkeyp
     assert {cause.label for cause in left.hypothesis.causes} == {"a", "c"}
 
 
-@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("seed", [3, 5])
 def test_rivals_are_compared_over_the_same_samples(seed, arm):
     """Blows at another rate, or a sensor's clock: each knows other samples, and stops early."""
     late = ("pulse_rate", "tool", {"scale": 1.0046})
@@ -209,7 +210,7 @@ def test_swapped_axes_are_fitted_with_their_own_slopes(arm):
     swapped = [kind(SENSORS[0], code=float(code)) for code in range(48)]
     true = truth["causes"][0]["parameters"]["axes"]
     right = next(effect for effect in swapped if effect.axes == true)
-    found = _fit_short(problem, known, right, some, 0.3)
+    found = fit_short(problem, known, right, some, 0.3)
     assert found.chi_square / found.samples < 1.1
 
 

@@ -21,6 +21,7 @@ def summary(rows):
     """Print everything."""
     rows = [row for row in rows if not _aside(row)]
     print_kinds(rows)
+    print_draws(rows)
     print_rates(rows)
     # Where something unknown is left, what is fitted beside it says nothing of these.
     known = [row for row in rows if row["kind"] != "mixed"]
@@ -73,6 +74,23 @@ def print_kinds(rows):
         right = f"{sum(not wrong(row) for row in found)}/{len(found)}"
         verdicts = dict(Counter(row["verdict"] for row in found).most_common())
         print(f"{robot:<18}{kind:<10}{snr:>4}{len(found):>7}{right:>9}  {verdicts}")
+
+
+def print_draws(rows):
+    """Draw by draw, which is about the order in which the code came to them."""
+    print()
+    for kind, snr in (("single", 40), ("weak", 20), ("left-out", 40)):
+        draws = defaultdict(list)
+        for row in rows:
+            if (row["robot"], row["kind"], row["snr"]) == (ARM, kind, snr):
+                draws[int(row["case"].rsplit("/", 1)[1])].append(row)
+        told = [f"{sum(not wrong(row) for row in r)}/{len(r)}" for _, r in sorted(draws.items())]
+        if told:
+            print(f"right, draw by draw, {kind}, {snr} dB: {', '.join(told)}")
+    weak = [row for row in rows if row["kind"] == "weak" and row["claimed"]]
+    if weak:
+        print(f"weak: where anything is told, it holds the truth in "
+              f"{sum(row['right'] for row in weak)} of {len(weak)}")  # fmt: skip
 
 
 def print_rates(rows):
@@ -208,6 +226,8 @@ def print_sets(rows):
 
 def print_times(rows):
     """CPU time by robot."""
+    total = sum(row.get("cpu_seconds", 0.0) for row in rows)
+    print(f"CPU time, all {len(rows)} cases that could be made: {total / 3600:.1f} h")
     for robot in dict.fromkeys(row["robot"] for row in rows):
         for kind in dict.fromkeys(row["kind"] for row in rows):
             times = sorted(

@@ -14,7 +14,7 @@ from picchio.diagnosis.life import Unsure
 from picchio.diagnosis.percussion.confidence import confidence
 from picchio.diagnosis.percussion.drawn_numbers import width_spread
 from picchio.diagnosis.percussion.fit import Fit
-from picchio.diagnosis.percussion.problem import MeasuredRecord
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
 from picchio.diagnosis.percussion.select import EXACT, Search
 from picchio.diagnosis.percussion.steadiness import between_poses
 from picchio.diagnosis.percussion.trials import Trial, score

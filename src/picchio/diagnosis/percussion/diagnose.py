@@ -27,8 +27,9 @@ from picchio.diagnosis.percussion.fit import Fit
 from picchio.diagnosis.percussion.gain import held_out, measure_gain
 from picchio.diagnosis.percussion.latent import hum_lines
 from picchio.diagnosis.percussion.look import look, weighed
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
 from picchio.diagnosis.percussion.next_measurement import next_measurement
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.select import (
     LEAST_GAIN,
     Search,

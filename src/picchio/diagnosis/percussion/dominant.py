@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from picchio.diagnosis.percussion.fit import Fit, fit
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
+from picchio.diagnosis.percussion.problem import Problem
 
 # Nine tenths: what imitates something unknown takes away that much of it where the two are
 # correlated by 0.95.

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
+from picchio.diagnosis.percussion.problem import Problem
 
 _BANDS = 8
 # So many times the highest natural frequency still belongs to where the arm answers.

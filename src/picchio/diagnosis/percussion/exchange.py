@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence, Set
 from dataclasses import replace
 
+from picchio.diagnosis.percussion.candidate_fit import SCREEN_WINDOW
 from picchio.diagnosis.percussion.evidence import weigh
 from picchio.diagnosis.percussion.fit import HOPELESS, Fit, fit
 from picchio.diagnosis.percussion.latent import LATENT, with_hidden
 from picchio.diagnosis.percussion.latent_fit import fit_latent
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
+from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.trials import (
-    SCREEN_WINDOW,
     SHORT_LIST,
     Trial,
     score,

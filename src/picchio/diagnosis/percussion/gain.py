@@ -9,7 +9,8 @@ import numpy as np
 from picchio.diagnosis.percussion.fit import fit
 from picchio.diagnosis.percussion.latent import LATENT
 from picchio.diagnosis.percussion.latent_fit import fit_latent
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
+from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.diagnosis.result import Gain
 from picchio.model.effects import effect_class

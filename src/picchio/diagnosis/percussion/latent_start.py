@@ -13,7 +13,8 @@ import numpy as np
 
 from picchio.core.arrays import BoolArray, FloatArray
 from picchio.diagnosis.percussion.fit import Fit, fit
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
+from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 
 # How far a blow is looked for, in intervals of the blows; how finely at first, parts of a sample;

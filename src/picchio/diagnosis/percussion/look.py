@@ -10,7 +10,8 @@ from picchio.diagnosis.percussion.evidence import Evidence, weigh
 from picchio.diagnosis.percussion.fit import Fit, fit, fit_growing
 from picchio.diagnosis.percussion.gain import Split
 from picchio.diagnosis.percussion.latent import LATENT
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
+from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.select import Search, refit, search
 from picchio.diagnosis.percussion.steadiness import unsteadiness
 from picchio.diagnosis.percussion.trials import score

@@ -17,8 +17,9 @@ from picchio.diagnosis.percussion.asked_plan import (
     when,
 )
 from picchio.diagnosis.percussion.fit import Fit
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
 from picchio.diagnosis.percussion.possible_records import possible_records, varied
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.separation import separation
 from picchio.diagnosis.percussion.trials import SAME, Trial
 from picchio.diagnosis.percussion.unknowns import Hypothesis

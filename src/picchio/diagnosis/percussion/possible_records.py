@@ -10,7 +10,8 @@ import numpy as np
 
 from picchio.campaign import parse_channel
 from picchio.core.arrays import FloatArray
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
+from picchio.diagnosis.percussion.problem import Problem
 from picchio.model.geometry import Geometry
 from picchio.prediction.percussion import PercussionSetup
 

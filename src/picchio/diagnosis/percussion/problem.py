@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import itertools
-import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
-from picchio.campaign import Campaign, Channel
+from picchio.campaign import Campaign
 from picchio.core.arrays import BoolArray, FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.edges import near_edges
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
 from picchio.model import Effect, Model
 from picchio.prediction.noise_level import Noise
 from picchio.prediction.percussion import POSITION_KINDS, PercussionSetup, percussion_setups
@@ -26,54 +24,6 @@ Pin = tuple[int, tuple[Effect, ...]]
 _numbers = itertools.count()
 _JUMPING = ("force", "acceleration", "accelerometer")
 _KEPT_EDGES = 8
-
-
-@dataclass(frozen=True, eq=False)
-class MeasuredRecord:
-    """One record to be explained.
-
-    Attributes:
-        setup: what is needed to predict it.
-        values: channel -> (m,) SI.
-        noise: channel -> its noise at the record's rate.
-        pose: number of its pose among the campaign's.
-    """
-
-    setup: PercussionSetup
-    values: Mapping[str, FloatArray]
-    noise: Mapping[str, Noise]
-    pose: int
-    _cuts: dict[float, PercussionSetup] = field(default_factory=dict)
-    _edges: dict[object, dict[str, BoolArray] | None] = field(default_factory=dict)
-    _fillers: dict[str, FloatArray] = field(default_factory=dict)
-    _pinned: list[dict[str, BoolArray] | None] = field(default_factory=list)
-
-    @property
-    def name(self) -> str:
-        """Its file."""
-        return self.setup.name
-
-    @cached_property
-    def channels(self) -> list[Channel]:
-        """The channels of `values`, in their order."""
-        known = {channel.name: channel for channel in self.setup.channels}
-        return [known[name] for name in self.values]
-
-    def filler(self, channel: str) -> FloatArray:
-        """(m,) of +-1 without a pattern, always the same: in place of what is not known."""
-        if channel not in self._fillers:
-            seed = zlib.crc32(f"{self.name}/{channel}".encode())
-            signs = np.random.default_rng(seed).integers(0, 2, self.setup.samples.count)
-            self._fillers[channel] = 2.0 * signs - 1.0
-        return self._fillers[channel]
-
-    def until(self, end: float | None) -> PercussionSetup:
-        """The setup up to a time, s."""
-        if end is None or end >= self.setup.samples.times[-1]:
-            return self.setup
-        if end not in self._cuts:
-            self._cuts[end] = self.setup.cut(end)
-        return self._cuts[end]
 
 
 class Helpers(Protocol):

@@ -20,7 +20,8 @@ from picchio.diagnosis.percussion.exchange import (
 from picchio.diagnosis.percussion.fit import Fit, fit
 from picchio.diagnosis.percussion.latent import LATENT
 from picchio.diagnosis.percussion.latent_fit import fit_latent
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem, signal_power
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
+from picchio.diagnosis.percussion.problem import Problem, signal_power
 from picchio.diagnosis.percussion.stuck import unstuck
 from picchio.diagnosis.percussion.trials import (
     MOST_RIVALS,

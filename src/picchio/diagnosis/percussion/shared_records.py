@@ -5,7 +5,6 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -13,7 +12,8 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from picchio.core.arrays import FloatArray
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Pin, Problem
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
+from picchio.diagnosis.percussion.problem import Pin, Problem
 from picchio.diagnosis.percussion.workers import worker_count
 from picchio.model import Effect
 
@@ -30,8 +30,7 @@ def shared_out(problem: Problem) -> Iterator[None]:
     fork (not on Linux), nothing is shared.
     """
     count = worker_count(problem.workers) - 1
-    able = sys.platform == "linux" and not multiprocessing.current_process().daemon
-    if count < 1 or not able or problem.helpers is not None:
+    if count < 1 or problem.helpers is not None:
         yield
         return
     helpers = _Helpers(problem, count)

@@ -8,7 +8,8 @@ from dataclasses import replace
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.evidence import weigh
 from picchio.diagnosis.percussion.fit import Fit, fit_growing, kinked
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
+from picchio.diagnosis.percussion.problem import Problem
 from picchio.model import Effect
 from picchio.model.effects import Scales
 

@@ -7,19 +7,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.fit import Fit, fit, fit_growing, kinked
+from picchio.diagnosis.percussion.candidate_fit import SCREEN_WINDOW, fit_long, fit_short
+from picchio.diagnosis.percussion.fit import Fit, fit
 from picchio.diagnosis.percussion.latent import hidden_cost
-from picchio.diagnosis.percussion.latent_fit import fit_latent
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
+from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.screen import Screen, Suspect
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.diagnosis.percussion.workers import Workers
 from picchio.model import Effect
 from picchio.model.effects import Scales
 
-SCREEN_WINDOW = 0.3
-_ON_THE_WAY = (SCREEN_WINDOW, 2.0 * SCREEN_WINDOW)
 # Where nothing explains half of what is left there, this much of it is screened as well, s.
 _EARLY = 0.08
 _HALF = 0.5
@@ -112,10 +110,10 @@ def try_candidates(
         early = Screen(problem, begun, scales)
 
     def short_fit(effect: Effect) -> Fit | None:
-        return _light(_fit_short(problem, start, effect, some, window))
+        return _light(fit_short(problem, start, effect, some, window))
 
     def long_fit(task: tuple[Hypothesis, Effect, float]) -> Fit | None:
-        return _light(_fit_long(problem, *task, records))
+        return _light(fit_long(problem, *task, records))
 
     # What takes long begins first, or all others would wait for it at the end.
     candidates = sorted(candidates, key=lambda c: c[0].latent is None)
@@ -259,44 +257,3 @@ def spread_out(records: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
         order = own[turn % len(own) :] + own[: turn % len(own)]
         chosen += order[:per_pose]
     return chosen
-
-
-def _fit_short(
-    problem: Problem,
-    known: Fit,
-    start: Effect,
-    records: Sequence[MeasuredRecord],
-    window: float | None,
-) -> Fit | None:
-    """A candidate fitted to the first part of the records."""
-    # What has no small size turns all slopes: those that are known say nothing beside it.
-    near = None if start.discrete else known
-    try:
-        hypothesis = known.hypothesis.plus(start)
-        if start.latent is not None:
-            turns = 0 if start.name == "pulse_jitter" else 1
-            first = fit(problem, hypothesis, records, window, iterations=turns)
-            return fit_latent(problem, first, type(start), start.target)
-        if window is None:
-            return fit(problem, hypothesis, records, None, iterations=3, near=near)
-        windows = (0.06, 0.16, window)
-        return fit_growing(problem, hypothesis, records, windows=windows, iterations=4, near=near)
-    except InputError:
-        return None
-
-
-def _fit_long(
-    problem: Problem,
-    short: Hypothesis,
-    effect: Effect,
-    rival: float,
-    records: Sequence[MeasuredRecord],
-) -> Fit:
-    """A candidate fitted to all of the records."""
-    if effect.latent is not None:
-        turns = 0 if effect.name == "pulse_jitter" else 3
-        long = fit(problem, short, records, None, iterations=turns)
-        return fit_latent(problem, long, type(effect), effect.target, rival)
-    if kinked(short):  # a small error early is a large one late: not all at once
-        short = fit_growing(problem, short, records, windows=_ON_THE_WAY, iterations=3).hypothesis
-    return fit(problem, short, records, None, iterations=6, rival=rival)

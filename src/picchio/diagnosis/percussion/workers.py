@@ -25,7 +25,12 @@ def cores() -> int:
 
 
 def worker_count(workers: int | None) -> int:
-    """As many as are asked for; as many as cores where None, eight at most."""
+    """As many as are asked for; as many as cores where None, eight at most.
+
+    One where a process can't be forked safely: not on Linux, or within such a process.
+    """
+    if sys.platform != "linux" or multiprocessing.current_process().daemon:
+        return 1
     return min(cores(), _MOST) if workers is None else workers
 
 
@@ -44,9 +49,7 @@ class Workers:
     def __init__(self, workers: int | None, functions: Mapping[str, Callable[[Any], Any]]) -> None:
         self._functions = functions
         self._number = next(_numbers)
-        wanted = worker_count(workers)
-        able = sys.platform == "linux" and not multiprocessing.current_process().daemon
-        self._workers = wanted if able else 1
+        self._workers = worker_count(workers)
         self._pool: ProcessPoolExecutor | None = None
 
     def __enter__(self) -> Self:

@@ -12,7 +12,7 @@ from picchio.campaign import Channel
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.diagnose import PercussionDiagnosis
 from picchio.diagnosis.percussion.fit import Fit
-from picchio.diagnosis.percussion.problem import MeasuredRecord
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
 from picchio.diagnosis.percussion.trials import score
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.view.plots.diagnosis import plot_left_over, plot_overlay, telling_window

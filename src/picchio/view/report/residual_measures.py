@@ -9,7 +9,8 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.fit import Fit
-from picchio.diagnosis.percussion.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.measured_record import MeasuredRecord
+from picchio.diagnosis.percussion.problem import Problem
 from picchio.prediction.percussion import POSITION_KINDS
 from picchio.prediction.residual import ChannelResidual, by_window, spectrum
 from picchio.prediction.residual_dynamics import (
