@@ -193,6 +193,28 @@ def test_every_verdict_has_its_page(case, verdict):
     assert ("Candidates of step 1" in html) == (verdict != "nothing-wrong")
 
 
+def test_a_partial_verdict_without_rivals_says_where_to_look(case):
+    diagnosis = replace(case.found.diagnosis, verdict="partial", next_measurement=None)
+    said = text(diagnosis_report_of(case, diagnosis))
+    assert "there is nothing to tell apart" in said
+    assert "No measurement is known" not in said
+
+
+def test_a_wide_search_shows_its_best(case):
+    row = {"step": 1, "target": "tool", "screened_gain": 1.0}
+    rows = tuple(
+        {**row, "effect": f"effect_{n}", "bic": 100.0 + n, "chi_square_per_sample": 2.0 + n}
+        for n in range(22)
+    )
+    html = diagnosis_report_of(case, replace(case.found.diagnosis, scores=rows))
+    assert "10 more did no better" in text(html)
+    assert "effect 11" in html and "effect 12" not in html
+
+
+def diagnosis_report_of(case, diagnosis):
+    return diagnosis_report(replace(case.found, diagnosis=diagnosis))
+
+
 def test_what_all_sensors_have_alike_is_said_and_not_called_noise(case, capsys):
     why = "sensor gain would explain it, but by the same amount in all sensors"
     leads = tuple(("sensor_gain", group) for group in ("accelerometer.tool", "deflection"))

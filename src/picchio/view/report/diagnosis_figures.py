@@ -24,6 +24,8 @@ from picchio.view.report.page import number, themed_svg
 # Blow periods that an overlay shows.
 _PERIODS = 10.0
 _FEWEST_SECONDS = 0.15
+# Candidates that a picture of a step shows; a wider search fits many more.
+_SHOWN = 12
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,8 @@ class DiagnosisFigures:
         stand = tuple(tuple(x.split(":", 1)) for x in self.found.extended.hypothesis.labels)
         made = []
         for step in sorted({row["step"] for row in rows}):
-            here = [row for row in rows if row["step"] == step]
+            tried = [row for row in rows if row["step"] == step]
+            here = tried[:_SHOWN]  # the best come first
             ax = plot_scores(here, without, blank_figure(9.0, 1.0 + 0.27 * len(here)),
                              chosen=stand)  # type: ignore[arg-type]  # fmt: skip
             best = min(here, key=lambda row: row["bic"])
@@ -180,6 +183,8 @@ class DiagnosisFigures:
             caption = f"Step {step} of the search: " + (
                 f"{_words(best)} does best." if kept else "nothing that could be kept."
             )
+            if len(tried) > len(here):
+                caption += f" {len(tried) - len(here)} more did no better."
             made.append(self._picture(ax, alt, caption))
             without = (best["bic"], best["chi_square_per_sample"])
         return made
