@@ -36,6 +36,8 @@ SALT = 1  # of the seeds published in docs/; those with 0 were used while buildi
 
 def cases(draws):
     """All cases, draw by draw, so that a trial cut short has seen a bit of everything."""
+    from trial import SETS
+
     from worlds.effects import EFFECTS
     from worlds.outside import EFFECTS as OUTSIDE
 
@@ -61,6 +63,8 @@ def cases(draws):
             yield {"robot": ARM, "kind": "weak", "effect": effect, "snr": 20, "draw": draw}
         for effect in EFFECTS:
             yield {"robot": ARM, "kind": "few", "effect": effect, "snr": 40, "draw": draw}
+        for effect in SETS:
+            yield {"robot": ARM, "kind": "sets", "effect": effect, "snr": 40, "draw": draw}
         for n in range(20):
             yield {"robot": ARM, "kind": "few-null", "snr": 40, "draw": 20 * draw + n}
         for robot in ("ur10", "kinova_gen3"):

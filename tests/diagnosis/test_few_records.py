@@ -27,8 +27,6 @@ def arm():
         ("pulse_jitter", 0, {}),
         # The blows' shape came with it, by what the model is not exact to.
         ("mount_resonance", 0, {"frequency": 0.002}),
-        # So much softer that the first three tenths of a second were out of step.
-        ("joint_stiffness", 1, {}),
         # The blow is missing late in one record: the first part of both showed nothing.
         ("missed_hits", 1, {}),
         # Two records that were fitted say drift as well; the one held out knows better.

@@ -35,6 +35,18 @@ CLASSES = (
     {"joint_stiffness", "servo_compliance"},  # a servo's motor without inertia is a softer joint
     {"sensor_axes", "sensor_misalignment"},  # axes that are swapped are turned
 )
+# What few records cannot tell from something else: (target, records) of an accelerometer alone.
+SETS = {
+    "force_amplitude": ("tool", 3),
+    "sensor_gain": ("accelerometer.tool", 3),
+    "joint_stiffness": ("joint_1", 3),
+    "base_compliance": ("rz", 3),
+    "tool_offset": ("tool", 1),
+    "force_direction": ("tool", 1),
+    "sensor_misalignment": ("accelerometer.tool", 1),
+    "stiffness_drift": (None, 2),
+    "thermal_stiffness": (None, 2),
+}
 
 
 def class_of(effect):
@@ -60,6 +72,12 @@ def make(case, salt=0):
     robot = picchio.load_robot(case["robot"])
     accelerometer = f"accelerometer.{robot.tool_frame}"
     weak = case["kind"] == "weak"
+    if case["kind"] == "sets":
+        target, records = SETS[case["effect"]]
+        return worlds.make(
+            robot=case["robot"], seed=seed, causes=[(case["effect"], target, None)],
+            sensors=(accelerometer,), records=records, snr_db=float(case["snr"]),
+        )  # fmt: skip
     few = case["kind"] in ("few", "few-null")
     alone = weak or few
     sensors = case.get("sensors") or ((accelerometer,) if alone else (accelerometer, "deflection"))
@@ -103,7 +121,7 @@ def run(case, salt=0, without=(), method="diagnose"):
     if method == "diagnose":
         found = diagnose_percussion(robot, campaign, without=without, workers=1)
         result = judge(case, truth, found)
-        if case["kind"] == "few" and found.diagnosis.verdict == "ambiguous":
+        if case["kind"] in ("few", "sets") and found.diagnosis.verdict == "ambiguous":
             result["follow_up"] = follow(robot, case, campaign, truth, found, seed_of(case, salt))
         if truth["causes"] and result["right"]:
             result["burst"] = burst.errors(found, truth, seed_of(case, salt))
@@ -124,6 +142,7 @@ def follow(robot, case, campaign, truth, found, seed):
     after = judge(case, truth, diagnose_percussion(robot, more, workers=1))
     return {
         "foretold": [rival["chi_square"] for rival in ask["rivals"]],
+        "told": [rival["told"] for rival in ask["rivals"]],
         "sensor": ask["sensor"],
         **{key: after[key] for key in ("verdict", "claimed", "alternatives", "right")},
     }

@@ -23,8 +23,9 @@ def summary(rows):
     print_kinds(rows)
     print_draws(rows)
     print_rates(rows)
-    # Where something unknown is left, what is fitted beside it says nothing of these.
-    known = [row for row in rows if row["kind"] != "mixed"]
+    # Where something unknown is left, what is fitted beside it says nothing of these; nor do
+    # records that were too few on purpose.
+    known = [row for row in rows if row["kind"] not in ("mixed", "sets")]
     print_parameters(known)
     print_gains(known)
     print_bursts(known)
@@ -210,8 +211,15 @@ def print_sets(rows):
         f"what is told in {sum(row['right'] for row in claimed)}; "
         f"{sum(row['verdict'] == 'ambiguous' for row in few)} told as sets"
     )
-    asked = [row["follow_up"] for row in few if row.get("follow_up")]
-    can = [f for f in asked if min(f["foretold"]) >= ENOUGH]
+    poor = [row for row in rows if row["kind"] == "sets"]
+    if poor:
+        print(
+            f"records that leave sets: {len(poor)}, the truth among what is told in "
+            f"{sum(row['right'] for row in poor)}; "
+            f"{sum(row['verdict'] == 'ambiguous' for row in poor)} told as sets"
+        )
+    asked = [row["follow_up"] for row in (*few, *poor) if row.get("follow_up")]
+    can = [f for f in asked if _foretold(f)]
     done = sum(f["verdict"] == "named" and f["right"] and not f["alternatives"] for f in can)
     print(
         f"next measurement: foretold to tell all apart in {len(can)} of {len(asked)}; taken, it "
@@ -222,6 +230,13 @@ def print_sets(rows):
         alarms = sum(row["verdict"] != "nothing-wrong" for row in nulls)
         bound = f"rate below {100 * upper_bound(alarms, len(nulls)):.2g} % (95 %)"
         print(f"three records, nothing hidden: {alarms} false alarms in {len(nulls)}; {bound}")
+
+
+def _foretold(follow_up):
+    """Whether the measurement was said to tell all apart, at least if it comes out one way."""
+    if "told" in follow_up:
+        return "no" not in follow_up["told"]
+    return min(follow_up["foretold"]) >= ENOUGH
 
 
 def print_times(rows):

@@ -384,3 +384,25 @@ def test_a_foundation_is_stated_per_metre_along_an_axis_and_per_radian_about_it(
     kind = effect_class("base_compliance")
     assert [kind("x").unit(n) for n in ("stiffness", "damping")] == ["N/m", "N*s/m"]
     assert [kind("rx").unit(n) for n in ("stiffness", "damping")] == ["N*m/rad", "N*m*s/rad"]
+
+
+def test_a_base_that_turns_about_the_first_joint_is_a_spring_in_series(arm, geometry):
+    """Between them is nothing heavy: their dynamic stiffnesses add as compliances do."""
+    stiffness, damping = 9e5, 400.0
+    turns = from_dict(
+        {"effect": "base_compliance", "target": "rz",
+         "parameters": {"stiffness": stiffness, "damping": damping, "modal_share": 0.0}}
+    )  # fmt: skip
+    force = np.array([-np.sin(0.3), np.cos(0.3), 0.0])  # across the arm: joint 1 alone answers
+    plain = Model(arm, True).plant(geometry).build(force)
+    system = Model(arm, True).with_effects([turns]).plant(geometry).build(force)
+    assert system.coordinates[-1] == "base.rz"
+    for hertz in (0.0, 3.0, 8.0, 20.0, 60.0, 200.0):
+        s = 2j * np.pi * hertz
+        whole = s * s * system.mass + s * system.damping + system.stiffness
+        moved = np.linalg.solve(whole, system.force)
+        joint = s * plain.damping[0, 0] + plain.stiffness[0, 0]
+        base = s * damping + stiffness
+        expected = plain.force[0] / (s * s * plain.mass[0, 0] + 1.0 / (1.0 / joint + 1.0 / base))
+        assert system.force @ moved == pytest.approx(plain.force[0] * expected, rel=2e-3)
+        assert moved[0] * joint == pytest.approx(moved[-1] * base, rel=0.03)  # one torque in both

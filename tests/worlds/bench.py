@@ -55,7 +55,7 @@ class Bench:
         damping_ratio: of all modes.
         coupling: (n, n) N m/rad, further stiffness between the joints' deflections.
         dampers: (n,) N m s/rad, further dampers between link and motor.
-        armature: joint -> kg m^2 that turns with the link.
+        armature: joint, or what else yields -> kg m^2 that turns with the link.
         servos: joint -> (rotor inertia, stiffness, damping) of a motor side that yields.
         soft: inserted coordinate -> (stiffness, damping) against its parent.
         elements: (kind, joint, p0, p1) nonlinear, on the joint's deflection.
@@ -120,7 +120,8 @@ class Bench:
         at = [self.chain.names.index(name) for name in self.robot.joints]
         matrix = matrix[np.ix_(at, at)]
         for name, value in self.armature.items():
-            matrix[self.joint(name), self.joint(name)] += value
+            if name in self.robot.joints:
+                matrix[self.joint(name), self.joint(name)] += value
         return matrix
 
     def damping_matrix(self):

@@ -73,6 +73,9 @@ def base_compliance(bench: Bench, axis, p):
     direction = np.eye(3)["xyz".index(axis[-1])]
     bench.chain = bench.chain.on_moving_base(f"base.{axis}", direction, axis[0] != "r")
     bench.soft[f"base.{axis}"] = p["stiffness"], p["damping"]
+    # About the first joint's axis only a base of its own resists: alone it would swing at 1 kHz.
+    if axis == "rz" and bench.chain.mass[0] == 0.0:
+        bench.armature[f"base.{axis}"] = p["stiffness"] / (2.0 * np.pi * 1000.0) ** 2
 
 
 @effect

@@ -18,6 +18,11 @@ from picchio.robot.expansion import Motion
 
 Row = dict[str, float]
 
+# Below this share of its own size a mass matrix has something in it that no mass resists.
+_MASSLESS = 1e-9
+# What then stands for the unknown own inertia of what yields, relative to all that it carries.
+_OWN_INERTIA = 1e-4
+
 
 @dataclass
 class _Spring:
@@ -192,6 +197,7 @@ class Plant:
         for row, value in self._added_inertia:
             vector = self._vector(row)
             mass = mass + value * np.outer(vector, vector)
+        mass = self._with_own_inertia(mass)
 
         joints = np.array(list(self.springs.values()))
         deflections = np.eye(len(joints), size)  # the joints' coordinates are the first
@@ -240,6 +246,21 @@ class Plant:
             geometry=geometry,
         )
         return system, motion
+
+    def _with_own_inertia(self, mass: FloatArray) -> FloatArray:
+        """A mass matrix in which what yields has a little inertia of its own, where it needs it.
+
+        Where a base turns about the axis of the first joint, and the URDF gives the base no mass,
+        nothing resists their turning against each other: the two springs are in series, and what
+        is between them answers far above all else, whatever its small inertia.
+        """
+        n = len(self.springs)
+        size = np.sqrt(np.maximum(mass.diagonal(), 1e-300))
+        if len(mass) == n or np.linalg.eigvalsh(mass / np.outer(size, size))[0] > _MASSLESS:
+            return mass
+        own = np.zeros(len(mass))
+        own[n:] = _OWN_INERTIA * mass.diagonal()[n:]
+        return np.asarray(mass + np.diag(own))
 
     def _vector(self, row: Row) -> FloatArray:
         vector = np.zeros(len(self.coordinates))

@@ -11,6 +11,7 @@ import numpy as np
 from picchio.campaign import Campaign
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.life import life_before_and_after
+from picchio.diagnosis.percussion.alike import behind
 from picchio.diagnosis.percussion.candidates import all_candidates
 from picchio.diagnosis.percussion.causes import (
     stated_spread,
@@ -213,7 +214,7 @@ def _on_all_records(
     refuted: list[Trial] = []
     for trial in same:
         there = refit(problem, trial.fit.hypothesis, problem.records)
-        alike = score(there) - score(whole) < SAME
+        alike = behind(problem, whole, there, problem.records) < SAME
         (kept if alike else refuted).append(replace(trial, fit=there, score=score(there)))
     return kept, refuted
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,11 +16,11 @@ from picchio.diagnosis.percussion.asked_plan import (
     sensor_group,
     when,
 )
-from picchio.diagnosis.percussion.fit import Fit
+from picchio.diagnosis.percussion.fit import Fit, fit
 from picchio.diagnosis.percussion.measured_record import MeasuredRecord
 from picchio.diagnosis.percussion.possible_records import possible_records, varied
 from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.separation import separation
+from picchio.diagnosis.percussion.separation import Separation, new_noise, separation
 from picchio.diagnosis.percussion.trials import SAME, Trial
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.prediction.percussion import PercussionSetup
@@ -40,19 +40,29 @@ class _Shot:
     varied: str
     sensor: str
     at_hand: bool
-    told: FloatArray
+    told: Separation
+
+    @property
+    def surely(self) -> FloatArray:
+        """(rivals,) chi-square, whichever is the true one."""
+        return np.minimum(self.told.if_best, self.told.if_rival)
+
+    @property
+    def perhaps(self) -> FloatArray:
+        """(rivals,) chi-square, should the right one of the two be true."""
+        return np.maximum(self.told.if_best, self.told.if_rival)
 
     @property
     def least(self) -> float:
         """Chi-square by which it tells the rival that it tells least of those it tells."""
-        clear = self.told >= _ENOUGH
-        return float(self.told[clear].min()) if clear.any() else 0.0
+        clear = self.surely >= _ENOUGH
+        return float(self.surely[clear].min()) if clear.any() else 0.0
 
     @property
-    def worth(self) -> tuple[int, bool, bool, float, float]:
-        """Rivals told apart; no new sensor, no other conditions; the least of them; all."""
-        told = int((self.told >= _ENOUGH).sum())
-        return told, self.at_hand, not self.varied, self.least, float(self.told.sum())
+    def worth(self) -> tuple[int, int, bool, bool, float, float]:
+        """Rivals told apart, for sure and perhaps; no new sensor, no other conditions; how far."""
+        sure, some = (int((told >= _ENOUGH).sum()) for told in (self.surely, self.perhaps))
+        return sure, some, self.at_hand, not self.varied, self.least, float(self.surely.sum())
 
 
 def next_measurement(
@@ -66,11 +76,13 @@ def next_measurement(
     Each rival's best fit is simulated against the best one in records that were not taken: other
     poses and directions, the most force that was used and less, the sensors at hand and those
     missing, another temperature and a later day where records say theirs. A difference counts as
-    far as the best model's own unknowns, known as well as they are by now, could not make up for
-    it.
+    far as the unknowns of the one that is wrong, known as well as they are by now, could not make
+    up for it; `chi_square` is what is left whichever it is, `chi_square_at_best` should it be the
+    one that is refuted more easily.
 
     Returns:
-        as in the JSON, with `rivals` (what it would tell the best from, and what it would not),
+        as in the JSON, with `rivals` (what it would tell the best from, "either way" or "one way"
+        only, and what it would not),
         `plan` (the record as a `picchio-plan/1` file), and, where they matter, `temperature`
         (deg C) and `days` (after the first record); None where there is no rival to be told apart.
     """
@@ -83,25 +95,14 @@ def next_measurement(
         return None
     chosen = list(others.values())[: _RIVALS if same else 1]
     some = max(problem.records, key=lambda r: float(np.abs(r.setup.blows.height).max()))
-    shots = _shots(problem, best, [fit.hypothesis for fit in chosen], some)
+    shots = _shots(problem, best, [_with_slopes(problem, other) for other in chosen], some)
     if not shots:
         return None
     shot = max(shots, key=lambda s: s.worth)
-    names = [_name(fit.hypothesis) for fit in chosen]
-    told = [name for name, value in zip(names, shot.told, strict=True) if value >= _ENOUGH]
-    alike = [name for name in names if name not in told]
+    names = [_name(other.hypothesis) for other in chosen]
     how = _conditions(problem, shot)
     where = "here" if not how.words else f"here, {' and '.join(how.words)}"
-    why = f"{_name(best.hypothesis)} is best told {where}, by the {shot.sensor}, "
-    if told:
-        why += f"from {' or '.join(told)}: chi-square would fall by {shot.least:.3g}"
-        if alike:
-            why += f"; from {' or '.join(alike)} nothing that was tried tells it"
-    else:
-        why = (
-            f"nothing that was tried tells {_name(best.hypothesis)} from {' or '.join(alike)}; "
-            f"this comes nearest (chi-square {float(shot.told.max()):.3g}, {shot.sensor})"
-        )
+    why = _why(shot, _name(best.hypothesis), names, where)
     pose = zip(problem.robot.joint_names, shot.setup.geometry.pose, strict=True)
     ask: dict[str, Any] = {
         "why": why,
@@ -110,17 +111,62 @@ def next_measurement(
         "force": round(float(np.abs(shot.setup.blows.height).max()), 6),
         "sensor": shot.sensor,
         **how.values,
-        "separation": float(shot.told.max()),
+        "separation": float(shot.surely.max()),
         "rivals": [
             {
-                "causes": [label.split(":", 1) for label in sorted(fit.hypothesis.labels)],
-                "chi_square": float(value),
+                "causes": [label.split(":", 1) for label in sorted(other.hypothesis.labels)],
+                "chi_square": float(least),
+                "chi_square_at_best": float(most),
+                "told": "either way"
+                if least >= _ENOUGH
+                else "one way"
+                if most >= _ENOUGH
+                else "no",
             }
-            for fit, value in zip(chosen, shot.told, strict=True)
+            for other, least, most in zip(chosen, shot.surely, shot.perhaps, strict=True)
         ],
     }
     text = asked_plan(problem, ask, shot.setup, some.setup.name)
     return ask if text is None else ask | {"plan": text}
+
+
+def _how_told(least: float, most: float) -> str:
+    if least >= _ENOUGH:
+        return "either way"
+    return "one way" if most >= _ENOUGH else "no"
+
+
+def _why(shot: _Shot, best: str, names: Sequence[str], where: str) -> str:
+    """What the record tells, what only if it comes out that way, and what it does not."""
+    surely = [n for n, value in zip(names, shot.surely, strict=True) if value >= _ENOUGH]
+    alike = [n for n, value in zip(names, shot.perhaps, strict=True) if value < _ENOUGH]
+    halves = [
+        f"from {name} only should it be {best if if_best > if_rival else name} "
+        f"(chi-square {max(if_best, if_rival):.3g})"
+        for name, if_best, if_rival in zip(
+            names, shot.told.if_best, shot.told.if_rival, strict=True
+        )
+        if name not in (*surely, *alike)
+    ]
+    if len(alike) == len(names):
+        return (
+            f"nothing that was tried tells {best} from {' or '.join(alike)}; "
+            f"this comes nearest (chi-square {float(shot.perhaps.max()):.3g}, {shot.sensor})"
+        )
+    told = []
+    if surely:
+        told.append(f"from {' or '.join(surely)}: chi-square would fall by {shot.least:.3g}")
+    told += halves
+    if alike:
+        told.append(f"from {' or '.join(alike)} nothing that was tried tells it")
+    return f"{best} is best told {where}, by the {shot.sensor}, {'; '.join(told)}"
+
+
+def _with_slopes(problem: Problem, found: Fit) -> Fit:
+    """A fit with the Jacobian that says how well its unknowns are known."""
+    if found.jacobians is not None:
+        return found
+    return fit(problem, found.hypothesis, None, None, iterations=0, with_jacobian=True)
 
 
 def _name(hypothesis: Hypothesis) -> str:
@@ -128,18 +174,14 @@ def _name(hypothesis: Hypothesis) -> str:
     return " + ".join(labels) or "the nominal model"
 
 
-def _shots(
-    problem: Problem, best: Fit, rivals: Sequence[Hypothesis], some: MeasuredRecord
-) -> list[_Shot]:
-    shots = [
-        shot
-        for setup in possible_records(problem, some)
-        for shot in _taken(problem, setup, best, rivals)
-    ]
+def _shots(problem: Problem, best: Fit, rivals: Sequence[Fit], some: MeasuredRecord) -> list[_Shot]:
+    setups = list(possible_records(problem, some))
+    fresh = new_noise(problem, setups, best)
+    shots = [shot for setup in setups for shot in _taken(problem, setup, best, rivals, fresh=fresh)]
     again = dict.fromkeys(s.setup for s in sorted(shots, key=lambda s: s.worth, reverse=True))
     for setup in list(again)[:_TRIED_AGAIN]:
         for what, other in varied(problem, setup).items():
-            shots += _taken(problem, other, best, rivals, what)
+            shots += _taken(problem, other, best, rivals, what, fresh=fresh)
     return shots
 
 
@@ -147,12 +189,14 @@ def _taken(
     problem: Problem,
     setup: PercussionSetup,
     best: Fit,
-    rivals: Sequence[Hypothesis],
+    rivals: Sequence[Fit],
     what: str = "",
+    *,
+    fresh: Mapping[str, float],
 ) -> list[_Shot]:
     """The record with every sensor; none where one of the models is none there."""
     try:
-        told = separation(problem, setup, best, rivals)
+        told = separation(problem, setup, best, rivals, fresh)
     except InputError:
         return []
     return [

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from picchio.diagnosis.percussion.alike import behind
 from picchio.diagnosis.percussion.confidence import confidence
 from picchio.diagnosis.percussion.evidence import Evidence, weigh
 from picchio.diagnosis.percussion.exchange import (
@@ -243,15 +244,15 @@ def alternatives(
     best = found.best
     same: list[Trial] = []
     tried: list[Trial] = []
-    reference = score(best)
     for cause in best.hypothesis.causes:
         trials = _tried_before(found, cause.label) or rivals_of(
             cause.label, problem, best, candidates, scales, records, found.replacements, MOST_RIVALS
         )
         tried += [t for t in trials if t.finished(records)]
         for trial in trials:
-            worse = trial.score - reference
-            if worse < SAME and trial.fit.hypothesis.labels != best.hypothesis.labels:
+            if trial.fit.hypothesis.labels == best.hypothesis.labels:
+                continue
+            if behind(problem, best, trial.fit, records) < SAME:
                 same.append(trial)
     return same, tried
 

@@ -209,6 +209,9 @@ def _poses(found: PercussionDiagnosis) -> list[tuple[str, str, str, str]]:
     return rows
 
 
+_TOLD = {"one way": "may tell it from", "no": "does not tell it from"}
+
+
 def _ask(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     """The next measurement, a line each."""
     ask = diagnosis.next_measurement
@@ -228,6 +231,10 @@ def _ask(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         rows.append(("when", when(float(ask["days"]))))
     for rival in ask.get("rivals", ()):
         pairs = [(str(effect), str(target)) for effect, target in rival["causes"]]
-        fall = f"chi-square {float(rival['chi_square']):.3g}"
-        rows.append(("tells it from", f"{set_words(pairs)} ({fall})"))
+        least, most = (float(rival.get(k, 0.0)) for k in ("chi_square", "chi_square_at_best"))
+        fall = f"chi-square {least:.3g}"
+        if most > 2.0 * least:
+            fall += f" or {most:.3g}, by which it is"
+        told = _TOLD.get(rival.get("told", ""), "tells it from")
+        rows.append((told, f"{set_words(pairs)} ({fall})"))
     return rows

@@ -1,0 +1,105 @@
+"""What few records cannot tell apart is told as a set, however many numbers it takes to say it."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import follow_up
+import numpy as np
+import pytest
+
+import picchio
+from picchio.diagnosis.percussion.alike import _told_numbers
+from picchio.diagnosis.percussion.diagnose import diagnose_percussion
+from worlds import campaign as worlds
+
+ACCELEROMETER = "accelerometer.tool"
+JOINT, BASE = ("joint_stiffness", "joint_1"), ("base_compliance", "rz")
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return picchio.load_robot("fanuc_like_3dof")
+
+
+def told(diagnosis):
+    """Every set of causes that is told."""
+    claimed = frozenset((c.effect, c.target) for c in diagnosis.causes)
+    return {claimed, *(frozenset(tuple(p) for p in each) for each in diagnosis.alternatives)}
+
+
+def made(cause, seed, **options):
+    return worlds.make(seed=seed, causes=[cause], records=3, **options)
+
+
+@pytest.fixture(scope="module")
+def soft_joint():
+    """Joint 1 a quarter softer, and no deflections measured."""
+    return made((*JOINT, {"scale": 0.73}), 102, sensors=(ACCELEROMETER,))
+
+
+@pytest.fixture(scope="module")
+def first(arm, soft_joint):
+    return diagnose_percussion(arm, soft_joint[0]).diagnosis
+
+
+def test_a_softer_first_joint_may_be_the_base_that_turns_under_it(first):
+    assert first.verdict == "ambiguous"
+    assert told(first) == {frozenset([JOINT]), frozenset([BASE])}
+
+
+def test_the_joints_own_deflection_is_asked_for_and_tells_them_apart(arm, soft_joint, first):
+    """In a blow that moves joint 1: one in the arm's plane says nothing of it."""
+    campaign, truth = soft_joint
+    ask = first.next_measurement
+    assert ask["sensor"] == "deflection"
+    assert [rival["told"] for rival in ask["rivals"]] == ["either way"]
+    across = [-math.sin(ask["pose"]["joint_1"]), math.cos(ask["pose"]["joint_1"]), 0.0]
+    assert abs(np.dot(across, ask["direction"])) > 0.3
+    after = diagnose_percussion(arm, follow_up.taken(ask, campaign, truth, 5)).diagnosis
+    assert after.verdict == "named" and told(after) == {frozenset([JOINT])}
+
+
+@pytest.mark.parametrize("sensors", [(ACCELEROMETER,), (ACCELEROMETER, "deflection")])
+def test_a_base_that_turns_is_found_and_may_be_the_servo_of_the_joint_above(sensors, arm):
+    """Nothing resists joint 1 and such a base turning against each other: it has no mass."""
+    true = {"stiffness": 9e5, "damping": 400.0}
+    campaign, _ = made((*BASE, true), 103, sensors=sensors)
+    found = diagnose_percussion(arm, campaign).diagnosis
+    servo = ("servo_compliance", "joint_1")
+    assert frozenset([BASE]) in told(found) <= {frozenset([BASE]), frozenset([servo])}
+    (cause,) = found.causes
+    assert (cause.effect, cause.target) == BASE
+    stiffness = cause.parameters["stiffness"]
+    assert abs(stiffness.value - true["stiffness"]) < 3.0 * stiffness.std
+    # Without deflections it is known no better than the spring of joint 1 that it adds to.
+    assert stiffness.std < (0.005 if "deflection" in sensors else 0.3) * true["stiffness"]
+
+
+def fitted(slopes, priors):
+    """A fit with these slopes; None is an unknown that nothing is known of."""
+    unknowns = [SimpleNamespace(prior=p) for p in priors]
+    records = (object(),)
+    return records, SimpleNamespace(
+        hypothesis=SimpleNamespace(unknowns=lambda: unknowns), jacobians=[slopes],
+        records=records,
+        normal_matrix=lambda: slopes.T @ slopes
+        + np.diag([0.0 if p is None else p[1] ** -2 for p in priors]),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("columns", "priors", "numbers"),
+    [
+        ([[9.0, 0.0], [0.0, 9.0]], (None, None), 2.0),
+        ([[9.0, 9.0], [9.0, 9.0]], (None, None), 1.0),  # only their sum
+        ([[9.0, 0.0], [0.0, 0.0]], (None, None), 1.0),  # nothing of the second
+        ([[9.0, 9.0], [9.0, 9.0]], (None, (0.0, 1e-6)), 1.0),  # the other is known
+        ([[9.0, 9.0], [9.0, 9.0]], (None, (0.0, 1e3)), 0.0),  # the other might be all
+        ([[1.0 / 3.0]], (None,), 0.5),  # as much as was known before
+    ],
+)
+def test_numbers_count_as_far_as_the_records_tell_them(columns, priors, numbers):
+    records, found = fitted(np.array(columns), priors)
+    assert _told_numbers(None, found, records) == pytest.approx(numbers, abs=5e-3)
