@@ -83,3 +83,17 @@ def test_one_pose_has_no_spread():
     found.records, found.jacobians = found.records[:1], found.jacobians[:1]
     found.residuals = found.residuals[:1]
     assert not between_poses(found).any()
+
+
+def test_what_one_record_alone_tells_does_not_spread():
+    """Without it nothing but rounding is left of that unknown: it once came out as 1e160."""
+    found = fitted(np.random.default_rng(10), poses=2)
+    for jacobian in found.jacobians[1:]:
+        jacobian[:, 0] = 0.0
+    normal = sum(j.T @ j for j in found.jacobians)
+    normal[0, 1:] += 1e-13
+    normal[1:, 0] += 1e-13
+    found.normal_matrix = lambda: normal
+    spread = between_poses(found)
+    assert spread[0, 0] < np.linalg.inv(normal)[0, 0]
+    assert (spread.diagonal()[1:] < 4.0 * np.linalg.inv(normal).diagonal()[1:]).all()

@@ -62,7 +62,9 @@ def between_poses(found: Fit) -> FloatArray:
     moved = []
     for own, right in parts:
         left = whole - own
-        scale = np.sqrt(np.maximum(left.diagonal(), 1e-300))
+        # What this pose alone tells stays: the others have nothing to say of it.
+        told = left.diagonal() > _TOLD * whole.diagonal()
+        scale = np.where(told, np.sqrt(np.maximum(left.diagonal(), 0.0)), np.inf)
         solved = np.linalg.pinv(left / np.outer(scale, scale), rcond=_TOLD, hermitian=True)
         # The fit stands where all gradients cancel: without one pose that one's pulls it back.
         moved.append(solved @ (right / scale) / scale)
