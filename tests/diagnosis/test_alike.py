@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import follow_up
 import numpy as np
 import pytest
+import trial
 
 import picchio
 from picchio.diagnosis.percussion.alike import _told_numbers
@@ -57,6 +58,18 @@ def test_the_joints_own_deflection_is_asked_for_and_tells_them_apart(arm, soft_j
     assert [rival["told"] for rival in ask["rivals"]] == ["either way"]
     across = [-math.sin(ask["pose"]["joint_1"]), math.cos(ask["pose"]["joint_1"]), 0.0]
     assert abs(np.dot(across, ask["direction"])) > 0.3
+    after = diagnose_percussion(arm, follow_up.taken(ask, campaign, truth, 5)).diagnosis
+    assert after.verdict == "named" and told(after) == {frozenset([JOINT])}
+
+
+def test_what_slopes_foretell_is_held_against_a_refit(arm):
+    """By slopes another record of the accelerometer tells; the base's own damping hides it."""
+    case = {"robot": "fanuc_like_3dof", "kind": "sets", "snr": 40, "draw": 1}
+    campaign, truth = trial.make({**case, "effect": JOINT[0]}, 1)
+    before = diagnose_percussion(arm, campaign).diagnosis
+    assert told(before) == {frozenset([JOINT]), frozenset([BASE])}
+    ask = before.next_measurement
+    assert ask["sensor"] == "deflection"
     after = diagnose_percussion(arm, follow_up.taken(ask, campaign, truth, 5)).diagnosis
     assert after.verdict == "named" and told(after) == {frozenset([JOINT])}
 

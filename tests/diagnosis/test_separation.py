@@ -1,9 +1,12 @@
 """What a difference leaves when unknowns, known so far, make up for it: against the closed form."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from picchio.diagnosis.percussion.separation import _left, _root
+from picchio.diagnosis.percussion.next_measurement import _Shot, _why
+from picchio.diagnosis.percussion.separation import Separation, _left, _root, new_noise
 
 
 @pytest.fixture
@@ -38,3 +41,53 @@ def test_the_root_is_one(drawn):
     scale = np.sqrt(covariance.diagonal())
     error = (root @ root.T - covariance) / np.outer(scale, scale)
     assert np.abs(error).max() < 1e-12
+
+
+def shot(if_best, if_rival):
+    return _Shot(None, "", "deflection", False, Separation(np.array(if_best), np.array(if_rival)))
+
+
+def test_what_is_told_either_way_comes_before_what_is_told_one_way():
+    """However far the one way would be: the other may be true."""
+    sure, half, none = shot([40.0], [50.0]), shot([1e6], [20.0]), shot([3.0], [20.0])
+    assert sorted([none, sure, half], key=lambda s: s.worth) == [none, half, sure]
+    assert [s.surely[0] for s in (sure, half, none)] == [40.0, 20.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    ("if_best", "if_rival", "words"),
+    [
+        ([40.0, 70.0], [50.0, 35.0], "A is best told here, by the deflection, from B or C: "
+         "chi-square would fall by 35"),
+        ([1e6, 2.0], [20.0, 1.0], "A is best told here, by the deflection, from B: chi-square "
+         "would fall by 1e+06 should it be A, by 20 otherwise; from C nothing that was tried "
+         "tells it"),
+        ([3.0, 20.0], [1e6, 90.0], "A is best told here, by the deflection, from B: chi-square "
+         "would fall by 1e+06 should it be B, by 3 otherwise; from C: chi-square would fall by 90 "
+         "should it be C, by 20 otherwise"),
+        ([3.0, 2.0], [2.0, 1.0], "nothing that was tried tells A from B or C; this comes nearest "
+         "(chi-square 3, deflection)"),
+    ],
+)  # fmt: skip
+def test_what_a_record_tells_is_said_in_words(if_best, if_rival, words):
+    assert _why(shot(if_best, if_rival), "A", ["B", "C"], "here") == words
+
+
+def test_a_new_sensor_is_as_noisy_where_little_moves():
+    """A hundredth of what it reads in all records, not in each: the stillest would tell most."""
+    channels = [SimpleNamespace(name=f"deflection.{j}", group="deflection") for j in "ab"]
+    channels.append(SimpleNamespace(name="accelerometer.x", group="accelerometer"))
+
+    def setup(a, b):
+        read = {"deflection.a": np.full(4, a), "deflection.b": np.full(4, b)}
+        return SimpleNamespace(
+            channels=channels, predict=lambda model: read | {"accelerometer.x": np.ones(4)}
+        )
+
+    problem = SimpleNamespace(
+        noise={"accelerometer.x": SimpleNamespace(std=0.5)},
+        model=SimpleNamespace(with_effects=lambda effects: None),
+    )
+    best = SimpleNamespace(hypothesis=SimpleNamespace(effects=()))
+    found = new_noise(problem, [setup(0.0, 2.0), setup(1e-20, 2.0)], best)
+    assert found == {"deflection": pytest.approx(0.01 * np.sqrt(2.0))}

@@ -35,6 +35,10 @@ CLASSES = (
     {"joint_stiffness", "servo_compliance"},  # a servo's motor without inertia is a softer joint
     {"sensor_axes", "sensor_misalignment"},  # axes that are swapped are turned
 )
+# Springs one above the other about one axis, of which no sensor at the tool tells one.
+IN_SERIES = {
+    ("base_compliance", "rz"), ("servo_compliance", "joint_1"), ("joint_stiffness", "joint_1"),
+}  # fmt: skip
 # What few records cannot tell from something else: (target, records) of an accelerometer alone.
 SETS = {
     "force_amplitude": ("tool", 3),
@@ -49,8 +53,10 @@ SETS = {
 }
 
 
-def class_of(effect):
+def class_of(effect, target=""):
     """An effect and what cannot be told from it: its class."""
+    if (effect, target) in IN_SERIES:
+        return {name for name, _ in IN_SERIES}
     return next((kind for kind in CLASSES if effect in kind), {effect})
 
 
@@ -115,7 +121,9 @@ def run(case, salt=0, without=(), method="diagnose"):
     if case["kind"] == "weak" and not cases.is_detectable(truth, float(case["snr"])):
         return {**_head(case), "verdict": "not detectable"}
     if case["kind"] == "left-out":
-        without = {name for cause in truth["causes"] for name in class_of(cause["effect"])}
+        without = {
+            name for cause in truth["causes"] for name in class_of(cause["effect"], cause["target"])
+        }
     robot = picchio.load_robot(case["robot"])
     began, spent = time.monotonic(), time.process_time()
     if method == "diagnose":

@@ -27,7 +27,7 @@ from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.diagnosis.result import Cause, Diagnosis, Value
 from picchio.model.effects import effect_class
 from picchio.robot import load_robot
-from picchio.view.report.diagnosis import diagnosis_report, headline
+from picchio.view.report.diagnosis import _ask, diagnosis_report, headline
 from picchio.view.report.page import number, spread
 from picchio.view.report.residual import residual_report
 from picchio.view.scene import diagnosis_scene
@@ -158,6 +158,23 @@ def test_every_name_is_escaped(case):
     )  # fmt: skip
     assert "<script" not in html
     assert html.count("&lt;script&gt;") > 10
+
+
+@pytest.mark.parametrize(
+    ("told", "least", "most", "said"),
+    [
+        ("either way", 40.0, 50.0, ("tells it from", "(chi-square 40)")),
+        ("one way", 20.0, 1e6, ("may tell it from", "(chi-square 20 or 1e+06, by what it is)")),
+        ("no", 1.0, 2.0, ("does not tell it from", "(chi-square 1)")),
+    ],
+)
+def test_whether_the_next_measurement_tells_is_said(told, least, most, said, case):
+    ask = {"why": "", "pose": {}, "rivals": [
+        {"causes": [["payload", "tool"]], "told": told, "chi_square": least,
+         "chi_square_at_best": most},
+    ]}  # fmt: skip
+    ((name, words),) = _ask(replace(case.found.diagnosis, next_measurement=ask))
+    assert name == said[0] and words.endswith(said[1])
 
 
 def test_the_scene_is_at_the_worst_record_and_in_the_page(case):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from picchio.diagnosis.percussion.asked_plan import (
     when,
 )
 from picchio.diagnosis.percussion.fit import Fit, fit
-from picchio.diagnosis.percussion.measured_record import MeasuredRecord
+from picchio.diagnosis.percussion.foretold import foretold
 from picchio.diagnosis.percussion.possible_records import possible_records, varied
 from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.separation import Separation, new_noise, separation
@@ -95,10 +95,13 @@ def next_measurement(
         return None
     chosen = list(others.values())[: _RIVALS if same else 1]
     some = max(problem.records, key=lambda r: float(np.abs(r.setup.blows.height).max()))
-    shots = _shots(problem, best, [_with_slopes(problem, other) for other in chosen], some)
+    fits = [_fitted(problem, other) for other in chosen]
+    setups = list(possible_records(problem, some))
+    fresh = new_noise(problem, setups, best)
+    shots = _shots(problem, setups, best, fits, fresh)
     if not shots:
         return None
-    shot = max(shots, key=lambda s: s.worth)
+    shot = _best(problem, shots, best, fits, fresh)
     names = [_name(other.hypothesis) for other in chosen]
     how = _conditions(problem, shot)
     where = "here" if not how.words else f"here, {' and '.join(how.words)}"
@@ -141,11 +144,9 @@ def _why(shot: _Shot, best: str, names: Sequence[str], where: str) -> str:
     surely = [n for n, value in zip(names, shot.surely, strict=True) if value >= _ENOUGH]
     alike = [n for n, value in zip(names, shot.perhaps, strict=True) if value < _ENOUGH]
     halves = [
-        f"from {name} only should it be {best if if_best > if_rival else name} "
-        f"(chi-square {max(if_best, if_rival):.3g})"
-        for name, if_best, if_rival in zip(
-            names, shot.told.if_best, shot.told.if_rival, strict=True
-        )
+        f"from {name}: chi-square would fall by {max(ways):.3g} should it be "
+        f"{best if ways[0] > ways[1] else name}, by {min(ways):.3g} otherwise"
+        for name, *ways in zip(names, shot.told.if_best, shot.told.if_rival, strict=True)
         if name not in (*surely, *alike)
     ]
     if len(alike) == len(names):
@@ -162,11 +163,37 @@ def _why(shot: _Shot, best: str, names: Sequence[str], where: str) -> str:
     return f"{best} is best told {where}, by the {shot.sensor}, {'; '.join(told)}"
 
 
-def _with_slopes(problem: Problem, found: Fit) -> Fit:
-    """A fit with the Jacobian that says how well its unknowns are known."""
-    if found.jacobians is not None:
+def _fitted(problem: Problem, found: Fit) -> Fit:
+    """A fit to all records, with the Jacobian that says how well its unknowns are known."""
+    if found.jacobians is not None and len(found.records) == len(problem.records):
         return found
-    return fit(problem, found.hypothesis, None, None, iterations=0, with_jacobian=True)
+    return fit(problem, found.hypothesis, None, None, iterations=4, with_jacobian=True)
+
+
+def _best(
+    problem: Problem,
+    shots: Sequence[_Shot],
+    best: Fit,
+    rivals: Sequence[Fit],
+    fresh: Mapping[str, float],
+) -> _Shot:
+    """The best record: of each sensor that which slopes say is best, held against refits."""
+    firsts: dict[str, _Shot] = {}
+    for shot in sorted(shots, key=lambda s: s.worth, reverse=True):
+        firsts.setdefault(shot.sensor, shot)
+    checked: list[_Shot] = []
+    for shot in firsts.values():
+        ways = np.array([shot.told.if_best, shot.told.if_rival])
+        for k, rival in enumerate(rivals):
+            if shot.perhaps[k] >= _ENOUGH:
+                ways[:, k] = [
+                    foretold(problem, shot.setup, shot.sensor, fresh, true, other)
+                    for true, other in ((best, rival), (rival, best))
+                ]
+        checked.append(replace(shot, told=Separation(ways[0], ways[1])))
+        if (checked[-1].surely >= _ENOUGH).all():
+            break
+    return max(checked, key=lambda s: s.worth)
 
 
 def _name(hypothesis: Hypothesis) -> str:
@@ -174,14 +201,18 @@ def _name(hypothesis: Hypothesis) -> str:
     return " + ".join(labels) or "the nominal model"
 
 
-def _shots(problem: Problem, best: Fit, rivals: Sequence[Fit], some: MeasuredRecord) -> list[_Shot]:
-    setups = list(possible_records(problem, some))
-    fresh = new_noise(problem, setups, best)
-    shots = [shot for setup in setups for shot in _taken(problem, setup, best, rivals, fresh=fresh)]
+def _shots(
+    problem: Problem,
+    setups: Sequence[PercussionSetup],
+    best: Fit,
+    rivals: Sequence[Fit],
+    fresh: Mapping[str, float],
+) -> list[_Shot]:
+    shots = [shot for setup in setups for shot in _taken(problem, setup, best, rivals, fresh)]
     again = dict.fromkeys(s.setup for s in sorted(shots, key=lambda s: s.worth, reverse=True))
     for setup in list(again)[:_TRIED_AGAIN]:
         for what, other in varied(problem, setup).items():
-            shots += _taken(problem, other, best, rivals, what, fresh=fresh)
+            shots += _taken(problem, other, best, rivals, fresh, what)
     return shots
 
 
@@ -190,9 +221,8 @@ def _taken(
     setup: PercussionSetup,
     best: Fit,
     rivals: Sequence[Fit],
-    what: str = "",
-    *,
     fresh: Mapping[str, float],
+    what: str = "",
 ) -> list[_Shot]:
     """The record with every sensor; none where one of the models is none there."""
     try:

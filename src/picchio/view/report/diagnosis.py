@@ -234,7 +234,7 @@ def _ask(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         least, most = (float(rival.get(k, 0.0)) for k in ("chi_square", "chi_square_at_best"))
         fall = f"chi-square {least:.3g}"
         if most > 2.0 * least:
-            fall += f" or {most:.3g}, by which it is"
+            fall += f" or {most:.3g}, by what it is"
         told = _TOLD.get(rival.get("told", ""), "tells it from")
         rows.append((told, f"{set_words(pairs)} ({fall})"))
     return rows
