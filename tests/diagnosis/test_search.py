@@ -20,8 +20,9 @@ from picchio.diagnosis.percussion.fit import fit, fit_growing
 from picchio.diagnosis.percussion.gain import held_out
 from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import Problem
+from picchio.diagnosis.percussion.screen import Suspect
 from picchio.diagnosis.percussion.stuck import unstuck
-from picchio.diagnosis.percussion.trials import SAME, Trial, score, spread_out
+from picchio.diagnosis.percussion.trials import SAME, Trial, _short_list, score, spread_out
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model.effects import effect_class
 from worlds import campaign as worlds
@@ -269,3 +270,20 @@ def test_a_contact_that_a_fit_holds_shut_for_ever_is_opened_again(arm):
     assert weigh(problem, opened.residuals).is_noise
     (found,) = opened.hypothesis.causes
     assert found.values["preload"] == pytest.approx(34.0, rel=0.02)
+
+
+def test_what_explains_exactly_as_much_as_one_of_the_best_is_fitted_as_well():
+    """A gain was named as a force, which came just before it and was the last of the list."""
+
+    def suspect(name, target, gain):
+        effect = effect_class(name)(target)
+        return Suspect(effect, gain, len(effect.parameters), (effect,))
+
+    force, gain = ("force_amplitude", "tool"), ("sensor_gain", "accelerometer.tool")
+    ranked = [suspect("payload", "tool", 9e5), suspect(*force, 349547.3), suspect(*gain, 349546.3),
+              suspect("sensor_delay", "accelerometer.tool", 3e5)]  # fmt: skip
+    assert [s.label for s in _short_list(ranked, 2)] == [
+        "payload:tool", "force_amplitude:tool", "sensor_gain:accelerometer.tool"
+    ]  # fmt: skip
+    ranked[2] = suspect(*gain, 348000.0)
+    assert len(_short_list(ranked, 2)) == 2

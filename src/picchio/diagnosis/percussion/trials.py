@@ -32,6 +32,8 @@ _HOPE = 0.1
 # Numbers that are drawn anew in every record are screened as free as they are: nothing to add.
 _HOPE_LATENT = 0.5
 _RIVALS = 2
+# Relative difference of what two suspects explain that do the same to the data.
+_TWIN = 1e-4
 MOST_RIVALS = 5
 # Chi-square per sample up to which the first part of a part of the records shows nothing.
 _LITTLE = 1.2
@@ -235,15 +237,22 @@ def _long_trials(
 
 
 def _short_list(suspects: Sequence[Suspect], size: int) -> list[Suspect]:
-    """The best, but no more than three of one effect: others deserve a hearing, too."""
+    """The best, but no more than three of one effect: others deserve a hearing, too.
+
+    Whatever explains exactly as much as one of them is there as well: it may be the same thing.
+    """
     chosen: list[Suspect] = []
     for suspect in suspects:
+        if len(chosen) >= size and not any(_twins(suspect, s) for s in chosen):
+            continue
         same = sum(1 for s in chosen if s.effect.name == suspect.effect.name)
         if same < 3 and suspect.gain > 0.0:
             chosen.append(suspect)
-        if len(chosen) == size:
-            break
     return chosen
+
+
+def _twins(one: Suspect, other: Suspect) -> bool:
+    return one.numbers == other.numbers and abs(one.gain - other.gain) < _TWIN * one.gain
 
 
 def spread_out(records: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
