@@ -11,6 +11,7 @@ it goes, keyed by the case and the seeds' salt: run it again and it goes on wher
     python benchmarks/blind_trial.py --out part.jsonl --only single --most 20
     python benchmarks/blind_trial.py --out trial.jsonl --summary --since b3ad859  # later code only
     python benchmarks/blind_trial.py --out trial.jsonl --summary --page docs/blind_trial.md
+    python benchmarks/blind_trial.py --out trial.jsonl --against docs/blind_trial_plain_bic.jsonl
 """
 
 from __future__ import annotations
@@ -111,6 +112,9 @@ def main():
     parser.add_argument("--method", default="diagnose", help="or: score-test, plain-bic")
     parser.add_argument("--summary", action="store_true", help="run nothing")
     parser.add_argument("--since", metavar="COMMIT", help="tables of rows since this change only")
+    parser.add_argument(
+        "--against", type=Path, help="a simpler method's rows: compare"
+    )
     parser.add_argument("--page", type=Path, help="a page whose tables to bring up to date")
     given = parser.parse_args()
     rows = []
@@ -125,7 +129,7 @@ def main():
     commit = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True
     ).stdout.strip()
-    if not given.summary:
+    if not given.summary and not given.against:
         import trial
 
         done = {row["case"] for row in rows}
@@ -150,6 +154,9 @@ def main():
                 print(f"{number}/{len(todo)}", *note, file=sys.stderr)
     import trial_tables
 
+    if given.against:
+        trial_tables.print_against(rows, trial_tables.read_rows(given.against))
+        return
     if given.page:
         trial_tables.into_page(rows, given.page)
     trial_tables.summary(since(rows, given.since) if given.since else rows)

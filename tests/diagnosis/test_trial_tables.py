@@ -1,6 +1,5 @@
 """The published tables of the blind trial are those that its rows give."""
 
-import json
 import shutil
 from pathlib import Path
 
@@ -13,8 +12,7 @@ PAGE = DOCS / "blind_trial.md"
 
 @pytest.fixture(scope="module")
 def rows():
-    lines = (DOCS / "blind_trial.jsonl").read_text().splitlines()
-    return [json.loads(line) for line in lines if line]
+    return trial_tables.read_rows(DOCS / "blind_trial.jsonl")
 
 
 def test_the_page_says_what_the_rows_say(rows):
@@ -22,6 +20,11 @@ def test_the_page_says_what_the_rows_say(rows):
         "python benchmarks/blind_trial.py --out docs/blind_trial.jsonl --summary "
         "--page docs/blind_trial.md brings the page up to date"
     )
+
+
+@pytest.mark.parametrize("name", trial_tables.SIMPLER)
+def test_the_page_says_how_simpler_ways_did(name, rows):
+    assert trial_tables.printed_against(rows, DOCS / name) in PAGE.read_text()
 
 
 def test_a_page_is_brought_up_to_date(rows, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections import Counter, defaultdict
 from contextlib import redirect_stdout
@@ -12,6 +13,8 @@ from picchio.core.files import atomic_write
 ARM = "fanuc_like_3dof"
 UNNAMEABLE = {"outside": "out of the catalogue", "left-out": "true cause taken out"}
 BEGIN, END = "<!-- tables: printed, not written -->", "<!-- end of the tables -->"
+BESIDE = "<!-- {}: printed, not written -->", "<!-- end of {} -->"
+SIMPLER = "blind_trial_score_test.jsonl", "blind_trial_plain_bic.jsonl"
 ENOUGH = 30.0  # chi-square from which a measurement is foretold to tell causes apart
 REMOVED = {40: 0.99, 20: 0.95}  # asked for, by SNR
 WITHIN = {"peak": 0.01, "life": 0.05}  # of a burst that nobody measured
@@ -35,19 +38,43 @@ def summary(rows):
     print_wrong(rows)
 
 
+def read_rows(path):
+    """A file of rows, one line of JSON each."""
+    return [json.loads(line) for line in path.read_text().splitlines() if line]
+
+
 def printed(rows):
     """What `summary` prints, as a block for a page."""
+    return _block(BEGIN, END, summary, rows)
+
+
+def printed_against(rows, others):
+    """What `print_against` prints of a file of a simpler method, as a block for a page."""
+    begin, end = (mark.format(others.name) for mark in BESIDE)
+    return _block(begin, end, print_against, rows, read_rows(others))
+
+
+def _block(begin, end, what, *given):
     room = StringIO()
     with redirect_stdout(room):
-        summary(rows)
-    return f"{BEGIN}\n```text\n{room.getvalue().rstrip()}\n```\n{END}"
+        what(*given)
+    return f"{begin}\n```text\n{room.getvalue().rstrip()}\n```\n{end}"
 
 
 def into_page(rows, page):
-    """Put the tables between a page's marks."""
-    before, rest = page.read_text().split(BEGIN)
+    """Put the tables between a page's marks; those of simpler methods, whose rows lie beside it."""
+    blocks = [(BEGIN, END, printed(rows))]
+    for name in SIMPLER:
+        if (page.parent / name).exists():
+            marks = (mark.format(name) for mark in BESIDE)
+            blocks.append((*marks, printed_against(rows, page.parent / name)))
+    text = page.read_text()
+    for begin, end, block in blocks:
+        if begin in text:
+            before, rest = text.split(begin)
+            text = before + block + rest.split(end)[1]
     with atomic_write(page) as stream:
-        stream.write(before + printed(rows) + rest.split(END)[1])
+        stream.write(text)
 
 
 def _aside(row):
@@ -230,6 +257,26 @@ def print_sets(rows):
         alarms = sum(row["verdict"] != "nothing-wrong" for row in nulls)
         bound = f"rate below {100 * upper_bound(alarms, len(nulls)):.2g} % (95 %)"
         print(f"three records, nothing hidden: {alarms} false alarms in {len(nulls)}; {bound}")
+
+
+def print_against(rows, others):
+    """A simpler method beside this one, on the cases that both were given.
+
+    A method that says no more than names is right where it names the causes and no other; with
+    nothing hidden, or out of the catalogue, where it names nothing.
+    """
+    mine = {row["case"]: row for row in rows if not _aside(row)}
+    both = [row for row in others if not _aside(row) and row["case"] in mine]
+    print("kind       SNR  cases  right  the other: right  the truth among what it names")
+    for kind, snr in dict.fromkeys((row["kind"], row["snr"]) for row in both):
+        some = [row for row in both if (row["kind"], row["snr"]) == (kind, snr)]
+        right = sum(not wrong(mine[row["case"]]) for row in some)
+        held = [row for row in some if row["truth"] and kind not in UNNAMEABLE]
+        among = sum(all(cause in row["claimed"] for cause in row["truth"]) for row in held)
+        print(
+            f"{kind:<9} {snr:>4} {len(some):>6} {right:>6} {sum(not wrong(r) for r in some):>17}"
+            + (f"  {among}" if held else "")
+        )
 
 
 def _foretold(follow_up):
