@@ -112,9 +112,7 @@ def main():
     parser.add_argument("--method", default="diagnose", help="or: score-test, plain-bic")
     parser.add_argument("--summary", action="store_true", help="run nothing")
     parser.add_argument("--since", metavar="COMMIT", help="tables of rows since this change only")
-    parser.add_argument(
-        "--against", type=Path, help="a simpler method's rows: compare"
-    )
+    parser.add_argument("--against", type=Path, help="a simpler method's rows: compare")
     parser.add_argument("--page", type=Path, help="a page whose tables to bring up to date")
     given = parser.parse_args()
     rows = []

@@ -97,6 +97,7 @@ class Screen:
         faint: whether only what hardly stands out of the noise is looked for. A typical size is
             then far too large: late in a record it no longer looks like a small one.
         enough: a fall of chi-square below which a promise is of no use.
+        early: whether these are the first few cycles, where a narrow resonance can be met.
     """
 
     def __init__(
@@ -106,8 +107,10 @@ class Screen:
         scales: Scales,
         faint: bool = False,
         enough: float = 0.0,
+        early: bool = False,
     ) -> None:
-        self.problem, self.fit, self.scales, self.faint = problem, fit, scales, faint
+        self.problem, self.fit, self.scales = problem, fit, scales
+        self.faint, self.early = faint, early
         self.project = Projector(fit)
         self.left = self.project(flat(fit.residuals))
         self.enough, self.first = enough, None
@@ -139,7 +142,9 @@ class Screen:
             glance = self.first.suspect(candidate)
             if glance is None or glance.gain < _FIRST * self.enough / _EVERY:
                 return glance
-        trials = [kind(target, **values) for values in kind(target).trials(self.scales)]
+        bare = kind(target)
+        sizes = bare.early_trials(self.scales) if self.early else bare.trials(self.scales)
+        trials = [kind(target, **values) for values in sizes]
         if self.faint:
             trials = [self._faint(trial) for trial in trials]
         return _judged(*self._changes(trials), self.left, self.faint)

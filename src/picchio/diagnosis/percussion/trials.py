@@ -109,7 +109,7 @@ def try_candidates(
     early = None
     if window is not None:
         begun = fit(problem, known, some, _EARLY, iterations=4, with_jacobian=True)
-        early = Screen(problem, begun, scales)
+        early = Screen(problem, begun, scales, early=True)
 
     def short_fit(effect: Effect) -> Fit | None:
         return _light(fit_short(problem, start, effect, some, window))

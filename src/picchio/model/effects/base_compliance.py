@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
 from picchio.model.effects.yielding import MODAL_SHARE, yielding_damping, yielding_stiffness
@@ -35,8 +37,13 @@ class BaseCompliance(Effect):
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """A foundation on which the robot alone has 11, 17 or 25 Hz: a resonance is narrow."""
+        return self._swinging(scales, (70.0, 105.0, 160.0))
+
+    def early_trials(self, scales: Scales) -> list[dict[str, float]]:
+        """From 9 to 90 Hz, a sixth apart."""
+        return self._swinging(scales, [57.0 * 1.165**i for i in range(16)])
+
+    def _swinging(self, scales: Scales, rates: Sequence[float]) -> list[dict[str, float]]:
         turns = self.target.startswith("r")
         mass = max(scales.inertia.values()) if turns else scales.mass
-        return [
-            {"stiffness": mass * w * w, "damping": 0.08 * mass * w} for w in (70.0, 105.0, 160.0)
-        ]
+        return [{"stiffness": mass * w * w, "damping": 0.08 * mass * w} for w in rates]

@@ -153,6 +153,14 @@ class Effect(ABC):
         """
         return []
 
+    def early_trials(self, scales: Scales) -> list[dict[str, float]]:
+        """As `trials`, for the first few cycles: more of them where a resonance is narrow.
+
+        Args:
+            scales: sizes of deflections, torques and readings in the campaign.
+        """
+        return self.trials(scales)
+
     # Hooks: an effect overrides those that concern it ----------------------------------------
 
     def structure(self, plant: Plant) -> None:  # noqa: B027

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.effects.yielding import MODAL_SHARE, yielding_damping, yielding_stiffness
@@ -44,12 +46,20 @@ class ServoCompliance(Effect):
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """A servo some times stiffer than the spring, with light and heavy rotors."""
+        return self._servos(scales, (6.0,))
+
+    def early_trials(self, scales: Scales) -> list[dict[str, float]]:
+        """Twice to fifty times as stiff as the spring."""
+        return self._servos(scales, [2.0 * 1.9**i for i in range(6)])
+
+    def _servos(self, scales: Scales, times: Sequence[float]) -> list[dict[str, float]]:
         k, m = scales.stiffness[self.target], scales.inertia[self.target]
         return [
             {
-                "stiffness": 6.0 * k,
+                "stiffness": n * k,
                 "rotor_inertia": part * m,
-                "damping": 0.2 * (6.0 * k * part * m) ** 0.5,
+                "damping": 0.2 * (n * k * part * m) ** 0.5,
             }
+            for n in times
             for part in (0.1, 0.6)
         ]

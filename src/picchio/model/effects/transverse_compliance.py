@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
 from picchio.model.effects.yielding import MODAL_SHARE, yielding_damping, yielding_stiffness
@@ -33,6 +35,12 @@ class TransverseCompliance(Effect):
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """Four and sixteen times as stiff as the joint: what is stiff leaves slowly."""
+        return self._stiffer(scales, (4.0, 16.0))
+
+    def early_trials(self, scales: Scales) -> list[dict[str, float]]:
+        """From three to a hundred times as stiff as the joint, a sixth in frequency apart."""
+        return self._stiffer(scales, [3.0 * 1.35**i for i in range(12)])
+
+    def _stiffer(self, scales: Scales, times: Sequence[float]) -> list[dict[str, float]]:
         k, m = scales.stiffness[self.target], scales.inertia[self.target]
-        stiff = (4.0 * k, 16.0 * k)
-        return [{"stiffness": s, "damping": 0.04 * (s * m) ** 0.5} for s in stiff]
+        return [{"stiffness": n * k, "damping": 0.04 * (n * k * m) ** 0.5} for n in times]
