@@ -294,3 +294,23 @@ def test_what_explains_exactly_as_much_as_one_of_the_best_is_fitted_as_well():
     ]  # fmt: skip
     ranked[2] = suspect(*gain, 348000.0)
     assert len(_short_list(ranked, 2)) == 2
+
+
+def test_what_was_fitted_to_a_part_of_the_records_is_no_alternative(monkeypatch):
+    """Of few samples chi-square is small: by that alone it once came before what is right."""
+
+    def trial_of(label, records, end):
+        hypothesis = SimpleNamespace(
+            labels=frozenset([label]), causes=(SimpleNamespace(label=label),)
+        )
+        fitted = SimpleNamespace(hypothesis=hypothesis, records=records, end=end)
+        return Trial(label, fitted, 0.0, 1.0)
+
+    records = (object(), object())
+    right = trial_of("payload:tool", records, None)
+    part = trial_of("link_mass:link_3", records[:1], 0.3)
+    rival = trial_of("joint_inertia:joint_3", records, None)
+    found = SimpleNamespace(best=right.fit, steps=[[right, part, rival]])
+    monkeypatch.setattr(select, "behind", lambda problem, best, other, records: -1.0)
+    same, tried = select.alternatives(None, found, [], None, records)
+    assert same == tried == [rival]

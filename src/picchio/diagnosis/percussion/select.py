@@ -248,8 +248,9 @@ def alternatives(
         trials = _tried_before(found, cause.label) or rivals_of(
             cause.label, problem, best, candidates, scales, records, found.replacements, MOST_RIVALS
         )
-        tried += [t for t in trials if t.finished(records)]
-        for trial in trials:
+        finished = [t for t in trials if t.finished(records)]
+        tried += finished
+        for trial in finished:
             if trial.fit.hypothesis.labels == best.hypothesis.labels:
                 continue
             if behind(problem, best, trial.fit, records) < SAME:
