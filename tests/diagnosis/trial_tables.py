@@ -30,7 +30,7 @@ def summary(rows):
     # records that were too few on purpose.
     known = [row for row in rows if row["kind"] not in ("mixed", "sets")]
     print_parameters(known)
-    print_gains(known)
+    print_gains([row for row in known if row["kind"] != "few"])
     print_bursts(known)
     print_sets(rows)
     print_times(rows)

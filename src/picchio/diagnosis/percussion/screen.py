@@ -129,6 +129,8 @@ class Screen:
         count = self.left.size
         return math.sqrt(max(self.total - count, 3.0 * math.sqrt(2.0 * count)))
 
+    # A trial far too large may diverge: it is tried smaller.
+    @np.errstate(over="ignore", invalid="ignore")
     def suspect(self, candidate: tuple[type[Effect], str]) -> Suspect | None:
         """What an effect at a target promises; None where it can't act, or is known already."""
         kind, target = candidate
