@@ -55,3 +55,9 @@ def taken(ask, campaign, truth, seed):
         robot=table.robot, tool=table.tool,
         excitation=table.excitation.model_dump(exclude_none=True),
     )  # fmt: skip
+
+
+def told_sets(diagnosis):
+    """Every set of causes that a diagnosis tells."""
+    claimed = frozenset((c.effect, c.target) for c in diagnosis.causes)
+    return {claimed, *(frozenset(tuple(p) for p in each) for each in diagnosis.alternatives)}

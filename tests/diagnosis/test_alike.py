@@ -24,12 +24,6 @@ def arm():
     return picchio.load_robot("fanuc_like_3dof")
 
 
-def told(diagnosis):
-    """Every set of causes that is told."""
-    claimed = frozenset((c.effect, c.target) for c in diagnosis.causes)
-    return {claimed, *(frozenset(tuple(p) for p in each) for each in diagnosis.alternatives)}
-
-
 def made(cause, seed, **options):
     return worlds.make(seed=seed, causes=[cause], records=3, **options)
 
@@ -47,7 +41,7 @@ def first(arm, soft_joint):
 
 def test_a_softer_first_joint_may_be_the_base_that_turns_under_it(first):
     assert first.verdict == "ambiguous"
-    assert told(first) == {frozenset([JOINT]), frozenset([BASE])}
+    assert follow_up.told_sets(first) == {frozenset([JOINT]), frozenset([BASE])}
 
 
 def test_the_joints_own_deflection_is_asked_for_and_tells_them_apart(arm, soft_joint, first):
@@ -59,7 +53,7 @@ def test_the_joints_own_deflection_is_asked_for_and_tells_them_apart(arm, soft_j
     across = [-math.sin(ask["pose"]["joint_1"]), math.cos(ask["pose"]["joint_1"]), 0.0]
     assert abs(np.dot(across, ask["direction"])) > 0.3
     after = diagnose_percussion(arm, follow_up.taken(ask, campaign, truth, 5)).diagnosis
-    assert after.verdict == "named" and told(after) == {frozenset([JOINT])}
+    assert after.verdict == "named" and follow_up.told_sets(after) == {frozenset([JOINT])}
 
 
 def test_what_slopes_foretell_is_held_against_a_refit(arm):
@@ -67,11 +61,11 @@ def test_what_slopes_foretell_is_held_against_a_refit(arm):
     case = {"robot": "fanuc_like_3dof", "kind": "sets", "snr": 40, "draw": 1}
     campaign, truth = trial.make({**case, "effect": JOINT[0]}, 1)
     before = diagnose_percussion(arm, campaign).diagnosis
-    assert told(before) == {frozenset([JOINT]), frozenset([BASE])}
+    assert follow_up.told_sets(before) == {frozenset([JOINT]), frozenset([BASE])}
     ask = before.next_measurement
     assert ask["sensor"] == "deflection"
     after = diagnose_percussion(arm, follow_up.taken(ask, campaign, truth, 5)).diagnosis
-    assert after.verdict == "named" and told(after) == {frozenset([JOINT])}
+    assert after.verdict == "named" and follow_up.told_sets(after) == {frozenset([JOINT])}
 
 
 @pytest.mark.parametrize("sensors", [(ACCELEROMETER,), (ACCELEROMETER, "deflection")])
@@ -81,7 +75,9 @@ def test_a_base_that_turns_is_found_and_may_be_the_servo_of_the_joint_above(sens
     campaign, _ = made((*BASE, true), 103, sensors=sensors)
     found = diagnose_percussion(arm, campaign).diagnosis
     servo = ("servo_compliance", "joint_1")
-    assert frozenset([BASE]) in told(found) <= {frozenset([BASE]), frozenset([servo])}
+    assert (
+        frozenset([BASE]) in follow_up.told_sets(found) <= {frozenset([BASE]), frozenset([servo])}
+    )
     (cause,) = found.causes
     assert (cause.effect, cause.target) == BASE
     stiffness = cause.parameters["stiffness"]

@@ -20,12 +20,6 @@ def arm():
     return picchio.load_robot("fanuc_like_3dof")
 
 
-def both(diagnosis):
-    """Every set of causes that is told."""
-    claimed = frozenset((c.effect, c.target) for c in diagnosis.causes)
-    return {claimed, *(frozenset(tuple(p) for p in each) for each in diagnosis.alternatives)}
-
-
 @pytest.mark.parametrize("effect", ["force_amplitude", "sensor_gain"])
 def test_what_is_asked_for_tells_force_from_gain(effect, arm, tmp_path):
     """One accelerometer cannot tell a harder blow from a sensor that reads too much."""
@@ -33,7 +27,7 @@ def test_what_is_asked_for_tells_force_from_gain(effect, arm, tmp_path):
     first = diagnose_percussion(arm, campaign).diagnosis
     assert first.verdict == "ambiguous"
     force, gain = ("force_amplitude", "tool"), ("sensor_gain", "accelerometer.tool")
-    assert both(first) == {frozenset([force]), frozenset([gain])}
+    assert follow_up.told_sets(first) == {frozenset([force]), frozenset([gain])}
     ask = first.next_measurement
     assert ask["sensor"] == "deflection"
     # Force has a tolerance, by which a gain may be made up for in part.
@@ -60,7 +54,7 @@ def test_what_differs_by_the_day_or_by_the_weather_is_asked_for_on_such_a_day(ar
     campaign, truth = trial.make({**FEW, "effect": "stiffness_drift", "records": 2}, 1)
     first = diagnose_percussion(arm, campaign).diagnosis
     drift, thermal = ("stiffness_drift", "joint_2"), ("thermal_stiffness", "joint_2")
-    assert both(first) == {frozenset([drift]), frozenset([thermal])}
+    assert follow_up.told_sets(first) == {frozenset([drift]), frozenset([thermal])}
     ask = first.next_measurement
     assert {"temperature", "days"} & set(ask)
     assert min(rival["chi_square"] for rival in ask["rivals"]) > CLEAR
@@ -77,7 +71,7 @@ def test_what_a_record_held_out_tells_apart_is_no_alternative(arm):
     campaign, _ = trial.make({**FEW, "effect": "stiffness_drift"}, 1)
     found = diagnose_percussion(arm, campaign).diagnosis
     assert found.verdict == "named"
-    assert both(found) == {frozenset([("stiffness_drift", "joint_3")])}
+    assert follow_up.told_sets(found) == {frozenset([("stiffness_drift", "joint_3")])}
     assert found.causes[0].confidence > 0.99
 
 
@@ -86,7 +80,7 @@ def test_what_no_measurement_tells_apart_is_said(arm):
     campaign, _ = trial.make({**FEW, "effect": "joint_inertia"})
     found = diagnose_percussion(arm, campaign).diagnosis
     assert found.verdict == "ambiguous"
-    assert both(found) == {
+    assert follow_up.told_sets(found) == {
         frozenset([("joint_inertia", "joint_1")]), frozenset([("link_mass", "link_1")])
     }  # fmt: skip
     ask = found.next_measurement

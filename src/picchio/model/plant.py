@@ -12,7 +12,7 @@ from picchio.core.errors import InputError
 from picchio.model.conditions import Conditions
 from picchio.model.elements import Element
 from picchio.model.geometry import Geometry
-from picchio.model.linear_system import undamped_modes
+from picchio.model.joint_damping import shared_damping
 from picchio.model.system import VibratingSystem
 from picchio.robot.expansion import Motion
 
@@ -217,7 +217,10 @@ class Plant:
             jacobian[:, wide] = geometry.motion(anchor.link).jacobian[:3, taken]
             stiffness += anchor.stiffness * jacobian.T @ jacobian
             dampers += anchor.damping * jacobian.T @ jacobian
-        damping = self._modal_damping(mass, stiffness, deflections, joints, springs) + dampers
+        # Where nothing but the joints' springs holds it, both conventions of damping are one.
+        share = self.modal_share if not np.array_equal(stiffness, springs) else 0.0
+        ratios = self.damping_scale * geometry.robot.damping_ratio
+        damping = shared_damping(mass, stiffness, deflections, joints, ratios, share) + dampers
 
         robot = geometry.robot
         # The force acts at the tool point; an offset is given in the tool frame.
@@ -267,50 +270,3 @@ class Plant:
         for name, value in row.items():
             vector[self.coordinates.index(name)] = value
         return vector
-
-    def _modal_damping(
-        self,
-        mass: FloatArray,
-        stiffness: FloatArray,
-        deflections: FloatArray,
-        joints: FloatArray,
-        springs: FloatArray,
-    ) -> FloatArray:
-        """C = M S diag(2 zeta omega) S^T M, ratios weighted by the joints' strain energy."""
-        n = len(joints)
-        whole = np.zeros_like(mass)
-        share = self.modal_share if not np.array_equal(stiffness, springs) else 0.0
-        if share > 0.0:
-            whole = self._damping_of(mass, stiffness, deflections, joints)
-        if share == 1.0:
-            return whole
-        eye = np.eye(n)
-        alone = self._damping_of(mass[:n, :n], np.diag(joints), eye, joints)
-        damping: FloatArray = share * whole + (1.0 - share) * deflections.T @ alone @ deflections
-        return damping
-
-    def _damping_of(
-        self,
-        mass: FloatArray,
-        stiffness: FloatArray,
-        deflections: FloatArray,
-        joints: FloatArray,
-    ) -> FloatArray:
-        omega, shapes = _modes(mass, stiffness)
-        energy = joints[:, None] * (deflections @ shapes) ** 2 + 1e-300
-        ratio = self.geometry.robot.damping_ratio @ energy / energy.sum(axis=0)
-        weighted = mass @ shapes
-        damping: FloatArray = (weighted * (2.0 * self.damping_scale * ratio * omega)) @ weighted.T
-        return damping
-
-
-def _modes(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """As `undamped_modes`, by Cholesky's factor: small matrices, asked for many times."""
-    try:
-        inverse = np.linalg.inv(np.linalg.cholesky(mass))
-    except np.linalg.LinAlgError:
-        return undamped_modes(mass, stiffness)
-    squared, vectors = np.linalg.eigh(inverse @ stiffness @ inverse.T)
-    if not squared[0] > 0.0:
-        return undamped_modes(mass, stiffness)
-    return np.sqrt(squared), inverse.T @ vectors
