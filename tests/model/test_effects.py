@@ -406,3 +406,11 @@ def test_a_base_that_turns_about_the_first_joint_is_a_spring_in_series(arm, geom
         expected = plain.force[0] / (s * s * plain.mass[0, 0] + 1.0 / (1.0 / joint + 1.0 / base))
         assert system.force @ moved == pytest.approx(plain.force[0] * expected, rel=2e-3)
         assert moved[0] * joint == pytest.approx(moved[-1] * base, rel=0.03)  # one torque in both
+
+
+def test_an_axis_that_is_none_is_refused_by_name(arm, geometry):
+    """It once came out as a mass matrix that is not positive definite."""
+    values = {"stiffness": 1e6, "damping": 10.0}
+    turns = from_dict({"effect": "base_compliance", "target": "rw", "parameters": values})
+    with pytest.raises(InputError, match="no such axis.*rw.*rz"):
+        Model(arm, True).with_effects([turns]).plant(geometry)

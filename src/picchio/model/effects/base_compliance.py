@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from picchio.core.errors import InputError
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
 from picchio.model.effects.yielding import MODAL_SHARE, yielding_damping, yielding_stiffness
 from picchio.model.plant import Plant
+from picchio.robot.expansion import BASE_AXES
 
 
 class BaseCompliance(Effect):
@@ -29,7 +31,13 @@ class BaseCompliance(Effect):
         return unit if self.target.startswith("r") else unit.replace("N*m", "N").replace("rad", "m")
 
     def structure(self, plant: Plant) -> None:
-        """Let the base's coordinate move."""
+        """Let the base's coordinate move.
+
+        Raises:
+            InputError: no such axis.
+        """
+        if self.target not in BASE_AXES:
+            raise InputError("no such axis", key="target", value=self.target, choices=BASE_AXES)
         plant.modal_share = self.values["modal_share"]
         plant.add_coordinate(
             f"base.{self.target}", self.values["stiffness"], self.values["damping"]
