@@ -412,5 +412,5 @@ def test_an_axis_that_is_none_is_refused_by_name(arm, geometry):
     """It once came out as a mass matrix that is not positive definite."""
     values = {"stiffness": 1e6, "damping": 10.0}
     turns = from_dict({"effect": "base_compliance", "target": "rw", "parameters": values})
-    with pytest.raises(InputError, match="no such axis.*rw.*rz"):
+    with pytest.raises(InputError, match=r"no such axis.*rw.*rz"):
         Model(arm, True).with_effects([turns]).plant(geometry)
