@@ -1,5 +1,6 @@
 """The prediction against an independent nonlinear simulator of the arm (`tests/worlds`)."""
 
+import dataclasses
 import sys
 import warnings
 
@@ -9,8 +10,11 @@ import pytest
 import picchio
 from picchio.campaign import Campaign, Record, load_campaign
 from picchio.core.errors import InputError
+from picchio.model import Model
+from picchio.model.effects import effect_class
 from picchio.prediction.noise_tests import whiteness
 from picchio.prediction.percussion import percussion_setups, predict
+from picchio.prediction.percussion_setup import InCommon
 from picchio.robot import load_robot
 
 GROUPS = ("force", "deflection", "acceleration.tool", "accelerometer.tool", "velocity.tool",
@@ -121,3 +125,22 @@ def test_a_burst_that_outlasts_its_record_is_warned_of():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         percussion_setups(arm, _campaign(pose))
+
+
+def test_records_struck_alike_share_their_force_and_steps(small):
+    robot = load_robot("fanuc_like_3dof")
+    first, second, third = percussion_setups(robot, small[0])[:3]
+    second = dataclasses.replace(second, blows=second.blows.change(height=1.7 * first.blows.height))
+    model = Model(robot)
+    assert second.struck(model).unit is first.struck(model).unit
+    assert second.struck(model).peak == pytest.approx(1.7 * first.struck(model).peak)
+    # What is shared is the same as what is made for one alone.
+    alone = dataclasses.replace(third, in_common=InCommon())
+    third.predict(model)  # from what the others have made
+    for name, values in alone.predict(model).items():
+        assert np.array_equal(third.predict(model)[name], values)
+    wider = model.with_effects([effect_class("pulse_width")("tool", scale=1.2)])
+    assert second.struck(wider).unit is first.struck(wider).unit is not first.struck(model).unit
+    direct = wider.blows(second.blows).force()
+    assert np.allclose(second.struck(wider).force.constant, direct.constant, rtol=1e-14)
+    assert second.struck(wider).force.constant.max() == pytest.approx(1.7 * SMALL)

@@ -240,12 +240,12 @@ def test_what_all_sensors_have_alike_is_said_and_not_called_noise(case, capsys):
     )
     html = diagnosis_report(replace(case.found, diagnosis=diagnosis))
     assert why[1:] in text(html, "//*[@id='verdict']")
-    assert "hardly the cause" in text(html) and "force at the tool" in text(html)
+    assert "they are not claimed" in text(html) and "force at the tool" in text(html)
     assert "helped a little" not in text(html)
     show_diagnosis(diagnosis, None)
     said = " ".join(capsys.readouterr().out.split())
     assert f"unexplained: {why}." in said
-    assert "hardly the cause: sensor_gain of deflection" in said
+    assert "but is not claimed: sensor_gain of deflection" in said
     assert "more than noise" not in said
     assert diagnosis.to_dict()["note"] == why
 

@@ -41,7 +41,7 @@ def show_diagnosis(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
     for each in differences(found):
         out.print(f"  these data cannot tell it from {in_words(each)}")
     helped = (
-        "explains it, but is hardly the cause" if found.note else "helped, but is not the cause"
+        "would explain it, but is not claimed" if found.note else "helped, but is not the cause"
     )
     for effect, target in found.leads:
         out.print(f"  {helped}: {effect} of {target}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,6 +66,15 @@ class PiecewiseForce:
         index = np.clip(np.searchsorted(self.start, t, side="right") - 1, 0, None)
         value = self.in_piece(index, t - self.start[index])
         return np.where((t >= 0.0) & (t < self.end), value, 0.0)
+
+    def scaled(self, factor: float) -> PiecewiseForce:
+        """So many times as large."""
+        return replace(
+            self,
+            constant=factor * self.constant,
+            slope=factor * self.slope,
+            amplitude=factor * self.amplitude,
+        )
 
     def in_piece(self, index: ArrayLike, u: ArrayLike) -> FloatArray:
         """The force (N) of piece `index` at `u` seconds after that piece's start."""

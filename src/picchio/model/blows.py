@@ -62,6 +62,17 @@ class Blows:
             shape=shape,
         )
 
+    @property
+    def key(self) -> tuple[object, ...]:
+        """What makes the force: blows with the same key have the same history."""
+        times, heights = self.start.tobytes(), self.height.tobytes()
+        return (times, heights, self.width, self.blend, self.period, self.shape)
+
+    @property
+    def peak(self) -> float:
+        """The largest of the heights, N; 1 where there is none."""
+        return float(np.abs(self.height).max(initial=0.0)) or 1.0
+
     def change(self, **changes: object) -> Blows:
         """The same blows with some attributes replaced."""
         return replace(self, **changes)  # type: ignore[arg-type]
@@ -118,11 +129,7 @@ class Blows:
         )
 
     def _measured(self, shape: PiecewiseForce) -> PiecewiseForce:
-        scaled = [
-            replace(shape, constant=h * shape.constant, slope=h * shape.slope,
-                    amplitude=h * shape.amplitude)
-            for h in self.height
-        ]  # fmt: skip
+        scaled = [shape.scaled(h) for h in self.height]
         names = ("constant", "slope", "amplitude", "angular_frequency")
         start = np.concatenate([s + part.start for s, part in zip(self.start, scaled, strict=True)])
         pieces = {n: np.concatenate([getattr(part, n) for part in scaled]) for n in names}

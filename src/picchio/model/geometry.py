@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.recent import Recent
 from picchio.robot import FlexibleRobot
 from picchio.robot.expansion import Inertia, Motion, WideChain
 
@@ -34,8 +35,8 @@ class Geometry:
         self.pose = pose
         self._inertias: dict[object, Inertia] = {}
         self._motions: dict[object, Motion] = {}
-        self._totals: dict[object, Inertia] = {}
-        self._plants: dict[object, Plant] = {}
+        self._totals: Recent[Inertia] = Recent(_KEPT_TOTALS)
+        self._plants: Recent[Plant] = Recent(_KEPT_PLANTS)
         state = chain.robot.state(pose)
         self.stiffness = state.stiffness
         self.gravity_torque = state.gravity_torque
@@ -69,30 +70,21 @@ class Geometry:
             masses: (weight, link or "robot", point) each.
             taken: which coordinates of the chain.
         """
-        key = (masses, taken)
-        found = self._totals.get(key)
-        if found is None:
+
+        def make() -> Inertia:
             parts = [(weight, self.inertia(what, point)) for weight, what, point in masses]
 
             def add(name: str) -> FloatArray:
                 whole = np.asarray(sum(weight * getattr(part, name) for weight, part in parts))
                 return np.ascontiguousarray(whole[np.ix_(*[taken] * whole.ndim)])
 
-            found = Inertia(**{f.name: add(f.name) for f in fields(Inertia)})
-            if len(self._totals) >= _KEPT_TOTALS:
-                self._totals = {}
-            self._totals[key] = found
-        return found
+            return Inertia(**{f.name: add(f.name) for f in fields(Inertia)})
 
-    def plant(self, key: object, make: Callable[[], Plant]) -> Plant:
+        return self._totals.get((masses, taken), make)
+
+    def plant(self, key: Hashable, make: Callable[[], Plant]) -> Plant:
         """The plant of a key, made where it is not known: records of one pose share theirs."""
-        found = self._plants.get(key)
-        if found is None:
-            found = make()
-            while len(self._plants) >= _KEPT_PLANTS:
-                self._plants.pop(next(iter(self._plants)))
-            self._plants[key] = found
-        return found
+        return self._plants.get(key, make)
 
     def motion(self, frame: str, taken: tuple[int, ...] | None = None) -> Motion:
         """As `WideChain.motion`; a joint's name means the link that it carries.

@@ -46,6 +46,9 @@ class Model:
     gravity_balanced: bool = False
     effects: tuple[Effect, ...] = ()
     own: tuple[Effect, ...] = field(default=(), repr=False)
+    _keys: dict[tuple[Where, ...], tuple[object, ...]] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     def __post_init__(self) -> None:
         if self.robot.effect_tables and not self.own:
@@ -75,7 +78,10 @@ class Model:
 
     def key(self, *where: Where) -> tuple[object, ...]:
         """What the effects of some kinds are: models with the same key do the same there."""
-        return tuple(e.key for e in self.effects if e.where in where)
+        found = self._keys.get(where)
+        if found is None:
+            found = self._keys[where] = tuple(e.key for e in self.effects if e.where in where)
+        return found
 
     @cached_property
     def ordered(self) -> list[Effect]:

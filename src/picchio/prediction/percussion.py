@@ -16,7 +16,7 @@ from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects import Effect
 from picchio.model.geometry import Geometry
-from picchio.prediction.percussion_setup import PercussionSetup
+from picchio.prediction.percussion_setup import InCommon, PercussionSetup
 from picchio.robot import FlexibleRobot
 from picchio.robot.expansion import WideChain
 from picchio.vibration.integrate import Samples
@@ -38,7 +38,7 @@ def percussion_setups(
 ) -> list[PercussionSetup]:
     """What is needed to predict a campaign's percussion records.
 
-    Poses that are the same share their geometry.
+    Poses that are the same share their geometry, blows that are the same their force.
 
     Args:
         robot: the robot.
@@ -53,7 +53,7 @@ def percussion_setups(
     chosen = [r for r in (records or campaign.records) if r.kind == "percussion"]
     taken = [r.taken for r in chosen if r.taken is not None]
     warm = [r.temperature for r in chosen if r.temperature is not None]
-    setups = []
+    setups, in_common = [], InCommon()
     for record in chosen:
         pose = _pose(robot, campaign, record)
         geometry = geometries.setdefault(pose.tobytes(), Geometry(chain, pose))
@@ -75,6 +75,7 @@ def percussion_setups(
                 Conditions(record.file, days, kelvin),
                 Samples(clock.start, clock.step, clock.samples),
                 _channels(record, robot),
+                in_common,
             )
         )
     return setups

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from picchio.campaign import Channel
-from picchio.core.arrays import FloatArray
+from picchio.core.arrays import BoolArray, FloatArray
+from picchio.core.recent import Recent
 from picchio.excitation import PiecewiseForce
 from picchio.model import Model
 from picchio.model.blows import Blows
@@ -26,13 +26,51 @@ from picchio.vibration.integrate import (
     Plan,
     Samples,
     default_step,
+    follow,
     integrate,
     make_plan,
 )
 
 # Filters need the motion this finely, s.
 _FILTER_STEP = 1e-4
-_KEPT_MOTIONS = 6
+# How many results are kept: of a record; of what the records of a campaign have in common.
+_KEPT = 6
+_KEPT_IN_COMMON = 48
+
+
+@dataclass(frozen=True, eq=False)
+class InCommon:
+    """What records that are struck alike have in common.
+
+    Attributes:
+        forces: the blows' force, the highest blow of 1 N.
+        plans: the steps of the integration.
+        edges: which samples stand near a jump of the force; None where nothing jumps.
+    """
+
+    forces: Recent[PiecewiseForce] = field(default_factory=lambda: Recent(_KEPT_IN_COMMON))
+    plans: Recent[Plan] = field(default_factory=lambda: Recent(_KEPT_IN_COMMON))
+    edges: Recent[BoolArray | None] = field(default_factory=lambda: Recent(_KEPT_IN_COMMON))
+
+
+@dataclass(frozen=True, eq=False)
+class Struck:
+    """The blows of a record with a model's effects in them.
+
+    Attributes:
+        blows: as they come.
+        unit: the force they make, divided by `peak`: the same in many records.
+        peak: N.
+    """
+
+    blows: Blows
+    unit: PiecewiseForce
+    peak: float
+
+    @property
+    def force(self) -> PiecewiseForce:
+        """The force they make."""
+        return self.unit.scaled(self.peak)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +84,7 @@ class PercussionSetup:
         conditions: date and temperature.
         samples: the record's clock.
         channels: those that can be predicted.
+        in_common: what it shares with other records of its campaign.
     """
 
     name: str
@@ -54,10 +93,14 @@ class PercussionSetup:
     conditions: Conditions
     samples: Samples
     channels: tuple[Channel, ...]
-    _motions: dict[object, tuple[VibratingSystem, CoordinateMotion]] = field(default_factory=dict)
-    _forces: dict[object, tuple[Blows, PiecewiseForce]] = field(default_factory=dict)
-    _systems: dict[object, VibratingSystem] = field(default_factory=dict)
-    _plans: dict[object, Plan] = field(default_factory=dict)
+    in_common: InCommon = field(default_factory=InCommon, repr=False)
+    _motions: Recent[tuple[VibratingSystem, CoordinateMotion]] = field(
+        default_factory=lambda: Recent(_KEPT), init=False, repr=False
+    )
+    _struck: Recent[Struck] = field(default_factory=lambda: Recent(_KEPT), init=False, repr=False)
+    _systems: Recent[VibratingSystem] = field(
+        default_factory=lambda: Recent(_KEPT), init=False, repr=False
+    )
 
     @property
     def steady(self) -> bool:
@@ -79,14 +122,8 @@ class PercussionSetup:
     def cut(self, end: float) -> PercussionSetup:
         """The same record up to a time, s."""
         count = int(np.searchsorted(self.samples.times, end + 1e-9))
-        return PercussionSetup(
-            self.name,
-            self.geometry,
-            self.blows,
-            self.conditions,
-            Samples(self.samples.start, self.samples.step, min(count, self.samples.count)),
-            self.channels,
-        )
+        mine = self.samples
+        return replace(self, samples=Samples(mine.start, mine.step, min(count, mine.count)))
 
     def predict(self, model: Model) -> dict[str, FloatArray]:
         """Every channel at the record's samples, (count,) in its SI unit.
@@ -119,7 +156,7 @@ class PercussionSetup:
             )
         kind = members[0].kind.name
         if kind == "force":
-            values = _history(self.struck(model)[1], samples.times)[None]
+            values = _history(self.struck(model).force, samples.times)[None]
         else:
             at_jumps: AtJumps = "after"
             if chain.filters:
@@ -147,28 +184,31 @@ class PercussionSetup:
             rows = {name: row + line for name, row in rows.items()}
         return rows
 
-    def struck(self, model: Model) -> tuple[Blows, PiecewiseForce]:
+    def struck(self, model: Model) -> Struck:
         """The blows with the model's effects in them, and the force they make."""
-        key = model.key("blows")
-        if key not in self._forces:
+
+        def make() -> Struck:
             blows = model.blows(self.blows, self.conditions)
-            _forget(self._forces)
-            self._forces[key] = (blows, blows.force())
-        return self._forces[key]
+            peak = blows.peak
+            unit = blows.change(height=blows.height / peak)
+            return Struck(blows, self.in_common.forces.get(unit.key, unit.force), peak)
+
+        return self._struck.get(model.key("blows"), make)
 
     def _system(self, model: Model, blows: Blows) -> VibratingSystem:
         moving = model.key("structure", "over-time", "nonlinear")
-        key = (moving, model.gravity_stiffness, blows.direction.tobytes())
-        if key not in self._systems:
-            _forget(self._systems)
+
+        def make() -> VibratingSystem:
             # Only what drifts asks for more than the pose.
             when = self.conditions if model.key("over-time") else None
             plant = self.geometry.plant(
                 (moving, model.gravity_stiffness, when),
                 lambda: model.plant(self.geometry, self.conditions),
             )
-            self._systems[key] = plant.build(blows.direction)
-        return self._systems[key]
+            return plant.build(blows.direction)
+
+        key = (moving, model.gravity_stiffness, blows.direction.tobytes())
+        return self._systems.get(key, make)
 
     def _shifted(self, chain: SensorChain) -> Samples:
         rate = 1.0 + chain.clock_rate
@@ -184,37 +224,22 @@ class PercussionSetup:
     ) -> tuple[VibratingSystem, CoordinateMotion]:
         moving = model.key("structure", "over-time", "nonlinear", "blows")
         key = (moving, model.gravity_stiffness, samples, at_jumps)
-        blows, force = self.struck(model)
-        if key not in self._motions:
-            system = self._system(model, blows)
-            _forget(self._motions)
-            plan = None if self.steady else self._plan(model, force, samples, system, at_jumps)
-            motion = integrate(system, force, samples, at_jumps=at_jumps, plan=plan)
-            self._motions[key] = (system, motion)
-        return self._motions[key]
 
-    def _plan(
-        self,
-        model: Model,
-        force: PiecewiseForce,
-        samples: Samples,
-        system: VibratingSystem,
-        at_jumps: AtJumps,
-    ) -> Plan:
-        """The steps, which most effects leave as they are."""
-        step = default_step(system)
-        key = (model.key("blows"), samples, step, at_jumps)
-        if key not in self._plans:
-            _forget(self._plans)
-            self._plans[key] = make_plan(force, samples, step, at_jumps=at_jumps)
-        return self._plans[key]
+        def make() -> tuple[VibratingSystem, CoordinateMotion]:
+            struck = self.struck(model)
+            system = self._system(model, struck.blows)
+            if self.steady:
+                return system, integrate(system, struck.force, samples, at_jumps=at_jumps)
+            # Most effects leave the steps as they are.
+            step = default_step(system)
+            plan = self.in_common.plans.get(
+                (struck.unit, samples, step, at_jumps),
+                lambda: make_plan(struck.unit, samples, step, at_jumps=at_jumps),
+            )
+            return system, follow(system, plan.scaled(struck.peak), samples.count)
+
+        return self._motions.get(key, make)
 
 
 def _history(force: PiecewiseForce, times: FloatArray) -> FloatArray:
     return force(np.mod(times, force.end)) if np.isfinite(force.end) else force(times)
-
-
-def _forget(cache: dict[Any, Any]) -> None:
-    """Keep a cache small: the oldest goes first."""
-    while len(cache) >= _KEPT_MOTIONS:
-        cache.pop(next(iter(cache)), None)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -42,6 +42,11 @@ class Samples:
         """(count,) s."""
         return self.start + self.step * np.arange(self.count)
 
+    @property
+    def last(self) -> float:
+        """The time of the last, s."""
+        return self.start + self.step * (self.count - 1)
+
 
 @dataclass(frozen=True, eq=False)
 class CoordinateMotion:
@@ -66,6 +71,15 @@ class Plan:
     force_after: FloatArray
     first: int
 
+    def scaled(self, factor: float) -> Plan:
+        """The same steps under a force so many times as large."""
+        return replace(
+            self,
+            force0=factor * self.force0,
+            force1=factor * self.force1,
+            force_after=factor * self.force_after,
+        )
+
 
 def integrate(
     system: VibratingSystem,
@@ -74,7 +88,6 @@ def integrate(
     *,
     longest_step: float | None = None,
     at_jumps: AtJumps = "after",
-    plan: Plan | None = None,
 ) -> CoordinateMotion:
     """The system's motion from rest under a burst, or its steady motion under a periodic force.
 
@@ -87,7 +100,6 @@ def integrate(
             for a filter that takes straight lines between the samples and lets no jump through,
             accelerations beside the jump by which its response is right ("moments"; see
             `picchio.vibration.jumps`).
-        plan: of a burst, where it was made before from the same force, samples and step.
 
     Returns:
         the motion at the samples.
@@ -101,9 +113,19 @@ def integrate(
             return _periodic(system, force, samples, longest, at_jumps)
         except np.linalg.LinAlgError:
             raise InputError(_MASSLESS) from None
-    plan = plan or make_plan(force, samples, longest, at_jumps=at_jumps)
+    return follow(system, make_plan(force, samples, longest, at_jumps=at_jumps), samples.count)
+
+
+def follow(system: VibratingSystem, plan: Plan, count: int) -> CoordinateMotion:
+    """The system's motion from rest along a burst's steps.
+
+    Args:
+        system: the equations.
+        plan: made by `make_plan`, with a step no longer than `default_step`.
+        count: of samples.
+    """
     try:
-        return _run(system, plan, samples.count, _rest(system))[0]
+        return _run(system, plan, count, _rest(system))[0]
     except np.linalg.LinAlgError:
         raise InputError(_MASSLESS) from None
 

@@ -40,9 +40,14 @@ from picchio.diagnosis.percussion.select import (
 from picchio.diagnosis.percussion.shared_records import shared_out
 from picchio.diagnosis.percussion.trials import SAME, Trial, score
 from picchio.diagnosis.percussion.unknowns import TOLERATED, Hypothesis
+from picchio.diagnosis.percussion.verdict import (
+    may_be_partial,
+    pair_of,
+    verdict_of,
+    why_none,
+)
 from picchio.diagnosis.percussion.warm_up import warm_up
-from picchio.diagnosis.result import Cause, Diagnosis, Verdict
-from picchio.diagnosis.verdict_rules import BEYOND_DOUBT, MOSTLY
+from picchio.diagnosis.result import Diagnosis
 from picchio.model import Effect
 from picchio.model.effects import Scales
 from picchio.prediction.noise_level import Noise
@@ -162,7 +167,7 @@ def _diagnosed(
     ]
     causes = told_causes(whole, found, rivals, train)
     # More rivals can only lessen the confidence: what isn't sure by now won't be claimed.
-    if causes and (after.is_noise or (_mostly(gain.explained) and _sure(causes))):
+    if causes and (after.is_noise or may_be_partial(causes, gain.explained)):
         say("looking for other causes that would do as well")
         # Over the same samples: else a rival may lose, or win, by which of them it knows.
         with problem.pinned(found.best.hypothesis.effects):
@@ -171,21 +176,21 @@ def _diagnosed(
             same, refuted = _on_all_records(problem, whole, same)
         causes = told_causes(whole, found, rivals, train, refuted)
     common = common_faults(whole.hypothesis, told_covariance(whole), problem.groups)
-    verdict = _verdict(whole, causes, before, after, same, gain.explained, common)
+    verdict = verdict_of(causes, before, after, bool(same), gain.explained, common)
     if any(e.name == "mains_hum" for e in whole.hypothesis.effects):
         causes = with_hum(causes, hum_lines(problem, whole))
     others: dict[tuple[tuple[str, str], ...], Hypothesis] = {}
     for t in same:
-        pairs = tuple(sorted(_pair(label) for label in t.fit.hypothesis.labels))
+        pairs = tuple(sorted(pair_of(label) for label in t.fit.hypothesis.labels))
         others.setdefault(pairs, t.fit.hypothesis)
+    note = why_none(causes, common) if after.is_noise and verdict == "unexplained" else ""
     leads: tuple[tuple[str, str], ...] = ()
-    note = _why_common(common) if after.is_noise else ""
     if note:
         leads = tuple((c.effect, c.target) for c in causes)
     elif verdict == "unexplained":
         leads = tuple(_leads(found))
     ask = None
-    if verdict in ("ambiguous", "unexplained", "partial") and not note:
+    if verdict in ("ambiguous", "unexplained", "partial") and not common:
         say("looking for the measurement that would tell most")
         ask = next_measurement(problem, whole, rivals, same)
     claimed = verdict in ("named", "ambiguous", "partial")
@@ -219,64 +224,20 @@ def _on_all_records(
     return kept, refuted
 
 
-def _pair(label: str) -> tuple[str, str]:
-    name, _, target = label.partition(":")
-    return name, target
-
-
-def _mostly(explained: float | None) -> bool:
-    return explained is not None and explained >= MOSTLY
-
-
-def _verdict(
-    whole: Fit,
-    causes: Sequence[Cause],
-    before: Evidence,
-    after: Evidence,
-    same: Sequence[object],
-    explained: float | None,
-    common: Sequence[str],
-) -> Verdict:
-    if not whole.hypothesis.labels:
-        return "nothing-wrong" if before.is_noise else "unexplained"
-    if common:
-        return "unexplained"
-    if after.is_noise:
-        return "ambiguous" if same else "named"
-    if _sure(causes) and _mostly(explained) and not same:
-        return "partial"
-    return "unexplained"
-
-
-def _sure(causes: Sequence[Cause]) -> bool:
-    return all(cause.confidence >= BEYOND_DOUBT for cause in causes)
-
-
-def _why_common(names: Sequence[str]) -> str:
-    if not names:
-        return ""
-    said = " and ".join(name.replace("_", " ") for name in names)
-    return (
-        f"{said} would explain it, but by the same amount in all sensors: then it is not they that "
-        "are wrong but something before them, in the blows or in the clock that starts the "
-        "records, which no known cause describes; a force sensor at the tool would tell"
-    )
-
-
 def _leads(found: Search) -> list[tuple[str, str]]:
     """What helped, though nothing may be claimed."""
     if not found.steps:
         return []
     reference = score(found.baseline)
     helpful = [t for t in found.steps[0] if reference - t.score > LEAST_GAIN]
-    return [_pair(t.label) for t in helpful[:3]]
+    return [pair_of(t.label) for t in helpful[:3]]
 
 
 def _scores(found: Search) -> list[dict[str, object]]:
     rows = []
     for number, step in enumerate(found.steps):
         for trial in step:
-            name, target = _pair(trial.label)
+            name, target = pair_of(trial.label)
             rows.append(
                 {
                     "step": number + 1,

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from picchio.core.arrays import BoolArray
+from picchio.excitation import PiecewiseForce
 from picchio.model import Model
 from picchio.prediction.percussion import PercussionSetup
+from picchio.vibration.integrate import Samples
 
 # A sample this near a jump of the force, but not on it, holds neither side for sure: a sensor of
 # finite bandwidth smears a jump, and what keeps it from aliasing by about half a sample.
@@ -21,9 +25,24 @@ _SMALL_JUMP = 0.05
 
 def near_edges(setup: PercussionSetup, model: Model) -> dict[str, BoolArray] | None:
     """Which samples of each group stand so near a jump that either side may be meant."""
+    force = setup.struck(model).unit
+    sensors, clock = model.sensors(setup.conditions), setup.samples
+    found = {}
+    for group in setup.groups:
+        timing = sensors.get(group).timing
+        near = setup.in_common.edges.get(
+            (force, clock, timing), partial(_marked, force, clock, *timing)
+        )
+        if near is None:
+            return None
+        found[group] = near
+    return found
+
+
+def _marked(force: PiecewiseForce, clock: Samples, delay: float, rate: float) -> BoolArray | None:
+    """(count,) which samples of a sensor; None where nothing jumps."""
     from picchio.diagnosis.percussion._residual_kernel import near_edges as mark
 
-    _, force = setup.struck(model)
     edges = force.start
     if edges.size > 400:  # a measured history has no jumps
         return None
@@ -32,13 +51,8 @@ def near_edges(setup: PercussionSetup, model: Model) -> dict[str, BoolArray] | N
     if not edges.size:
         return None
     if np.isfinite(force.end):
-        last = setup.samples.times[-1]
-        edges = (edges + force.end * np.arange(int(last / force.end) + 2)[:, None]).ravel()
-    sensors, clock = model.sensors(setup.conditions), setup.samples
-    found = {}
-    for group in setup.groups:
-        delay, rate = sensors.get(group).timing
-        near = max(_NEAR_EDGE, _SMEARED * clock.step) + _MARGIN
-        found[group] = np.empty(clock.count, dtype=bool)
-        mark(clock.start, clock.step, rate, delay, edges, near, found[group])
-    return found
+        edges = (edges + force.end * np.arange(int(clock.last / force.end) + 2)[:, None]).ravel()
+    near = max(_NEAR_EDGE, _SMEARED * clock.step) + _MARGIN
+    out = np.empty(clock.count, dtype=bool)
+    mark(clock.start, clock.step, rate, delay, edges, near, out)
+    return out

@@ -53,7 +53,7 @@ def _simulated(
     true: Fit,
 ) -> MeasuredRecord:
     # Under a name of its own: what is known by the others' names is not asked for.
-    setup = replace(setup, name="next", _motions={}, _forces={}, _systems={}, _plans={})
+    setup = replace(setup, name="next")
     read = setup.predict(problem.model.with_effects(true.hypothesis.effects))
     rate = 1.0 / setup.samples.step
     noise: dict[str, Noise] = {}

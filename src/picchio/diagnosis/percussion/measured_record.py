@@ -11,8 +11,11 @@ import numpy as np
 
 from picchio.campaign import Channel
 from picchio.core.arrays import BoolArray, FloatArray
+from picchio.core.recent import Recent
 from picchio.prediction.noise_level import Noise
 from picchio.prediction.percussion import PercussionSetup
+
+_KEPT_EDGES = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +34,7 @@ class MeasuredRecord:
     noise: Mapping[str, Noise]
     pose: int
     _cuts: dict[float, PercussionSetup] = field(default_factory=dict)
-    _edges: dict[object, dict[str, BoolArray] | None] = field(default_factory=dict)
+    _edges: Recent[dict[str, BoolArray] | None] = field(default_factory=lambda: Recent(_KEPT_EDGES))
     _fillers: dict[str, FloatArray] = field(default_factory=dict)
     _pinned: list[dict[str, BoolArray] | None] = field(default_factory=list)
 
@@ -56,7 +59,7 @@ class MeasuredRecord:
 
     def until(self, end: float | None) -> PercussionSetup:
         """The setup up to a time, s."""
-        if end is None or end >= self.setup.samples.times[-1]:
+        if end is None or end >= self.setup.samples.last:
             return self.setup
         if end not in self._cuts:
             self._cuts[end] = self.setup.cut(end)

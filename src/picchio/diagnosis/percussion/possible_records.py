@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -52,18 +51,13 @@ def _span(problem: Problem) -> float:
 def varied(problem: Problem, setup: PercussionSetup) -> dict[str, PercussionSetup]:
     """The same record with softer blows, in a warmer or cooler room, later."""
     now, span = setup.conditions, _span(problem)
-    found = {"force": _fresh(setup, blows=setup.blows.change(height=_SOFTER * setup.blows.height))}
+    found = {"force": replace(setup, blows=setup.blows.change(height=_SOFTER * setup.blows.height))}
     if now.temperature is not None:
         kelvin = now.temperature + _OTHERWISE * (-1.0 if now.temperature > 0.0 else 1.0)
-        found["temperature"] = _fresh(setup, conditions=replace(now, temperature=kelvin))
+        found["temperature"] = replace(setup, conditions=replace(now, temperature=kelvin))
     if now.days is not None and span > 0.0:  # as long again: what drifts is known no further
-        found["days"] = _fresh(setup, conditions=replace(now, days=now.days + span))
+        found["days"] = replace(setup, conditions=replace(now, days=now.days + span))
     return found
-
-
-def _fresh(setup: PercussionSetup, **changes: Any) -> PercussionSetup:
-    """A setup with changes, and nothing remembered of the old one."""
-    return replace(setup, **changes, _motions={}, _forces={}, _systems={}, _plans={})
 
 
 def _pose(problem: Problem, rng: np.random.Generator) -> FloatArray:
@@ -89,7 +83,7 @@ def _setup(
     channels = {c.name: c for c in like.channels}
     channels |= {name: parse_channel(name)[0] for name in names}
     rotation = geometry.motion(frame).rotation
-    return _fresh(
+    return replace(
         like,
         geometry=geometry,
         blows=like.blows.change(direction=direction, tool_rotation=rotation),

@@ -23,7 +23,6 @@ from picchio.robot import FlexibleRobot
 Pin = tuple[int, tuple[Effect, ...]]
 _numbers = itertools.count()
 _JUMPING = ("force", "acceleration", "accelerometer")
-_KEPT_EDGES = 8
 
 
 class Helpers(Protocol):
@@ -196,7 +195,7 @@ def residual(record: MeasuredRecord, model: Model, end: float | None = None) -> 
         foretold = predicted[name]
         offset = 0.0
         if setup.steady or channel.kind.name in POSITION_KINDS:
-            offset = float((record.values[name][:count] - foretold).mean())
+            offset = float((record.values[name][:count] - foretold).sum()) / count
         unknown = known
         if masked is not None and channel.kind.name in _JUMPING:
             # Before the filter, which would spread what is not known, and after it; there as
@@ -249,8 +248,4 @@ def _kept_edges(
         count = setup.samples.count
         return None if fixed is None else {g: mask[:count] for g, mask in fixed.items()}
     key = (setup.samples, model.key("blows", "sensor"))
-    if key not in record._edges:
-        if len(record._edges) >= _KEPT_EDGES:
-            record._edges.pop(next(iter(record._edges)), None)
-        record._edges[key] = near_edges(setup, model)
-    return record._edges[key]
+    return record._edges.get(key, lambda: near_edges(setup, model))

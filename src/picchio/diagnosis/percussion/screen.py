@@ -18,7 +18,14 @@ from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.fit import Fit, prior_weights
 from picchio.diagnosis.percussion.latent import LATENT, latent_gain
 from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.trial_sizes import bounded, moves_one_each, resized, scaled
+from picchio.diagnosis.percussion.trial_sizes import (
+    acts_either_way,
+    bounded,
+    moves_one_each,
+    resized,
+    scaled,
+    smallest,
+)
 from picchio.model import Effect
 from picchio.model.effects import Scales
 
@@ -148,6 +155,8 @@ class Screen:
         sizes = bare.early_trials(self.scales) if self.early else bare.trials(self.scales)
         trials = [kind(target, **values) for values in sizes]
         if self.faint:
+            if acts_either_way(kind, faint=True) and len(kind.parameters) == 1:
+                trials = [smallest(trials)]  # the others would become the same
             trials = [self._faint(trial) for trial in trials]
         return _judged(*self._changes(trials), self.left, self.faint)
 
@@ -231,11 +240,7 @@ def _judged(
     # the residual falls by the part of it that the change (of either size) can undo
     alone = (moves.T @ -left) / size**2
     gains = np.where(alone > 0.0, (alone * size) ** 2, 0.0)
-    # What is small acts alike either way, a factor as well as a difference.
-    linear = all(
-        (p.neutral == 0.0 and p.lower < 0.0) or (faint and p.neutral == 1.0 and p.logarithmic)
-        for p in kept[0].parameters
-    )
+    linear = acts_either_way(type(kept[0]), faint)
     if linear:
         gains = (alone * size) ** 2
     numbers = len(kept[0].parameters)

@@ -153,10 +153,11 @@ def search(
                 break
             found.best = unstuck(problem, found.best, scales, records)
             # Times of blows may have been missed: then they are looked for once more.
-            noise = weigh(problem, found.best.residuals, found.best.records).is_noise
-            again = with_latent(problem, found.best, best.label if noise else "")
-            if again.cost < found.best.cost:
-                found.best = prune(problem, again, records, least, alone=False)
+            if known:
+                noise = weigh(problem, found.best.residuals, found.best.records).is_noise
+                again = with_latent(problem, found.best, best.label if noise else "")
+                if again.cost < found.best.cost:
+                    found.best = prune(problem, again, records, least, alone=False)
             if known and not weigh(problem, found.best.residuals, found.best.records).is_noise:
                 other = exchange(problem, found.best, found.steps, records, least)
                 if other is not found.best:  # beside the right one, others may have nothing to do

@@ -16,6 +16,25 @@ def moves_one_each(trials: Sequence[Effect]) -> bool:
     return len(trials) > 1 and len(set(moved)) == len(moved) and all(len(m) == 1 for m in moved)
 
 
+def acts_either_way(kind: type[Effect], faint: bool) -> bool:
+    """Whether an effect may have either sign; a `faint` factor acts as a difference does."""
+    return all(
+        (p.neutral == 0.0 and p.lower < 0.0) or (faint and p.neutral == 1.0 and p.logarithmic)
+        for p in kind.parameters
+    )
+
+
+def smallest(trials: Sequence[Effect]) -> Effect:
+    """Of trials of an effect of one parameter, that which is nearest to doing nothing."""
+
+    def size(trial: Effect) -> float:
+        (p,) = trial.parameters
+        value = trial.values[p.name]
+        return abs(math.log(value)) if p.logarithmic and p.neutral == 1.0 else abs(value)
+
+    return min(trials, key=size)
+
+
 def scaled(trial: Effect, weight: float, signed: bool) -> Effect:
     """The trial made larger or smaller as the residual asks."""
     size = float(np.clip(abs(weight), 0.05, 8.0))

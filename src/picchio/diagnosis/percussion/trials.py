@@ -30,7 +30,7 @@ _SHORT = 0.3
 # What promises less than this share of what the cause itself promised is no rival of it.
 _HOPE = 0.1
 # Numbers that are drawn anew in every record are screened as free as they are: nothing to add.
-_HOPE_LATENT = 0.5
+_HOPE_LATENT = 0.8
 _RIVALS = 2
 # Relative difference of what two suspects explain that do the same to the data.
 _TWIN = 1e-4
@@ -215,12 +215,14 @@ def _long_trials(
     `mark` is the score to come near to in the first part, `rival` the cost to come near to in all.
     """
     trials: list[Trial] = []
-    wanted = []
+    wanted: list[tuple[Suspect, Fit]] = []
     for place, (suspect, found, value) in enumerate(short):
         # What is far behind after the first part will not catch up.
         mark = value if mark is None else mark
         behind = value - mark
-        late = place >= long_fits or (place > 0 and behind > 0.5 * mark + 200.0)
+        # One is fitted all the same, to tell how much better the best is; if it does not take long.
+        told = bool(wanted) or suspect.effect.latent is not None
+        late = place >= long_fits or (told and behind > 0.5 * mark + 200.0)
         if late and (behind > SAME or place >= 2 * long_fits):
             trials.append(Trial(suspect.label, found, math.inf, suspect.gain))
         else:

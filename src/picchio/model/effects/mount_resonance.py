@@ -9,6 +9,8 @@ from picchio.model.sensing import Sensors
 
 # Hz: a tool's bracket is soft, wax and a stud are stiffer.
 _FREQUENCIES = (50.0, 70.0, 100.0, 140.0, 200.0, 300.0, 450.0)
+# Damped by more than 1/sqrt(2) nothing resonates: that is a low-pass filter, an effect of its own.
+_MOST = 0.7
 
 
 class MountResonance(Effect):
@@ -28,7 +30,7 @@ class MountResonance(Effect):
             meaning="of the mount",
         ),
         parameter(
-            "damping_ratio", neutral=0.05, lower=1e-3, upper=2.0, log=True, meaning="of the mount"
+            "damping_ratio", neutral=0.05, lower=1e-3, upper=_MOST, log=True, meaning="of the mount"
         ),
     )
     meaning = "the sensor swings on its magnet, wax or bracket"

@@ -1,0 +1,48 @@
+"""What may be said of the causes that were found."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from picchio.diagnosis.percussion.verdict import verdict_of, why_none
+from picchio.diagnosis.result import Cause
+
+NOISE, MORE = SimpleNamespace(is_noise=True), SimpleNamespace(is_noise=False)
+COMMON = ("sensor_gain",)
+
+
+def causes(*confidences):
+    return [
+        Cause(f"effect_{i}", f"joint_{i}", confidence, {})
+        for i, confidence in enumerate(confidences)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("confidences", "before", "after", "others", "explained", "common", "verdict"),
+    [
+        ((), NOISE, NOISE, False, None, (), "nothing-wrong"),
+        ((), MORE, MORE, False, None, (), "unexplained"),
+        ((0.6,), MORE, NOISE, False, 0.99, (), "named"),
+        ((0.6,), MORE, NOISE, True, 0.99, (), "ambiguous"),
+        ((0.999, 0.999), MORE, NOISE, False, 0.99, (), "named"),
+        # Of several each must be needed beyond doubt.
+        ((0.999, 0.999, 0.95), MORE, NOISE, False, 0.99, (), "unexplained"),
+        ((0.999, 0.999), MORE, NOISE, False, 0.99, COMMON, "unexplained"),
+        ((0.999, 0.999), MORE, MORE, False, 0.9, (), "partial"),
+        ((0.999, 0.95), MORE, MORE, False, 0.9, (), "unexplained"),
+        ((0.999,), MORE, MORE, False, 0.5, (), "unexplained"),
+        ((0.999,), MORE, MORE, True, 0.9, (), "unexplained"),
+    ],
+)
+def test_verdict(confidences, before, after, others, explained, common, verdict):
+    assert verdict_of(causes(*confidences), before, after, others, explained, common) == verdict
+
+
+def test_which_of_several_causes_is_doubted_is_said():
+    why = why_none(causes(0.999, 0.95, 0.999), ())
+    assert "3 causes together" in why
+    assert "effect 1 (joint_1, confidence 0.95) is not beyond doubt" in why
+    assert "effect 0" not in why
+    assert why_none(causes(0.999, 0.999), ()) == "" == why_none(causes(0.5), ())
+    assert "all sensors" in why_none(causes(0.5, 0.5), COMMON)
