@@ -143,6 +143,7 @@ def try_candidates(
             # What makes a motion differ ever more is only like itself while it differs little.
             chosen = _joined(chosen, early.ranked(pool.map("early", candidates)))
         tried = [(suspect, effect) for suspect in chosen for effect in suspect.starts]
+        tried.sort(key=lambda each: each[1].latent is None)
         fits = pool.map("short", [effect for _, effect in tried])
         short = _best_of_each(tried, fits, some)
         if best is None or not short:
@@ -229,7 +230,8 @@ def _long_trials(
             wanted.append((suspect, found))
     # The first is the others' rival: a fit that stays far above it is given up. It is fitted here,
     # where other processes may predict some of its records.
-    for some in (wanted[:1], wanted[1:]):
+    others = sorted(wanted[1:], key=lambda each: each[0].effect.latent is None)
+    for some in (wanted[:1], others):
         tasks = [(found.hypothesis, suspect.effect, rival) for suspect, found in some]
         for (suspect, _), light in zip(some, pool.map("long", tasks), strict=True):
             long = replace(light, records=tuple(records))
