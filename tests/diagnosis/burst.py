@@ -67,8 +67,7 @@ def _deflections(problem, record, pose, direction, fit):
         geometry=geometry,
         blows=record.setup.blows.change(direction=direction, tool_rotation=rotation),
         channels=tuple(picchio.campaign.parse_channel(name)[0] for name in names),
-        _motions={}, _forces={}, _systems={},
-    )  # fmt: skip
+    )
     # A sensor's fault is in the readings, not in the arm.
     effects = [e for e in fit.hypothesis.effects if e.where != "sensor"]
     predicted = setup.predict(problem.model.with_effects(effects))

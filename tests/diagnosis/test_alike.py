@@ -13,6 +13,11 @@ import trial
 import picchio
 from picchio.diagnosis.percussion.alike import _told_numbers
 from picchio.diagnosis.percussion.diagnose import diagnose_percussion
+from picchio.diagnosis.percussion.fit import fit
+from picchio.diagnosis.percussion.problem import Problem
+from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.diagnosis.percussion.unseen import unseen
+from picchio.model.effects import effect_class
 from worlds import campaign as worlds
 
 ACCELEROMETER = "accelerometer.tool"
@@ -87,12 +92,17 @@ def test_a_base_that_turns_is_found_and_may_be_the_servo_of_the_joint_above(sens
 
 
 def fitted(slopes, priors):
-    """A fit with these slopes; None is an unknown that nothing is known of."""
-    unknowns = [SimpleNamespace(prior=p) for p in priors]
+    """A linear problem and a fit with these slopes; None is an unknown that nothing is known of."""
+    unknowns = [SimpleNamespace(prior=p, lower=-9.0, upper=9.0) for p in priors]
+    here = np.zeros(len(priors))
     records = (object(),)
-    return records, SimpleNamespace(
-        hypothesis=SimpleNamespace(unknowns=lambda: unknowns), jacobians=[slopes],
-        records=records,
+    problem = SimpleNamespace(residuals=lambda vector, records, end: [slopes @ vector])
+    return problem, records, SimpleNamespace(
+        hypothesis=SimpleNamespace(
+            unknowns=lambda: unknowns, vector=lambda: here,
+            at=lambda vector: SimpleNamespace(effects=vector),
+        ),
+        jacobians=[slopes], residuals=[slopes @ here], records=records, end=None,
         normal_matrix=lambda: slopes.T @ slopes
         + np.diag([0.0 if p is None else p[1] ** -2 for p in priors]),
     )  # fmt: skip
@@ -106,9 +116,31 @@ def fitted(slopes, priors):
         ([[9.0, 0.0], [0.0, 0.0]], (None, None), 1.0),  # nothing of the second
         ([[9.0, 9.0], [9.0, 9.0]], (None, (0.0, 1e-6)), 1.0),  # the other is known
         ([[9.0, 9.0], [9.0, 9.0]], (None, (0.0, 1e3)), 0.0),  # the other might be all
-        ([[1.0 / 3.0]], (None,), 0.5),  # as much as was known before
+        ([[2.1]], (None,), 0.975),  # hardly: a move by a half is just seen
+        ([[1.9]], (None,), 0.0),  # whatever slopes say, nobody would see it move
     ],
 )
 def test_numbers_count_as_far_as_the_records_tell_them(columns, priors, numbers):
-    records, found = fitted(np.array(columns), priors)
-    assert _told_numbers(None, found, records) == pytest.approx(numbers, abs=5e-3)
+    problem, records, found = fitted(np.array(columns), priors)
+    assert _told_numbers(problem, found, records) == pytest.approx(numbers, abs=5e-3)
+
+
+def test_a_rotor_of_next_to_no_inertia_is_no_number(arm, soft_joint):
+    """Its slope is rounding, and was taken for knowledge: a servo was then no rival of a base."""
+    problem = Problem(arm, soft_joint[0])
+    values = {"stiffness": 1e6, "rotor_inertia": 1.002e-9, "damping": 420.0}
+    servo = effect_class("servo_compliance")("joint_1", **values)
+    hypothesis = Hypothesis.baseline(arm, soft_joint[0].tolerance).plus(servo)
+    found = fit(problem, hypothesis, problem.records, None, iterations=0, with_jacobian=True)
+    numbers = {u.name: k for k, u in enumerate(hypothesis.unknowns()) if u.prior is None}
+    assert unseen(problem, found, numbers["stiffness"]) == 0.0
+    far = unseen(problem, found, numbers["rotor_inertia"])
+    assert 1e-4 < values["rotor_inertia"] * math.exp(far) < 10.0  # kg m^2; the arm's are 10 to 100
+
+    def changes(distance):
+        moved = hypothesis.vector()
+        moved[numbers["rotor_inertia"]] += distance
+        there = problem.residuals(hypothesis.at(moved).effects)
+        return sum(float(((a - b) ** 2).sum()) for a, b in zip(there, found.residuals, strict=True))
+
+    assert changes(far - 1.0) < 1.0 <= changes(far)

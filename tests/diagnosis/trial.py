@@ -35,10 +35,12 @@ CLASSES = (
     {"joint_stiffness", "servo_compliance"},  # a servo's motor without inertia is a softer joint
     {"sensor_axes", "sensor_misalignment"},  # axes that are swapped are turned
 )
-# Springs one above the other about one axis, of which no sensor at the tool tells one.
-IN_SERIES = {
-    ("base_compliance", "rz"), ("servo_compliance", "joint_1"), ("joint_stiffness", "joint_1"),
-}  # fmt: skip
+# Springs one above the other about one axis, of which no sensor at the tool tells one; the first
+# joint's bearing yields as the floor under it tilts.
+IN_SERIES = (
+    {("base_compliance", "rz"), ("servo_compliance", "joint_1"), ("joint_stiffness", "joint_1")},
+    {("transverse_compliance", "joint_1"), ("base_compliance", "rx"), ("base_compliance", "ry")},
+)
 # What few records cannot tell from something else: (target, records) of an accelerometer alone.
 SETS = {
     "force_amplitude": ("tool", 3),
@@ -55,8 +57,9 @@ SETS = {
 
 def class_of(effect, target=""):
     """An effect and what cannot be told from it: its class."""
-    if (effect, target) in IN_SERIES:
-        return {name for name, _ in IN_SERIES}
+    for pairs in IN_SERIES:
+        if (effect, target) in pairs:
+            return {name for name, _ in pairs}
     return next((kind for kind in CLASSES if effect in kind), {effect})
 
 

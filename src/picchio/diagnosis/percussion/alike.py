@@ -15,6 +15,7 @@ from picchio.diagnosis.percussion.fit import Fit, fit
 from picchio.diagnosis.percussion.measured_record import MeasuredRecord
 from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.trials import SAME, score
+from picchio.diagnosis.percussion.unseen import unseen
 
 _PARALLEL = 1.0 - 1e-9
 # What is known of a cause's number beforehand, in typical sizes or e-folds: hardly anything.
@@ -63,9 +64,12 @@ def _told_numbers(problem: Problem, found: Fit, records: Sequence[MeasuredRecord
     The trace of what data add to next to nothing (D. J. C. MacKay, Neural Computation 4 (1992)
     415, doi:10.1162/neco.1992.4.3.415).
     """
-    free = np.array([u.prior is None for u in found.hypothesis.unknowns()])
     if found.jacobians is None or len(found.records) != len(records):
         found = fit(problem, found.hypothesis, records, None, iterations=0, with_jacobian=True)
-    matrix = found.normal_matrix() + np.diag(free / _VAGUE**2)
+    free = np.array([u.prior is None for u in found.hypothesis.unknowns()])
+    at_work = ~free
+    at_work[free] = [not unseen(problem, found, int(k)) for k in np.flatnonzero(free)]
+    free = free[at_work]
+    matrix = found.normal_matrix()[np.ix_(at_work, at_work)] + np.diag(free / _VAGUE**2)
     left = np.linalg.pinv(matrix, hermitian=True)[np.ix_(free, free)]
     return float(np.clip(1.0 - np.linalg.eigvalsh(left) / _VAGUE**2, 0.0, 1.0).sum())

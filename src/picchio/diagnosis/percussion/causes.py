@@ -15,10 +15,12 @@ from picchio.diagnosis.percussion.confidence import confidence
 from picchio.diagnosis.percussion.drawn_numbers import width_spread
 from picchio.diagnosis.percussion.fit import Fit
 from picchio.diagnosis.percussion.measured_record import MeasuredRecord
+from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.select import EXACT, Search
 from picchio.diagnosis.percussion.steadiness import between_poses
 from picchio.diagnosis.percussion.trials import Trial, score
 from picchio.diagnosis.percussion.unknowns import NUISANCE_KEYS, Hypothesis
+from picchio.diagnosis.percussion.unseen import away, unseen
 from picchio.diagnosis.result import Cause, Value
 from picchio.model import Effect
 from picchio.model.effects.effect import CHANNEL_UNIT
@@ -26,6 +28,7 @@ from picchio.robot import FlexibleRobot
 
 
 def told_causes(
+    problem: Problem,
     whole: Fit,
     found: Search,
     rivals: Sequence[Trial],
@@ -34,9 +37,11 @@ def told_causes(
 ) -> tuple[Cause, ...]:
     """The causes with their values, spreads and confidence.
 
-    The spread is that of the fit, larger where more than noise is left, and that of the model.
+    The spread is that of the fit, larger where more than noise is left, and that of the model; at
+    least as far as a value may go before anybody sees it.
 
     Args:
+        problem: data and noise.
         whole: the fit to all records.
         found: the way there.
         rivals: other sets, fitted to the records of the search.
@@ -56,6 +61,7 @@ def told_causes(
             for k, unknown in enumerate(unknowns):
                 if unknown.effect == index and unknown.name == p.name:
                     std = abs(unknown.slope(vector[k])) * math.sqrt(max(variance[k], 0.0))
+                    std = max(std, _unseen(problem, whole, k))
             if effect.name == "pulse_jitter":
                 std = _width_spread(whole, effect)
             values[p.name] = Value(effect.values[p.name], std, _unit(whole, effect, p.name))
@@ -68,6 +74,15 @@ def told_causes(
             )
         )
     return tuple(result)
+
+
+def _unseen(problem: Problem, whole: Fit, number: int) -> float:
+    """As `unseen`, in the parameter's unit; 0 for what is known beforehand."""
+    unknown, here = whole.hypothesis.unknowns()[number], float(whole.hypothesis.vector()[number])
+    if unknown.prior is not None:
+        return 0.0
+    moved = here + away(unknown.lower, unknown.upper, here) * unseen(problem, whole, number)
+    return abs(unknown.value(moved) - unknown.value(here))
 
 
 def _unit(whole: Fit, effect: Effect, parameter: str) -> str:

@@ -165,7 +165,7 @@ def _diagnosed(
         for t in (found.steps[0] if found.steps else [])
         if t.finished(train) and t.fit.hypothesis.labels != whole.hypothesis.labels
     ]
-    causes = told_causes(whole, found, rivals, train)
+    causes = told_causes(problem, whole, found, rivals, train)
     # More rivals can only lessen the confidence: what isn't sure by now won't be claimed.
     if causes and (after.is_noise or may_be_partial(causes, gain.explained)):
         say("looking for other causes that would do as well")
@@ -174,7 +174,7 @@ def _diagnosed(
             same, rivals = alternatives(problem, found, candidates, scales, train)
         with problem.pinned(whole.hypothesis.effects):
             same, refuted = _on_all_records(problem, whole, same)
-        causes = told_causes(whole, found, rivals, train, refuted)
+        causes = told_causes(problem, whole, found, rivals, train, refuted)
     common = common_faults(whole.hypothesis, told_covariance(whole), problem.groups)
     verdict = verdict_of(causes, before, after, bool(same), gain.explained, common)
     if any(e.name == "mains_hum" for e in whole.hypothesis.effects):
