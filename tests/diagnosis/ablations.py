@@ -20,14 +20,14 @@ MOST = 3
 _SMALL = 1e-3
 
 
-def _begin(robot, campaign):
+def _begin(robot, campaign, without):
     problem = Problem(robot, campaign)
     start = Hypothesis.baseline(robot, campaign.tolerance)
     found = fit(problem, start, iterations=8, with_jacobian=True)
     effects = found.hypothesis.effects
     scales = measure_scales(problem, effects, problem.predictions(effects))
     candidates = []
-    for kind, target in all_candidates(problem):
+    for kind, target in all_candidates(problem, without):
         effect = kind(target)
         if effect.latent is None and not effect.discrete:
             trials = effect.trials(scales)
@@ -53,13 +53,13 @@ def _shrunk(effect, share):
     return effect.with_values(**values)
 
 
-def score_test(robot, campaign):
+def score_test(robot, campaign, without=()):
     """Forward selection in a library of derivatives (sparse regression): no effect is refitted.
 
     Each candidate gives one column, its response at a thousandth of its size; the one that takes
     most out of the residual is chosen while BIC falls.
     """
-    problem, found, candidates = _begin(robot, campaign)
+    problem, found, candidates = _begin(robot, campaign, without)
     project = Projector(found)
     base = flat(found.residuals)
     columns, labels = [], []
@@ -87,12 +87,12 @@ def score_test(robot, campaign):
     return {labels[i] for i in chosen}
 
 
-def plain_bic(robot, campaign):
+def plain_bic(robot, campaign, without=()):
     """Least squares of every candidate on all the data from its typical size; the lowest BIC.
 
     No growing windows, no held-out poses, no test of what is left.
     """
-    problem, found, candidates = _begin(robot, campaign)
+    problem, found, candidates = _begin(robot, campaign, without)
     known, cost = found, found.cost
     chosen = []
     while len(chosen) < MOST:

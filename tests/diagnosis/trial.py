@@ -138,7 +138,7 @@ def run(case, salt=0, without=(), method="diagnose"):
             result["burst"] = burst.errors(found, truth, seed_of(case, salt))
             result["removed"] = removed.share(found, truth)
     else:
-        result = judge_labels(case, truth, METHODS[method](robot, campaign))
+        result = judge_labels(case, truth, METHODS[method](robot, campaign, without))
     result["seconds"] = round(time.monotonic() - began, 1)
     result["cpu_seconds"] = round(time.process_time() - spent, 1)
     return result

@@ -240,6 +240,7 @@ def test_what_all_sensors_have_alike_is_said_and_not_called_noise(case, capsys):
     )
     html = diagnosis_report(replace(case.found, diagnosis=diagnosis))
     assert why[1:] in text(html, "//*[@id='verdict']")
+    assert "all of the leads together, none of which is claimed" in text(html)
     assert "they are not claimed" in text(html) and "force at the tool" in text(html)
     assert "helped a little" not in text(html)
     show_diagnosis(diagnosis, None)
