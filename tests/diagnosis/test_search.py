@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import permutations
 from types import SimpleNamespace
 
+import follow_up
 import pytest
 import trial
 
@@ -178,7 +179,7 @@ def test_what_replaces_a_cause_must_hold_on_poses_held_out(holds, two_causes, ar
     start = fit(problem, Hypothesis.baseline(arm, problem.campaign.tolerance))
     found = select.search(
         problem, [], None, problem.records, start,
-        confirmed=lambda before, after: holds or after is not better,
+        lambda before, after: 9.0 if holds or after is not better else -9.0,
     )  # fmt: skip
     assert found.best is (better if holds else best)
 
@@ -230,11 +231,42 @@ def test_where_poses_held_out_refute_the_best_the_search_goes_wider(two_causes, 
     start = fit(problem, Hypothesis.baseline(arm, problem.campaign.tolerance))
     found = select.search(
         problem, [], None, problem.records, start,
-        confirmed=lambda before, after: after is not wrong.fit,
+        lambda before, after: -9.0 if after is wrong.fit else 9.0,
     )  # fmt: skip
     assert asked == [False, True, False]
     assert found.best is right.fit
     assert found.steps[0][0] is right
+
+
+@pytest.mark.parametrize(
+    ("gains", "chosen"),
+    [
+        ((), None),
+        ((5.0, 5.0), 0),
+        ((-5.0, 5.0), 1),
+        ((-5.0, -9.0), None),
+        ((5.0, 14.0), 0),  # no more than chance
+        ((5.0, 16.0, 4e3), 2),  # all alike where they were fitted, and clearly not there
+        ((None, 4e3), 0),  # cannot be held against those records
+        ((5.0, None), 0),
+        ((-5.0, None), 1),
+    ],
+)
+def test_of_what_does_as_well_the_records_held_out_choose(gains, chosen):
+    tied = [(str(i), gain) for i, gain in enumerate(gains)]
+    assert select._held_out_choice(tied) == (None if chosen is None else str(chosen))
+
+
+def test_warmth_is_not_chosen_where_a_record_held_out_says_it_was_the_day(arm):
+    """In the records that are fitted both explain as much, to one in chi-square."""
+    campaign, truth = trial.make(
+        {"robot": ROBOT, "kind": "sets", "effect": "stiffness_drift", "snr": 40, "draw": 10}, 1
+    )
+    before = diagnose_percussion(arm, campaign).diagnosis
+    assert before.verdict == "ambiguous"
+    more = follow_up.taken(before.next_measurement, campaign, truth, 5)
+    after = diagnose_percussion(arm, more).diagnosis
+    assert (after.verdict, [c.effect for c in after.causes]) == ("named", ["stiffness_drift"])
 
 
 @pytest.mark.slow

@@ -74,16 +74,14 @@ def look(
     effects = baseline.hypothesis.effects
     scales = measure_scales(problem, effects, problem.predictions(effects))
 
-    def confirmed(before: Fit, after: Fit) -> bool:
+    def held_out_gain(before: Fit, after: Fit) -> float | None:
         names = {e.name for e in after.hypothesis.causes}
         if not kept or names & set(LATENT):
-            return True
+            return None
         old = _chi_square(problem, before.hypothesis, kept)
-        return _chi_square(problem, after.hypothesis, kept) < old
+        return old - _chi_square(problem, after.hypothesis, kept)
 
-    found = search(
-        problem, candidates, scales, train, baseline, confirmed=confirmed, progress=progress
-    )
+    found = search(problem, candidates, scales, train, baseline, held_out_gain, progress=progress)
     return Look(train, kept, baseline, scales, found)
 
 

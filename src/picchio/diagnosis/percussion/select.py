@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -81,8 +82,8 @@ def search(
     scales: Scales,
     records: Sequence[MeasuredRecord],
     baseline: Fit,
+    held_out_gain: Callable[[Fit, Fit], float | None] = lambda before, after: None,
     *,
-    confirmed: Callable[[Fit, Fit], bool] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Search:
     """Add causes one by one while they pay.
@@ -93,17 +94,20 @@ def search(
         scales: sizes that matter.
         records: to fit; others are held out.
         baseline: the nuisances' fit to them.
-        confirmed: (before, after) -> whether the records held out confirm the new cause.
+        held_out_gain: (before, after) -> fall of chi-square in the records held out; None where
+            they can't tell.
         progress: told what is being done.
     """
     say = progress or (lambda text: None)
     found = Search(baseline, baseline)
     least = max(LEAST_GAIN, EXACT**2 * signal_power(records))
 
+    def confirmed(before: Fit, after: Fit) -> bool:
+        gain = held_out_gain(before, after)
+        return gain is None or gain > 0.0
+
     def accepted(other: Fit) -> Fit:
-        if other is found.best or confirmed is None or confirmed(found.best, other):
-            return other
-        return found.best
+        return other if other is found.best or confirmed(found.best, other) else found.best
 
     def grow(stack: ExitStack) -> None:
         for _ in range(MOST_CAUSES):
@@ -123,11 +127,9 @@ def search(
             if not found.pinned:
                 trials = over_the_same_samples(problem, trials, records)
             found.steps.append(trials)
-            # Of those that do as well, the records held out have the first word.
             tied = [t for t in trials if t.score - trials[0].score < SAME]
-            held = (t for t in tied if confirmed is None or confirmed(here, t.fit))
-            best = next(held, None)
-            if best is None and confirmed is not None and not quiet:
+            best = _held_out_choice([(t, held_out_gain(here, t.fit)) for t in tied])
+            if best is None and not quiet:
                 # What looked best is none; the right one may not have been among those fitted.
                 wider = try_candidates(
                     problem, here.hypothesis, candidates, scales, records,
@@ -187,6 +189,22 @@ def search(
                 grow(stack)
     found.evidence = weigh(problem, found.best.residuals, found.best.records)
     return found
+
+
+def _held_out_choice(tied: Sequence[tuple[Trial, float | None]]) -> Trial | None:
+    """Of trials that do as well, the first that the records held out confirm, or clearly prefer.
+
+    Args:
+        tied: with the fall of chi-square there, None where they can't tell.
+    """
+    held = [(t, gain) for t, gain in tied if gain is None or gain > 0.0]
+    if not held:
+        return None
+    best, least = held[0]
+    if least is None:
+        return best
+    other, most = max(held, key=lambda each: -math.inf if each[1] is None else each[1])
+    return other if most is not None and most > least + SAME else best
 
 
 def over_the_same_samples(
