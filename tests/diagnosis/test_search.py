@@ -14,6 +14,7 @@ from picchio.diagnosis.percussion import exchange as exchange_module
 from picchio.diagnosis.percussion import select
 from picchio.diagnosis.percussion.candidate_fit import fit_short
 from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.choice import held_out_choice, over_the_same_samples
 from picchio.diagnosis.percussion.diagnose import diagnose_percussion
 from picchio.diagnosis.percussion.evidence import weigh
 from picchio.diagnosis.percussion.exchange import exchange, prune
@@ -23,6 +24,7 @@ from picchio.diagnosis.percussion.latent_fit import fit_latent
 from picchio.diagnosis.percussion.problem import Problem
 from picchio.diagnosis.percussion.screen import Suspect
 from picchio.diagnosis.percussion.stuck import unstuck
+from picchio.diagnosis.percussion.trial_sizes import acts_either_way, smallest
 from picchio.diagnosis.percussion.trials import SAME, Trial, _short_list, score, spread_out
 from picchio.diagnosis.percussion.unknowns import Hypothesis
 from picchio.model.effects import effect_class
@@ -138,7 +140,7 @@ def test_rivals_are_compared_over_the_same_samples(seed, arm):
         trial_of("pulse_rate", "tool", scale=1.0043),
     ]
     trials.sort(key=lambda t: t.score)
-    again = select.over_the_same_samples(problem, trials, problem.records)
+    again = over_the_same_samples(problem, trials, problem.records)
     assert [t.score for t in again] == sorted(t.score for t in again)
     assert abs(again[0].score - again[1].score) < SAME
     rate = next(t for t in again if t.label == "pulse_rate:tool").fit.hypothesis.causes[0]
@@ -238,6 +240,18 @@ def test_where_poses_held_out_refute_the_best_the_search_goes_wider(two_causes, 
     assert found.steps[0][0] is right
 
 
+def test_of_faint_trials_that_would_become_one_the_smallest_is_tried():
+    scale = effect_class("joint_stiffness")
+    trials = [scale("joint_1", scale=value) for value in (0.5, 1.6, 0.9, 1.4)]
+    assert acts_either_way(scale, faint=True) and not acts_either_way(scale, faint=False)
+    assert smallest(trials) is trials[2]
+    rate = effect_class("clock_drift")
+    (name,) = (p.name for p in rate.parameters)
+    trials = [rate("deflection", **{name: value}) for value in (3e-4, -1e-4, 1e-3)]
+    assert acts_either_way(rate, faint=False) and smallest(trials) is trials[1]
+    assert not acts_either_way(effect_class("backlash"), faint=True)
+
+
 @pytest.mark.parametrize(
     ("gains", "chosen"),
     [
@@ -254,7 +268,7 @@ def test_where_poses_held_out_refute_the_best_the_search_goes_wider(two_causes, 
 )
 def test_of_what_does_as_well_the_records_held_out_choose(gains, chosen):
     tied = [(str(i), gain) for i, gain in enumerate(gains)]
-    assert select._held_out_choice(tied) == (None if chosen is None else str(chosen))
+    assert held_out_choice(tied) == (None if chosen is None else str(chosen))
 
 
 def test_warmth_is_not_chosen_where_a_record_held_out_says_it_was_the_day(arm):

@@ -414,3 +414,11 @@ def test_an_axis_that_is_none_is_refused_by_name(arm, geometry):
     turns = from_dict({"effect": "base_compliance", "target": "rw", "parameters": values})
     with pytest.raises(InputError, match=r"no such axis.*rw.*rz"):
         Model(arm, True).with_effects([turns]).plant(geometry)
+
+
+def test_a_mount_that_does_not_resonate_is_refused():
+    """From 1/sqrt(2) on its answer has no peak: that is a low-pass filter."""
+    mount = effect_class("mount_resonance")
+    mount("accelerometer.tool", frequency=200.0, damping_ratio=0.7)
+    with pytest.raises(InputError, match="damping_ratio"):
+        mount("accelerometer.tool", frequency=200.0, damping_ratio=0.75)

@@ -20,7 +20,7 @@ from picchio.diagnosis.percussion.select import EXACT, Search
 from picchio.diagnosis.percussion.steadiness import between_poses
 from picchio.diagnosis.percussion.trials import Trial, score
 from picchio.diagnosis.percussion.unknowns import NUISANCE_KEYS, Hypothesis
-from picchio.diagnosis.percussion.unseen import away, unseen
+from picchio.diagnosis.percussion.unseen import unseen
 from picchio.diagnosis.result import Cause, Value
 from picchio.model import Effect
 from picchio.model.effects.effect import CHANNEL_UNIT
@@ -81,7 +81,7 @@ def _unseen(problem: Problem, whole: Fit, number: int) -> float:
     unknown, here = whole.hypothesis.unknowns()[number], float(whole.hypothesis.vector()[number])
     if unknown.prior is not None:
         return 0.0
-    moved = here + away(unknown.lower, unknown.upper, here) * unseen(problem, whole, number)
+    moved = here + unseen(problem, whole, number)
     return abs(unknown.value(moved) - unknown.value(here))
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from picchio.diagnosis.percussion.alike import behind
+from picchio.diagnosis.percussion.choice import held_out_choice, over_the_same_samples
 from picchio.diagnosis.percussion.confidence import confidence
 from picchio.diagnosis.percussion.evidence import Evidence, weigh
 from picchio.diagnosis.percussion.exchange import (
@@ -46,8 +46,6 @@ LEAST_GAIN = 8.0
 EXACT = 3e-4
 # Of the least gain: beyond that no fit without the cause comes near.
 _CLEAR = 10.0
-# Fall of BIC up to which a rival may owe its place to the samples that it counts as known.
-_ROUGH = 100.0
 # How often every cause is replaced in turn, and up to what share of the baseline's cost that is
 # worth while.
 _SWEEPS = 2
@@ -128,7 +126,7 @@ def search(
                 trials = over_the_same_samples(problem, trials, records)
             found.steps.append(trials)
             tied = [t for t in trials if t.score - trials[0].score < SAME]
-            best = _held_out_choice([(t, held_out_gain(here, t.fit)) for t in tied])
+            best = held_out_choice([(t, held_out_gain(here, t.fit)) for t in tied])
             if best is None and not quiet:
                 # What looked best is none; the right one may not have been among those fitted.
                 wider = try_candidates(
@@ -189,51 +187,6 @@ def search(
                 grow(stack)
     found.evidence = weigh(problem, found.best.residuals, found.best.records)
     return found
-
-
-def _held_out_choice(tied: Sequence[tuple[Trial, float | None]]) -> Trial | None:
-    """Of trials that do as well, the first that the records held out confirm, or clearly prefer.
-
-    Args:
-        tied: with the fall of chi-square there, None where they can't tell.
-    """
-    held = [(t, gain) for t, gain in tied if gain is None or gain > 0.0]
-    if not held:
-        return None
-    best, least = held[0]
-    if least is None:
-        return best
-    other, most = max(held, key=lambda each: -math.inf if each[1] is None else each[1])
-    return other if most is not None and most > least + SAME else best
-
-
-def over_the_same_samples(
-    problem: Problem, trials: Sequence[Trial], records: Sequence[MeasuredRecord]
-) -> list[Trial]:
-    """Trials, the best first; where that leaves noise, close rivals are compared with it anew.
-
-    Each was fitted with its own choice of which samples are known, by which its cost is rough: a
-    fit may stop early, or gain by what it leaves out. Now all count those of the best.
-    """
-    best = trials[0]
-    close = [
-        t
-        for t in trials
-        if t.finished(records)
-        and t.score - best.score < _ROUGH
-        and effect_class(t.label.split(":")[0]).latent is None
-    ]
-    if best not in close or len(close) < 2:
-        return list(trials)
-    if not weigh(problem, best.fit.residuals, best.fit.records).is_noise:
-        return list(trials)
-    with problem.pinned(best.fit.hypothesis.effects):
-        again = []
-        for t in close:
-            there = fit(problem, t.fit.hypothesis, records, None, iterations=6)
-            again.append(replace(t, fit=there, score=score(there)))
-    others = [t for t in trials if t not in close]
-    return sorted([*again, *others], key=lambda t: t.score)
 
 
 def _calm(problem: Problem, best: Fit, newest: str, records: Sequence[MeasuredRecord]) -> Fit:

@@ -25,12 +25,12 @@ def unseen(problem: Problem, found: Fit, number: int) -> float:
         number: of the unknown.
 
     Returns:
-        in the unknown's own coordinate; 0 where a move by half a typical size, or half an e-fold,
-        is seen.
+        the signed move in the unknown's own coordinate; 0 where one by half a typical size, or half
+        an e-fold, is seen.
     """
     unknown, vector = found.hypothesis.unknowns()[number], found.hypothesis.vector()
-    inwards = away(unknown.lower, unknown.upper, float(vector[number]))
-    room = abs((unknown.upper if inwards > 0.0 else unknown.lower) - float(vector[number]))
+    below, above = float(vector[number]) - unknown.lower, unknown.upper - float(vector[number])
+    inwards, room = (1.0, above) if below < above else (-1.0, below)
 
     def seen(far: float) -> bool:
         moved = vector.copy()
@@ -46,16 +46,11 @@ def unseen(problem: Problem, found: Fit, number: int) -> float:
     low, high = 0.0, min(_FAR, room)
     while not seen(high):
         if high >= room:
-            return room
+            return inwards * room
         low, high = high, min(2.0 * high, room)
     if low == 0.0:
         return 0.0
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if seen(middle) else (middle, high)
-    return high
-
-
-def away(lower: float, upper: float, value: float) -> float:
-    """The direction away from the nearer bound: 1 or -1."""
-    return 1.0 if value < 0.5 * (lower + upper) else -1.0
+    return inwards * high
