@@ -422,3 +422,19 @@ def test_a_mount_that_does_not_resonate_is_refused():
     mount("accelerometer.tool", frequency=200.0, damping_ratio=0.7)
     with pytest.raises(InputError, match="damping_ratio"):
         mount("accelerometer.tool", frequency=200.0, damping_ratio=0.75)
+
+
+def test_a_saved_model_with_a_value_out_of_bounds_is_named_with_its_file(tmp_path):
+    saved = tmp_path / "saved.toml"
+    saved.write_text(
+        'format = "picchio-model/1"\nrobot = "fanuc_like_3dof"\n[[effect]]\n'
+        'effect = "mount_resonance"\ntarget = "accelerometer.tool"\n'
+        "[effect.parameters]\nfrequency = 200.0\ndamping_ratio = 1.5\n"
+    )
+    with pytest.raises(InputError) as told:
+        Model(picchio.load_robot(saved))
+    line = str(told.value)
+    assert line.startswith(
+        f"{saved}: mount_resonance.damping_ratio: must lie between 0.001 and 0.7"
+    )
+    assert "0.7, got 1.5" in line

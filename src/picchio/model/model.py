@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, Where
 from picchio.model.effects.registry import from_dict
@@ -52,7 +53,10 @@ class Model:
 
     def __post_init__(self) -> None:
         if self.robot.effect_tables and not self.own:
-            own = tuple(from_dict(table) for table in self.robot.effect_tables)
+            try:
+                own = tuple(from_dict(table) for table in self.robot.effect_tables)
+            except InputError as error:  # a saved model is the last file that was read
+                raise error.placed(file=next(reversed(self.robot.files), None)) from None
             object.__setattr__(self, "own", own)
             object.__setattr__(self, "effects", (*own, *self.effects))
 

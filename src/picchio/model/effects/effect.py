@@ -91,7 +91,8 @@ class Effect(ABC):
             inside = bounds.lower <= value <= bounds.upper or value == bounds.neutral
             if math.isnan(value) or not inside:
                 raise InputError(
-                    f"must lie between {bounds.lower:g} and {bounds.upper:g} {bounds.unit}",
+                    f"must lie between {bounds.lower:g} and {bounds.upper:g} "
+                    f"{'' if bounds.unit == '1' else bounds.unit}".rstrip(),
                     key=f"{self.name}.{key}",
                     value=value,
                 )
