@@ -32,13 +32,13 @@ import pinocchio as pin
 
 import picchio
 from picchio.core.files import atomic_write
-from picchio.model import LinearSystem
-from picchio.robot import Shaft
-from picchio.studies import places
-from picchio.studies.batch_damage import batch_damage
-from picchio.studies.envelope import icosphere
-from picchio.studies.map import workspace_map
-from picchio.vibration.batch import batch_peaks
+from picchio.model.linear_system import LinearSystem
+from picchio.robot.joint import Shaft
+from picchio.studies.envelopes import icosphere
+from picchio.studies.maps import places
+from picchio.studies.maps.run import workspace_map
+from picchio.studies.rivet.batch import batch_damage
+from picchio.vibration.batch.peaks import batch_peaks
 
 BLOWS = picchio.PulseTrain(force=300.0, period=0.040, width=0.004)
 ROBOTS = {3: "fanuc_like_3dof", 6: "ur10", 7: "panda"}

@@ -24,10 +24,10 @@ import numpy as np
 
 import picchio
 from picchio.core.files import atomic_write
-from picchio.model import Model
 from picchio.model.blows import Blows
 from picchio.model.geometry import Geometry
-from picchio.vibration.integrate import Samples, integrate
+from picchio.model.model import Model
+from picchio.vibration.integration.integrate import Samples, integrate
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[0] = str(ROOT / "tests" / "worlds")  # not this folder, which has a rainflow.py of its own

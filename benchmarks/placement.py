@@ -25,7 +25,7 @@ import numba
 import picchio
 from picchio.cli.output import finite
 from picchio.core.files import atomic_write
-from picchio.studies.placement import place
+from picchio.studies.placement.run import place
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests" / "studies"))

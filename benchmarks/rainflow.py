@@ -20,7 +20,7 @@ from types import ModuleType
 import numpy as np
 from pylife.stress.rainflow import FourPointDetector, LoopValueRecorder
 
-from picchio.fatigue import rainflow
+from picchio.fatigue.counting.counter import rainflow
 
 
 def package() -> ModuleType:

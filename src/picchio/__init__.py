@@ -16,47 +16,51 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from picchio import datasets
-    from picchio.campaign import Campaign, Record, load_campaign, write_campaign
+    from picchio.campaign.campaign import Campaign, load_campaign, write_campaign
+    from picchio.campaign.record import Record
     from picchio.core.errors import InputError, PicchioError, PicchioWarning
-    from picchio.excitation import HalfSineTrain, MeasuredForce, PulseTrain
-    from picchio.fatigue import SNCurve, load_sn_curve, rainflow
-    from picchio.model import LinearSystem, Model
-    from picchio.robot import FlexibleRobot, load_robot
-    from picchio.studies import Assessment, Task, assess, load_task, task_from_dict
-    from picchio.vibration import (
-        modal_analysis,
-        response_from_rest,
-        steady_state,
-        truncated_fourier_response,
-    )
+    from picchio.excitation.trains import HalfSineTrain, MeasuredForce, PulseTrain
+    from picchio.fatigue.counting.counter import rainflow
+    from picchio.fatigue.sn.curve import SNCurve
+    from picchio.fatigue.sn.library import load_sn_curve
+    from picchio.model.linear_system import LinearSystem
+    from picchio.model.model import Model
+    from picchio.robot.flexible_robot import FlexibleRobot
+    from picchio.robot.loading.load import load_robot
+    from picchio.studies.assessment.result import Assessment
+    from picchio.studies.assessment.run import assess
+    from picchio.studies.tasks import Task, load_task, task_from_dict
+    from picchio.vibration.closed_form.fourier import truncated_fourier_response
+    from picchio.vibration.closed_form.modes import modal_analysis
+    from picchio.vibration.closed_form.response import response_from_rest, steady_state
 
 _HOME = {
-    "Assessment": "studies",
-    "Campaign": "campaign",
-    "FlexibleRobot": "robot",
-    "HalfSineTrain": "excitation",
+    "Assessment": "studies.assessment.result",
+    "Campaign": "campaign.campaign",
+    "FlexibleRobot": "robot.flexible_robot",
+    "HalfSineTrain": "excitation.trains",
     "InputError": "core.errors",
-    "LinearSystem": "model",
-    "MeasuredForce": "excitation",
-    "Model": "model",
+    "LinearSystem": "model.linear_system",
+    "MeasuredForce": "excitation.trains",
+    "Model": "model.model",
     "PicchioError": "core.errors",
     "PicchioWarning": "core.errors",
-    "PulseTrain": "excitation",
-    "Record": "campaign",
-    "SNCurve": "fatigue",
-    "Task": "studies",
-    "assess": "studies",
-    "load_campaign": "campaign",
-    "load_robot": "robot",
-    "load_sn_curve": "fatigue",
-    "load_task": "studies",
-    "modal_analysis": "vibration",
-    "rainflow": "fatigue",
-    "response_from_rest": "vibration",
-    "steady_state": "vibration",
-    "task_from_dict": "studies",
-    "truncated_fourier_response": "vibration",
-    "write_campaign": "campaign",
+    "PulseTrain": "excitation.trains",
+    "Record": "campaign.record",
+    "SNCurve": "fatigue.sn.curve",
+    "Task": "studies.tasks",
+    "assess": "studies.assessment.run",
+    "load_campaign": "campaign.campaign",
+    "load_robot": "robot.loading.load",
+    "load_sn_curve": "fatigue.sn.library",
+    "load_task": "studies.tasks",
+    "modal_analysis": "vibration.closed_form.modes",
+    "rainflow": "fatigue.counting.counter",
+    "response_from_rest": "vibration.closed_form.response",
+    "steady_state": "vibration.closed_form.response",
+    "task_from_dict": "studies.tasks",
+    "truncated_fourier_response": "vibration.closed_form.fourier",
+    "write_campaign": "campaign.campaign",
 }
 
 __all__ = [

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from picchio.campaign import load_campaign
-from picchio.campaign.importing import read_mapping
+from picchio.campaign.campaign import load_campaign
+from picchio.campaign.importing.mapping import read_mapping
 
 TABLE = """format = "picchio-campaign/1"
 robot = "fanuc_like_3dof"

@@ -4,7 +4,7 @@ import hashlib
 
 import pytest
 
-from picchio.campaign import load_campaign
+from picchio.campaign.campaign import load_campaign
 from picchio.core.errors import InputError
 
 from .conftest import write_good

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from picchio.campaign import load_campaign
+from picchio.campaign.campaign import load_campaign
 from picchio.core.errors import InputError
 
 from .conftest import write_good
@@ -58,7 +58,7 @@ def test_random_damage(good, tmp_path_factory, name, changes):
 def test_an_extra_that_is_not_installed_is_named(tmp_path, monkeypatch, module, ending, words):
     import sys
 
-    from picchio.campaign.importing import read_raw
+    from picchio.campaign.importing.importer import read_raw
 
     for name in [n for n in sys.modules if n.partition(".")[0] == module]:
         monkeypatch.delitem(sys.modules, name)

@@ -6,12 +6,13 @@ import sys
 import numpy as np
 import pytest
 
-from picchio.campaign import Campaign, Record
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
 
 CHECK = r"""
 import re, resource, sys
 from pathlib import Path
-from picchio.campaign import load_campaign
+from picchio.campaign.campaign import load_campaign
 campaign = load_campaign(sys.argv[1])
 campaign.check_samples()
 total = 0.0

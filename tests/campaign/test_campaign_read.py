@@ -8,7 +8,8 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from picchio.campaign import Campaign, Record, load_campaign
+from picchio.campaign.campaign import Campaign, load_campaign
+from picchio.campaign.record import Record
 from picchio.core.errors import InputError, PicchioWarning
 
 

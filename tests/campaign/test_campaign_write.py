@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from picchio.campaign import Campaign, Record, load_campaign
-from picchio.campaign import write as write_module
+from picchio.campaign import campaign as write_module
+from picchio.campaign.campaign import Campaign, load_campaign
+from picchio.campaign.record import Record
 from picchio.core.errors import InputError
 
 finite = st.floats(allow_nan=False, allow_infinity=False, width=64)

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from picchio.campaign import load_campaign
+from picchio.campaign.campaign import load_campaign
 from picchio.cli.main import run
 
 MAPPING = """format = "picchio-mapping/1"

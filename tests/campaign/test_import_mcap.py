@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from picchio.campaign.importing import import_record, mapping_template, read_mapping, read_raw
+from picchio.campaign.importing.importer import import_record, read_raw
+from picchio.campaign.importing.mapping import read_mapping
+from picchio.campaign.importing.template import mapping_template
 from picchio.core.errors import InputError
 
 STAMP = "int32 sec\nuint32 nanosec"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from picchio.campaign.importing import import_record, read_raw
+from picchio.campaign.importing.importer import import_record, read_raw
 from picchio.core.errors import InputError, PicchioWarning
 
 from .conftest import MAPPING_RECORD as RECORD

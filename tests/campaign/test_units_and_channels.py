@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from picchio.campaign import ChannelKind, parse_channel, parse_header, register_channel_kind
 from picchio.campaign import channels as channels_module
+from picchio.campaign.channels import (
+    ChannelKind,
+    parse_channel,
+    parse_header,
+    register_channel_kind,
+)
 from picchio.campaign.units import conversion
 from picchio.core.errors import InputError
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from picchio.robot.find import shipped_robots
+from picchio.robot.loading.find import shipped_robots
 
 MAIN = "from picchio.cli.main import main; main()"
 WANTED = {"ur5", "ur10", "panda", "kinova", "xarm7", "z1", "tiago", "talos_left_arm"}

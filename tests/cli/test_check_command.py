@@ -8,7 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from picchio.campaign import Campaign, Record
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
 from picchio.cli.main import run
 
 PULSES = {"kind": "pulse_train", "force": 300.0, "period": 0.04, "width": 0.004, "hits": 12}

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from picchio.fatigue import load_sn_curve
+from picchio.fatigue.sn.library import load_sn_curve
 
 
 def picchio(*arguments):

@@ -6,8 +6,8 @@ import sys
 import pytest
 
 import picchio.datasets
-from picchio.robot import load_robot
-from picchio.robot.sidecar import read_sidecar
+from picchio.robot.annotations.sidecar import read_sidecar
+from picchio.robot.loading.load import load_robot
 
 MAIN = "from picchio.cli.main import main; main()"
 

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from picchio.campaign import load_campaign
+from picchio.campaign.campaign import load_campaign
 from picchio.cli.main import run
 
 PLAN = """\

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from picchio.core.phi import phi1, phi2
+from picchio.excitation.piecewise import phi1, phi2
 
 
 def oracle(z: complex) -> tuple[complex, complex]:

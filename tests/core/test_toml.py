@@ -6,8 +6,7 @@ import pytest
 from pydantic import Field
 
 from picchio.core.errors import InputError
-from picchio.core.model import Positive, StrictModel
-from picchio.core.toml import parse_toml
+from picchio.core.toml import Positive, StrictModel, parse_toml
 
 
 class Inner(StrictModel):

@@ -10,11 +10,11 @@ import math
 import numpy as np
 
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
-from picchio.diagnosis.percussion.fit import fit
-from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.screen import Projector, flat
-from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.fit.least_squares import fit
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.search.screen import Projector, flat
 
 MOST = 3
 _SMALL = 1e-3

@@ -8,7 +8,7 @@ import numpy as np
 import rainflow
 from scipy.interpolate import CubicSpline
 
-import picchio
+from picchio.campaign.channels import parse_channel
 from picchio.core.errors import InputError
 from picchio.model.geometry import Geometry
 from worlds import campaign as worlds
@@ -72,7 +72,7 @@ def _deflections(problem, record, pose, direction, fit):
         record.setup,
         geometry=geometry,
         blows=record.setup.blows.change(direction=direction, tool_rotation=rotation),
-        channels=tuple(picchio.campaign.parse_channel(name)[0] for name in names),
+        channels=tuple(parse_channel(name)[0] for name in names),
     )
     # A sensor's fault is in the readings, not in the arm.
     effects = [e for e in fit.hypothesis.effects if e.where != "sensor"]

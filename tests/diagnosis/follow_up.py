@@ -7,7 +7,8 @@ from datetime import timedelta
 
 import numpy as np
 
-from picchio.campaign import Campaign, Record
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
 from worlds import campaign as worlds
 from worlds import robots
 

@@ -13,7 +13,8 @@ import pinocchio as pin
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, filtfilt
 
-from picchio.campaign import Campaign, Record
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
 
 Change = Callable[[dict[str, np.ndarray], float], dict[str, np.ndarray]]
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pinocchio as pin
 
-from picchio.campaign import Campaign, Record
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
 
 RATE, DURATION = 500.0, 10.0
 ARM = "fanuc_like_3dof"

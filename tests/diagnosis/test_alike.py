@@ -11,13 +11,13 @@ import pytest
 import trial
 
 import picchio
-from picchio.diagnosis.percussion.alike import _told_numbers
-from picchio.diagnosis.percussion.diagnose import diagnose_percussion
-from picchio.diagnosis.percussion.fit import fit
-from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.unknowns import Hypothesis
-from picchio.diagnosis.percussion.unseen import unseen
-from picchio.model.effects import effect_class
+from picchio.diagnosis.percussion.criteria.equivalence import _told_numbers
+from picchio.diagnosis.percussion.criteria.identifiability import unseen
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.fit.least_squares import fit
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.run import diagnose_percussion
+from picchio.model.effects.registry import effect_class
 from worlds import campaign as worlds
 
 ACCELEROMETER = "accelerometer.tool"

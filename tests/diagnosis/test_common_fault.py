@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import picchio
-from picchio.campaign import Tolerance
-from picchio.diagnosis.percussion.common_fault import common_faults
-from picchio.diagnosis.percussion.unknowns import Hypothesis
-from picchio.model.effects import effect_class
+from picchio.campaign.tables import Tolerance
+from picchio.diagnosis.percussion.criteria.common_fault import common_faults
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.model.effects.registry import effect_class
 
 BOTH = ("accelerometer.tool", "deflection")
 

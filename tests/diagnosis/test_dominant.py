@@ -5,16 +5,16 @@ from __future__ import annotations
 import pytest
 
 import picchio
-from picchio.diagnosis.percussion import diagnose
-from picchio.diagnosis.percussion.candidates import measure_scales
-from picchio.diagnosis.percussion.dominant import dominant, share
-from picchio.diagnosis.percussion.evidence import weigh
-from picchio.diagnosis.percussion.fit import fit, fit_growing
-from picchio.diagnosis.percussion.look import Look
-from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.select import Search
-from picchio.diagnosis.percussion.unknowns import Hypothesis
-from picchio.model.effects import effect_class
+from picchio.diagnosis.percussion import run as diagnose
+from picchio.diagnosis.percussion.criteria.dominance import dominant, share
+from picchio.diagnosis.percussion.criteria.whiteness import weigh
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.search.candidates import measure_scales
+from picchio.diagnosis.percussion.search.rounds import Look
+from picchio.diagnosis.percussion.search.select import Search
+from picchio.model.effects.registry import effect_class
 from worlds import campaign as worlds
 
 ROBOT = "fanuc_like_3dof"

@@ -8,10 +8,10 @@ from scipy.integrate import trapezoid
 from scipy.optimize import minimize_scalar
 from scipy.stats import norm
 
-from picchio.diagnosis.percussion.causes import with_hum
-from picchio.diagnosis.percussion.drawn_numbers import drawn_cost, width_spread
+from picchio.diagnosis.percussion.conclude.causes import with_hum
+from picchio.diagnosis.percussion.fit.drawn import drawn_cost, width_spread
 from picchio.diagnosis.result import Cause, Value
-from picchio.model.effects import effect_class
+from picchio.model.effects.registry import effect_class
 
 
 def deviance(seen, width):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import gamma, norm
 
-from picchio.diagnosis.percussion.evidence import BAND_LIMIT, standard_deviations
+from picchio.diagnosis.percussion.criteria.whiteness import BAND_LIMIT, standard_deviations
 
 
 @pytest.mark.parametrize("ordinates", [12, 30, 75, 1000])

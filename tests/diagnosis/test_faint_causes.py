@@ -5,13 +5,13 @@ import pytest
 import trial
 
 import picchio
-from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
-from picchio.diagnosis.percussion.confidence import confidence
-from picchio.diagnosis.percussion.fit import Fit, fit
-from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.screen import Screen
-from picchio.diagnosis.percussion.unknowns import Hypothesis
-from picchio.model.effects import effect_class
+from picchio.diagnosis.percussion.criteria.confidence import confidence
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.search.screen import Screen
+from picchio.model.effects.registry import effect_class
 from worlds import campaign as worlds
 
 ARM = "fanuc_like_3dof"

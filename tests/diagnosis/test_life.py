@@ -8,8 +8,8 @@ import pytest
 
 import picchio
 from picchio.diagnosis.life import Unsure, life_before_and_after, with_effects
-from picchio.model.effects import effect_class
-from picchio.studies import assess
+from picchio.model.effects.registry import effect_class
+from picchio.studies.assessment.run import assess
 
 DRAWS = 120
 

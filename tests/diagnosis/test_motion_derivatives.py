@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from picchio.diagnosis.motion.fit import clean, jacobian, stable_solve, stable_solves
-from picchio.diagnosis.motion.state import State
-from picchio.diagnosis.motion.system import System
-from picchio.model.effects import catalogue, effect_class
-from picchio.prediction.motion import MotionLog
-from picchio.robot import load_robot
+from picchio.diagnosis.motion.data.system import System
+from picchio.diagnosis.motion.fit.least_squares import clean, jacobian, stable_solve, stable_solves
+from picchio.diagnosis.motion.fit.state import State
+from picchio.model.effects.registry import catalogue, effect_class
+from picchio.prediction.motion.log import MotionLog
+from picchio.robot.loading.load import load_robot
 
 RATE, SAMPLES = 500.0, 3000
 JOINTS = ("joint_1", "joint_2", "joint_3")
@@ -48,7 +48,7 @@ EVERYTHING = (
 
 
 def test_every_motion_effect_is_in_the_list():
-    from picchio.diagnosis.motion.candidates import motion_effects
+    from picchio.diagnosis.motion.search.candidates import motion_effects
 
     assert {name for name, *_ in EVERYTHING} == set(motion_effects())
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 import picchio.datasets
-from picchio.diagnosis.motion import diagnose_motion
-from picchio.robot import load_robot
+from picchio.diagnosis.motion.run import diagnose_motion
+from picchio.robot.loading.load import load_robot
 
 sys.path.insert(0, str(Path(__file__).parent))
 import motion_injection as injection
@@ -84,7 +84,7 @@ GONE = ["coulomb_friction", "asymmetric_friction", "encoder_delay", "torque_ripp
 
 @pytest.mark.parametrize("gone", GONE)
 def test_without_a_cause_no_wrong_name(robot, emps, diagnosis, gone):
-    from picchio.diagnosis.motion.candidates import motion_effects
+    from picchio.diagnosis.motion.search.candidates import motion_effects
 
     other = diagnose_motion(robot, emps, catalogue=set(motion_effects()) - {gone})
     assert other.verdict in ("partial", "unexplained")

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 import picchio.datasets
-from picchio.diagnosis.motion import diagnose_motion
-from picchio.robot import load_robot
+from picchio.diagnosis.motion.run import diagnose_motion
+from picchio.robot.loading.load import load_robot
 
 sys.path.insert(0, str(Path(__file__).parent))
 import motion_injection as injection

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import picchio.datasets
-from picchio.diagnosis.motion import diagnose_motion
-from picchio.robot import load_robot
+from picchio.diagnosis.motion.run import diagnose_motion
+from picchio.robot.loading.load import load_robot
 
 sys.path.insert(0, str(Path(__file__).parent))
 import motion_injection as injection
@@ -52,7 +52,7 @@ def test_the_lag_of_a_takes_the_error_of_b_and_c(diagnosis):
 
 
 def test_stiffness_only_where_b_and_c_gain(robot, kuka, diagnosis):
-    from picchio.diagnosis.motion.candidates import motion_effects
+    from picchio.diagnosis.motion.search.candidates import motion_effects
 
     joints = {c.target for c in diagnosis.causes if c.effect == "joint_stiffness"}
     rest = set(motion_effects()) - {"joint_stiffness"}
@@ -85,7 +85,7 @@ def test_rotor_inertias_are_those_documented(diagnosis):
 
 
 def test_without_delay_in_the_catalogue_no_wrong_name(robot, kuka):
-    from picchio.diagnosis.motion.candidates import motion_effects
+    from picchio.diagnosis.motion.search.candidates import motion_effects
 
     rest = set(motion_effects()) - {"encoder_delay"}
     diagnosis = diagnose_motion(robot, kuka, catalogue=rest)

@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from picchio.campaign import Campaign, Record
-from picchio.diagnosis.motion import diagnose_motion
-from picchio.diagnosis.motion.baseline import stated_friction
-from picchio.diagnosis.motion.order_spectrum import power_at, power_spectrum
-from picchio.diagnosis.motion.orders import find_orders
-from picchio.diagnosis.motion.split import split
-from picchio.diagnosis.motion.state import State
-from picchio.diagnosis.motion.stretches import confidence
-from picchio.diagnosis.motion.system import System
-from picchio.model.effects import effect_class
-from picchio.prediction.motion import MotionLog
-from picchio.robot import load_robot
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
+from picchio.diagnosis.motion.data.baseline import stated_friction
+from picchio.diagnosis.motion.data.split import split
+from picchio.diagnosis.motion.data.system import System
+from picchio.diagnosis.motion.fit.state import State
+from picchio.diagnosis.motion.fit.stretches import confidence
+from picchio.diagnosis.motion.run import diagnose_motion
+from picchio.diagnosis.motion.search.orders import find_orders, power_at, power_spectrum
+from picchio.model.effects.registry import effect_class
+from picchio.prediction.motion.log import MotionLog
+from picchio.robot.loading.load import load_robot
 
 RATE = 1000.0
 

@@ -10,12 +10,19 @@ from dataclasses import replace
 import pytest
 from motion_records import ARM, campaign
 
-from picchio.diagnosis.alternatives import differences, in_words
-from picchio.diagnosis.motion import diagnose_motion
-from picchio.diagnosis.motion.carried import NO_SHAFT, NO_TASK, STANDS, carried, motion_life
-from picchio.robot import load_robot
-from picchio.studies import assess, load_task
-from picchio.view.report.motion_diagnosis import motion_diagnosis_report
+from picchio.diagnosis.motion.conclude.carried import (
+    NO_SHAFT,
+    NO_TASK,
+    STANDS,
+    carried,
+    motion_life,
+)
+from picchio.diagnosis.motion.run import diagnose_motion
+from picchio.diagnosis.result import differences, in_words
+from picchio.robot.loading.load import load_robot
+from picchio.studies.assessment.run import assess
+from picchio.studies.tasks import load_task
+from picchio.visuals.report.motion_diagnosis import motion_diagnosis_report
 
 MAIN = "from picchio.cli.main import main; main()"
 MASS = 8.0

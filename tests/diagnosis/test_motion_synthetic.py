@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from motion_records import ARM, RATE, campaign, wave
 
-from picchio.campaign import Campaign, Record
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
 from picchio.core.errors import InputError
-from picchio.diagnosis.motion import diagnose_motion
-from picchio.robot import load_robot
+from picchio.diagnosis.motion.run import diagnose_motion
+from picchio.robot.loading.load import load_robot
 
 
 def found(effect, seed, **more):
@@ -76,7 +77,7 @@ def test_two_at_once():
     ],
 )
 def test_without_the_cause_in_the_catalogue_no_wrong_name(effect, gone):
-    from picchio.diagnosis.motion.candidates import motion_effects
+    from picchio.diagnosis.motion.search.candidates import motion_effects
 
     diagnosis = found(effect, 5, catalogue=set(motion_effects()) - gone)
     assert diagnosis.verdict in ("partial", "unexplained")

@@ -7,9 +7,9 @@ import pytest
 import trial
 
 import picchio
-from picchio.diagnosis.percussion.diagnose import diagnose_percussion
+from picchio.diagnosis.percussion.run import diagnose_percussion
 from picchio.prediction.plan import read_plan
-from picchio.prediction.simulate import simulate
+from picchio.prediction.simulation import simulate
 
 FEW = {"robot": "fanuc_like_3dof", "kind": "few", "snr": 40, "draw": 0}
 CLEAR = 30.0  # chi-square

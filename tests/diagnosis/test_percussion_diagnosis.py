@@ -13,16 +13,16 @@ import pytest
 import trial
 
 import picchio
-from picchio.campaign import Tolerance
+from picchio.campaign.tables import Tolerance
 from picchio.cli.main import run as command
-from picchio.diagnosis.percussion.diagnose import diagnose_percussion
-from picchio.diagnosis.percussion.evidence import weigh
-from picchio.diagnosis.percussion.fit import fit_growing
-from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.diagnosis.percussion.criteria.whiteness import weigh
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.fit.least_squares import fit_growing
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.run import diagnose_percussion
 from picchio.diagnosis.result import Gain
-from picchio.model.effects import effect_class
-from picchio.robot import load_robot
+from picchio.model.effects.registry import effect_class
+from picchio.robot.loading.load import load_robot
 
 ARM = "fanuc_like_3dof"
 FEW = {"robot": ARM, "snr": 40, "records": 9}

@@ -10,24 +10,29 @@ import pytest
 import trial
 
 import picchio
-from picchio.diagnosis.percussion import exchange as exchange_module
-from picchio.diagnosis.percussion import select
-from picchio.diagnosis.percussion.candidate_fit import fit_short
-from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
-from picchio.diagnosis.percussion.choice import held_out_choice, over_the_same_samples
-from picchio.diagnosis.percussion.diagnose import diagnose_percussion
-from picchio.diagnosis.percussion.evidence import weigh
-from picchio.diagnosis.percussion.exchange import exchange, prune
-from picchio.diagnosis.percussion.fit import fit, fit_growing
-from picchio.diagnosis.percussion.gain import held_out
-from picchio.diagnosis.percussion.latent_fit import fit_latent
-from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.screen import Suspect
-from picchio.diagnosis.percussion.stuck import unstuck
-from picchio.diagnosis.percussion.trial_sizes import acts_either_way, smallest
-from picchio.diagnosis.percussion.trials import SAME, Trial, _short_list, score, spread_out
-from picchio.diagnosis.percussion.unknowns import Hypothesis
-from picchio.model.effects import effect_class
+from picchio.diagnosis.percussion.conclude.holdout import held_out
+from picchio.diagnosis.percussion.criteria.whiteness import weigh
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.fit.drawn import fit_latent
+from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing, unstuck
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.run import diagnose_percussion
+from picchio.diagnosis.percussion.search import exchange as exchange_module
+from picchio.diagnosis.percussion.search import select
+from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.search.exchange import exchange, prune
+from picchio.diagnosis.percussion.search.screen import Suspect, acts_either_way, smallest
+from picchio.diagnosis.percussion.search.trials import (
+    SAME,
+    Trial,
+    _short_list,
+    fit_short,
+    held_out_choice,
+    over_the_same_samples,
+    score,
+    spread_out,
+)
+from picchio.model.effects.registry import effect_class
 from worlds import campaign as worlds
 from worlds import cases
 from worlds.effects import EFFECTS

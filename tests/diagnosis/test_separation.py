@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from picchio.diagnosis.percussion.next_measurement import _Shot, _why
-from picchio.diagnosis.percussion.separation import Separation, _left, _root, new_noise
+from picchio.diagnosis.percussion.follow_up.next_measurement import _Shot, _why
+from picchio.diagnosis.percussion.follow_up.separation import Separation, _left, _root, new_noise
 
 
 @pytest.fixture

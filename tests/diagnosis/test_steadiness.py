@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from picchio.diagnosis.percussion.steadiness import between_poses, unsteadiness
+from picchio.diagnosis.percussion.criteria.pose_consistency import between_poses, unsteadiness
 
 POSES, RECORDS, SAMPLES, UNKNOWNS = 6, 3, 80, 4
 

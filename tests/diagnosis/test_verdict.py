@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from picchio.diagnosis.percussion.verdict import verdict_of, why_none
+from picchio.diagnosis.percussion.conclude.verdict import verdict_of, why_none
 from picchio.diagnosis.result import Cause
 
 NOISE, MORE = SimpleNamespace(is_noise=True), SimpleNamespace(is_noise=False)

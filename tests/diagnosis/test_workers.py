@@ -12,14 +12,14 @@ import trial
 
 import picchio
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
-from picchio.diagnosis.percussion.fit import fit
-from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.shared_records import shared_out
-from picchio.diagnosis.percussion.trials import try_candidates
-from picchio.diagnosis.percussion.unknowns import Hypothesis
-from picchio.diagnosis.percussion.workers import Workers
-from picchio.model.effects import effect_class
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.fit.least_squares import fit
+from picchio.diagnosis.percussion.fit.shared_records import shared_out
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.fit.workers import Workers
+from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.search.trials import try_candidates
+from picchio.model.effects.registry import effect_class
 
 ARM = "fanuc_like_3dof"
 CASE = {"robot": ARM, "kind": "single", "effect": "payload", "snr": 40, "draw": 0, "records": 3}
@@ -138,10 +138,10 @@ sys.path[:0] = {folders!r}
 import gc
 import numba
 import picchio, trial
-from picchio.diagnosis.percussion.candidates import all_candidates, measure_scales
-from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.unknowns import Hypothesis
-from picchio.diagnosis.percussion.warm_up import warm_up
+from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.fit.workers import warm_up
 
 def loaded():
     found = [o for o in gc.get_objects() if isinstance(o, numba.core.registry.CPUDispatcher)]
@@ -191,7 +191,7 @@ ANSWER = """
 import sys
 sys.path[:0] = {folders!r}
 import picchio, trial
-from picchio.diagnosis.percussion.diagnose import diagnose_percussion
+from picchio.diagnosis.percussion.run import diagnose_percussion
 
 if __name__ == "__main__":
     campaign, _ = trial.make({case!r})

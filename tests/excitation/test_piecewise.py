@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from picchio.core.errors import InputError
-from picchio.excitation import HalfSineTrain, MeasuredForce, PulseTrain
+from picchio.excitation.trains import HalfSineTrain, MeasuredForce, PulseTrain
 
 MEASURED = MeasuredForce(
     np.array([0.0, 0.001, 0.003, 0.004, 0.02]), np.array([0.0, 310.0, 80.0, -20.0, 0.0]), 0.04

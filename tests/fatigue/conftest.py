@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from picchio.fatigue import rainflow
+from picchio.fatigue.counting.counter import rainflow
 
 
 @pytest.fixture(autouse=True, scope="session")

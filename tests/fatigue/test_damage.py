@@ -8,16 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from picchio.core.errors import InputError
-from picchio.fatigue import (
-    Cycles,
-    SNCurve,
-    damage,
-    life,
-    load_sn_curve,
-    peak_damage,
-    rainflow,
-    utilisation,
-)
+from picchio.fatigue.counting.counter import rainflow
+from picchio.fatigue.counting.cycles import Cycles
+from picchio.fatigue.miner import damage, life, peak_damage, utilisation
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.fatigue.sn.library import load_sn_curve
 
 CURVE = SNCurve(name="c", strength=200e6, cycles=1e6, slopes=(8.0,), knees=(1e6,))
 

@@ -10,8 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from picchio.core.errors import InputError
-from picchio.fatigue import Cycles, MeanStress, SNCurve, damage, load_sn_curve, utilisation
-from picchio.fatigue.mean_stress import RULES, fkm_sensitivity
+from picchio.fatigue.counting.cycles import Cycles
+from picchio.fatigue.mean_stress import RULES, MeanStress, fkm_sensitivity
+from picchio.fatigue.miner import damage, utilisation
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.fatigue.sn.library import load_sn_curve
 
 
 def curve(**changes: object) -> SNCurve:

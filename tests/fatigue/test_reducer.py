@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from picchio.core.errors import InputError
-from picchio.fatigue.reducer import Reducer
-from picchio.fatigue.reducer_library import load_reducer, read_reducers, reducer_names
+from picchio.fatigue.reducer import Reducer, load_reducer, read_reducers, reducer_names
 
 RPM = 2.0 * math.pi / 60.0
 

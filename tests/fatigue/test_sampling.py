@@ -8,8 +8,8 @@ from SALib.analyze import sobol as salib
 from SALib.sample import sobol as salib_sample
 
 from picchio.core.errors import InputError
-from picchio.fatigue import SNCurve
-from picchio.fatigue.sampling import Samples, Uncertain, propagate, strength_factor
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.fatigue.uncertain_lives import Samples, Uncertain, propagate, strength_factor
 
 CURVE = SNCurve(name="c", strength=200e6, cycles=1e6, slopes=(8.0,), survival=0.975, scatter=0.04)
 

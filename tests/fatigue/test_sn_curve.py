@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from picchio.core.errors import InputError, PicchioWarning
-from picchio.fatigue import DEFAULT_SN_CURVE, SNCurve, load_sn_curve, sn_curve_names
-from picchio.fatigue.sn_curve import MINER_RULES, MinerRule
+from picchio.fatigue.sn.curve import MINER_RULES, MinerRule, SNCurve
+from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, load_sn_curve, sn_curve_names
 
 
 def some_curve(**changes: object) -> SNCurve:

@@ -12,11 +12,12 @@ from pylife.strength.failure_probability import FailureProbability
 from pylife.strength.fkm_linear.constants import consts_fkm, fw_t
 
 from picchio.core.errors import InputError
-from picchio.fatigue import Cycles, MeanStress, SNCurve, damage, load_sn_curve
-from picchio.fatigue.allowable import allowable_factor, allowable_radius
-from picchio.fatigue.mean_stress import fkm_sensitivity
-from picchio.fatigue.sn_curve import MinerRule
-from picchio.fatigue.sn_factors import (
+from picchio.fatigue.allowable_load import allowable_factor, allowable_radius
+from picchio.fatigue.counting.cycles import Cycles
+from picchio.fatigue.mean_stress import MeanStress, fkm_sensitivity
+from picchio.fatigue.miner import damage
+from picchio.fatigue.sn.curve import MinerRule, SNCurve
+from picchio.fatigue.sn.factors import (
     fkm_shear_strength,
     fkm_surface_factor,
     key_factor,
@@ -25,6 +26,7 @@ from picchio.fatigue.sn_factors import (
     shigley_torsion_curve,
     spline_factor,
 )
+from picchio.fatigue.sn.library import load_sn_curve
 
 assert pylife.materiallaws.woehlercurve  # registers the accessor used below
 

@@ -14,10 +14,10 @@ import pytest
 from scipy import optimize, stats
 
 from picchio.core.errors import InputError
-from picchio.fatigue import SNCurve
-from picchio.fatigue._sn_kernel import bivariate_upper
-from picchio.fatigue._sn_likelihood import Likelihood
-from picchio.fatigue.sn_fit import Estimate, SNFit, fit_sn
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.fatigue.sn.fit import Estimate, SNFit, fit_sn
+from picchio.fatigue.sn.kernel import bivariate_upper
+from picchio.fatigue.sn.likelihood import Likelihood
 
 TRUTH = SNCurve(
     name="truth", strength=290e6, cycles=1e6, slopes=(8.0,), knees=(1e6,), survival=0.5,

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from picchio.core.errors import InputError, PicchioWarning
-from picchio.fatigue.sn_tests import read_sn_tests
+from picchio.fatigue.sn.test_table import read_sn_tests
 
 
 def test_reading_a_table(tmp_path: Path) -> None:

@@ -10,8 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from picchio.core.errors import InputError, PicchioError
-from picchio.fatigue import SNCurve, damage, life, rainflow
-from picchio.fatigue.spectral import METHODS, gaussian_bias, narrow_band_life, spectral_life
+from picchio.fatigue.counting.counter import rainflow
+from picchio.fatigue.miner import damage, life
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.fatigue.spectral_life import METHODS, gaussian_bias, narrow_band_life, spectral_life
 
 CURVE = SNCurve(name="c", strength=200e6, cycles=1e6, slopes=(5.0,), knees=(1e6,))
 

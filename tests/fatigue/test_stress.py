@@ -9,8 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from picchio.core.errors import InputError
-from picchio.fatigue import check_shaft, shear_stress, shear_stress_from_deflection
-from picchio.fatigue.stress import polar_moment, radius_for_stress
+from picchio.fatigue.shaft_stress import (
+    check_shaft,
+    polar_moment,
+    radius_for_stress,
+    shear_stress,
+    shear_stress_from_deflection,
+)
 
 
 @dataclass(frozen=True)

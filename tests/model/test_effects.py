@@ -10,11 +10,11 @@ from scipy.integrate import solve_ivp
 
 import picchio
 from picchio.core.errors import InputError
-from picchio.model import Model
 from picchio.model.blows import Blows
-from picchio.model.effects import catalogue, effect_class, from_dict
+from picchio.model.effects.registry import catalogue, effect_class, from_dict
 from picchio.model.geometry import Geometry
-from picchio.vibration.integrate import Samples, integrate
+from picchio.model.model import Model
+from picchio.vibration.integration.integrate import Samples, integrate
 
 BLOWS = picchio.PulseTrain(force=300.0, period=0.040, width=0.004)
 CLOCK = Samples(0.0005, 0.001, 500)
@@ -295,7 +295,7 @@ def test_steady_state_with_play_repeats(arm, geometry):
 
 
 def test_effects_go_through_files(tmp_path, arm):
-    from picchio.robot.saved_model import saved_model_text
+    from picchio.robot.loading.saved_model import saved_model_text
 
     effects = [
         effect_class("joint_stiffness")("joint_2", scale=0.8),
@@ -310,7 +310,7 @@ def test_effects_go_through_files(tmp_path, arm):
 
 
 def test_a_saved_model_is_assessed_as_any_robot(tmp_path, arm):
-    from picchio.robot.saved_model import saved_model_text
+    from picchio.robot.loading.saved_model import saved_model_text
 
     softer = effect_class("joint_stiffness")("joint_3", scale=0.8).to_dict()
     file = tmp_path / "softer.toml"
@@ -327,7 +327,7 @@ def test_a_saved_model_is_assessed_as_any_robot(tmp_path, arm):
 
 
 def test_a_nonlinear_model_is_assessed(tmp_path, arm):
-    from picchio.robot.saved_model import saved_model_text
+    from picchio.robot.loading.saved_model import saved_model_text
 
     task = picchio.load_task(arm.task_path, arm)
     peaks = []

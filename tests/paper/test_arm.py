@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 import picchio
-from picchio.fatigue import check_shaft
-from picchio.paper.arm import arm, places_of, poses_at
+from picchio.fatigue.shaft_stress import check_shaft
+from picchio.paper.arm import arm, places_of, poses_at, rivet_points
 from picchio.paper.assumptions import Assumptions
-from picchio.paper.pattern import rivet_points
 from picchio.paper.printed import printed
 from picchio.paper.world import random_worlds
 

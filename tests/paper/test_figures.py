@@ -69,7 +69,7 @@ def test_rings_and_axes(study):
 
 
 def test_the_largest_envelopes_are_the_exact_ones(study):
-    from picchio.studies.envelope import direction_envelope
+    from picchio.studies.envelopes import direction_envelope
 
     ours = envelope.figure_9(study).data["peak_mrad"]
     for k, pose in enumerate(study.base.path_poses):

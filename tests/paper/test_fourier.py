@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from picchio.excitation import PulseTrain
-from picchio.paper.fourier import amplitude_and_phase, printed_force
-from picchio.paper.series import printed_series
+from picchio.excitation.trains import PulseTrain
+from picchio.paper.fourier import amplitude_and_phase, printed_force, printed_series
 from picchio.paper.statics import gravity_stress, holding_torque
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from picchio.paper.assumptions import INPUTS, Assumptions, parse_assumptions
-from picchio.paper.claims import CLAIMS, claim
+from picchio.paper.claims.registry import CLAIMS, claim
 from picchio.paper.printed import printed
 
 

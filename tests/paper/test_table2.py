@@ -9,7 +9,8 @@ from picchio.paper.table2.fit import evaluate, refine, whole_target
 from picchio.paper.table2.place import Place, decode, encode, steady_extremes
 from picchio.paper.table2.rules import at_mean, at_worst, by_miner, rules
 from picchio.paper.world import World
-from picchio.vibration import modal_analysis, steady_state
+from picchio.vibration.closed_form.modes import modal_analysis
+from picchio.vibration.closed_form.response import steady_state
 
 WORLD = {
     "period": 0.07, "duty": 0.3, "damping_ratio": 0.03, "panel_x": 0.9, "panel_y": 0.4,

@@ -6,10 +6,11 @@ import warnings
 import numpy as np
 import pytest
 
-from picchio.fatigue import load_sn_curve
+from picchio.fatigue.sn.library import load_sn_curve
 from picchio.paper.claims.life import STEEL
 from picchio.paper.waterfall import CORRECTIONS, paper_lives, waterfall
-from picchio.studies import Task, assess
+from picchio.studies.assessment.run import assess
+from picchio.studies.tasks import Task
 
 
 @pytest.fixture(scope="module")

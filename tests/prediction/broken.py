@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from picchio.campaign import Campaign, Record
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
 
 from .signals import CHANNELS, EXCITATION, FORCE, LEVELS, PERIOD, POSE, WIDTH, record
 

@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.signal import lfilter, welch
 
-from picchio.campaign import Campaign, Record
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
 
 PERIOD, WIDTH, HITS, FORCE = 0.040, 0.004, 12, 300.0
 POSE = {"joint_1": 0.3, "joint_2": 0.5, "joint_3": -0.8}

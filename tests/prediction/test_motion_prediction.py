@@ -6,13 +6,15 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.signal import butter, sosfiltfilt
 
-from picchio.campaign import Campaign, Record
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
 from picchio.core.errors import InputError
-from picchio.model.effects import effect_class
-from picchio.prediction.motion import Band, Predictor, choose_cutoff, read_logs
+from picchio.model.effects.registry import effect_class
 from picchio.prediction.motion.closed_loop import CascadeLaw, friction_curve, simulate_closed_loop
-from picchio.prediction.motion.fractional_delay import shift
-from picchio.robot import load_robot
+from picchio.prediction.motion.filters import Band, choose_cutoff, shift
+from picchio.prediction.motion.log import read_logs
+from picchio.prediction.motion.readings import Predictor
+from picchio.robot.loading.load import load_robot
 
 RATE = 500.0
 T = np.arange(4000) / RATE

@@ -6,13 +6,13 @@ from scipy.linalg import toeplitz
 from scipy.signal import freqz, lfilter
 from scipy.stats import binom
 
-from picchio.campaign import Record
+from picchio.campaign.record import Record
 from picchio.core.errors import InputError
-from picchio.prediction.noise import noise_levels
-from picchio.prediction.noise_ar import AutoRegression, fit_autoregression
-from picchio.prediction.noise_periodic import find_period, not_periodic
-from picchio.prediction.noise_ringdown import fit_ring_down
-from picchio.prediction.noise_tests import band_levels, flatness, largest_line, runs, whiteness
+from picchio.measurement.noise.autoregression import AutoRegression, fit_autoregression
+from picchio.measurement.noise.estimate import noise_levels
+from picchio.measurement.noise.periodic import find_period, not_periodic
+from picchio.measurement.noise.ringdown import fit_ring_down
+from picchio.measurement.noise.whiteness import band_levels, flatness, largest_line, runs, whiteness
 
 from .signals import CHANNELS, LEVELS, PERIOD, campaign, noise, record, steady
 

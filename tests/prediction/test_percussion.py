@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import picchio
-from picchio.campaign import Campaign, Record, load_campaign
+from picchio.campaign.campaign import Campaign, load_campaign
+from picchio.campaign.record import Record
 from picchio.core.errors import InputError
-from picchio.model import Model
-from picchio.model.effects import effect_class
-from picchio.prediction.noise_tests import whiteness
-from picchio.prediction.percussion import percussion_setups, predict
-from picchio.prediction.percussion_setup import InCommon
-from picchio.robot import load_robot
+from picchio.measurement.noise.whiteness import whiteness
+from picchio.model.effects.registry import effect_class
+from picchio.model.model import Model
+from picchio.prediction.percussion import InCommon, percussion_setups, predict
+from picchio.robot.loading.load import load_robot
 
 GROUPS = ("force", "deflection", "acceleration.tool", "accelerometer.tool", "velocity.tool",
           "displacement.tool")  # fmt: skip

@@ -9,8 +9,8 @@ import sys
 import numpy as np
 import pytest
 
-from picchio.prediction.quality import check_campaign
-from picchio.robot import load_robot
+from picchio.measurement.quality.report import check_campaign
+from picchio.robot.loading.load import load_robot
 
 SENSOR = "accelerometer.tool"
 

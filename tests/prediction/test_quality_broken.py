@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from picchio.prediction.quality import CHECKS, check_campaign
-from picchio.robot import load_robot
+from picchio.measurement.quality.registry import CHECKS
+from picchio.measurement.quality.report import check_campaign
+from picchio.robot.loading.load import load_robot
 
 from .broken import SPOILERS, sound
 

@@ -8,10 +8,11 @@ from picchio.prediction.residual import (
     ChannelResidual,
     by_window,
     growth_with_level,
+    residual_torque,
     spectrum,
     together,
+    transfer,
 )
-from picchio.prediction.residual_dynamics import residual_torque, transfer
 
 MASS = np.array([[30.0, 6.0], [6.0, 12.0]])
 STIFFNESS = np.diag([9e4, 4e4])

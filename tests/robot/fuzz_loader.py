@@ -20,7 +20,7 @@ from types import FrameType
 from typing import Any
 
 from picchio.core.errors import InputError
-from picchio.robot import load_robot
+from picchio.robot.loading.load import load_robot
 
 SEED_URDF = b"""<?xml version="1.0"?>
 <robot name="r" xmlns:picchio="urn:picchio:1" xmlns:drake="urn:drake">

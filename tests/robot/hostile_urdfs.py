@@ -235,7 +235,7 @@ def main(names: list[str], folder: Path) -> None:
 
     socket.socket.connect = no_network  # type: ignore[method-assign, assignment]
     from picchio.core.errors import InputError
-    from picchio.robot import load_robot
+    from picchio.robot.loading.load import load_robot
 
     warnings.simplefilter("ignore")
     for name in names:

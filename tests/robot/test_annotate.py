@@ -12,11 +12,10 @@ import pytest
 import yourdfpy
 
 from picchio.core.errors import InputError, PicchioWarning
-from picchio.robot import load_robot
-from picchio.robot.annotate import annotate
-from picchio.robot.find import example_robots
-from picchio.robot.load import load_tree
-from picchio.robot.sidecar import JointEntry, Sidecar, read_sidecar
+from picchio.robot.annotations.annotate import annotate
+from picchio.robot.annotations.sidecar import JointEntry, Sidecar, read_sidecar
+from picchio.robot.loading.find import example_robots
+from picchio.robot.loading.load import load_robot, load_tree
 
 FULL = """format = "picchio-sidecar/1"
 [joint.a]

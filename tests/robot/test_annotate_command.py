@@ -8,7 +8,7 @@ import typer
 
 from picchio.cli.annotate import register
 from picchio.core.errors import InputError
-from picchio.robot import load_robot
+from picchio.robot.loading.load import load_robot
 
 
 def run(*arguments: str) -> None:

@@ -8,9 +8,9 @@ import pytest
 from lxml import etree
 
 from picchio.core.errors import InputError
-from picchio.robot import load_robot
-from picchio.robot.annotate import annotate
-from picchio.robot.sidecar import JointEntry, Sidecar, read_sidecar
+from picchio.robot.annotations.annotate import annotate
+from picchio.robot.annotations.sidecar import JointEntry, Sidecar, read_sidecar
+from picchio.robot.loading.load import load_robot
 
 FULL = """format = "picchio-sidecar/1"
 [joint.a]

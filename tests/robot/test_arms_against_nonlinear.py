@@ -13,8 +13,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
 import picchio
-from picchio.robot.find import example_robots
-from picchio.robot.load import load_tree
+from picchio.robot.loading.find import example_robots
+from picchio.robot.loading.load import load_tree
 
 ARMS = [
     ("ur5_robot", "tool0", ""),

@@ -11,9 +11,8 @@ import pytest
 from lxml import etree
 
 from picchio.core.errors import InputError, PicchioWarning
-from picchio.robot import load_robot
-from picchio.robot.find import example_robot, example_robots, find_robot, shipped_robots
-from picchio.robot.load import load_tree
+from picchio.robot.loading.find import example_robot, example_robots, find_robot, shipped_robots
+from picchio.robot.loading.load import load_robot, load_tree
 
 URDFS = example_robots()
 BROKEN = "ur3"

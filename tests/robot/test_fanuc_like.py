@@ -11,7 +11,8 @@ import pytest
 from scipy.linalg import eigh
 
 from picchio.core.errors import InputError
-from picchio.robot import FlexibleRobot, load_robot
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.loading.load import load_robot
 
 NAME = "fanuc_like_3dof"
 POSES = [(0.0, 0.5, -0.8), (0.3, 1.1, -1.0), (0.7, 0.0, 0.0), (-2.1, -0.6, 1.2)]

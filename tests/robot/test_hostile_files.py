@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from picchio.core.errors import InputError
-from picchio.robot import load_robot
+from picchio.robot.loading.load import load_robot
 
 SCRIPT = Path(__file__).with_name("hostile_urdfs.py")
 _spec = importlib.util.spec_from_file_location("hostile_urdfs", SCRIPT)

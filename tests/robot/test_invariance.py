@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lxml import etree
 
-from picchio.robot import load_robot
-from picchio.robot.balancer import Balancer
-from picchio.robot.chain import rotation_from_rpy
+from picchio.robot.ik.chain import rotation_from_rpy
+from picchio.robot.joint import Balancer
+from picchio.robot.loading.load import load_robot
 
 KIN = ("revolute", "continuous", "prismatic")
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from picchio.core.errors import InputError
-from picchio.robot import load_robot
+from picchio.robot.loading.load import load_robot
 
 ROBOT = load_robot("fanuc_like_3dof")
 

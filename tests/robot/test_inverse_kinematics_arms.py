@@ -8,12 +8,11 @@ import pinocchio as pin
 import pytest
 
 from picchio.core.errors import InputError
-from picchio.robot import load_robot
-from picchio.robot.branch import branch_label, tool_joints
-from picchio.robot.find import example_robots
-from picchio.robot.inverse_kinematics import solve_many
-from picchio.robot.load import load_tree
-from picchio.robot.self_motion import move_along_self_motion, self_motion_basis
+from picchio.robot.ik.branch import branch_label, tool_joints
+from picchio.robot.ik.inverse_kinematics import solve_many
+from picchio.robot.ik.self_motion import move_along_self_motion, self_motion_basis
+from picchio.robot.loading.find import example_robots
+from picchio.robot.loading.load import load_robot, load_tree
 
 ARMS = {
     "ur5_robot": "tool0",

@@ -9,10 +9,10 @@ import pytest
 import yourdfpy
 
 from picchio.core.errors import InputError, PicchioWarning
-from picchio.robot import load_robot
-from picchio.robot.find import shipped_robots
-from picchio.robot.sidecar import __doc__ as sidecar_example
-from picchio.robot.sidecar import read_sidecar
+from picchio.robot.annotations.sidecar import __doc__ as sidecar_example
+from picchio.robot.annotations.sidecar import read_sidecar
+from picchio.robot.loading.find import shipped_robots
+from picchio.robot.loading.load import load_robot
 
 BODY = (
     '<inertial><origin xyz="0.1 0.2 0.3"/><mass value="2"/>'

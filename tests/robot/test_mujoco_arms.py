@@ -8,8 +8,8 @@ import pytest
 from lxml import etree
 from scipy.linalg import eigh
 
-from picchio.robot import load_robot
-from picchio.robot.find import example_robots
+from picchio.robot.loading.find import example_robots
+from picchio.robot.loading.load import load_robot
 
 # name, tool frame, how many joints of the arm, what their names have in common
 ARMS = [

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from picchio.core.errors import InputError
-from picchio.robot import load_robot
-from picchio.robot.catalogue import describe_robot
-from picchio.robot.find import FoundRobot
+from picchio.robot.loading.catalogue import describe_robot
+from picchio.robot.loading.find import FoundRobot
+from picchio.robot.loading.load import load_robot
 
 ANNOTATION = '<picchio:flexibility stiffness="111" damping_ratio="0.11" rotor_inertia="0.111"/>'
 DRAKE = (

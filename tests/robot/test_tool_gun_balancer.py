@@ -8,9 +8,8 @@ import pytest
 from scipy.linalg import eigh
 
 from picchio.core.errors import InputError
-from picchio.robot import load_robot
-from picchio.robot.balancer import Balancer
-from picchio.robot.stiffness_curve import StiffnessCurve
+from picchio.robot.joint import Balancer, StiffnessCurve
+from picchio.robot.loading.load import load_robot
 
 HEAD = 'format = "picchio-sidecar/1"\n[joint.a]\nstiffness = 2e4\n[joint.b]\nstiffness = 1e4\n'
 POSE = [0.4, -0.7, 0.1]

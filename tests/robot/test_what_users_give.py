@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from picchio.core.errors import InputError, PicchioWarning
-from picchio.robot import load_robot
+from picchio.robot.loading.load import load_robot
 
 
 def message(*arguments: object, **options: object) -> str:
@@ -100,9 +100,9 @@ def test_overdamped_is_allowed_with_a_warning(arm, flex, recwarn):
 
 ORDER = """
 import sys
-from picchio.robot import load_robot
-from picchio.robot.annotate import annotate
-from picchio.robot.sidecar import read_sidecar
+from picchio.robot.loading.load import load_robot
+from picchio.robot.annotations.annotate import annotate
+from picchio.robot.annotations.sidecar import read_sidecar
 urdf, flex = sys.argv[1:]
 print(list(load_robot(urdf, flex=flex).origins.items()))
 print(annotate(urdf, read_sidecar(flex)))

@@ -14,7 +14,7 @@ import numpy as np
 
 import picchio
 from picchio.core.errors import InputError
-from picchio.robot import Shaft
+from picchio.robot.joint import Shaft
 
 # A shaft for arms whose own nobody has published: assumed, so that a life exists.
 SHAFT = Shaft(0.008, 0.02, 79.3e9, "42CrMo4-QT-shaft")

@@ -6,10 +6,12 @@ import math
 import pytest
 
 from picchio.core.errors import InputError
-from picchio.fatigue import SNCurve
-from picchio.robot import FlexibleRobot, load_robot
-from picchio.studies import Task, assess, task_from_dict
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.loading.load import load_robot
+from picchio.studies.assessment.run import assess
 from picchio.studies.backwards import allowable
+from picchio.studies.tasks import Task, task_from_dict
 
 # A thinner shaft at the same joint stiffness is meant here, and warned of.
 pytestmark = pytest.mark.filterwarnings("ignore:.*own stiffness G Jp")

@@ -5,7 +5,7 @@ import pytest
 
 import picchio
 from picchio.core.errors import InputError
-from picchio.studies.envelope import direction_envelope, icosphere
+from picchio.studies.envelopes import direction_envelope, icosphere
 
 BLOWS = picchio.PulseTrain(300.0, 0.040, 0.004)
 POSE = [0.3, 1.1, -1.0]

@@ -12,9 +12,9 @@ import xarray
 
 import picchio
 from picchio.core.errors import InputError
-from picchio.studies import places
-from picchio.studies.envelope import direction_envelope
-from picchio.studies.map import workspace_map
+from picchio.studies.envelopes import direction_envelope
+from picchio.studies.maps import places
+from picchio.studies.maps.run import workspace_map
 
 BLOWS = picchio.PulseTrain(300.0, 0.040, 0.004)
 
@@ -177,7 +177,7 @@ def test_rows_are_written_in_blocks(tmp_path, robot, monkeypatch, ending):
     """Blocks that end within a chunk, and chunks that end within a block."""
     grid = places.joint_grid(robot, [2, 5, 5])
     whole = workspace_map(robot, grid, BLOWS, tmp_path / f"whole{ending}")
-    monkeypatch.setattr("picchio.studies.map_file._ROWS", 12)
+    monkeypatch.setattr("picchio.studies.maps.files._ROWS", 12)
     for chunk in (5, 12, 31):
         cut = workspace_map(robot, grid, BLOWS, tmp_path / f"cut{chunk}{ending}", chunk=chunk)
         for name in whole.data_vars:

@@ -8,11 +8,11 @@ import trimesh
 
 import picchio
 from picchio.core.errors import InputError
-from picchio.studies import places
-from picchio.studies.batch_damage import batch_damage
-from picchio.studies.curves import curves_of
-from picchio.studies.envelope import icosphere
-from picchio.studies.map import workspace_map
+from picchio.studies.envelopes import icosphere
+from picchio.studies.maps import places
+from picchio.studies.maps.run import workspace_map
+from picchio.studies.rivet.batch import batch_damage
+from picchio.studies.rivet.life_rules import curves_of
 
 # Forty times the paper's blow: shafts of this steel then fail.
 BLOWS = picchio.PulseTrain(12000.0, 0.040, 0.004)

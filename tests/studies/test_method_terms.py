@@ -4,10 +4,13 @@ import math
 
 import pytest
 
-from picchio.fatigue import load_sn_curve, peak_damage
-from picchio.robot import FlexibleRobot, load_robot
-from picchio.studies import Task, assess, task_from_dict
-from picchio.studies.method_terms import Term, compare_methods
+from picchio.fatigue.miner import peak_damage
+from picchio.fatigue.sn.library import load_sn_curve
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.loading.load import load_robot
+from picchio.studies.assessment.method_comparison import Term, compare_methods
+from picchio.studies.assessment.run import assess
+from picchio.studies.tasks import Task, task_from_dict
 
 CURVE = load_sn_curve("42CrMo4-QT-keyed")
 

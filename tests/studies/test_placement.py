@@ -9,12 +9,12 @@ import pytest
 
 import picchio
 from picchio.core.errors import InputError, PicchioWarning
-from picchio.fatigue.reducer_library import load_reducer
-from picchio.studies.batch_damage import batch_damage
-from picchio.studies.curves import curves_of
-from picchio.studies.placement import place
-from picchio.studies.placement_loads import reducer_utilisation
-from picchio.studies.placement_work import Work
+from picchio.fatigue.reducer import load_reducer
+from picchio.studies.placement.loads import reducer_utilisation
+from picchio.studies.placement.run import place
+from picchio.studies.placement.work import Work
+from picchio.studies.rivet.batch import batch_damage
+from picchio.studies.rivet.life_rules import curves_of
 
 # Beyond this, relative, the search's last steps no longer look.
 REFINED = 1e-6

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import picchio
-from picchio.cli.assess_tables import show
+from picchio.cli.assess import show
 from picchio.core.errors import PicchioWarning
-from picchio.fatigue.reducer_library import load_reducer
-from picchio.studies.assess_checks import reducer_checks
+from picchio.fatigue.reducer import load_reducer
+from picchio.studies.assessment.checks import reducer_checks
 
 TASK = {
     "hits_per_rivet": 12,

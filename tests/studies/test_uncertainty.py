@@ -7,14 +7,15 @@ import numpy as np
 import pytest
 
 from picchio.core.errors import InputError
-from picchio.fatigue import SNCurve
-from picchio.fatigue.sampling import Uncertain
-from picchio.model import Model
-from picchio.robot import FlexibleRobot, load_robot
-from picchio.studies import Task, assess, task_from_dict
-from picchio.studies.loads import loads_at
-from picchio.studies.uncertain_job import LifeJob, place_of
-from picchio.studies.uncertainty import DEFAULT_INPUTS, uncertain_life
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.fatigue.uncertain_lives import Uncertain
+from picchio.model.model import Model
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.loading.load import load_robot
+from picchio.studies.assessment.run import assess
+from picchio.studies.rivet.loads import loads_at
+from picchio.studies.tasks import Task, task_from_dict
+from picchio.studies.uncertainty import DEFAULT_INPUTS, LifeJob, place_of, uncertain_life
 
 STRAIGHT = SNCurve(name="straight", strength=60e6, cycles=1e6, slopes=(5.0,))
 SURE = 1e-9

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh, expm
 
-from picchio.model import LinearSystem
+from picchio.model.linear_system import LinearSystem
 
 
 def modal_damping(mass, stiffness, ratio):

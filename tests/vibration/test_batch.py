@@ -6,10 +6,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from picchio.core.errors import InputError
-from picchio.excitation import HalfSineTrain, MeasuredForce, PulseTrain
-from picchio.model import LinearSystem, modal_damping_matrix
-from picchio.vibration import modal_analysis, steady_state
-from picchio.vibration.batch import batch_peaks
+from picchio.excitation.trains import HalfSineTrain, MeasuredForce, PulseTrain
+from picchio.model.linear_system import LinearSystem, modal_damping_matrix
+from picchio.vibration.batch.peaks import batch_peaks
+from picchio.vibration.closed_form.modes import modal_analysis
+from picchio.vibration.closed_form.response import steady_state
 
 TRAINS = [
     PulseTrain(300.0, 0.040, 0.004),

@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from picchio.core.errors import InputError
-from picchio.excitation import HalfSineTrain, PulseTrain
-from picchio.vibration import modal_analysis, response_from_rest, steady_state
+from picchio.excitation.trains import HalfSineTrain, PulseTrain
+from picchio.vibration.closed_form.modes import modal_analysis
+from picchio.vibration.closed_form.response import response_from_rest, steady_state
 
 DIRECTION = np.array([0.48, -0.6, 0.64])
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from picchio.core.errors import InputError
-from picchio.excitation import HalfSineTrain, MeasuredForce, PulseTrain
-from picchio.model import LinearSystem
-from picchio.vibration import modal_analysis, response_from_rest
+from picchio.excitation.trains import HalfSineTrain, MeasuredForce, PulseTrain
+from picchio.model.linear_system import LinearSystem
+from picchio.vibration.closed_form.modes import modal_analysis
+from picchio.vibration.closed_form.response import response_from_rest
 
 DIRECTION = np.array([0.48, -0.6, 0.64])
 PULSES = PulseTrain(300.0, 0.04, 0.004)

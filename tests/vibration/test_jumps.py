@@ -7,11 +7,12 @@ import pytest
 from scipy.signal import cont2discrete, lfilter
 
 import picchio
-from picchio.campaign import Campaign, Record
-from picchio.model.effects import effect_class
-from picchio.prediction import percussion_setup
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
+from picchio.model.effects.registry import effect_class
+from picchio.prediction import percussion as percussion_setup
 from picchio.prediction.percussion import predict
-from picchio.vibration.jumps import jump_corrections
+from picchio.vibration.integration.jumps import jump_corrections
 
 STEP = 1e-4
 FREQUENCY, DAMPING = 140.0, 0.05

@@ -5,10 +5,10 @@ import pytest
 
 import picchio
 from picchio.model.blows import Blows
-from picchio.model.effects import effect_class
+from picchio.model.effects.registry import effect_class
 from picchio.model.geometry import Geometry
-from picchio.vibration._element_kernel import element_force, kink_correction
-from picchio.vibration.integrate import Samples, integrate
+from picchio.vibration.integration.element_kernel import element_force, kink_correction
+from picchio.vibration.integration.integrate import Samples, integrate
 
 BACKLASH = (0, np.array([1e5, 2e-4, 1e-5, 0.0, 0.0, 0.0]))
 CONTACT = (4, np.array([1e5, 50.0, 10.0, 0.0, 0.0, 0.0]))

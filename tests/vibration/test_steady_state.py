@@ -6,13 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from picchio.core.errors import InputError
-from picchio.excitation import HalfSineTrain, MeasuredForce, PulseTrain
-from picchio.vibration import (
-    modal_analysis,
-    response_from_rest,
-    steady_state,
-    truncated_fourier_response,
-)
+from picchio.excitation.trains import HalfSineTrain, MeasuredForce, PulseTrain
+from picchio.vibration.closed_form.fourier import truncated_fourier_response
+from picchio.vibration.closed_form.modes import modal_analysis
+from picchio.vibration.closed_form.response import response_from_rest, steady_state
 
 PULSES = PulseTrain(300.0, 0.04, 0.004)
 TRAINS = {

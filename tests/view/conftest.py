@@ -13,7 +13,7 @@ import matplotlib
 import pytest
 
 import picchio
-from picchio.view.worst import worst_rivet
+from picchio.visuals.worst_rivet import worst_rivet
 
 matplotlib.use("Agg")
 
@@ -61,7 +61,7 @@ def hostile_urdf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The 3-DoF arm with names that would be markup or code if nobody escaped them."""
     from lxml import etree
 
-    from picchio.robot.find import find_robot
+    from picchio.robot.loading.find import find_robot
 
     tree = etree.parse(str(find_robot("fanuc_like_3dof").urdf))
     for element in tree.getroot().iter("link", "joint", "parent", "child"):
@@ -81,7 +81,7 @@ def hostile_urdf(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def recoiling(tmp_path_factory: pytest.TempPathFactory) -> picchio.FlexibleRobot:
     """The 3-DoF arm with a gun on a recoil spring."""
-    from picchio.robot.find import find_robot
+    from picchio.robot.loading.find import find_robot
 
     path = tmp_path_factory.mktemp("gun") / "gun.toml"
     path.write_text(
@@ -94,7 +94,7 @@ def recoiling(tmp_path_factory: pytest.TempPathFactory) -> picchio.FlexibleRobot
 @pytest.fixture(scope="session")
 def missing_meshes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A UR10 whose meshes are not there, but for one file that is no mesh."""
-    from picchio.robot.find import find_robot
+    from picchio.robot.loading.find import find_robot
 
     folder = tmp_path_factory.mktemp("bare")
     (folder / "broken.stl").write_bytes(b"solid nothing\nfacet normal x y z\n")

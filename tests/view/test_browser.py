@@ -15,9 +15,10 @@ from PIL import Image
 
 import picchio
 from picchio.diagnosis.result import Cause, Diagnosis, Value
-from picchio.excitation import PulseTrain
-from picchio.view.report import assessment_report
-from picchio.view.scene import build_scene, compare_scene
+from picchio.excitation.trains import PulseTrain
+from picchio.visuals.report.assessment import assessment_report
+from picchio.visuals.scene.build import build_scene
+from picchio.visuals.scene.compare import compare_scene
 
 pytestmark = pytest.mark.slow
 
@@ -124,7 +125,7 @@ def test_links_are_where_pinocchio_has_them(open_page, arm_scene, arm) -> None:
           });
         }"""
     )
-    from picchio.view.scene.kinematics import frames
+    from picchio.visuals.scene.robot.kinematics import frames
 
     for frame, place in zip(frames(arm.robot, arm.worst.pose), places, strict=True):
         expected, _ = arm.robot.frame_placement(arm.worst.pose, frame.link)
@@ -190,7 +191,7 @@ def test_scenes_of_other_robots(open_page, tmp_path, pictures, name: str) -> Non
 
 
 def test_a_robot_without_meshes(open_page, tmp_path, pictures, missing_meshes) -> None:
-    flex = picchio.robot.find.robots_folder() / "ur10" / "flex.toml"
+    flex = picchio.robot.loading.find.robots_folder() / "ur10" / "flex.toml"
     robot = picchio.load_robot(missing_meshes, flex=flex)
     path = tmp_path / "bare.html"
     with warnings.catch_warnings():
@@ -265,8 +266,8 @@ def test_report_prints_on_two_pages(open_page, tmp_path, arm, pictures) -> None:
 
 
 def test_the_map_follows_the_joint(open_page, tmp_path, pictures, arm) -> None:
-    from picchio.studies.map import workspace_map
-    from picchio.studies.places import plane
+    from picchio.studies.maps.places import plane
+    from picchio.studies.maps.run import workspace_map
 
     blows = arm.worst.operation.excitation
     workspace = workspace_map(arm.robot, plane(arm.robot, "xz", spacing=0.15), blows,

@@ -14,12 +14,12 @@ from scipy.spatial.transform import Rotation
 import picchio
 from picchio.cli.main import run
 from picchio.diagnosis.result import Cause, Diagnosis, Value
-from picchio.excitation import PulseTrain
-from picchio.model.effects import catalogue
+from picchio.excitation.trains import PulseTrain
 from picchio.model.effects.effect import Effect, parameter
-from picchio.view.diagnosis_file import read_diagnosis
-from picchio.view.scene import build_scene
-from picchio.view.scene.kinematics import world
+from picchio.model.effects.registry import catalogue
+from picchio.visuals.diagnosis_file import read_diagnosis
+from picchio.visuals.scene.build import build_scene
+from picchio.visuals.scene.robot.kinematics import world
 
 BLOWS = PulseTrain(300.0, 0.040, 0.004)
 POSE = [-0.3, 0.6, -0.5]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import picchio
-from picchio.view.plots.diagnosis_place import plot_place
-from picchio.view.plots.style import blank_figure
+from picchio.visuals.plots.diagnosis import plot_place
+from picchio.visuals.plots.style import blank_figure
 
 NAMES = ("joint_stiffness", "joint_damping")
 

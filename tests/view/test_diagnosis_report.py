@@ -12,25 +12,25 @@ from types import SimpleNamespace
 import pytest
 from lxml import html as lxml_html
 
-from picchio.campaign import Campaign
-from picchio.cli.diagnose_tables import show_diagnosis
+from picchio.campaign.campaign import Campaign
+from picchio.cli.diagnose import show_diagnosis
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.candidates import measure_scales
-from picchio.diagnosis.percussion.diagnose import PercussionDiagnosis
-from picchio.diagnosis.percussion.evidence import weigh
-from picchio.diagnosis.percussion.fit import fit, fit_growing
-from picchio.diagnosis.percussion.gain import held_out, measure_gain
-from picchio.diagnosis.percussion.problem import Problem
-from picchio.diagnosis.percussion.select import Search
-from picchio.diagnosis.percussion.trials import Trial, score
-from picchio.diagnosis.percussion.unknowns import Hypothesis
+from picchio.diagnosis.percussion.conclude.holdout import held_out, measure_gain
+from picchio.diagnosis.percussion.criteria.whiteness import weigh
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.run import PercussionDiagnosis
+from picchio.diagnosis.percussion.search.candidates import measure_scales
+from picchio.diagnosis.percussion.search.select import Search
+from picchio.diagnosis.percussion.search.trials import Trial, score
 from picchio.diagnosis.result import Cause, Diagnosis, Value
-from picchio.model.effects import effect_class
-from picchio.robot import load_robot
-from picchio.view.report.diagnosis import _ask, diagnosis_report, headline
-from picchio.view.report.page import number, spread
-from picchio.view.report.residual import residual_report
-from picchio.view.scene import diagnosis_scene
+from picchio.model.effects.registry import effect_class
+from picchio.robot.loading.load import load_robot
+from picchio.visuals.report.diagnosis import _ask, diagnosis_report, headline
+from picchio.visuals.report.page import number, spread
+from picchio.visuals.report.residual import residual_report
+from picchio.visuals.scene.diagnosed import diagnosis_scene
 
 OUTSIDE = re.compile(
     r"""(?:src|href|action|data)\s*=\s*["']\s*(?:https?:)?//|url\(\s*["']?https?:|@import"""
@@ -272,7 +272,7 @@ def test_the_residual_page_names_no_cause_but_shows_where(case):
 def test_a_campaign_without_blows_is_refused(case):
     import numpy as np
 
-    from picchio.campaign import Record
+    from picchio.campaign.record import Record
 
     time = np.arange(50) / 100.0
     motion = Record.from_arrays("m.csv", time, {"position.joint_1": time}, kind="motion")

@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 
 import picchio
 from picchio.core.errors import PicchioWarning
-from picchio.excitation import PulseTrain
-from picchio.view.scene import build_scene
-from picchio.view.scene.body import MOST_FACES, build_body
-from picchio.view.scene.decimate import decimate
-from picchio.view.scene.kinematics import frames, world
-from picchio.view.scene.mesh import sphere
-from picchio.view.scene.visuals import load_mesh, resolve_mesh
+from picchio.excitation.trains import PulseTrain
+from picchio.visuals.scene.build import build_scene
+from picchio.visuals.scene.robot.body import MOST_FACES, build_body, decimate
+from picchio.visuals.scene.robot.kinematics import frames, world
+from picchio.visuals.scene.robot.mesh import sphere
+from picchio.visuals.scene.robot.visuals import load_mesh, resolve_mesh
 
 BLOWS = PulseTrain(300.0, 0.040, 0.004)
 
@@ -37,7 +36,7 @@ def test_scene_is_small_and_no_mesh_is_in_it_twice(name: str) -> None:
 
 
 def test_missing_meshes_become_bones_with_a_warning(missing_meshes: Path) -> None:
-    flex = picchio.robot.find.robots_folder() / "ur10" / "flex.toml"
+    flex = picchio.robot.loading.find.robots_folder() / "ur10" / "flex.toml"
     robot = picchio.load_robot(missing_meshes, flex=flex)
     with pytest.warns(PicchioWarning, match="drawn as a primitive") as seen:
         scene = build_scene(robot, robot.pose([0.2] * 6), BLOWS, subdivisions=2)

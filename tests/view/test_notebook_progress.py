@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from picchio.view import notebook
+from picchio.visuals import notebook
 
 
 class Handle:

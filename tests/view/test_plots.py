@@ -11,13 +11,13 @@ import scipy.linalg
 from matplotlib.figure import Figure
 
 import picchio
-from picchio.excitation import HalfSineTrain, PulseTrain
-from picchio.fatigue import rainflow
-from picchio.fatigue.sn_fit import fit_sn
-from picchio.fatigue.sn_tests import SNTests
-from picchio.studies.envelope import direction_envelope
-from picchio.view import plots
-from picchio.view.plots.polar import cut_directions
+from picchio.excitation.trains import HalfSineTrain, PulseTrain
+from picchio.fatigue.counting.counter import rainflow
+from picchio.fatigue.sn.fit import fit_sn
+from picchio.fatigue.sn.test_table import SNTests
+from picchio.studies.envelopes import direction_envelope
+from picchio.visuals import plots
+from picchio.visuals.plots.polar import cut_directions
 
 BLOWS = PulseTrain(300.0, 0.040, 0.004, preload=20.0)
 

@@ -11,7 +11,7 @@ import pytest
 from lxml import html as lxml_html
 
 import picchio
-from picchio.view.report import assessment_report
+from picchio.visuals.report.assessment import assessment_report
 
 OUTSIDE = re.compile(
     r"""(?:src|href|action|data)\s*=\s*["']\s*(?:https?:)?//|url\(\s*["']?https?:|@import"""
@@ -84,7 +84,7 @@ def luminance(colour: str) -> float:
 
 @pytest.mark.parametrize("theme", [0, 1])
 def test_contrast_of_both_themes(theme: int) -> None:
-    css = (files("picchio.view.report") / "style.css").read_text("utf-8")
+    css = (files("picchio.visuals.report") / "style.css").read_text("utf-8")
     block = css.split(":root {")[1 + theme].split("}")[0]
     colours = dict(re.findall(r"--(\w+): (#[0-9a-f]{6})", block))
     for ground in ("paper", "soft"):
@@ -154,8 +154,8 @@ def test_a_scene_is_folded_in(arm: SimpleNamespace) -> None:
 
 
 def test_backwards_doubt_and_terms_have_their_place(arm: SimpleNamespace) -> None:
+    from picchio.studies.assessment.method_comparison import Term
     from picchio.studies.backwards import Allowable
-    from picchio.studies.method_terms import Term
     from picchio.studies.uncertainty import UncertainLife
 
     spread = SimpleNamespace(p10=1.5e5, p50=2.5e6, p90=float("inf"), endless=0.25, shares={},

@@ -11,8 +11,8 @@ from lxml import html as lxml_html
 
 import picchio
 from picchio.core.html import MOST_ROWS, cell, sheet
-from picchio.fatigue import fit_sn
-from picchio.studies.envelope import direction_envelope
+from picchio.fatigue.sn.fit import fit_sn
+from picchio.studies.envelopes import direction_envelope
 from picchio.studies.uncertainty import uncertain_life
 
 BLOWS = picchio.PulseTrain(300.0, 0.040, 0.004)

@@ -7,7 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from picchio.campaign import Campaign, Record
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
 
 from . import plan as plans
 from . import robots

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from picchio.campaign import load_campaign
+from picchio.campaign.campaign import load_campaign
 from worlds import campaign, cases, detect, draw, effects, robots
 from worlds import plan as plans
 

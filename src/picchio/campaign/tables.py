@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator
 
-from picchio.core.model import Finite, NotNegative, Positive, StrictModel
-from picchio.excitation import ExcitationTable
+from picchio.core.toml import Finite, NotNegative, Positive, StrictModel
+from picchio.excitation.table import ExcitationTable
 
 FORMAT = "picchio-campaign/1"
 CAMPAIGN_FILE = "campaign.toml"

@@ -34,9 +34,9 @@ def annotate(
     from picchio.core.errors import InputError
     from picchio.core.files import atomic_write
     from picchio.core.provenance import provenance
-    from picchio.robot.annotate import annotate as annotated
-    from picchio.robot.find import find_robot
-    from picchio.robot.sidecar import read_sidecar
+    from picchio.robot.annotations.annotate import annotate as annotated
+    from picchio.robot.annotations.sidecar import read_sidecar
+    from picchio.robot.loading.find import find_robot
 
     for target in (out, json):
         check_target(target, [flex])

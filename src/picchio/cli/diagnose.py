@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,11 +17,211 @@ from picchio.cli.options import FlexOption, JsonOption, RobotArgument, ToolOptio
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
-    from picchio.campaign import Campaign
-    from picchio.cli.diagnose_motion import MotionAnswer
-    from picchio.diagnosis.percussion.diagnose import PercussionDiagnosis
-    from picchio.model import Effect
-    from picchio.robot import FlexibleRobot
+    from picchio.campaign.campaign import Campaign
+    from picchio.diagnosis.motion.conclude.carried import Carried, MotionLife
+    from picchio.diagnosis.percussion.run import PercussionDiagnosis
+    from picchio.diagnosis.result import Diagnosis
+    from picchio.model.effects.effect import Effect
+    from picchio.robot.flexible_robot import FlexibleRobot
+
+
+# What `picchio diagnose` prints.
+
+
+def show_diagnosis(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
+    """Print verdict, causes, gain, life and what to measure next."""
+    from rich.table import Table
+
+    from picchio.cli.output import console
+    from picchio.diagnosis.result import VERDICTS, differences, in_words
+    from picchio.model.effects.registry import effect_class
+    from picchio.studies.assessment.result import format_count
+
+    out = console()
+    out.print(f"[bold]{found.verdict}[/bold]: {found.note or VERDICTS[found.verdict]}.")
+    if found.causes:
+        table = Table(box=None, pad_edge=False, header_style="dim")
+        for name in ("cause", "where", "confidence", "value", "std", "unit"):
+            table.add_column(name, justify="right" if name in ("value", "std") else "left")
+        for cause in found.causes:
+            if not cause.parameters:
+                table.add_row(cause.effect, cause.target, f"{cause.confidence:.3f}")
+            for i, (name, value) in enumerate(cause.parameters.items()):
+                head = (
+                    (cause.effect, cause.target, f"{cause.confidence:.3f}") if i == 0 else ("",) * 3
+                )
+                unit = "" if value.unit == "1" else value.unit
+                table.add_row(*head, f"{name} {value.value:.5g}", f"{value.std:.2g}", unit)
+        out.print(table)
+        for name in dict.fromkeys(cause.effect for cause in found.causes):
+            out.print(f"  {name}: {effect_class(name).meaning}")
+    for each in differences(found):
+        out.print(f"  these data cannot tell it from {in_words(each)}")
+    helped = (
+        "would explain it, but is not claimed" if found.note else "helped, but is not the cause"
+    )
+    for effect, target in found.leads:
+        out.print(f"  {helped}: {effect} of {target}")
+    gain = found.gain
+    if gain is not None:
+        count = len(gain.held_out_records)
+        kept = f"{count} record" if count == 1 else f"{count} records"
+        share = "" if gain.explained is None else f"; {100 * gain.explained:.1f} % explained"
+        out.print(
+            f"On {kept} held out the residual falls from "
+            f"{100 * gain.baseline_nrmse:.3g} % to {100 * gain.extended_nrmse:.3g} % of the "
+            f"signal; noise alone is {100 * gain.noise_floor_nrmse:.3g} %{share}."
+        )
+    if life is not None:
+        _show_life(life)
+        others = life.get("alternatives") or ()
+        for pairs, other in zip(found.alternatives, others, strict=False):
+            names = " and ".join(f"{effect} of {target}" for effect, target in pairs)
+            told = other.get("why") or (
+                f"rivets {format_count(other['rivets_to_failure'])}, "
+                f"utilisation {100 * other['utilisation']:.4g} %"
+            )
+            out.print(f"  with {names} instead: {told}")
+        if others:
+            out.print("  until the sets are told apart, only the worst of these may be promised")
+        elif found.alternatives:
+            out.print(
+                '  "after" is with the cause named above; with another of the sets the life is '
+                "another: until they are told apart, neither may be promised"
+            )
+    ask = found.next_measurement
+    if ask:
+        direction = ", ".join(f"{c:.2f}" for c in ask.get("direction", ()))
+        pose = ", ".join(f"{name} {value:.2f}" for name, value in ask.get("pose", {}).items())
+        out.print(f"Measure next: {ask['why']}", highlight=False)
+        if pose:
+            out.print(f"  pose {pose}; force along ({direction}), {ask.get('force', 0):g} N")
+
+
+def _show_life(life: Mapping[str, Any]) -> None:
+    from rich.table import Table
+
+    from picchio.cli.output import console
+    from picchio.studies.assessment.result import format_count
+
+    table = Table(box=None, pad_edge=False, header_style="dim", title="Life", title_justify="left")
+    for name in ("joint", "rivets before", "after", "utilisation before %", "after %"):
+        table.add_column(name, justify="left" if name == "joint" else "right")
+
+    def rivets(joint: Mapping[str, Any]) -> str:
+        return format_count(joint["rivets_to_failure"])
+
+    def used(joint: Mapping[str, Any]) -> str:
+        return f"{100 * joint['utilisation']:.4g}"
+
+    def between(joint: Mapping[str, Any], key: str, show: Callable[[float], str]) -> str:
+        """The interval, where it says more than the value."""
+        low, high = (show(end) for end in joint.get(key, (math.nan, math.nan)))
+        return "" if low == high else f"[dim]{low} to {high}[/dim]"
+
+    before, after = life["baseline"]["joints"], life["extended"]["joints"]
+    for name, old in before.items():
+        sides = (old, after[name])
+        table.add_row(name, *map(rivets, sides), *map(used, sides))
+        spans = [between(side, "rivets_interval", format_count) for side in sides]
+        spans += [
+            between(side, "utilisation_interval", lambda u: f"{100 * u:.4g}") for side in sides
+        ]
+        if any(spans):
+            table.add_row("", *spans)
+    out = console()
+    out.print(table)
+    if "interval_level" in life:
+        out.print(
+            f"  [dim]{100 * life['interval_level']:g} % intervals: before, of the stated "
+            "tolerance; after, of what was fitted. The material's scatter is not in them (picchio "
+            "assess --uncertainty)[/dim]"
+        )
+
+
+# What `picchio diagnose` does with motion records.
+
+
+@dataclass(frozen=True)
+class MotionAnswer:
+    """A diagnosis of motion records, and what it says of blows.
+
+    Attributes:
+        diagnosis: the answer.
+        carried: which causes act while the tool hits.
+        life: what they do to the task's life.
+    """
+
+    diagnosis: Diagnosis
+    carried: Carried
+    life: MotionLife
+
+    @property
+    def notes(self) -> str:
+        """What a model's file says of causes that it does not hold."""
+        head = "found by picchio diagnose in motion records"
+        why: dict[str, list[str]] = {}
+        for effect, reason in self.carried.left:
+            names = why.setdefault(reason, [])
+            name = f"{effect.name} of {effect.target}"
+            if name not in names:
+                names.append(name)
+        said = [f"{', '.join(names)}: {reason}" for reason, names in why.items()]
+        return f"{head}; found as well, and not in this model: {'; '.join(said)}" if said else head
+
+    def extra(self) -> dict[str, Any]:
+        """Keys that JSON has beside the contract's."""
+        blows = {side: dict(joints) for side, joints in self.life.blows.items()}
+        return {"life_note": self.life.why, "blows": blows or None}
+
+    def page(
+        self, campaign: Campaign, model_toml: str, command: str, warnings: Sequence[str]
+    ) -> str:
+        """The report."""
+        from picchio.visuals.report.motion_diagnosis import motion_diagnosis_report
+
+        return motion_diagnosis_report(
+            self.diagnosis,
+            life=self.life,
+            carried=self.carried,
+            model_toml=model_toml if self.diagnosis.causes else "",
+            command=command,
+            folder=None if campaign.folder is None else campaign.folder.name,
+            warnings=warnings,
+        )
+
+
+def diagnose_motion_records(
+    robot: FlexibleRobot, campaign: Campaign, without: Sequence[str], task: Path | None
+) -> MotionAnswer:
+    """Diagnose, and follow the task's blows before and after.
+
+    Args:
+        robot: the nominal robot.
+        campaign: its motion records.
+        without: effects that must not be considered.
+        task: for the life; the robot's own if None.
+
+    Raises:
+        InputError: as `diagnose_motion`; a bad task that was asked for.
+    """
+    from picchio.cli.output import progress
+    from picchio.diagnosis.motion.conclude.carried import MotionLife, carried, motion_life
+    from picchio.diagnosis.motion.run import diagnose_motion
+    from picchio.studies.tasks import load_task
+
+    with progress("diagnosis") as report:
+        found = diagnose_motion(robot, campaign, without=without, progress=report)
+    path = task or robot.task_path
+    try:
+        work = load_task(path, robot) if path is not None else None
+        life = motion_life(robot, work, found)
+    except InputError as error:
+        if task is not None:
+            raise
+        life = MotionLife(None, f"the life could not be computed: {error}")
+    return MotionAnswer(found, carried(found), life)
+
 
 EPILOG = "Example: picchio diagnose fanuc_like_3dof --data measurements/ --report why.html"
 
@@ -73,15 +275,13 @@ def diagnose(
     against every effect picchio knows; whole poses are held out to judge the gain. What cannot
     be known is said, and what to measure to know it.
     """
-    from picchio.campaign import load_campaign
-    from picchio.cli.diagnose_motion import diagnose_motion_records
-    from picchio.cli.diagnose_tables import show_diagnosis
+    from picchio.campaign.campaign import load_campaign
     from picchio.cli.output import check_target, console, said_warnings, write_json
     from picchio.core.files import atomic_write
     from picchio.core.provenance import provenance
-    from picchio.model.effects import effect_class
-    from picchio.robot import load_robot
-    from picchio.studies import load_task
+    from picchio.model.effects.registry import effect_class
+    from picchio.robot.loading.load import load_robot
+    from picchio.studies.tasks import load_task
 
     for target in (json, report, model, plan):
         check_target(target, [robot, flex, task])
@@ -140,8 +340,8 @@ def _page(
     percussion: PercussionDiagnosis, text: str, command: str, life: Mapping[str, Any] | None
 ) -> str:
     from picchio.cli.output import said_warnings
-    from picchio.view.report.diagnosis import diagnosis_report
-    from picchio.view.scene import diagnosis_scene
+    from picchio.visuals.report.diagnosis import diagnosis_report
+    from picchio.visuals.scene.diagnosed import diagnosis_scene
 
     return diagnosis_report(
         percussion,
@@ -160,7 +360,7 @@ def _percussion(
     gravity_stiffness: bool,
     say: Callable[[str], None],
 ) -> PercussionDiagnosis:
-    from picchio.diagnosis.percussion.diagnose import diagnose_percussion
+    from picchio.diagnosis.percussion.run import diagnose_percussion
 
     return diagnose_percussion(
         robot, campaign, without=without, gravity_stiffness=gravity_stiffness, progress=say
@@ -185,7 +385,7 @@ def _life(
     """Life before and after; None where there is no task or nothing was found."""
     from picchio.cli.output import say_warning
     from picchio.diagnosis.life import NO_SHAFT
-    from picchio.studies import load_task
+    from picchio.studies.tasks import load_task
 
     path = task or robot.task_path
     if not any(j.shaft is not None or j.reducer is not None for j in robot.flexible_joints):
@@ -211,7 +411,7 @@ def _model_text(
     notes: str,
 ) -> str:
     from picchio.core.provenance import provenance
-    from picchio.robot.saved_model import saved_model_text
+    from picchio.robot.loading.saved_model import saved_model_text
 
     tables = [e.to_dict() for e in effects if e.values != type(e)(e.target).values or e.hidden]
     stamp = provenance(files)

@@ -20,7 +20,7 @@ from picchio.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from picchio.studies.envelope import DirectionEnvelope
+    from picchio.studies.envelopes import DirectionEnvelope
 
 EPILOG = "Example: picchio envelope fanuc_like_3dof --pose=0.3,1.1,-1.0"
 
@@ -45,10 +45,10 @@ def envelope(
     """The worst force direction of every joint at a pose, exact: no direction is sampled."""
     from picchio.cli.inputs import choose_blows, numbers
     from picchio.cli.output import check_target, write_json
-    from picchio.model import Model
-    from picchio.robot import load_robot
-    from picchio.studies.envelope import direction_envelope
-    from picchio.studies.limits import warn_beyond_limits
+    from picchio.model.model import Model
+    from picchio.robot.dynamics.pose import warn_beyond_limits
+    from picchio.robot.loading.load import load_robot
+    from picchio.studies.envelopes import direction_envelope
 
     check_target(json, [robot, flex])
     loaded = load_robot(robot, flex=flex, tool=tool)

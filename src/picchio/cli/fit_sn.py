@@ -11,8 +11,8 @@ from picchio.cli.options import JsonOption
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
-    from picchio.fatigue.sn_fit import Estimate, SNFit
-    from picchio.fatigue.sn_tests import SNTests
+    from picchio.fatigue.sn.fit import Estimate, SNFit
+    from picchio.fatigue.sn.test_table import SNTests
 
 # Distortion energy: the shear strength of ductile steel is 1 / sqrt(3) of the normal one.
 _TO_SHEAR = {
@@ -58,8 +58,8 @@ def fit_sn_command(
     """Fit slope, knee, endurance limit and scatter, each with its interval."""
     from picchio.cli.output import check_target, write_json
     from picchio.core.provenance import provenance
-    from picchio.fatigue.sn_fit import fit_sn
-    from picchio.fatigue.sn_tests import read_sn_tests
+    from picchio.fatigue.sn.fit import fit_sn
+    from picchio.fatigue.sn.test_table import read_sn_tests
 
     for target in (out, plot, json):
         check_target(target, [tests])
@@ -93,7 +93,7 @@ def _write_curve(found: SNFit, survival: float, out: Path, note: str) -> None:
     import tomlkit
 
     from picchio.core.files import atomic_write
-    from picchio.fatigue.sn_library import SN_FORMAT
+    from picchio.fatigue.sn.library import SN_FORMAT
 
     curve = found.curve(survival, name=out.stem)
     keys = ("name", "kind", "strength", "cycles", "slopes", "knees", "miner", "survival", "scatter")
@@ -108,8 +108,8 @@ def _draw(found: SNFit, data: SNTests, factor: float, plot: Path) -> None:
     import dataclasses
 
     from picchio.core.files import atomic_write
-    from picchio.view.plots import plot_sn_fit
-    from picchio.view.plots.style import PAPER, blank_figure
+    from picchio.visuals.plots.sn import plot_sn_fit
+    from picchio.visuals.plots.style import PAPER, blank_figure
 
     shear = dataclasses.replace(data, amplitude=factor * data.amplitude)
     figure = plot_sn_fit(found, shear, blank_figure(height=3.8)).get_figure(root=True)

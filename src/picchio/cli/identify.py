@@ -11,9 +11,9 @@ from picchio.cli.options import FlexOption, JsonOption, RobotArgument, ToolOptio
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
-    from picchio.campaign import Campaign
+    from picchio.campaign.campaign import Campaign
     from picchio.diagnosis.result import Diagnosis
-    from picchio.robot import FlexibleRobot
+    from picchio.robot.flexible_robot import FlexibleRobot
 
 EPILOG = (
     "Example: picchio identify kuka_kr300_r2500 --data motions/ --out identified.toml, "
@@ -37,11 +37,11 @@ def identify(
     json: JsonOption = None,
 ) -> None:
     """Write the extended model's values back as a sidecar, with their source and uncertainty."""
-    from picchio.campaign import load_campaign
+    from picchio.campaign.campaign import load_campaign
     from picchio.cli.output import check_target, console, say_warning, write_json
     from picchio.core.provenance import provenance
-    from picchio.diagnosis.motion.identified import identified_sidecar
-    from picchio.robot import load_robot
+    from picchio.diagnosis.motion.conclude.identified import identified_sidecar
+    from picchio.robot.loading.load import load_robot
 
     if str(out) == "-":
         raise InputError("must be a file", key="--out", value=str(out))
@@ -69,11 +69,11 @@ def _diagnose(robot: FlexibleRobot, campaign: Campaign) -> Diagnosis:
     from picchio.cli.output import progress
 
     if any(record.kind == "motion" for record in campaign):
-        from picchio.diagnosis.motion import diagnose_motion
+        from picchio.diagnosis.motion.run import diagnose_motion
 
         with progress("diagnosis") as report:
             return diagnose_motion(robot, campaign, progress=report)
-    from picchio.diagnosis.percussion.diagnose import diagnose_percussion
+    from picchio.diagnosis.percussion.run import diagnose_percussion
 
     return diagnose_percussion(robot, campaign).diagnosis
 

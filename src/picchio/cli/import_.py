@@ -10,7 +10,7 @@ import typer
 from picchio.cli.options import JsonOption
 
 if TYPE_CHECKING:
-    from picchio.campaign import Campaign
+    from picchio.campaign.campaign import Campaign
 
 EPILOG = (
     "Example: picchio import run.mcap --write-mapping mapping.toml, edit it, then "
@@ -54,13 +54,10 @@ def import_(
     json: JsonOption = None,
 ) -> None:
     """Import a file as a record of a campaign; the mapping is kept beside it as mapping.toml."""
-    from picchio.campaign.importing import (
-        import_record,
-        mapping_template,
-        read_mapping,
-        read_raw,
-    )
-    from picchio.campaign.write import write_campaign
+    from picchio.campaign.campaign import write_campaign
+    from picchio.campaign.importing.importer import import_record, read_raw
+    from picchio.campaign.importing.mapping import read_mapping
+    from picchio.campaign.importing.template import mapping_template
     from picchio.core.errors import InputError
     from picchio.core.files import atomic_write
 
@@ -117,7 +114,7 @@ def import_(
 
 def _appended(new: Campaign, to: Path, mapping: bytes) -> tuple[Campaign, dict[str, bytes]]:
     """The campaign at `to` with the new record in it, and the mapping's file."""
-    from picchio.campaign import Campaign, load_campaign
+    from picchio.campaign.campaign import Campaign, load_campaign
     from picchio.core.errors import InputError
 
     old = load_campaign(to)

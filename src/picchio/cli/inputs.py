@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
-    from picchio.excitation import Excitation
-    from picchio.robot import FlexibleRobot
+    from picchio.excitation.trains import Excitation
+    from picchio.robot.flexible_robot import FlexibleRobot
 
 
 def numbers(text: str, key: str, count: int | None = None) -> list[float]:
@@ -62,8 +62,8 @@ def choose_blows(
     """
     from picchio.cli.output import check_numbers
     from picchio.core.toml import parse_toml
-    from picchio.excitation import ExcitationTable
-    from picchio.studies.task import FORMAT, TaskTable
+    from picchio.excitation.table import ExcitationTable
+    from picchio.studies.tasks import FORMAT, TaskTable
 
     check_numbers(force=force, period=period, width=width)
     file = task or robot.task_path

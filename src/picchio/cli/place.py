@@ -19,7 +19,7 @@ from picchio.cli.options import (
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
-    from picchio.studies.placement_result import Placement
+    from picchio.studies.placement.result import Placement
 
 EPILOG = "Example: picchio place fanuc_like_3dof --move 0.3,0.3,0.3,30 --out moved.toml"
 
@@ -72,11 +72,11 @@ def place(
     """Where to put the work, with which poses and hit rate, so that the robot lasts longest."""
     from picchio.cli.inputs import numbers, task_file
     from picchio.cli.output import check_numbers, check_target, progress, write_json
-    from picchio.robot import load_robot
-    from picchio.studies import load_task
-    from picchio.studies.placement import place as run
-    from picchio.studies.placement_file import write_task
-    from picchio.studies.placement_work import Work
+    from picchio.robot.loading.load import load_robot
+    from picchio.studies.placement.file import write_task
+    from picchio.studies.placement.run import place as run
+    from picchio.studies.placement.work import Work
+    from picchio.studies.tasks import load_task
 
     for target in (json, out):
         check_target(target, [robot, task, flex, sn_curve])
@@ -129,7 +129,7 @@ def _show(found: Placement, off: float) -> None:
     from rich.table import Table
 
     from picchio.cli.output import console
-    from picchio.studies.verdict import format_count
+    from picchio.studies.assessment.result import format_count
 
     out = console()
     # Zeros are added for the sake of their sign.

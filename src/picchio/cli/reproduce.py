@@ -11,7 +11,7 @@ from picchio.cli.options import JsonOption
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
-    from picchio.paper import Reproduction
+    from picchio.paper.run import Reproduction
 
 EPILOG = "Example: picchio reproduce --report paper.html"
 
@@ -39,9 +39,9 @@ def reproduce(
     """Recompute the figures, tables and claims of Nie et al. 2016, and say which hold."""
     from picchio.cli.output import check_target, progress, write_json
     from picchio.core.files import atomic_write
-    from picchio.paper import reproduce as run
     from picchio.paper.assumptions import parse_assumptions
     from picchio.paper.printed import paper_file
+    from picchio.paper.run import reproduce as run
     from picchio.paper.study import WORLDS
 
     for target in (report, json):
@@ -52,7 +52,7 @@ def reproduce(
     with progress("hypotheses about Table 2") as told:
         found = run(given, worlds=worlds or WORLDS, progress=told)
     if report is not None:
-        from picchio.paper.report import reproduction_report
+        from picchio.paper.page import reproduction_report
 
         words = "".join(f" --assume {word}" for word in assume or [])
         words += f" --worlds {worlds}" if worlds is not None else ""

@@ -9,7 +9,7 @@ import typer
 from picchio.cli.options import JsonOption
 
 if TYPE_CHECKING:
-    from picchio.robot import RobotEntry
+    from picchio.robot.loading.catalogue import RobotEntry
 
 EPILOG = "Example: picchio robots --json robots.json"
 
@@ -25,7 +25,7 @@ def robots(json: JsonOption = None) -> None:
     from rich.table import Table
 
     from picchio.cli.output import console, write_json
-    from picchio.robot.catalogue import list_robots
+    from picchio.robot.loading.catalogue import list_robots
 
     entries = list_robots()
     if json is not None:

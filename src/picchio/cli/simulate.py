@@ -10,7 +10,7 @@ import typer
 from picchio.cli.options import FlexOption, JsonOption, RobotArgument, ToolOption
 
 if TYPE_CHECKING:
-    from picchio.campaign import Campaign
+    from picchio.campaign.campaign import Campaign
     from picchio.prediction.plan import Plan
 
 EPILOG = "Example: picchio simulate fanuc_like_3dof --plan plan.toml --to campaign"
@@ -56,14 +56,14 @@ def simulate(
     The plan (picchio-plan/1, TOML) names poses, directions, levels, blows, sample rate and
     sensors with their noise; [[effect]] tables in it make the world differ from the model.
     """
-    from picchio.campaign import write_campaign
+    from picchio.campaign.campaign import write_campaign
     from picchio.cli.output import check_target, progress, write_json
     from picchio.core.errors import InputError
     from picchio.core.provenance import provenance
     from picchio.prediction.plan import read_plan
-    from picchio.prediction.simulate import simulate as run
-    from picchio.robot import load_robot
-    from picchio.studies.limits import warn_beyond_limits
+    from picchio.prediction.simulation import simulate as run
+    from picchio.robot.dynamics.pose import warn_beyond_limits
+    from picchio.robot.loading.load import load_robot
 
     check_target(json, [robot, flex, plan])
     loaded = load_robot(robot, flex=flex, tool=tool)

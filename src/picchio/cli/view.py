@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     import xarray
 
     from picchio.diagnosis.result import Diagnosis
-    from picchio.robot import FlexibleRobot
-    from picchio.view.scene import Scene
+    from picchio.robot.flexible_robot import FlexibleRobot
+    from picchio.visuals.scene.scene import Scene
 
 EPILOG = "Example: picchio view fanuc_like_3dof --out scene.html"
 
@@ -87,9 +87,9 @@ def view(
     """
     from picchio.cli.output import check_target, write_json
     from picchio.core.files import atomic_write
-    from picchio.model import Model
-    from picchio.robot import load_robot
-    from picchio.view.scene import build_scene
+    from picchio.model.model import Model
+    from picchio.robot.loading.load import load_robot
+    from picchio.visuals.scene.build import build_scene
 
     if out is None and not live:
         raise InputError("needs a file", key="--out", hint="--out scene.html, or --live")
@@ -98,7 +98,7 @@ def view(
     found = _diagnosis(diagnosis, loaded)
     workspace = None
     if map_ is not None:
-        from picchio.studies.map import open_map
+        from picchio.studies.maps.run import open_map
 
         workspace = open_map(map_)
     if pose is None:
@@ -143,9 +143,10 @@ def _of_task(
     diagnosis: Diagnosis | None,
 ) -> Scene:
     from picchio.cli.output import progress
-    from picchio.studies import assess, load_task
-    from picchio.view.scene import build_scene
-    from picchio.view.worst import worst_rivet
+    from picchio.studies.assessment.run import assess
+    from picchio.studies.tasks import load_task
+    from picchio.visuals.scene.build import build_scene
+    from picchio.visuals.worst_rivet import worst_rivet
 
     path = task or robot.task_path
     if path is None:
@@ -174,7 +175,7 @@ def _diagnosis(path: Path | None, robot: FlexibleRobot) -> Diagnosis | None:
     """The diagnosis of a file, if it can be one of this robot."""
     if path is None:
         return None
-    from picchio.view.diagnosis_file import read_diagnosis
+    from picchio.visuals.diagnosis_file import read_diagnosis
 
     return read_diagnosis(path, robot)
 

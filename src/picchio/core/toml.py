@@ -6,9 +6,9 @@ import tomllib
 import types
 import typing
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from picchio.core.errors import InputError
 from picchio.core.files import read_text
@@ -151,3 +151,20 @@ def _flatten(kind: Any) -> list[Any]:
     if origin in (typing.Union, types.UnionType):
         return [leaf for arm in typing.get_args(kind) for leaf in _flatten(arm)]
     return [kind]
+
+
+# The base of everything that is read from a file a user edits.
+
+
+class StrictModel(BaseModel):
+    """A validated, frozen record: unknown keys, NaN and infinities are refused."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True, strict=False
+    )
+
+
+# Strict: a string or a boolean is no number, though Python could make one of it.
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
+Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]

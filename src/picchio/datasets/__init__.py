@@ -17,7 +17,7 @@ from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 
-from picchio.campaign import Campaign
+from picchio.campaign.campaign import Campaign
 from picchio.core.errors import InputError
 from picchio.datasets.fetch import Dataset, find_files
 

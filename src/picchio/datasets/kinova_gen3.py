@@ -25,7 +25,8 @@ from pathlib import Path
 
 import numpy as np
 
-from picchio.campaign import Campaign, Record
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.datasets.fetch import Dataset, RemoteFile, content

@@ -13,9 +13,11 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.model import Effect
-from picchio.robot import FlexibleRobot
-from picchio.studies import Assessment, Task, assess
+from picchio.model.effects.effect import Effect
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.studies.assessment.result import Assessment
+from picchio.studies.assessment.run import assess
+from picchio.studies.tasks import Task
 
 LEVEL = 0.90
 """Of the two-sided intervals, as `picchio fit-sn` has them."""
@@ -74,7 +76,7 @@ def life_before_and_after(
         before: how well the nominal values are known, for an interval.
         after: the same of the extended model.
         others: effects of other models that the data cannot tell from this one.
-        **options: of `picchio.studies.assess`.
+        **options: of `picchio.studies.assessment.run`.
 
     Returns:
         {"baseline": {...}, "extended": {...}}, each with rivets_to_failure (infinite where there
@@ -169,7 +171,7 @@ def life_intervals(
         task: its work.
         found: the assessment at the centre.
         unsure: the effects and how well they are known.
-        options: of `picchio.studies.assess`.
+        options: of `picchio.studies.assessment.run`.
         level: two-sided.
 
     Returns:

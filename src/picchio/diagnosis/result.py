@@ -6,6 +6,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+# What percussion and motion records are judged by alike.
+
+BEYOND_DOUBT = 0.99
+"""The least confidence, over the poses, of what is claimed though not all is explained."""
+
+MOSTLY = 0.8
+"""The least share of the held-out excess that the causes of a `partial` verdict explain.
+
+"Most of it" in the verdict's words. Four fifths, not a half: a wrong cause that is merely like the
+true one takes away half of its power as soon as the two are correlated by 0.71 (the share is the
+correlation squared), which stiffness, inertia and friction of one joint often are; by 0.89 they
+hardly ever are without being told as a set.
+"""
+
 FORMAT = "picchio-diagnosis/1"
 Verdict = Literal["nothing-wrong", "named", "ambiguous", "partial", "unexplained"]
 VERDICTS: dict[str, str] = {
@@ -139,3 +153,35 @@ class Diagnosis:
             "next_measurement": self.next_measurement,
             "note": self.note or None,
         }
+
+
+# Other sets of causes, told by what they have in place of what.
+
+Pairs = tuple[tuple[str, str], ...]
+
+
+def differences(diagnosis: Diagnosis) -> list[tuple[Pairs, Pairs]]:
+    """What each alternative set has that the causes lack, and the other way round.
+
+    Returns:
+        (effect, target) that come, and those that go; each difference once.
+    """
+    mine = tuple(dict.fromkeys((c.effect, c.target) for c in diagnosis.causes))
+    found = []
+    for other in diagnosis.alternatives:
+        come = tuple(dict.fromkeys(pair for pair in other if pair not in mine))
+        gone = tuple(pair for pair in mine if pair not in other)
+        if come or gone:
+            found.append((come, gone))
+    return list(dict.fromkeys(found))
+
+
+def in_words(difference: tuple[Pairs, Pairs]) -> str:
+    """A difference as a phrase."""
+    come, gone = (
+        " and ".join(f"{effect.replace('_', ' ')} of {target}" for effect, target in pairs)
+        for pairs in difference
+    )
+    if come and gone:
+        return f"{come} in place of {gone}"
+    return f"{come} as well" if come else f"all but {gone}"

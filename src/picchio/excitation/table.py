@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from picchio.core.errors import InputError
-from picchio.core.model import Finite, Positive, StrictModel
+from picchio.core.toml import Finite, Positive, StrictModel
 from picchio.excitation.trains import Excitation, HalfSineTrain, MeasuredForce, PulseTrain
 
 Kind = Literal["pulse_train", "half_sine_train", "measured"]

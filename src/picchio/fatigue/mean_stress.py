@@ -27,9 +27,9 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError
-from picchio.fatigue._types import FloatArray, as_floats
-from picchio.fatigue.sn_curve import SNCurve
+from picchio.fatigue.sn.curve import SNCurve
 
 Rule = Literal["none", "goodman", "gerber", "soderberg", "morrow", "walker", "swt", "fkm"]
 RULES: tuple[Rule, ...] = get_args(Rule)

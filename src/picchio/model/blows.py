@@ -8,7 +8,8 @@ import numpy as np
 
 from picchio.core.arrays import BoolArray, FloatArray
 from picchio.core.errors import InputError
-from picchio.excitation import Excitation, HalfSineTrain, PiecewiseForce, PulseTrain
+from picchio.excitation.piecewise import PiecewiseForce
+from picchio.excitation.trains import Excitation, HalfSineTrain, PulseTrain
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """Nonlinear elements between two sides of a joint, or between tool and workpiece.
 
 Each is a kind and at most six numbers, so that compiled code can take a list of them; the forces
-are in `picchio.vibration._element_kernel`.
+are in `picchio.vibration.integration.element_kernel`.
 """
 
 from __future__ import annotations

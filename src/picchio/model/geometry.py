@@ -10,8 +10,8 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.recent import Recent
-from picchio.robot import FlexibleRobot
-from picchio.robot.expansion import Inertia, Motion, WideChain
+from picchio.model.expansion import Inertia, Motion, WideChain
+from picchio.robot.flexible_robot import FlexibleRobot
 
 if TYPE_CHECKING:
     from picchio.model.plant import Plant

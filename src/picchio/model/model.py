@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from picchio.model.geometry import Geometry
     from picchio.model.plant import Plant
     from picchio.model.sensing import Sensors
-    from picchio.robot import FlexibleRobot, RobotState
+    from picchio.robot.dynamics.statics import RobotState
+    from picchio.robot.flexible_robot import FlexibleRobot
 
 # In which order effects are applied: what a later one reads, an earlier one has changed.
 _ORDER = ("structure", "over-time", "nonlinear", "blows", "sensor", "motion")
@@ -133,7 +134,7 @@ class Model:
     def linear_system(self, pose: FloatArray) -> LinearSystem:
         """The linear equations of motion at a pose.
 
-        Nonlinear effects are left out of it: `picchio.vibration.integrate` has them.
+        Nonlinear effects are left out of it: `picchio.vibration.integration.integrate` has them.
 
         Args:
             pose: (nv,) rad or m.

@@ -11,10 +11,10 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.model.conditions import Conditions
 from picchio.model.elements import Element
+from picchio.model.expansion import Motion
 from picchio.model.geometry import Geometry
-from picchio.model.joint_damping import shared_damping
+from picchio.model.linear_system import shared_damping
 from picchio.model.system import VibratingSystem
-from picchio.robot.expansion import Motion
 
 Row = dict[str, float]
 

@@ -14,7 +14,9 @@ from numpy.typing import ArrayLike
 from picchio.core.arrays import FloatArray
 from picchio.paper.assumptions import Assumptions
 from picchio.paper.printed import PrintedArm, printed
-from picchio.robot import FlexibleRobot, Shaft, load_robot
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.joint import Shaft
+from picchio.robot.loading.load import load_robot
 
 _folder = tempfile.TemporaryDirectory(prefix="picchio-paper-")
 atexit.register(_folder.cleanup)
@@ -112,3 +114,18 @@ def places_of(poses: ArrayLike) -> FloatArray:
     out = l2 * np.cos(q2) + l3 * np.cos(q2 + q3)
     up = l1 + l2 * np.sin(q2) + l3 * np.sin(q2 + q3)
     return np.stack([out * np.cos(q1), out * np.sin(q1), up], axis=-1)
+
+
+# The rivet pattern of Fig. 12, as assumed: a panel that faces forward, riveted row by row.
+
+
+def rivet_points(given: Assumptions) -> FloatArray:
+    """Rivets (k, 3) in m in the order of the path: there and back, from the bottom row up."""
+    across = (np.arange(given.columns) - (given.columns - 1) / 2.0) * given.pitch
+    up = (np.arange(given.rows) - (given.rows - 1) / 2.0) * given.pitch
+    points = [
+        (given.panel_x, given.panel_y + (a if row % 2 == 0 else -a), given.panel_z + b)
+        for row, b in enumerate(up)
+        for a in across
+    ]
+    return np.array(points)

@@ -96,7 +96,7 @@ def _search(study: Study) -> Dominance:
 
 
 def _worst(world: World, frame: World, mass: FloatArray, jacobian: FloatArray) -> FloatArray:
-    from picchio.vibration.batch import batch_peaks
+    from picchio.vibration.batch.peaks import batch_peaks
 
     return batch_peaks(
         mass, jacobian, frame.robot.stiffness, world.given.damping_ratio, world.blows

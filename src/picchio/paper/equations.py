@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from picchio.paper.fourier import amplitude_and_phase, worst_responses
+from picchio.paper.fourier import amplitude_and_phase, printed_series, worst_responses
 from picchio.paper.printed import Printed
-from picchio.paper.series import printed_series
 from picchio.paper.study import Study
 
 
@@ -187,7 +186,7 @@ def _series(study: Study) -> float:
 
 def _stress(study: Study) -> float:
     """Eqs. 14-17: G r x / l against k x r / Jp."""
-    from picchio.fatigue import shear_stress, shear_stress_from_deflection
+    from picchio.fatigue.shaft_stress import shear_stress, shear_stress_from_deflection
 
     gaps = []
     for joint in study.base.robot.flexible_joints:
@@ -224,8 +223,8 @@ DONE_BY: dict[str, tuple[str, str, Check | None]] = {
     "15": ("picchio.fatigue.shear_stress_from_deflection", _SHAFT, _stress),
     "16": ("picchio.fatigue.shear_stress_from_deflection", _SHAFT, _stress),
     "17": ("picchio.fatigue.shear_stress_from_deflection", _SHAFT, _stress),
-    "18": ("picchio.fatigue.damage", _MINER, lambda study: miner_gap(study.printed)),
+    "18": ("picchio.fatigue.miner", _MINER, lambda study: miner_gap(study.printed)),
     "19": ("picchio.fatigue.peak_damage", _MINER, lambda study: miner_gap(study.printed)),
-    "20": ("picchio.studies.assess", _MINER, lambda study: miner_gap(study.printed)),
-    "21": ("picchio.studies.assess", _MINER, lambda study: miner_gap(study.printed)),
+    "20": ("picchio.studies.assessment.run", _MINER, lambda study: miner_gap(study.printed)),
+    "21": ("picchio.studies.assessment.run", _MINER, lambda study: miner_gap(study.printed)),
 }  # fmt: skip

@@ -6,11 +6,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from picchio.core.arrays import FloatArray
-from picchio.excitation import PulseTrain
-from picchio.paper.series import printed_series
+from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.excitation.trains import PulseTrain
 from picchio.paper.world import World
-from picchio.vibration import Response, modal_analysis, steady_state
+from picchio.vibration.closed_form.modes import modal_analysis
+from picchio.vibration.closed_form.response import Response, steady_state
+
+# Eq. 12: the Fourier series of the pulse train, as it is written.
+
+
+def printed_series(blows: PulseTrain, harmonics: int) -> ComplexArray:
+    """Eq. 12: a0, then a_j - i b_j, (harmonics + 1,) N."""
+    j = np.arange(1, harmonics + 1)
+    share = blows.width / blows.period
+    a = blows.force / (j * np.pi) * np.sin(2.0 * np.pi * j * share)
+    b = blows.force / (j * np.pi) - blows.force / (j * np.pi) * np.cos(2.0 * np.pi * j * share)
+    return np.concatenate([[blows.force * share], a - 1j * b])
+
 
 _HARMONICS = 4000
 
@@ -118,7 +130,7 @@ def worst_responses(world: World, hits: int) -> tuple[Response, Response, FloatA
 
     Fig. 8, and what becomes of the steady state.
     """
-    from picchio.vibration import response_from_rest
+    from picchio.vibration.closed_form.response import response_from_rest
 
     direction, rivet, joint = worst_of(world)
     modes = modal_analysis(world.model.linear_system(world.rivet_poses[rivet]))

@@ -10,9 +10,8 @@ import numpy as np
 from pydantic import ConfigDict
 
 from picchio.core.arrays import FloatArray
-from picchio.core.model import StrictModel
-from picchio.core.toml import parse_toml
-from picchio.fatigue import SNCurve
+from picchio.core.toml import StrictModel, parse_toml
+from picchio.fatigue.sn.curve import SNCurve
 
 FORMAT = "picchio-paper/1"
 Triple = tuple[float, float, float]

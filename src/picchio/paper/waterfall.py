@@ -10,12 +10,15 @@ from typing import Any
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.fatigue import Cycles, SNCurve, life, load_sn_curve, rainflow
-from picchio.fatigue.damage import damage
+from picchio.fatigue.counting.counter import rainflow
+from picchio.fatigue.counting.cycles import Cycles
+from picchio.fatigue.miner import damage, life
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.fatigue.sn.library import load_sn_curve
 from picchio.paper.claims.life import STEEL
 from picchio.paper.statics import gravity_stress
 from picchio.paper.world import World
-from picchio.studies.loads import PoseLoads, loads_at
+from picchio.studies.rivet.loads import PoseLoads, loads_at
 
 CORRECTIONS = ("transient", "counting", "gravity", "curve")
 WORDS = {

@@ -11,15 +11,14 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.excitation import PulseTrain
-from picchio.model import Model
-from picchio.paper.arm import arm, poses_at
+from picchio.excitation.trains import PulseTrain
+from picchio.model.model import Model
+from picchio.paper.arm import arm, poses_at, rivet_points
 from picchio.paper.assumptions import INPUTS, Assumptions, Input
-from picchio.paper.pattern import rivet_points
 from picchio.paper.printed import Printed, printed
-from picchio.robot import FlexibleRobot
-from picchio.studies.task import Operation
-from picchio.vibration.batch import BatchPeaks, batch_peaks
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.studies.tasks import Operation
+from picchio.vibration.batch.peaks import BatchPeaks, batch_peaks
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,14 +11,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from picchio.campaign import CampaignExcitation, Channel, Tolerance, parse_channel
-from picchio.campaign.channels import AXES
-from picchio.campaign.tables import Direction, Hits, Pose
+from picchio.campaign.channels import AXES, Channel, parse_channel
+from picchio.campaign.tables import CampaignExcitation, Direction, Hits, Pose, Tolerance
 from picchio.core.errors import InputError
-from picchio.core.model import Finite, NotNegative, Positive, StrictModel
-from picchio.core.toml import parse_toml
-from picchio.model.effects import Effect, from_dict
-from picchio.robot import FlexibleRobot
+from picchio.core.toml import Finite, NotNegative, Positive, StrictModel, parse_toml
+from picchio.model.effects.effect import Effect
+from picchio.model.effects.registry import from_dict
+from picchio.robot.flexible_robot import FlexibleRobot
 
 FORMAT = "picchio-plan/1"
 MOST_SAMPLES = 50_000_000

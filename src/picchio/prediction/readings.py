@@ -6,9 +6,9 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.model.expansion import Motion
 from picchio.model.system import VibratingSystem
-from picchio.robot.expansion import Motion
-from picchio.vibration.integrate import CoordinateMotion
+from picchio.vibration.integration.integrate import CoordinateMotion
 
 
 def reading(
@@ -44,7 +44,7 @@ def reading(
         return _linear(frame, v) + _bilinear(frame, x, v)
     if kind not in ("acceleration", "accelerometer"):
         raise InputError("cannot be predicted", key="channel", value=kind)
-    from picchio.prediction._reading_kernel import felt, frame_acceleration
+    from picchio.prediction.reading_kernel import felt, frame_acceleration
 
     x, v, a = (np.ascontiguousarray(part) for part in (x, v, a))
     jacobian, gradient = np.ascontiguousarray(frame.jacobian), frame.gradient

@@ -12,16 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from picchio.core.errors import InputError
+from picchio.robot.dynamics.pose import check_pose
+from picchio.robot.dynamics.rigid_model import RigidModel
+from picchio.robot.dynamics.statics import RobotState, balancing, stiffness_at_torque
 from picchio.robot.joint import Joint
-from picchio.robot.pose import check_pose
-from picchio.robot.rigid_model import RigidModel
-from picchio.robot.state import RobotState
-from picchio.robot.statics import balancing, stiffness_at_torque
 from picchio.robot.tool import Gun, Mounting, Tool
-from picchio.robot.urdf_tree import UrdfTree
+from picchio.robot.urdf.tree import UrdfTree
 
 if TYPE_CHECKING:
-    from picchio.robot.inverse_kinematics import Solutions
+    from picchio.robot.ik.inverse_kinematics import Solutions
 
 Array = NDArray[np.float64]
 
@@ -241,7 +240,7 @@ class FlexibleRobot:
     ) -> list[Array]:
         """Every branch of poses (nv,) found that puts the tool on a point.
 
-        See `picchio.robot.inverse_kinematics.solve`.
+        See `picchio.robot.ik.inverse_kinematics.solve`.
         """
         return list(self._solve(point, axis, seed).poses)
 
@@ -260,19 +259,19 @@ class FlexibleRobot:
             axis: (3,) the way the tool shall point, world; None leaves it free, and so does an
                 arm of fewer than five joints, which cannot choose.
             branch: "any", "elbow-up", "elbow-down", or words such as "joint_3+" (see
-                `picchio.robot.branch`).
+                `picchio.robot.ik.branch`).
             seed: moves the starts of the search.
 
         Raises:
             InputError: out of reach (how far is said), or not on this branch.
         """
-        from picchio.robot.branch import branch_words, choose_branch
+        from picchio.robot.ik.branch import branch_words, choose_branch
 
         words = branch_words(self, branch)  # a misspelt word need not wait for the search
         return choose_branch(self, self.all_branches(point, axis=axis, seed=seed), words, point)
 
     def _solve(self, point: ArrayLike, axis: ArrayLike | None, seed: int) -> Solutions:
         # Compiled code takes a second to load: only when it is needed.
-        from picchio.robot.inverse_kinematics import solve
+        from picchio.robot.ik.inverse_kinematics import solve
 
         return solve(self, point, axis=axis, seed=seed)

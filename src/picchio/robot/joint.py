@@ -5,8 +5,116 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from picchio.robot.balancer import Balancer
-from picchio.robot.stiffness_curve import StiffnessCurve
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+# Stiffness that grows with the torque, as catalogues of strain-wave gears give it.
+#
+# A catalogue gives three stiffnesses K1, K2, K3 and two torques T1, T2: the wind-up against the
+# torque is three straight lines (for example Harmonic Drive, *Engineering data HFUC*, "torsional
+# stiffness"). Small vibration about the pose's gravity torque sees the slope there, so the model
+# takes the **tangent**. The secant, torque over wind-up, is what a static test between zero and
+# this torque measures, and is given too.
+
+
+@dataclass(frozen=True)
+class StiffnessCurve:
+    """Wind-up in three straight lines.
+
+    Args:
+        k1: N m/rad (N/m for a prismatic joint) below `t1`.
+        k2: between `t1` and `t2`.
+        k3: above `t2`.
+        t1: N m (N), the first corner.
+        t2: the second corner, above `t1`.
+    """
+
+    k1: float
+    k2: float
+    k3: float
+    t1: float
+    t2: float
+
+    def tangent(self, torque: ArrayLike) -> NDArray[np.float64]:
+        """Slope at a torque, N m/rad; at a corner the line below it. Same shape as `torque`."""
+        size = np.abs(np.asarray(torque, dtype=float))
+        return np.where(size <= self.t1, self.k1, np.where(size <= self.t2, self.k2, self.k3))
+
+    def wind_up(self, torque: ArrayLike) -> NDArray[np.float64]:
+        """Angle at a torque, rad (m for a prismatic joint); odd. Same shape as `torque`."""
+        signed = np.asarray(torque, dtype=float)
+        size = np.abs(signed)
+        angle = (
+            np.minimum(size, self.t1) / self.k1
+            + np.clip(size - self.t1, 0.0, self.t2 - self.t1) / self.k2
+            + np.maximum(size - self.t2, 0.0) / self.k3
+        )
+        return np.sign(signed) * angle
+
+    def secant(self, torque: ArrayLike) -> NDArray[np.float64]:
+        """Torque over wind-up, N m/rad; `k1` at zero. Same shape as `torque`."""
+        signed = np.asarray(torque, dtype=float)
+        angle = self.wind_up(signed)
+        still = angle == 0.0
+        return np.where(still, self.k1, signed / np.where(still, 1.0, angle))
+
+
+# A gravity balancer: a spring or a cylinder beside a joint that carries part of the weight.
+#
+# It pulls two points together, one fixed to the joint's parent link and one to its child link.
+# With the distance d(q) between them its energy is
+#
+#     E(q) = k (d - d0)^2 / 2 + F d
+#
+# so the drive carries dE/dq on top of gravity's torque, and d2E/dq2 adds to gravity's stiffness.
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Balancer:
+    """A spring and a constant force between two points of neighbouring links.
+
+    Args:
+        parent_point: m, fixed to the parent link, in the joint's frame.
+        child_point: m, fixed to the child link, in the joint's frame at position zero.
+        stiffness: N/m, of the spring.
+        free_length: m, where the spring pulls nothing.
+        force: N, a constant pull (a gas or hydraulic cylinder); a push is negative.
+    """
+
+    parent_point: Vector
+    child_point: Vector
+    stiffness: float = 0.0
+    free_length: float = 0.0
+    force: float = 0.0
+
+    def torque_and_stiffness(self, axis: Vector, angle: float) -> tuple[float, float]:
+        """What it adds to the torque the drive carries, and to that torque's slope.
+
+        Args:
+            axis: the joint's axis in the joint's frame, any length.
+            angle: joint position, rad.
+
+        Returns:
+            dE/dq in N m and d2E/dq2 in N m/rad.
+        """
+        a = np.asarray(axis, dtype=float)
+        a = a / np.linalg.norm(a)
+        c = np.asarray(self.child_point)
+        p = np.asarray(self.parent_point)
+        along = a * (a @ c)
+        across = c - along
+        turned = across * np.cos(angle) + np.cross(a, across) * np.sin(angle)
+        distance = float(np.linalg.norm(along + turned - p))
+        if distance < 1e-9:  # the points meet: the pull has no direction, a spring no kink
+            return 0.0, self.stiffness * float(across @ across)
+        half_slope = -float(p @ np.cross(a, turned))  # d(d^2/2)/dq
+        half_curvature = float(p @ turned) - float(a @ p) * float(a @ turned)
+        rate = half_slope / distance
+        rate_of_rate = (half_curvature - rate * rate) / distance
+        pull = self.stiffness * (distance - self.free_length) + self.force
+        return pull * rate, self.stiffness * rate * rate + pull * rate_of_rate
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,17 @@ from typing import Any
 import numpy as np
 
 from picchio.core.errors import InputError
-from picchio.fatigue import Cycles, SNCurve, damage
-from picchio.fatigue.allowable import largest_factor
+from picchio.fatigue.allowable_load import largest_factor
+from picchio.fatigue.counting.counter import Residue
+from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.mean_stress import Rule
-from picchio.fatigue.rainflow import Residue
-from picchio.model import Model
-from picchio.robot import FlexibleRobot, Joint
-from picchio.studies.task import Task
-from picchio.studies.uncertain_job import LifeJob, Place, place_of
+from picchio.fatigue.miner import damage
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.model.model import Model
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.joint import Joint
+from picchio.studies.tasks import Task
+from picchio.studies.uncertainty import LifeJob, Place, place_of
 
 _MOST_HITS = 1 << 10
 

@@ -8,8 +8,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from picchio.campaign.tables import FreeTable
-from picchio.core.model import Finite, Positive, StrictModel
-from picchio.core.toml import parse_toml
+from picchio.core.toml import Finite, Positive, StrictModel, parse_toml
 
 FORMAT = "picchio-mapping/1"
 FileKind = Literal["csv", "uff", "mcap", "matlab"]

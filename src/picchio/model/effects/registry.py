@@ -25,8 +25,8 @@ def catalogue() -> dict[str, type[Effect]]:
 
     package = importlib.import_module("picchio.model.effects")
     found: dict[str, type[Effect]] = {}
-    for info in pkgutil.iter_modules(package.__path__):
-        module = importlib.import_module(f"{package.__name__}.{info.name}")
+    for info in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+        module = importlib.import_module(info.name)
         for value in vars(module).values():
             if _is_effect(value) and value.__module__ == module.__name__:
                 _add(found, value)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from picchio.fatigue import load_sn_curve
+from picchio.fatigue.sn.library import load_sn_curve
 from picchio.paper.claims.registry import claim
 from picchio.paper.study import Study
 from picchio.paper.verdict import Finding, decided, unknown

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from picchio.paper.claims.registry import claim
-from picchio.paper.fourier import amplitude_and_phase
-from picchio.paper.series import printed_series
+from picchio.paper.fourier import amplitude_and_phase, printed_series
 from picchio.paper.study import Study
 from picchio.paper.verdict import PANEL, Finding, across, decided
 from picchio.paper.world import World

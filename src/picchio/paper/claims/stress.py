@@ -69,7 +69,8 @@ def direction(study: Study) -> Finding:
 @claim("fluctuates", "fig-8")
 def fluctuates(study: Study) -> Finding:
     """The stress goes up and down."""
-    from picchio.vibration import modal_analysis, steady_state
+    from picchio.vibration.closed_form.modes import modal_analysis
+    from picchio.vibration.closed_form.response import steady_state
 
     def moves(world: World) -> tuple[bool, float]:
         modes = modal_analysis(world.model.linear_system(world.rivet_poses[0]))

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from picchio.view.plots.style import STYLE
+from picchio.visuals.plots.style import STYLE
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from picchio.paper.figures.base import PaperFigure, panels, rounded
 from picchio.paper.fourier import amplitude_and_phase, printed_force, worst_of, worst_responses
 from picchio.paper.study import Study
-from picchio.view.plots.style import BLUE, INK, MUTED, VERMILION, look
+from picchio.visuals.plots.style import BLUE, INK, MUTED, VERMILION, look
 
 
 def figure_4(study: Study) -> PaperFigure:

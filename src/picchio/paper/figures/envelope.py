@@ -11,7 +11,7 @@ from picchio.paper.dominance import search_dominance
 from picchio.paper.figures.base import PaperFigure, panels, rounded
 from picchio.paper.study import Study
 from picchio.paper.world import World
-from picchio.view.plots.style import BLUE, COLOURS, GREY, INK, MUTED, VERMILION, look
+from picchio.visuals.plots.style import BLUE, COLOURS, GREY, INK, MUTED, VERMILION, look
 
 _COUNT = 60
 

@@ -12,7 +12,7 @@ from picchio.paper.figures.base import PaperFigure, panels, rounded
 from picchio.paper.reach import ReachMap
 from picchio.paper.study import Study
 from picchio.paper.verdict import plainly
-from picchio.view.plots.style import CMAP, INK, MUTED, VERMILION, look
+from picchio.visuals.plots.style import CMAP, INK, MUTED, VERMILION, look
 
 _NAMES = {"worst": "worst direction", "x": "force along x", "z": "force along z"}
 

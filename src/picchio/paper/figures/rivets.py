@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
+from picchio.paper.arm import rivet_points
 from picchio.paper.figures.base import PaperFigure, panels, rounded
-from picchio.paper.pattern import rivet_points
 from picchio.paper.study import Study
 from picchio.paper.table2.place import FREE, decode
 from picchio.paper.world import World
-from picchio.view.plots.style import BLUE, INK, MUTED, look
+from picchio.visuals.plots.style import BLUE, INK, MUTED, look
 
 
 def figure_12(study: Study) -> PaperFigure:

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from picchio.paper.figures.base import PaperFigure, panels, rounded
 from picchio.paper.study import Study
-from picchio.view.plots.style import BLUE, GREY, INK, MUTED, ORANGE, VERMILION
+from picchio.visuals.plots.style import BLUE, GREY, INK, MUTED, ORANGE, VERMILION
 
 
 def lives(study: Study) -> PaperFigure:

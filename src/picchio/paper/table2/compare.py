@@ -13,14 +13,7 @@ from picchio.core.arrays import FloatArray
 from picchio.paper.assumptions import Assumptions
 from picchio.paper.printed import Printed
 from picchio.paper.table2.by_curve import penalty, rounding_of
-from picchio.paper.table2.fit import (
-    Fit,
-    Target,
-    described,
-    evaluate,
-    refine,
-    whole_target,
-)
+from picchio.paper.table2.fit import Fit, Target, described, evaluate, refine, whole_target
 from picchio.paper.table2.place import FREE, Place, limits
 from picchio.paper.table2.rules import Rule, at_mean, rules
 

@@ -8,13 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.excitation import PulseTrain
-from picchio.paper.arm import arm, poses_at
+from picchio.excitation.trains import PulseTrain
+from picchio.paper.arm import arm, poses_at, rivet_points
 from picchio.paper.assumptions import Assumptions
-from picchio.paper.pattern import rivet_points
+from picchio.paper.fourier import printed_series
 from picchio.paper.printed import Printed
-from picchio.paper.series import printed_series
-from picchio.robot import FlexibleRobot
+from picchio.robot.flexible_robot import FlexibleRobot
 
 FREE = ("period", "duty", "damping_ratio", "panel_x", "panel_y", "panel_z", "pitch")
 """Fitted with every hypothesis, and the stress per twist, which is solved for: the same freedom."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.model.effects import Effect
+from picchio.model.effects.effect import Effect
 from picchio.model.motion import Motion
 
 _SUBSTEPS = 4

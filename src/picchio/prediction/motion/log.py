@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from picchio.campaign import Campaign, Record
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.robot import FlexibleRobot
+from picchio.robot.flexible_robot import FlexibleRobot
 
 _STANDS = 0.01
 

@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.model.effects import Effect
+from picchio.model.effects.effect import Effect
 from picchio.model.motion import RIPPLE, ROTOR, TORQUE, WINDUP, Motion
-from picchio.prediction.motion.filters import Band
-from picchio.prediction.motion.fractional_delay import shift, shift_smooth
+from picchio.prediction.motion.filters import Band, shift, shift_smooth
 from picchio.prediction.motion.log import MotionLog
 from picchio.prediction.motion.rigid import rigid_motion
-from picchio.robot import FlexibleRobot
+from picchio.robot.flexible_robot import FlexibleRobot
 
 _KEPT = 400
 Part = tuple[str, str, FloatArray]

@@ -10,8 +10,8 @@ from picchio.core.arrays import FloatArray
 from picchio.model.motion import Motion
 from picchio.prediction.motion.filters import Band
 from picchio.prediction.motion.log import MotionLog
-from picchio.robot import FlexibleRobot
-from picchio.robot.statics import balancing
+from picchio.robot.dynamics.statics import balancing
+from picchio.robot.flexible_robot import FlexibleRobot
 
 _STILL = 0.01  # of the fastest
 

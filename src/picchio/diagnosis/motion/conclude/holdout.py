@@ -1,0 +1,84 @@
+"""How much better the extended model predicts records that it has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.diagnosis.motion.data.system import Group, System
+from picchio.diagnosis.motion.fit.least_squares import Fit
+from picchio.diagnosis.motion.fit.state import State
+from picchio.diagnosis.result import Gain
+from picchio.model.motion import RIPPLE
+
+_THERE = 0.05
+
+
+def judged_groups(system: System, fitted: Fit) -> list[Group]:
+    """Torques in the band and windups; what is above the band where a claimed ripple is there."""
+    state = fitted.state
+    found = [g for g in system.groups if g[0] != RIPPLE]
+    if not any(e.name == "torque_ripple" for e in state.effects):
+        return found
+    predicted = system.predict(state.every, state.scales)
+    for group in system.groups:
+        rows = np.concatenate([np.arange(s.rows.start, s.rows.stop) for s in system.of(group)])
+        if group[0] == RIPPLE and np.std(predicted[rows]) > _THERE * np.std(system.measured[rows]):
+            found.append(group)
+    return found
+
+
+def residual_of(system: System, state: State) -> FloatArray:
+    """(rows,) measured less predicted."""
+    return system.measured - system.predict(state.every, state.scales)
+
+
+def judge(
+    system: System,
+    before: State,
+    after: State,
+    noise: Mapping[Group, float],
+    groups: Collection[Group],
+    train: tuple[str, ...],
+) -> Gain:
+    """Gain on a system.
+
+    Every channel's residual over its noise and the square root of its samples, all channels
+    together, relative to the signal so weighted.
+    """
+    sums = np.zeros(4)
+    parts = (system.measured, residual_of(system, before), residual_of(system, after))
+    for s in system.segments:
+        if s.group in groups:
+            for i, values in enumerate(parts):
+                sums[i] += float(np.mean(values[s.rows] ** 2)) / noise[s.group] ** 2
+            sums[3] += 1.0
+    signal = max(sums[0], 1e-300)
+    return Gain(
+        train_records=train,
+        held_out_records=tuple(log.file for log in system.logs),
+        baseline_nrmse=float(np.sqrt(sums[1] / signal)),
+        extended_nrmse=float(np.sqrt(sums[2] / signal)),
+        noise_floor_nrmse=float(np.sqrt(sums[3] / signal)),
+    )
+
+
+def table(
+    system: System, before: State, after: State, noise: Mapping[Group, float]
+) -> list[dict[str, object]]:
+    """Record by record and channel by channel: RMS measured, left before, left after, noise."""
+    left, less = residual_of(system, before), residual_of(system, after)
+    rms = lambda x: float(np.sqrt(np.mean(x**2)))  # noqa: E731
+    return [
+        {
+            "record": system.logs[s.record].file,
+            "channel": ".".join(s.group),
+            "measured": rms(s.measured),
+            "baseline": rms(left[s.rows]),
+            "extended": rms(less[s.rows]),
+            "noise": noise[s.group],
+        }
+        for s in system.segments
+    ]

@@ -1,0 +1,92 @@
+"""Fitted numbers in the units that people expect: causes, and nuisances."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from picchio.diagnosis.motion.data.system import System
+from picchio.diagnosis.motion.fit.least_squares import Fit
+from picchio.diagnosis.motion.fit.state import INVERSE
+from picchio.diagnosis.result import Cause, Value
+from picchio.model.effects.effect import Effect
+from picchio.robot.flexible_robot import FlexibleRobot
+
+_PRISMATIC = {"N*m": "N", "N*m*s/rad": "N*s/m", "kg*m^2": "kg", "rad/s": "m/s", "rad": "m"}
+_POSES = 50
+
+
+def unit_of(robot: FlexibleRobot, target: str, unit: str) -> str:
+    """A parameter's unit; newtons and metres where the joint is prismatic."""
+    joint = robot.tree.joints.get(target)
+    prismatic = joint is not None and joint.type == "prismatic"
+    return _PRISMATIC.get(unit, unit) if prismatic else unit
+
+
+def cause(system: System, current: Fit, index: int, confidence: float) -> Cause:
+    """An effect of a fit as a cause, with standard deviations."""
+    effect = current.state.effects[index]
+    number = len(current.state.nuisances) + index
+    return Cause(effect.name, effect.target, confidence,
+                 parameters(system, current, effect, number))  # fmt: skip
+
+
+def parameters(system: System, current: Fit, effect: Effect, number: int) -> dict[str, Value]:
+    """The parameters that were fitted, and what follows from them."""
+    robot = system.robot
+    std = {
+        c.name: float(s)
+        for c, s in zip(current.coordinates, current.std, strict=True) if c.index == number
+    }  # fmt: skip
+    found: dict[str, Value] = {}
+    for p in effect.parameters:
+        if p.name not in std and p.name != "order":
+            continue
+        # An order that is locked to the motor's turn has no spread.
+        value, spread = effect.values[p.name], std.get(p.name, 0.0)
+        if (effect.name, p.name) in INVERSE:
+            spread *= value**2
+        found[p.name] = Value(float(value), spread, unit_of(robot, effect.target, p.unit))
+    if effect.name == "joint_stiffness" and "scale" in found:
+        stated = dict(zip(robot.flexible_names, robot.stiffness, strict=True))
+        documented = float(stated[effect.target])
+        unit = "N/m" if unit_of(robot, effect.target, "rad") == "m" else "N*m/rad"
+        scale = found["scale"]
+        found["stiffness"] = Value(scale.value * documented, scale.std * documented, unit)
+    if effect.name == "torque_ripple" and {"cosine", "sine"} <= found.keys():
+        cosine, sine = found["cosine"], found["sine"]
+        size = math.hypot(cosine.value, sine.value)
+        spread = math.hypot(cosine.value * cosine.std, sine.value * sine.std) / max(size, 1e-300)
+        found["amplitude"] = Value(size, spread, cosine.unit)
+    return found
+
+
+def nuisances(system: System, current: Fit) -> dict[str, Value]:
+    """Inertias and stated frictions as fitted."""
+    found: dict[str, Value] = {}
+    inertia = mean_inertia(system)
+    for c, std in zip(current.coordinates, current.std, strict=True):
+        if c.index < 0:
+            size = inertia[c.name]
+            unit = unit_of(system.robot, c.name, "kg*m^2")
+            found[f"inertia.{c.name}"] = Value(c.value * size, float(std) * size, unit)
+        elif c.index < len(current.state.nuisances):
+            effect = current.state.nuisances[c.index]
+            unit = next(p.unit for p in effect.parameters if p.name == c.name)
+            found[f"{effect.name}.{effect.target}"] = Value(
+                c.value, float(std), unit_of(system.robot, effect.target, unit)
+            )
+    return found
+
+
+def mean_inertia(system: System) -> dict[str, float]:
+    """Joint -> the mass matrix's diagonal, mean over the poses of the records."""
+    robot, total = system.robot, []
+    for predictor in system.predictors:
+        angle = predictor.nominal.angle
+        step = max(1, predictor.log.samples // _POSES)
+        zero = np.zeros(predictor.log.samples)
+        poses = np.column_stack([angle.get(joint, zero) for joint in robot.joint_names])[::step]
+        total.append(np.mean([np.diag(robot.rigid.mass_matrix(q.copy())) for q in poses], axis=0))
+    return dict(zip(robot.joint_names, np.mean(total, axis=0).tolist(), strict=True))

@@ -1,0 +1,1 @@
+"""When something may be said: equivalence, and every record held out."""

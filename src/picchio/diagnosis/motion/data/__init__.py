@@ -1,0 +1,1 @@
+"""Motion records as equations, and their noise."""

@@ -1,0 +1,186 @@
+"""All equations of a set of motion records, stacked: what was measured, what is predicted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.model.effects.effect import Effect
+from picchio.model.motion import RIPPLE, TORQUE, WINDUP
+from picchio.prediction.motion.filters import Band
+from picchio.prediction.motion.log import MotionLog
+from picchio.prediction.motion.readings import Around, Predictor, Readings
+from picchio.robot.flexible_robot import FlexibleRobot
+
+Group = tuple[str, str]  # (kind, joint)
+BLOCKS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """The samples of one group in one record.
+
+    Attributes:
+        record: which, by number.
+        group: kind and joint.
+        samples: which samples of the record.
+        rows: which rows of the system.
+        measured: at those samples; of a windup, less its mean.
+    """
+
+    record: int
+    group: Group
+    samples: np.ndarray
+    rows: slice
+    measured: FloatArray
+
+
+class System:
+    """The equations of some records.
+
+    Three kinds: "torque" in the band, "ripple" above it, and "windup", link side less motor
+    side. A joint that stands tells nothing (friction holds it at any torque within its limit):
+    only samples at which it moves count in the first two. A windup's mean is a nuisance of the
+    record and taken off both sides.
+
+    Args:
+        robot: the nominal robot.
+        logs: the records.
+        cutoff: Hz.
+    """
+
+    def __init__(self, robot: FlexibleRobot, logs: Sequence[MotionLog], cutoff: float) -> None:
+        self.robot, self.logs, self.cutoff = robot, list(logs), cutoff
+        self.predictors = [Predictor(robot, log, Band(cutoff, log.rate)) for log in logs]
+        self.segments: list[Segment] = []
+        first = 0
+        for record, (log, predictor) in enumerate(zip(self.logs, self.predictors, strict=True)):
+            for group, samples in _choose(log, predictor):
+                measured = _measured(log, predictor.band, group)[samples]
+                if group[0] == WINDUP:
+                    measured = measured - measured.mean()
+                rows = slice(first, first + samples.size)
+                first = rows.stop
+                self.segments.append(Segment(record, group, samples, rows, measured))
+        self.size = first
+        self.groups = tuple(dict.fromkeys(s.group for s in self.segments))
+        self.measured = np.concatenate([s.measured for s in self.segments]) if first else (
+            np.zeros(0)
+        )  # fmt: skip
+        self.block = self._blocks()
+
+    def _blocks(self) -> np.ndarray:
+        """(rows,) in which stretch of which record a row lies."""
+        found = np.empty(self.size, dtype=np.intp)
+        for s in self.segments:
+            part = s.samples * BLOCKS // self.logs[s.record].samples
+            found[s.rows] = s.record * BLOCKS + np.minimum(part, BLOCKS - 1)
+        return found
+
+    def of(self, group: Group) -> list[Segment]:
+        """The segments of a group."""
+        return [s for s in self.segments if s.group == group]
+
+    def predict(
+        self,
+        effects: Sequence[Effect],
+        scales: Mapping[str, float],
+        only: Effect | None = None,
+        base: FloatArray | None = None,
+    ) -> FloatArray:
+        """(rows,) prediction.
+
+        Args:
+            effects: all that act.
+            scales: joint -> factor on the rigid-body torque.
+            only: where only this effect differs from `base`, records that it can't concern are
+                copied from there.
+            base: an earlier prediction.
+        """
+        out = np.zeros(self.size) if base is None else base.copy()
+        readings: dict[int, Readings] = {}
+        joint = only.target if only is not None and only.target_kind == "joint" else None
+        for s in self.segments:
+            if only is not None and base is not None and not self._concerns(only, s):
+                continue
+            if s.record not in readings:
+                readings[s.record] = self.predictors[s.record].predict(effects, scales, joint)
+            found = {TORQUE: readings[s.record].torque, RIPPLE: readings[s.record].ripple,
+                     WINDUP: readings[s.record].windup}[s.group[0]]  # fmt: skip
+            values = found[s.group[1]][s.samples]
+            out[s.rows] = values - values.mean() if s.group[0] == WINDUP else values
+        return out
+
+    def around(self, effects: Sequence[Effect]) -> list[Around]:
+        """What all effects together do to each one's term, record by record."""
+        return [predictor.around(effects) for predictor in self.predictors]
+
+    def by_scale(self, around: Sequence[Around], joint: str) -> FloatArray:
+        """(rows,) derivative by the factor on a joint's rigid-body torque."""
+        return self._rows(
+            joint, [p.by_scale(a, joint) for p, a in zip(self.predictors, around, strict=True)]
+        )
+
+    def by_parameter(
+        self, around: Sequence[Around], effect: Effect, other: Effect, name: str, step: float
+    ) -> FloatArray | None:
+        """(rows,) derivative by an effect's parameter, as `Predictor.by_parameter` has it."""
+        found: list[Readings] = []
+        for predictor, each in zip(self.predictors, around, strict=True):
+            readings = predictor.by_parameter(each, effect, other, name, step)
+            if readings is None:
+                return None
+            found.append(readings)
+        return self._rows(effect.target, found)
+
+    def _rows(self, joint: str, readings: Sequence[Readings]) -> FloatArray:
+        """(rows,) what one joint's readings are there, record by record."""
+        out = np.zeros(self.size)
+        for s in self.segments:
+            if s.group[1] != joint:
+                continue
+            found = readings[s.record]
+            series = {TORQUE: found.torque, RIPPLE: found.ripple, WINDUP: found.windup}[s.group[0]]
+            if joint in series:
+                values = series[joint][s.samples]
+                out[s.rows] = values - values.mean() if s.group[0] == WINDUP else values
+        return out
+
+    @staticmethod
+    def _concerns(effect: Effect, segment: Segment) -> bool:
+        return effect.target_kind != "joint" or effect.target == segment.group[1]
+
+
+def _choose(log: MotionLog, predictor: Predictor) -> list[tuple[Group, np.ndarray]]:
+    band, nominal = predictor.band, predictor.nominal
+    edge = band.edges(log.samples)
+    inner = np.arange(edge, log.samples - edge)
+    # What is above the band feels the ends for a shorter time.
+    short = int(np.ceil(log.rate / band.cutoff))
+    ripple_inner = np.arange(min(short, edge), log.samples - min(short, edge))
+    found: list[tuple[Group, np.ndarray]] = []
+    moving = set(log.moving)
+    for joint in log.torque:
+        if joint not in moving:
+            continue
+        moves = np.abs(nominal.velocity[joint][inner]) > nominal.still[joint]
+        every = inner[moves]
+        thinned = every[every % band.step == 0]
+        if thinned.size >= 2 * BLOCKS:
+            found.append(((TORQUE, joint), thinned))
+            if band.step > 1:
+                speed = np.abs(nominal.velocity[joint][ripple_inner])
+                found.append(((RIPPLE, joint), ripple_inner[speed > nominal.still[joint]]))
+    found += [((WINDUP, joint), inner) for joint in log.link if joint in moving]
+    return found
+
+
+def _measured(log: MotionLog, band: Band, group: Group) -> FloatArray:
+    kind, joint = group
+    if kind == WINDUP:
+        return log.link[joint] - log.angle[joint]
+    slow = band.low_pass(log.torque[joint])
+    return slow if kind == TORQUE else log.torque[joint] - slow

@@ -1,0 +1,1 @@
+"""Weighted least squares of motion records."""

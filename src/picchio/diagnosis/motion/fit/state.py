@@ -1,0 +1,130 @@
+"""What is currently believed: effects with values, nuisances, and what may be varied."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from picchio.model.effects.effect import Effect, Parameter
+
+# A motion's baseline takes drives as rigid: these parameters enter by their inverse, from zero.
+INVERSE = frozenset({("joint_stiffness", "scale")})
+_SMALL = 1e-3
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One number that a fit may vary.
+
+    Attributes:
+        index: of the effect in `State.every`; -1 for a factor on a joint's rigid-body torque.
+        name: the effect's parameter, or the joint.
+        value: now.
+        lower: smallest allowed.
+        upper: largest.
+        step: for differences.
+        prior: standard deviation about `centre`, or None.
+        centre: of the prior.
+    """
+
+    index: int
+    name: str
+    value: float
+    lower: float
+    upper: float
+    step: float
+    prior: float | None = None
+    centre: float = 0.0
+
+
+@dataclass(frozen=True)
+class State:
+    """Effects and nuisances with their values.
+
+    Attributes:
+        nuisances: effects that the nominal robot has in it with unknown values.
+        effects: those claimed so far.
+        scales: joint -> factor on its rigid-body torque, within the tolerance.
+        tolerance: relative standard deviation of that factor.
+        fixed: joints whose factor an effect has taken over: it is 1.
+    """
+
+    nuisances: tuple[Effect, ...] = ()
+    effects: tuple[Effect, ...] = ()
+    scales: Mapping[str, float] = field(default_factory=dict)
+    tolerance: float = 0.05
+    fixed: frozenset[str] = frozenset()
+
+    @property
+    def every(self) -> tuple[Effect, ...]:
+        """Nuisances, then effects."""
+        return self.nuisances + self.effects
+
+    def coordinates(self, rate: float) -> list[Coordinate]:
+        """What may be varied."""
+        found = [
+            Coordinate(-1, joint, value, 1.0 - 2.0 * self.tolerance, 1.0 + 2.0 * self.tolerance,
+                       0.01, self.tolerance, 1.0)
+            for joint, value in self.scales.items() if joint not in self.fixed
+        ]  # fmt: skip
+        for index, effect in enumerate(self.every):
+            found += effect_coordinates(effect, index, rate)
+        return found
+
+    def moved(self, coordinate: Coordinate, value: float) -> State:
+        """With another value of one coordinate."""
+        if coordinate.index < 0:
+            return replace(self, scales={**self.scales, coordinate.name: value})
+        effect = self.every[coordinate.index]
+        changed = with_coordinate(effect, coordinate.name, value)
+        count = len(self.nuisances)
+        if coordinate.index < count:
+            every = list(self.nuisances)
+            every[coordinate.index] = changed
+            return replace(self, nuisances=tuple(every))
+        every = list(self.effects)
+        every[coordinate.index - count] = changed
+        return replace(self, effects=tuple(every))
+
+    def with_effect(self, effect: Effect) -> State:
+        """With one effect more."""
+        return replace(self, effects=(*self.effects, effect))
+
+    def without(self, index: int) -> State:
+        """Without the effect of this number."""
+        kept = tuple(e for i, e in enumerate(self.effects) if i != index)
+        return replace(self, effects=kept)
+
+
+def effect_coordinates(effect: Effect, index: int, rate: float) -> list[Coordinate]:
+    """An effect's parameters as a fit varies them."""
+    found = []
+    for p in effect.parameters:
+        value, lower, upper = effect.values[p.name], p.lower, p.upper
+        if p.name == "order" and value.is_integer():
+            continue  # locked to the motor's turn: no measured order is whole to the last digit
+        if (effect.name, p.name) in INVERSE:
+            value, lower, upper = 1.0 / value, 1.0 / p.upper, 1.0 / p.lower
+            step = 0.1
+        else:
+            step = _step(p, value, rate)
+        found.append(Coordinate(index, p.name, value, lower, upper, step))
+    return found
+
+
+def with_coordinate(effect: Effect, name: str, value: float) -> Effect:
+    """The effect with one parameter set as a fit sees it."""
+    if (effect.name, name) in INVERSE:
+        value = 1.0 / max(value, _SMALL)
+    bounds = next(p for p in effect.parameters if p.name == name)
+    return effect.with_values(**{name: min(max(value, bounds.lower), bounds.upper)})
+
+
+def _step(p: Parameter, value: float, rate: float) -> float:
+    if p.unit == "s":
+        return 0.1 / rate
+    if p.name == "order":
+        return 1e-5 * value
+    if p.logarithmic:
+        return 1e-3 * value
+    return min(1.0, _SMALL * (p.upper - p.lower))

@@ -1,0 +1,232 @@
+"""Diagnosis of motion records: the robot moves, nothing hits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any
+
+from picchio.campaign.campaign import Campaign
+from picchio.core.errors import InputError
+from picchio.diagnosis.motion.conclude.holdout import judge, judged_groups, table
+from picchio.diagnosis.motion.conclude.values import cause, nuisances
+from picchio.diagnosis.motion.criteria.equivalence import rivals
+from picchio.diagnosis.motion.criteria.every_record import validate
+from picchio.diagnosis.motion.data.baseline import baseline
+from picchio.diagnosis.motion.data.noise import noise_levels
+from picchio.diagnosis.motion.data.split import split
+from picchio.diagnosis.motion.data.system import Group, System
+from picchio.diagnosis.motion.fit.instruments import instrument_shifts
+from picchio.diagnosis.motion.fit.least_squares import Fit, fit
+from picchio.diagnosis.motion.fit.state import State
+from picchio.diagnosis.motion.follow_up.advice import next_measurement
+from picchio.diagnosis.motion.search.candidates import motion_effects
+from picchio.diagnosis.motion.search.score import Scorer
+from picchio.diagnosis.motion.search.select import RIPPLE, Step, eliminate, necessity, select
+from picchio.diagnosis.result import MOSTLY, Cause, Diagnosis, Gain, Verdict
+from picchio.model.effects.effect import Effect
+from picchio.model.effects.registry import catalogue as all_effects
+from picchio.prediction.motion.filters import choose_cutoff
+from picchio.prediction.motion.log import MotionLog, read_logs
+from picchio.robot.flexible_robot import FlexibleRobot
+
+_NOISE = 1.15  # residual over noise that counts as noise: noise is known to about a tenth
+_SURE = 0.9999
+_READINGS = ("encoder_delay",)
+Pair = tuple[str, str]
+
+
+def diagnose_motion(
+    robot: FlexibleRobot,
+    campaign: Campaign,
+    *,
+    catalogue: Collection[str] | None = None,
+    without: Collection[str] = (),
+    train: Sequence[str] | None = None,
+    held_out: Sequence[str] | None = None,
+    cutoff: float | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Diagnosis:
+    """What the simulation gets wrong about a moving robot, why, and the gain of knowing it.
+
+    Predicted are the drives' torques (inverse dynamics of the measured motion) and, of joints
+    with two encoders, the link side's angle less the motor side's. Effects are added one by one
+    while stretches of the training records that were not fitted to gain; then those that are not
+    needed are taken out; then, where two or more records are held out, those that lose there.
+
+    Args:
+        robot: the nominal robot.
+        campaign: its motion records; others are passed over.
+        catalogue: names of the effects that may be claimed; all where None.
+        without: names of effects that must not be considered.
+        train: files of the records to fit to; see `picchio.diagnosis.motion.data.split`.
+        held_out: files of the records to judge on.
+        cutoff: Hz, of the band in which torques are compared; chosen from the encoders' noise
+            where None.
+        progress: told (step, steps).
+
+    Returns:
+        the diagnosis; `details` has the equations and states before and after, the steps of the
+        search, a table of all channels, what instrumental variables would change of the numbers
+        and, of joints whose elasticity was found, how it compares with what is documented.
+
+    Raises:
+        InputError: no motion record, a joint that the robot lacks, an unknown effect or file.
+    """
+    for name in (*(catalogue or ()), *without):
+        if name not in all_effects():
+            raise InputError("no such effect", value=name, choices=all_effects())
+    logs = read_logs(robot, campaign)
+    inside, outside = split(logs, train, held_out)
+    if cutoff is None:
+        cutoff = choose_cutoff(_moving(inside))
+    system = System(robot, inside, cutoff)
+    if not system.groups:
+        raise InputError("the records hold no torque and no second encoder of a joint that moves",
+                         file=campaign.folder)  # fmt: skip
+    judge_on = System(robot, outside, cutoff) if outside else system
+    kinds = {n: k for n, k in motion_effects(catalogue).items() if n not in without}
+    start = baseline(system, campaign.tolerance.force)
+    before = fit(system, start)
+    found, steps = select(system, start, kinds, progress or (lambda done, total: None))
+    dropped: list[tuple[Effect, dict[str, float]]] = []
+    if outside:
+        found, dropped = validate(system, judge_on, found)
+        # What stood only beside a cause that is gone goes, too.
+        found = eliminate(system, found) if dropped else found
+    found = fit(system, found.state)
+    return _conclude(system, judge_on, before, found, kinds, steps, dropped)
+
+
+def _moving(logs: Sequence[MotionLog]) -> list[Any]:
+    return [(log.angle[joint], log.rate) for log in logs for joint in log.moving]
+
+
+def _conclude(system: System, judge_on: System, before: Fit, found: Fit,
+              kinds: Mapping[str, type[Effect]], steps: list[Step],
+              dropped: list[tuple[Effect, dict[str, float]]]) -> Diagnosis:  # fmt: skip
+    noise = noise_levels(system)
+    outer = {**noise, **noise_levels(judge_on)} if judge_on is not system else noise
+    groups = judged_groups(judge_on, found)
+    train = tuple(log.file for log in system.logs)
+    gain = judge(judge_on, before.state, found.state, outer, groups, train)
+    scorer = Scorer(system, found)
+    sure = []
+    for index in range(len(found.state.effects)):
+        score = necessity(scorer, index)
+        sure.append(min(_SURE, score.confidence) if score is not None else 0.5)
+    alike = rivals(system, found, kinds)
+    order = sorted(
+        range(len(found.state.effects)),
+        key=lambda i: (found.state.effects[i].name == RIPPLE, i),
+    )  # fmt: skip
+    causes = tuple(cause(system, found, i, sure[i]) for i in order)
+    verdict = _verdict(system, before, found, noise, gain)
+    # The search stopped where nothing more could be claimed: what helped a little then.
+    leads = _leads(steps, found.state, dropped)
+    if verdict == "unexplained":
+        leads = tuple(dict.fromkeys([*_labels(found.state), *leads]))
+        causes = ()
+    alternatives = _alternatives(found.state, alike) if causes else ()
+    if verdict == "named" and alternatives:
+        verdict = "ambiguous"
+    return Diagnosis(
+        verdict=verdict,
+        causes=causes,
+        alternatives=alternatives,
+        leads=leads if verdict in ("partial", "unexplained") else (),
+        nuisances=nuisances(system, found),
+        gain=gain,
+        next_measurement=next_measurement(system, found, noise, alike)
+        if verdict not in ("nothing-wrong", "named") else None,
+        scores=tuple(row for step in steps for row in step.scores),
+        details=_details(system, judge_on, before, found, outer, steps, causes, dropped, kinds),
+    )  # fmt: skip
+
+
+def _verdict(system: System, before: Fit, found: Fit, noise: Mapping[Group, float],
+             gain: Gain) -> Verdict:  # fmt: skip
+    if not found.state.effects:
+        quiet = _quiet(before, noise, judged_groups(system, before))
+        return "nothing-wrong" if quiet else "unexplained"
+    if _quiet(found, noise, judged_groups(system, found)) and (
+        gain.extended_nrmse <= _NOISE * gain.noise_floor_nrmse
+    ):
+        return "named"
+    explained = gain.explained
+    return "partial" if explained is not None and explained >= MOSTLY else "unexplained"
+
+
+def _quiet(found: Fit, noise: Mapping[Group, float], groups: Sequence[Group]) -> bool:
+    return all(found.level[g] <= _NOISE * noise[g] for g in groups)
+
+
+def _labels(state: State) -> list[Pair]:
+    return [(e.name, e.target) for e in state.effects]
+
+
+def _leads(steps: list[Step], state: State,
+           dropped: list[tuple[Effect, dict[str, float]]]) -> tuple[Pair, ...]:  # fmt: skip
+    claimed = set(_labels(state))
+    last = next((s for s in reversed(steps) if s.scores), None)
+    rows = last.scores if last is not None else ()
+    helped = [(r["effect"], r["target"]) for r in rows if r["gain"] > 1.0 and r["admissible"]]
+    every = [*((e.name, e.target) for e, _ in dropped), *helped]
+    return tuple(dict.fromkeys(p for p in every if p not in claimed))[:8]
+
+
+def _alternatives(state: State, alike: Mapping[int, Sequence[Pair]]) -> tuple[
+        tuple[Pair, ...], ...]:  # fmt: skip
+    labels = _labels(state)
+    return tuple(
+        tuple(dict.fromkeys(other if i == index else label for i, label in enumerate(labels)))
+        for index, others in alike.items() for other in others
+    )  # fmt: skip
+
+
+def _details(system: System, judge_on: System, before: Fit, found: Fit,
+             noise: Mapping[Group, float], steps: list[Step], causes: tuple[Cause, ...],
+             dropped: list[tuple[Effect, dict[str, float]]],
+             kinds: Mapping[str, type[Effect]]) -> dict[str, Any]:  # fmt: skip
+    inner = {**noise, **{g: noise.get(g, 1.0) for g in system.groups}}
+    return {
+        "cutoff": system.cutoff,
+        "steps": [
+            {"accepted": s.accepted, "levels": dict(s.levels), "scores": list(s.scores)}
+            for s in steps
+        ],
+        "train": table(system, before.state, found.state, inner),
+        "held_out": table(judge_on, before.state, found.state, noise),
+        "dropped": [
+            {"effect": e.name, "target": e.target, "order": e.values.get("order"), "gain": dict(g)}
+            for e, g in dropped
+        ],
+        "stiffness": _stiffness(system, found, causes),
+        "instruments": instrument_shifts(system, found),
+        "systems": {"train": system, "held_out": judge_on},
+        "baseline": before.state,
+        "extended": found.state,
+    }
+
+
+def _stiffness(system: System, found: Fit, causes: tuple[Cause, ...]) -> dict[str, Any]:
+    """Joint -> stiffness found, documented, and what it would be with delays not accounted for."""
+    springs = [c for c in causes if c.effect == "joint_stiffness"]
+    if not springs:
+        return {}
+    late = [i for i, e in enumerate(found.state.effects) if e.name in _READINGS]
+    other = found.state
+    for i in reversed(late):
+        other = other.without(i)
+    without = fit(system, other) if late else found
+    scale = {e.target: e.values["scale"] for e in without.state.effects
+             if e.name == "joint_stiffness"}  # fmt: skip
+    documented = dict(zip(system.robot.flexible_names, system.robot.stiffness, strict=True))
+    return {
+        c.target: {
+            "found": float(c.parameters["stiffness"].value),
+            "documented": float(documented[c.target]),
+            "ratio": c.parameters["scale"].value,
+            "ratio_without_delay": scale[c.target],
+        }
+        for c in springs
+    }

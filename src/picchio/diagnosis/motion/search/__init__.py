@@ -1,0 +1,1 @@
+"""The search for causes: candidates, scores, ripple orders, selection."""

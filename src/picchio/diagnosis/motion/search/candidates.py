@@ -1,0 +1,164 @@
+"""What might be wrong: every effect of the catalogue at every place where it can act."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.diagnosis.motion.data.system import System
+from picchio.diagnosis.motion.fit.least_squares import Fit, clean, jacobian
+from picchio.diagnosis.motion.fit.state import INVERSE, Coordinate, effect_coordinates
+from picchio.diagnosis.motion.search.orders import find_orders
+from picchio.model.effects.effect import Effect
+from picchio.model.effects.registry import catalogue
+from picchio.model.motion import TORQUE, WINDUP
+from picchio.prediction.motion.readings import Around
+
+_RIPPLE = "torque_ripple"
+# Where two explain the same, the first is more usual in a drive. What the data can't tell apart
+# is told as a set; this only says which is put first.
+_USUAL = ("encoder_delay", "payload", "coulomb_friction", "viscous_friction", "asymmetric_friction",
+          "load_friction", "stribeck_friction", "joint_inertia", "torque_offset", "torque_gain",
+          "joint_stiffness", "backlash", "torque_ripple")  # fmt: skip
+
+# These describe how dry friction varies: they make no sense where there is none.
+_NEEDS = {"asymmetric_friction": "coulomb_friction", "stribeck_friction": "coulomb_friction",
+          "load_friction": "coulomb_friction"}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An effect to be tried: it starts as nothing, with what is searched for set.
+
+    Attributes:
+        effect: at its neutral values, its nonlinear ones set.
+        columns: (rows, c) what the data would change by.
+        coordinates: those of the columns.
+        neutral: (c,) where nothing changes.
+        searched: how many parameters were searched for.
+        noise: power of a sample's noise as a line sees it; None of what is no line.
+    """
+
+    effect: Effect
+    columns: FloatArray
+    coordinates: list[Coordinate]
+    neutral: FloatArray
+    searched: int = 0
+    noise: float | None = None
+
+    @property
+    def label(self) -> tuple[str, str]:
+        """Effect and target."""
+        return self.effect.name, self.effect.target
+
+    def started(self, values: tuple[float, ...]) -> Effect:
+        """The effect at values of its coordinates."""
+        from picchio.diagnosis.motion.fit.state import with_coordinate
+
+        effect = self.effect
+        for c, value in zip(self.coordinates, values, strict=True):
+            effect = with_coordinate(effect, c.name, float(np.clip(value, c.lower, c.upper)))
+        return effect
+
+
+def motion_effects(names: Collection[str] | None = None) -> dict[str, type[Effect]]:
+    """Those of the catalogue that change a motion record."""
+    return {
+        name: kind for name, kind in catalogue().items()
+        if kind.motion is not Effect.motion and (names is None or name in names)
+    }  # fmt: skip
+
+
+def targets(kind: type[Effect], system: System) -> list[str]:
+    """Where an effect could act in these records."""
+    robot = system.robot
+    if kind.target_kind == "tool":
+        return ["tool"]
+    if kind.target_kind == "channel group":
+        groups = {group for log in system.logs for group in log.group.values()}
+        groups |= {"position" for log in system.logs if log.link}
+        groups |= {TORQUE for log in system.logs if log.torque}
+        return sorted(groups)
+    wound = [joint for kind_, joint in system.groups if kind_ == WINDUP]
+    driven = [joint for kind_, joint in system.groups if kind_ == TORQUE]
+    if kind.name == "joint_stiffness":
+        return [joint for joint in wound if joint in robot.flexible_names]
+    if kind.name == "backlash":
+        return wound
+    return driven
+
+
+def candidates(
+    system: System, base: Fit, kinds: dict[str, type[Effect]], near: str | None = None
+) -> list[Candidate]:
+    """Everything that may be added to a fit.
+
+    Args:
+        system: the training equations.
+        base: the fit.
+        kinds: the catalogue.
+        near: only what acts at this target, or on more than a joint.
+    """
+    taken = {(e.name, e.target) for e in base.state.every}
+    predicted = system.measured - base.residual
+    around = system.around(base.state.every)
+    found: list[Candidate] = []
+    for name in sorted(kinds, key=usual):
+        kind = kinds[name]
+        for target in targets(kind, system):
+            if near not in (None, target) and kind.target_kind == "joint":
+                continue
+            if name == _RIPPLE:
+                for line in find_orders(system, base.residual, target, base.state):
+                    effect = kind(target, order=line.order)
+                    made = _make(system, base, predicted, effect, {"order"}, around)
+                    found += [replace(each, noise=line.noise) for each in made]
+            elif (name, target) not in taken and _NEEDS.get(name, "") in ("", *(
+                effect for effect, where in taken if where == target
+            )):  # fmt: skip
+                for trial in _trials(system, kind, target):
+                    effect = kind(target, **trial)
+                    found += _make(system, base, predicted, effect, set(trial), around)
+    return found
+
+
+def usual(name: str) -> tuple[int, str]:
+    """Where an effect stands among those that explain the same."""
+    return (_USUAL.index(name) if name in _USUAL else len(_USUAL), name)
+
+
+def _trials(system: System, kind: type[Effect], target: str) -> list[dict[str, float]]:
+    if kind.target_kind != "joint":
+        return kind(target).motion_trials(system.predictors[0].nominal)
+    moving = [p for p in system.predictors if target in p.log.moving]
+    if not moving:
+        return []
+    fastest = max(moving, key=lambda p: float(np.abs(p.nominal.velocity[target]).max()))
+    return kind(target).motion_trials(fastest.nominal)
+
+
+def _make(system: System, base: Fit, predicted: FloatArray, effect: Effect,
+          searched: set[str], around: list[Around]) -> list[Candidate]:  # fmt: skip
+    """Derivatives at nothing, by what is not searched for."""
+    inverse = {p for name, p in INVERSE if name == effect.name}
+    rate = system.logs[0].rate
+    if inverse:
+        # Nothing is an infinite stiffness; the column is what the nominal one does.
+        state = base.state.with_effect(effect)
+        changed = system.predict(state.every, state.scales, effect, predicted)
+        columns = clean(system, changed - predicted)[:, None]
+        coordinates = effect_coordinates(effect, len(state.every) - 1, rate)
+        kept = [c for c in coordinates if c.name in inverse]
+        return [Candidate(effect, columns, kept, np.zeros(1))] if np.any(columns) else []
+    state = base.state.with_effect(effect)
+    index = len(state.every) - 1
+    coordinates = [
+        c for c in effect_coordinates(effect, index, rate) if c.name not in searched
+    ]  # fmt: skip
+    kept, columns = jacobian(system, state, predicted, coordinates, around)
+    if not kept:
+        return []
+    return [Candidate(effect, columns, kept, np.array([c.value for c in kept]), len(searched))]

@@ -1,0 +1,254 @@
+"""How much a candidate would help, judged on stretches of the records that it was not fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.diagnosis.motion.data.system import Group, Segment, System
+from picchio.diagnosis.motion.fit.least_squares import Fit, correlation_length
+from picchio.diagnosis.motion.fit.state import Coordinate
+from picchio.diagnosis.motion.fit.stretches import (
+    Stretch,
+    Validated,
+    confidence,
+    cross_validate,
+    stretches_of,
+    without_added,
+)
+from picchio.diagnosis.motion.search.orders import Spectrum, order_spectrum
+from picchio.model.effects.effect import Effect
+
+_TINY = 1e-300
+_SAME = 0.02  # of a column's power: less of its own and others do the same already
+
+
+@dataclass(frozen=True)
+class Score:
+    """A candidate's score.
+
+    Attributes:
+        gain: log-likelihood gained in stretches held out, for autocorrelated residuals.
+        rank: the same less the penalty, with what a sample is worth taken from the base: it
+            compares candidates.
+        bic: half of what Schwarz' criterion falls by, in the stretches fitted to.
+        share: part of the groups' power that it removes in stretches held out.
+        confidence: that the gain is one, from its spread over the stretches.
+        values: of the candidate's coordinates.
+        admissible: within their bounds.
+        groups: equations that it acts in.
+        differences: what every stretch that was held out gains.
+    """
+
+    gain: float
+    rank: float
+    bic: float
+    share: float
+    confidence: float
+    values: tuple[float, ...]
+    admissible: bool
+    groups: tuple[Group, ...]
+    differences: Mapping[int, float]
+
+
+class Scorer:
+    """Scores candidates against one fit, linearised, by normal equations of every stretch.
+
+    Args:
+        system: the training equations.
+        base: the fit that candidates are added to.
+    """
+
+    def __init__(self, system: System, base: Fit) -> None:
+        self.system, self.base = system, base
+        self.weight = np.empty(system.size)
+        for s in system.segments:
+            self.weight[s.rows] = 1.0 / max(base.level[s.group], _TINY)
+        self.left = base.columns * self.weight[:, None]
+        self.right = base.residual * self.weight
+        prior = [0.0 if c.prior is None else 1.0 / c.prior**2 for c in base.coordinates]
+        self.prior = np.array(prior)
+        pull = [p * (c.centre - c.value) for p, c in zip(prior, base.coordinates, strict=True)]
+        self.pull = np.array(pull)
+        self._stretches: dict[int, list[Stretch]] = {}
+        self._sums: dict[int, tuple[np.ndarray, FloatArray, FloatArray]] = {}
+        self._spectra: dict[str, Spectrum | None] = {}
+        self._bases: dict[object, Validated] = {}
+        # A coordinate at its bound stays there.
+        self.free = np.array([
+            c.lower + 1e-9 < c.value < c.upper - 1e-9 for c in base.coordinates
+        ], dtype=bool)  # fmt: skip
+
+    def score(
+        self,
+        columns: FloatArray,
+        coordinates: list[Coordinate],
+        neutral: FloatArray,
+        *,
+        searched: int = 0,
+        without: Sequence[int] = (),
+        back: FloatArray | None = None,
+        noise: float | None = None,
+    ) -> Score | None:
+        """Score a candidate.
+
+        Args:
+            columns: (rows, c) its derivatives.
+            coordinates: the c of them.
+            neutral: (c,) the values at which nothing changes.
+            searched: further parameters that were searched for.
+            without: coordinates of the base that are left out.
+            back: (rows,) what is added to the base's residual.
+            noise: of a candidate that is a line in the spectrum: power of a sample's noise there.
+                A line is to be held against the noise beside it, not against all that is left.
+
+        Returns:
+            None where it does nothing in these records, or nothing that the base can't do.
+        """
+        touched = [s for s in self.system.segments if np.any(columns[s.rows])]
+        groups = tuple(dict.fromkeys(s.group for s in touched))
+        if not groups:
+            return None
+        added = columns * self.weight[:, None]
+        kept = [s for s in self.system.segments if s.group in groups]
+        # Coordinates of the base that other groups determine as well are held by those, too.
+        free = self.free.copy()
+        free[list(without)] = False
+        parts = [part for s in kept for part in self._of(s)]
+        touched_by = np.zeros(free.size, dtype=bool)
+        touched_by[np.concatenate([part.columns for part in parts])] = True
+        index = np.flatnonzero(free & touched_by)
+        right = self.right if back is None else self.right + back * self.weight
+        second = [part.block(index, added, right) for part in parts]
+        elsewhere = self._elsewhere(groups, index)
+        prior, pull = self.prior[index], self.pull[index]
+        key = (groups, index.tobytes()) if back is None and not without else None
+        base = self._bases.get(key)
+        if base is None:
+            first = [without_added(block, index.size) for block in second]
+            base = cross_validate(first, elsewhere, prior, pull, len(index))
+        if key is not None:
+            self._bases[key] = base
+        wide = cross_validate(second, elsewhere, prior, pull, len(index))
+        if wide.own < _SAME:
+            return None
+        values = neutral + wide.solution[len(index) :]
+        admissible = all(
+            c.lower - 1e-9 <= v <= c.upper + 1e-9
+            for c, v in zip(coordinates, values, strict=True)
+        )  # fmt: skip
+        # What a sample is worth is told by what is left once the candidate is in.
+        left = np.zeros(self.system.size)
+        for s in kept:
+            left[s.rows] = right[s.rows] - self.left[s.rows][:, index] @ (
+                wide.solution[: len(index)]
+            ) - added[s.rows] @ wide.solution[len(index):]  # fmt: skip
+        common = dict(self.base.correlation)
+        if noise is None:
+            correlation = {g: correlation_length(self.system, left, g) for g in groups}
+        else:
+            correlation = {g: noise / self.base.level[g] ** 2 for g in groups}
+            common |= correlation
+        return _compare(base, wide, correlation, common, groups,
+                        columns.shape[1] + searched, tuple(float(v) for v in values),
+                        admissible)  # fmt: skip
+
+    def noise_of(self, effect: Effect) -> float | None:
+        """Of a ripple, the power of a sample's noise beside its line; None of others."""
+        if "order" not in effect.values:
+            return None
+        if effect.target not in self._spectra:
+            base = self.base
+            self._spectra[effect.target] = order_spectrum(
+                self.system, base.residual, effect.target, base.state
+            )
+        spectrum = self._spectra[effect.target]
+        return None if spectrum is None else spectrum.noise(effect.values["order"])
+
+    def _of(self, s: Segment) -> list[Stretch]:
+        if s.rows.start not in self._stretches:
+            self._stretches[s.rows.start] = stretches_of(s, self.system.block, self.left)
+        return self._stretches[s.rows.start]
+
+    def _elsewhere(self, groups: tuple[Group, ...],
+                   index: np.ndarray) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+        """Normal equations of the other groups, for the coordinates that matter here.
+
+        What is added, or added back, is nothing there.
+        """
+        normal, target = np.zeros((index.size, index.size)), np.zeros(index.size)
+        for s in self.system.segments:
+            if s.group in groups:
+                continue
+            columns, own, right = self._sum(s)
+            shared, place, here = np.intersect1d(index, columns, True, return_indices=True)
+            if shared.size:
+                normal[np.ix_(place, place)] += own[np.ix_(here, here)]
+                target[place] += right[here]
+        return normal, target
+
+    def _sum(self, s: Segment) -> tuple[np.ndarray, FloatArray, FloatArray]:
+        """A segment's normal equations: columns, left and right side."""
+        if s.rows.start not in self._sums:
+            parts = self._of(s)
+            normal = sum(part.normal for part in parts)
+            right = sum(self.right[part.rows] @ part.left for part in parts)
+            self._sums[s.rows.start] = (parts[0].columns, np.asarray(normal), np.asarray(right))
+        return self._sums[s.rows.start]
+
+
+def _compare(
+    base: Validated,
+    wide: Validated,
+    correlation: Mapping[Group, float],
+    common: Mapping[Group, float],
+    groups: tuple[Group, ...],
+    added: int,
+    values: tuple[float, ...],
+    admissible: bool,
+) -> Score:
+    gain = rank = bic = removed = total = effective = 0.0
+    differences: dict[int, float] = {}
+    raw: dict[int, float] = {}
+    for group in groups:
+        samples = base.rows[group] / correlation[group]
+        before = sum(x for (g, _), x in base.outside.items() if g == group)
+        after = sum(x for (g, _), x in wide.outside.items() if g == group)
+        effective += samples
+        gain += 0.5 * samples * np.log(max(before, _TINY) / max(after, _TINY))
+        rank += (
+            0.5
+            * base.rows[group]
+            / common[group]
+            * (np.log(max(before, _TINY) / max(after, _TINY)))
+        )
+        inside = max(base.inside[group], _TINY) / max(wide.inside[group], _TINY)
+        bic += 0.5 * samples * np.log(inside)
+        removed, total = removed + before - after, total + before
+        for (g, number), x in base.outside.items():
+            if g == group:
+                # In logarithms one bad stretch does not outvote the others; without, stretches
+                # in which nothing happens don't. Evidence by either is evidence.
+                other = wide.outside[g, number]
+                change = (
+                    0.5
+                    * base.count[g, number]
+                    / correlation[g]
+                    * (np.log(max(x, _TINY) / max(other, _TINY)))
+                )
+                differences[number] = differences.get(number, 0.0) + change
+                raw[number] = raw.get(number, 0.0) + (x - other) / correlation[g] / (
+                    max(wide.inside[g], _TINY) / base.rows[g]
+                )
+    penalty = 0.5 * added * np.log(max(effective, 2.0))
+    bic -= penalty
+    rank -= penalty
+    sure = max(confidence(np.array(list(x.values()))) for x in (differences, raw))
+    return Score(
+        gain=float(gain), rank=float(rank), bic=float(bic), share=removed / max(total, _TINY),
+        confidence=sure, values=values, admissible=admissible, groups=groups,
+        differences=differences,
+    )  # fmt: skip

@@ -1,0 +1,268 @@
+"""Effects are added one after the other, then those that are not needed are taken out again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.diagnosis.motion.data.system import System
+from picchio.diagnosis.motion.fit.least_squares import Fit, fit, row_weights
+from picchio.diagnosis.motion.fit.state import State
+from picchio.diagnosis.motion.search.candidates import Candidate, candidates, usual
+from picchio.diagnosis.motion.search.score import Score, Scorer
+from picchio.diagnosis.motion.search.timing import time_by_ripple
+from picchio.model.effects.effect import Effect
+
+RIPPLE = "torque_ripple"
+_ELASTIC = ("joint_stiffness", "backlash")
+_AGAIN = 3
+_LEAST_BIC = 3.0
+_LEAST_CONFIDENCE = 0.90
+_LEAST_SHARE = 0.005
+_TIE = 1.0
+_ALIKE = 0.9
+_ROUNDS = 12
+_NEAR = 0.05  # orders
+_WITHIN = 3.0  # standard deviations
+_TOLD_APART = 0.1  # orders: no chance hit of a whole number
+
+Scored = tuple[Score, Candidate]
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One round of the search, for the report.
+
+    Attributes:
+        accepted: labels of what was added.
+        levels: group -> RMS before.
+        scores: the best candidates' scores.
+    """
+
+    accepted: tuple[tuple[str, str], ...]
+    levels: Mapping[str, float]
+    scores: tuple[Mapping[str, Any], ...]
+
+
+def select(
+    system: System, start: State, kinds: Mapping[str, type[Effect]], progress: Progress
+) -> tuple[Fit, list[Step]]:
+    """Search forwards and backwards until nothing changes.
+
+    The order: ripple, and what it tells of timing; everything else but elasticity; elasticity,
+    which needs the torque that the gears transmit; ripple again; then what is no longer needed
+    goes, and everything is tried once more.
+
+    Args:
+        system: the training equations.
+        start: the baseline.
+        kinds: the catalogue.
+        progress: told (stage, stages).
+    """
+    pick = lambda names: {n: k for n, k in kinds.items() if n in names}  # noqa: E731
+    ripple, elastic = pick({RIPPLE}), pick(_ELASTIC)
+    slow = pick(set(kinds) - {RIPPLE, *_ELASTIC})
+    stages = [(ripple, 2), (slow, _ROUNDS), (elastic, 3), (ripple, _ROUNDS)]
+    current = fit(system, start)
+    steps: list[Step] = []
+    for number, (pool, rounds) in enumerate(stages):
+        progress(number, 2 * len(stages))
+        current = _forward(system, current, pool, kinds, rounds, steps)
+    for number in range(_AGAIN):
+        progress(len(stages) + number, 2 * len(stages))
+        current = eliminate(system, current)
+        before = [(e.name, e.target) for e in current.state.effects]
+        for pool in (slow, elastic):
+            current = _forward(system, current, pool, kinds, 3, steps)
+        if before == [(e.name, e.target) for e in current.state.effects]:
+            break
+    return eliminate(system, current), steps
+
+
+def _forward(system: System, current: Fit, pool: Mapping[str, type[Effect]],
+             kinds: Mapping[str, type[Effect]], rounds: int, steps: list[Step]) -> Fit:  # fmt: skip
+    """Add from a pool until nothing passes."""
+    for _ in range(rounds if pool else 0):
+        scored = score_all(system, current, pool)
+        chosen = choose(scored)
+        steps.append(_step(current, scored, chosen))
+        if not chosen:
+            break
+        state = current.state
+        for score, candidate in chosen:
+            grown = state.with_effect(candidate.started(score.values))
+            state = _take_over(system, current, grown, candidate)
+        current = fit(system, state)
+        if RIPPLE in pool:
+            current = lock(system, current)
+        if RIPPLE in pool and "encoder_delay" in kinds:
+            current = time_by_ripple(system, current, kinds["encoder_delay"])
+    return current
+
+
+def lock(system: System, current: Fit) -> Fit:
+    """The fit with orders that are whole within three standard deviations made whole.
+
+    What repeats with the motor's turn does so a whole number of times. A line that does not fit a
+    whole number (a bearing's, or that of a wave generator against its flexspline) stays where it
+    is, and so does every order where the gear ratio is not known.
+    """
+    state = current.state
+    for c, std in zip(current.coordinates, current.std, strict=True):
+        if c.name != "order" or c.index < 0:
+            continue
+        effect = state.every[c.index]
+        whole = round(c.value)
+        ratio = system.predictors[0].nominal.gear_ratio[effect.target]
+        near = abs(c.value - whole) <= _WITHIN * std <= _TOLD_APART
+        if ratio != 1.0 and whole >= 1 and near:
+            state = state.moved(c, float(whole))
+    return current if state is current.state else fit(system, state, rounds=2)
+
+
+def score_all(system: System, base: Fit, kinds: Mapping[str, type[Effect]]) -> list[Scored]:
+    """Every candidate's score, the best first."""
+    scorer = Scorer(system, base)
+    found = []
+    for candidate in candidates(system, base, dict(kinds)):
+        score = scorer.score(candidate.columns, candidate.coordinates, candidate.neutral,
+                             searched=candidate.searched, noise=candidate.noise)  # fmt: skip
+        if score is not None:
+            found.append((score, candidate))
+    return sorted(found, key=lambda pair: -pair[0].rank)
+
+
+def passes(score: Score, ripple: bool = False) -> bool:
+    """Whether a candidate may be claimed: penalised, held out, and on every stretch."""
+    enough = ripple or score.share >= _LEAST_SHARE
+    return (
+        score.admissible and score.bic > _LEAST_BIC and score.gain > 0.0
+        and score.confidence >= _LEAST_CONFIDENCE and enough
+    )  # fmt: skip
+
+
+def choose(scored: list[Scored]) -> list[Scored]:
+    """The best of each set of equations; of equals the more usual."""
+    good = [pair for pair in scored if passes(pair[0], pair[1].effect.name == RIPPLE)]
+    taken: set[tuple[str, str]] = set()
+    chosen: list[Scored] = []
+    blocked = False
+    for score, candidate in good:
+        groups = set(score.groups)
+        if candidate.effect.name == RIPPLE:
+            if all(_apart(candidate.effect, other.effect) for _, other in chosen):
+                chosen.append((score, candidate))
+            continue
+        # One cause for several joints is not kept waiting by one for each of them.
+        if groups & taken and (len(groups) == 1 or blocked):
+            continue
+        blocked = blocked or len(groups) > 1
+        equal = [
+            pair for pair in good
+            if pair[1].effect.name != RIPPLE and set(pair[0].groups) == groups
+            and pair[0].rank >= score.rank - _TIE
+        ]  # fmt: skip
+        chosen.append(min(equal, key=lambda pair: (usual(pair[1].effect.name), -pair[0].rank)))
+        taken |= groups
+    return chosen
+
+
+def _apart(first: Effect, second: Effect) -> bool:
+    distance = abs(first.values["order"] - second.values["order"])
+    return first.target != second.target or distance > _NEAR
+
+
+def _take_over(system: System, base: Fit, state: State, candidate: Candidate) -> State:
+    """A cause that does what a joint's nuisance factor does takes its place."""
+    weight = row_weights(system, base.level)
+    fixed = set(state.fixed)
+    for index, c in enumerate(base.coordinates):
+        if c.index >= 0:
+            continue
+        rows = np.flatnonzero(base.columns[:, index])
+        x = base.columns[rows, index] * weight[rows]
+        columns = candidate.columns[rows] * weight[rows, None]
+        if not np.any(columns):
+            continue
+        left = x - columns @ np.linalg.lstsq(columns, x, rcond=None)[0]
+        if 1.0 - float(left @ left) / float(x @ x) > _ALIKE:
+            fixed.add(c.name)
+    scales = {j: 1.0 if j in fixed else s for j, s in state.scales.items()}
+    return replace(state, fixed=frozenset(fixed), scales=scales)
+
+
+def eliminate(system: System, current: Fit) -> Fit:
+    """Take out, the newest among them, what is no longer needed."""
+    while current.state.effects:
+        scorer = Scorer(system, current)
+        tried = []
+        for index, effect in enumerate(current.state.effects):
+            score = necessity(scorer, index)
+            if score is None or not passes(score, effect.name == RIPPLE):
+                tried.append((-np.inf if score is None else score.gain, index))
+        if not tried:
+            return current
+        current = fit(system, current.state.without(min(tried)[1]))
+    return current
+
+
+def necessity(scorer: Scorer, index: int) -> Score | None:
+    """What an effect of the scorer's fit gains over the fit without it."""
+    current = scorer.base
+    own, part = own_part(current, index)
+    if not own:
+        return None
+    coordinates = [current.coordinates[i] for i in own]
+    columns = current.columns[:, own]
+    values = np.array([c.value for c in coordinates])
+    noise = scorer.noise_of(current.state.effects[index])
+    return scorer.score(columns, coordinates, values - part, without=own, back=columns @ part,
+                        noise=noise)  # fmt: skip
+
+
+def own_part(current: Fit, index: int) -> tuple[list[int], FloatArray]:
+    """An effect's coordinates, and how far each is from where it does nothing.
+
+    At the optimum the residual is what the full model leaves: with the effect's own part (its
+    columns times these) added back, a fit without it has to leave it.
+    """
+    number = len(current.state.nuisances) + index
+    own = [i for i, c in enumerate(current.coordinates) if c.index == number]
+    return own, np.array([_from_neutral(current, i) for i in own])
+
+
+def _from_neutral(current: Fit, i: int) -> float:
+    """How far a linear parameter is from where it does nothing; others count as they are."""
+    c = current.coordinates[i]
+    effect = current.state.every[c.index]
+    parameter = next(p for p in effect.parameters if p.name == c.name)
+    if parameter.name == "order" or parameter.logarithmic:
+        return 0.0 if (effect.name, c.name) != ("joint_stiffness", "scale") else c.value
+    return c.value - parameter.neutral
+
+
+def _step(current: Fit, scored: list[Scored], chosen: list[Scored]) -> Step:
+    table = tuple(describe(score, candidate) for score, candidate in scored[:20])
+    levels = {".".join(group): level for group, level in current.level.items()}
+    return Step(tuple(c.label for _, c in chosen), levels, table)
+
+
+def describe(score: Score, candidate: Candidate) -> dict[str, Any]:
+    """A score as a row of the report."""
+    effect = candidate.started(score.values)
+    return {
+        "effect": effect.name,
+        "target": effect.target,
+        "parameters": dict(effect.values),
+        "rank": score.rank,
+        "gain": score.gain,
+        "bic": score.bic,
+        "share": score.share,
+        "confidence": score.confidence,
+        "admissible": score.admissible,
+    }

@@ -1,0 +1,1 @@
+"""What is said of the causes found: values, gain on held-out records, verdict."""

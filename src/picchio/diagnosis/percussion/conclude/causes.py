@@ -1,0 +1,226 @@
+"""What is told of a fit: the causes' values, how sure they are, and the nuisances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from picchio.campaign.tables import Tolerance
+from picchio.core.arrays import FloatArray
+from picchio.diagnosis.life import Unsure
+from picchio.diagnosis.percussion.criteria.confidence import confidence
+from picchio.diagnosis.percussion.criteria.identifiability import unseen
+from picchio.diagnosis.percussion.criteria.pose_consistency import between_poses
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.fit.drawn import width_spread
+from picchio.diagnosis.percussion.fit.least_squares import Fit
+from picchio.diagnosis.percussion.fit.unknowns import NUISANCE_KEYS, Hypothesis
+from picchio.diagnosis.percussion.search.select import EXACT, Search
+from picchio.diagnosis.percussion.search.trials import Trial, score
+from picchio.diagnosis.result import Cause, Value
+from picchio.model.effects.effect import CHANNEL_UNIT, Effect
+from picchio.robot.flexible_robot import FlexibleRobot
+
+
+def told_causes(
+    problem: Problem,
+    whole: Fit,
+    found: Search,
+    rivals: Sequence[Trial],
+    train: Sequence[MeasuredRecord],
+    refuted: Sequence[Trial] = (),
+) -> tuple[Cause, ...]:
+    """The causes with their values, spreads and confidence.
+
+    The spread is that of the fit, larger where more than noise is left, and that of the model; at
+    least as far as a value may go before anybody sees it.
+
+    Args:
+        problem: data and noise.
+        whole: the fit to all records.
+        found: the way there.
+        rivals: other sets, fitted to the records of the search.
+        train: those records.
+        refuted: rivals that only the records held out told apart, fitted to all.
+    """
+    unsettled = {trial.fit.hypothesis.labels for trial in refuted}
+    rivals = [r for r in rivals if r.fit.hypothesis.labels not in unsettled]
+    variance = told_covariance(whole).diagonal()
+    unknowns, vector = whole.hypothesis.unknowns(), whole.hypothesis.vector()
+    result = []
+    for effect in whole.hypothesis.causes:
+        index = whole.hypothesis.effects.index(effect)
+        values = {}
+        for p in effect.parameters:
+            std = 0.0
+            for k, unknown in enumerate(unknowns):
+                if unknown.effect == index and unknown.name == p.name:
+                    std = abs(unknown.slope(vector[k])) * math.sqrt(max(variance[k], 0.0))
+                    std = max(std, _unseen(problem, whole, k))
+            if effect.name == "pulse_jitter":
+                std = _width_spread(whole, effect)
+            values[p.name] = Value(effect.values[p.name], std, _unit(whole, effect, p.name))
+        result.append(
+            Cause(
+                effect.name,
+                effect.target,
+                _confidence(found, rivals, effect, train, whole, refuted),
+                values,
+            )
+        )
+    return tuple(result)
+
+
+def _unseen(problem: Problem, whole: Fit, number: int) -> float:
+    """As `unseen`, in the parameter's unit; 0 for what is known beforehand."""
+    unknown, here = whole.hypothesis.unknowns()[number], float(whole.hypothesis.vector()[number])
+    if unknown.prior is not None:
+        return 0.0
+    moved = here + unseen(problem, whole, number)
+    return abs(unknown.value(moved) - unknown.value(here))
+
+
+def _unit(whole: Fit, effect: Effect, parameter: str) -> str:
+    """The unit of a parameter; a sensor's range is in the unit that the sensor reads."""
+    unit = effect.unit(parameter)
+    if unit != CHANNEL_UNIT:
+        return unit
+    for record in whole.records:
+        for channel in record.setup.channels:
+            if channel.group == effect.target and channel.name in record.noise:
+                return record.noise[channel.name].unit
+    return "1"
+
+
+def _width_spread(whole: Fit, effect: Effect) -> float:
+    for label, fall, count in whole.hypothesis.drawn:
+        if label == effect.label:
+            return width_spread(next(iter(effect.values.values())), fall, count)
+    return 0.0
+
+
+def told_covariance(whole: Fit) -> FloatArray:
+    """(unknowns, unknowns) of the transformed unknowns, as it is told.
+
+    That of the fit, larger where more than noise is left: by how much more, and by how far the
+    poses then disagree. And that of the model's exactness.
+    """
+    inflate = max(1.0, whole.chi_square / max(whole.samples, 1))
+    covariance = whole.covariance() * inflate + (1.0 - 1.0 / inflate) * between_poses(whole)
+    hypothesis, vector = whole.hypothesis, whole.hypothesis.vector()
+    for k, unknown in enumerate(hypothesis.unknowns()):
+        effect = hypothesis.effects[unknown.effect]
+        if effect.label in hypothesis.labels and covariance[k, k] > 0.0:
+            neutral = next(p.neutral for p in effect.parameters if p.name == unknown.name)
+            slope = abs(unknown.slope(vector[k]))
+            left = _inexact(effect.values[unknown.name], neutral)
+            covariance[k, k] += (left / slope) ** 2 if slope > 0.0 else 0.0
+    return covariance
+
+
+def told_spread(whole: Fit) -> Unsure:
+    """How well all values of a fit are known, for the life."""
+    hypothesis = whole.hypothesis
+    return _unsure(hypothesis, told_covariance(whole))
+
+
+def stated_spread(robot: FlexibleRobot, tolerance: Tolerance) -> Unsure:
+    """How well the nominal values are known before anything was measured."""
+    hypothesis = Hypothesis.baseline(robot, tolerance)
+    spread = np.array([u.prior[1] if u.prior else 0.0 for u in hypothesis.unknowns()])
+    return _unsure(hypothesis, np.diag(spread**2))
+
+
+def _unsure(hypothesis: Hypothesis, covariance: FloatArray) -> Unsure:
+    unknowns = hypothesis.unknowns()
+    return Unsure(
+        lambda vector: hypothesis.at(vector).effects,
+        hypothesis.vector(),
+        covariance,
+        np.array([u.lower for u in unknowns]),
+        np.array([u.upper for u in unknowns]),
+    )
+
+
+def _inexact(value: float, neutral: float) -> float:
+    """What the forward model's own inexactness leaves open: its share of the effect's size."""
+    return EXACT * abs(value - (neutral if math.isfinite(neutral) else 0.0))
+
+
+def _confidence(
+    found: Search,
+    rivals: Sequence[Trial],
+    effect: Effect,
+    train: Sequence[MeasuredRecord],
+    whole: Fit,
+    refuted: Sequence[Trial],
+) -> float:
+    """From the poses' score differences to the best rival, and their spread (Student's t)."""
+    best = found.best
+    told = [
+        confidence(whole, r.fit) for r in refuted if effect.label not in r.fit.hypothesis.labels
+    ]
+    others = [
+        r.fit
+        for r in rivals
+        if effect.label not in r.fit.hypothesis.labels and r.finished(best.records)
+    ]
+    if others:
+        told.append(confidence(best, min(others, key=score)))
+    if not told and len(best.hypothesis.causes) == 1 and found.baseline is not best:
+        return confidence(best, found.baseline)
+    if not told:
+        return 0.5 if len(train) < 3 else 1.0
+    return min(told)
+
+
+def told_nuisances(found: Fit) -> dict[str, Value]:
+    """Fitted nuisances, in their own units."""
+    if found.jacobians is None:
+        return {}
+    covariance = found.covariance()
+    unknowns, vector = found.hypothesis.unknowns(), found.hypothesis.vector()
+    robot = found.records[0].setup.geometry.robot
+    nominal = dict(zip(robot.flexible_names, robot.stiffness, strict=True))
+    ratio = float(np.mean(robot.damping_ratio))
+    force = float(np.abs(found.records[0].setup.blows.height).max())
+    result = {}
+    for k, unknown in enumerate(unknowns):
+        effect = found.hypothesis.effects[unknown.effect]
+        if unknown.effect >= found.hypothesis.n_nuisances:
+            continue
+        key = NUISANCE_KEYS[effect.name]
+        scale, std = math.exp(vector[k]), math.exp(vector[k]) * math.sqrt(covariance[k, k])
+        if key == "stiffness":
+            prismatic = robot.tree.joints.get(effect.target)
+            unit = "N/m" if prismatic is not None and prismatic.type == "prismatic" else "N*m/rad"
+            size, name = float(nominal[effect.target]), f"stiffness.{effect.target}"
+        else:
+            size, unit = (ratio, "1") if key == "damping_ratio" else (force, "N")
+            name = key
+        result[name] = Value(scale * size, std * size, unit)
+    return result
+
+
+def with_hum(causes: Sequence[Cause], lines: Hypothesis) -> tuple[Cause, ...]:
+    """The causes with the hum's amplitude, which is not fitted but taken out of the residual.
+
+    What noise adds to the lines' power is taken out of it.
+    """
+    told = []
+    gains = {label: (fall, count) for label, fall, count in lines.drawn}
+    for cause in causes:
+        found = {e.target: e for e in lines.effects if e.name == "mains_hum"}.get(cause.target)
+        if cause.effect == "mains_hum" and found is not None:
+            seen, unit = found.values["amplitude"], cause.parameters["amplitude"].unit
+            fall, count = gains.get(found.label, (math.inf, 0))
+            amplitude = seen * math.sqrt(max(1.0 - count / max(fall, 1e-300), 0.0))
+            std = seen / math.sqrt(max(fall, 1e-300))
+            value = Value(amplitude, std, unit)
+            cause = replace(cause, parameters={**cause.parameters, "amplitude": value})
+        told.append(cause)
+    return tuple(told)

@@ -1,0 +1,107 @@
+"""The gain on records that neither the fit nor the choice of causes has seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.fit.drawn import fit_latent
+from picchio.diagnosis.percussion.fit.least_squares import fit
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.search.screen import LATENT
+from picchio.diagnosis.result import Gain
+from picchio.model.effects.registry import effect_class
+from picchio.prediction.percussion import POSITION_KINDS
+
+# One pose of so many is held out.
+_EVERY = 3
+
+
+Split = tuple[list[MeasuredRecord], list[MeasuredRecord]]
+
+
+def held_out(problem: Problem) -> list[Split]:
+    """Ways to choose records to fit and records held out, the usual one first.
+
+    Whole poses are held out, every third; of fewer poses every third record; of fewer records none.
+    """
+    ways: list[Split] = []
+    for offset in reversed(range(_EVERY)):
+        if problem.n_poses >= _EVERY:
+            kept = [r for r in problem.records if r.pose % _EVERY == offset]
+        elif len(problem.records) >= _EVERY:
+            kept = problem.records[offset::_EVERY]
+        else:
+            return [(list(problem.records), [])]
+        ways.append(([r for r in problem.records if r not in kept], kept))
+    return ways
+
+
+def measure_gain(
+    problem: Problem,
+    baseline: Hypothesis,
+    extended: Hypothesis,
+    train: Sequence[MeasuredRecord],
+    kept: Sequence[MeasuredRecord],
+) -> Gain:
+    """Normalised RMS residuals of both models on the records held out.
+
+    Each channel's residual is divided by its noise's standard deviation and the square root of
+    its samples; all together are relative to the signal so weighted.
+    """
+    judged = list(kept) or list(train)
+    signal, floor = 0.0, 0
+    for record in judged:
+        for values in _centred(record):
+            signal += float(np.mean(values**2))
+            floor += 1
+    signal = max(signal, 1e-300)
+    return Gain(
+        tuple(r.name for r in train),
+        tuple(r.name for r in judged),
+        float(np.sqrt(_mean_square(problem, baseline, judged) / signal)),
+        float(np.sqrt(_mean_square(problem, extended, judged) / signal)),
+        float(np.sqrt(floor / signal)),
+    )
+
+
+def _centred(record: MeasuredRecord) -> list[np.ndarray]:
+    kinds = {c.name: c.kind.name for c in record.setup.channels}
+    rows = []
+    for name, values in record.values.items():
+        offset = values.mean() if kinds[name] in POSITION_KINDS else 0.0
+        rows.append((values - offset) / record.noise[name].std)
+    return rows
+
+
+def _mean_square(
+    problem: Problem, hypothesis: Hypothesis, records: Sequence[MeasuredRecord]
+) -> float:
+    hypothesis = _own_latent(problem, hypothesis, records)
+    total = 0.0
+    for residual in problem.residuals(hypothesis.effects, records):
+        total += float((residual**2).mean(axis=1).sum())
+    return total
+
+
+def _own_latent(
+    problem: Problem, hypothesis: Hypothesis, records: Sequence[MeasuredRecord]
+) -> Hypothesis:
+    """Numbers that are drawn anew in every record must be found in these, too."""
+    names = [e.name for e in hypothesis.effects if e.name in LATENT and e.name != "mains_hum"]
+    for name in names:
+        found = fit(problem, hypothesis, records, None, iterations=0)
+        found = fit_latent(problem, found, effect_class(name), "tool")
+        own = next(e for e in found.hypothesis.effects if e.name == name)
+        effects = tuple(
+            e.with_hidden({**e.hidden, **own.hidden}) if e.name == name else e
+            for e in hypothesis.effects
+        )
+        hypothesis = Hypothesis(
+            effects, hypothesis.tolerance, hypothesis.n_nuisances, hypothesis.freed,
+            hypothesis.scales,
+        )  # fmt: skip
+    return hypothesis

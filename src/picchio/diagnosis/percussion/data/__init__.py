@@ -1,0 +1,1 @@
+"""Measured records beside their prediction, in units of their noise."""

@@ -1,0 +1,302 @@
+"""Measured records beside their prediction: residuals in units of their noise."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import Protocol
+
+import numpy as np
+
+from picchio.campaign.campaign import Campaign
+from picchio.core.arrays import BoolArray, FloatArray
+from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.excitation.piecewise import PiecewiseForce
+from picchio.measurement.noise.level import Noise
+from picchio.model.effects.effect import Effect
+from picchio.model.model import Model
+from picchio.prediction.percussion import POSITION_KINDS, PercussionSetup, percussion_setups
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.vibration.integration.integrate import Samples
+
+# Samples that stand so near a jump of the force that either side of it may be meant.
+
+# A sample this near a jump of the force, but not on it, holds neither side for sure: a sensor of
+# finite bandwidth smears a jump, and what keeps it from aliasing by about half a sample.
+_NEAR_EDGE = 1.8e-4
+# s, more: two samples that stand alike on either side of an edge are to be both in or both out,
+# whatever a fit does to the clock; else it gains by moving one of them out.
+_MARGIN = 2e-5
+_SMEARED = 0.5
+_ON_EDGE = 1e-7
+_SMALL_JUMP = 0.05
+
+
+def near_edges(setup: PercussionSetup, model: Model) -> dict[str, BoolArray] | None:
+    """Which samples of each group stand so near a jump that either side may be meant."""
+    force = setup.struck(model).unit
+    sensors, clock = model.sensors(setup.conditions), setup.samples
+    found = {}
+    for group in setup.groups:
+        timing = sensors.get(group).timing
+        near = setup.in_common.edges.get(
+            (force, clock, timing), partial(_marked, force, clock, *timing)
+        )
+        if near is None:
+            return None
+        found[group] = near
+    return found
+
+
+def _marked(force: PiecewiseForce, clock: Samples, delay: float, rate: float) -> BoolArray | None:
+    """(count,) which samples of a sensor; None where nothing jumps."""
+    from picchio.diagnosis.percussion.data.residual_kernel import near_edges as mark
+
+    edges = force.start
+    if edges.size > 400:  # a measured history has no jumps
+        return None
+    jump = np.abs(force(edges + _ON_EDGE) - force(edges - _ON_EDGE))
+    edges = edges[jump > _SMALL_JUMP * max(float(jump.max()), 1e-300)]
+    if not edges.size:
+        return None
+    if np.isfinite(force.end):
+        edges = (edges + force.end * np.arange(int(clock.last / force.end) + 2)[:, None]).ravel()
+    near = max(_NEAR_EDGE, _SMEARED * clock.step) + _MARGIN
+    out = np.empty(clock.count, dtype=bool)
+    mark(clock.start, clock.step, rate, delay, edges, near, out)
+    return out
+
+
+# Effects whose edges are held fixed, with a number of their own.
+Pin = tuple[int, tuple[Effect, ...]]
+_numbers = itertools.count()
+_JUMPING = ("force", "acceleration", "accelerometer")
+
+
+class Helpers(Protocol):
+    """Whoever predicts part of the records elsewhere (`shared_records`)."""
+
+    def residuals(
+        self, effects: Sequence[Effect], records: Sequence[MeasuredRecord], end: float | None
+    ) -> list[FloatArray] | None:
+        """As `Problem.residuals`; None where that is not worth it."""
+        ...
+
+
+class Problem:
+    """A campaign's percussion records, a robot, and the noise between them.
+
+    Args:
+        robot: the robot as its files have it.
+        campaign: the records.
+        noise: channel -> noise; estimated from the campaign where None.
+        gravity_stiffness: whether gravity's change with the deflection counts.
+        workers: processes for what is independent; as many as cores where None.
+
+    Raises:
+        InputError: no percussion record, or none with a channel that can be predicted.
+    """
+
+    def __init__(
+        self,
+        robot: FlexibleRobot,
+        campaign: Campaign,
+        noise: Mapping[str, Noise] | None = None,
+        *,
+        gravity_stiffness: bool = True,
+        workers: int | None = 1,
+    ) -> None:
+        self.workers = workers
+        self.helpers: Helpers | None = None
+        self.pins: list[Pin] = []
+        self.robot, self.campaign = robot, campaign
+        self.model = Model(robot, gravity_stiffness)
+        setups = percussion_setups(robot, campaign)
+        values = [campaign[s.name].read([c.name for c in s.channels]) for s in setups]
+        noise = dict(noise) if noise is not None else _noise(campaign, setups, values)
+        self.noise = noise
+        poses: dict[bytes, int] = {}
+        self.records: list[MeasuredRecord] = []
+        for setup, data in zip(setups, values, strict=True):
+            names = [c.name for c in setup.channels if noise[c.name].std > 0.0]
+            if not names:
+                continue
+            rate = 1.0 / setup.samples.step
+            self.records.append(
+                MeasuredRecord(
+                    setup,
+                    {name: data[name] for name in names},
+                    {name: noise[name].at(rate) for name in names},
+                    poses.setdefault(setup.geometry.pose.tobytes(), len(poses)),
+                )
+            )
+        if not self.records:
+            raise InputError(
+                "no percussion record with a channel that can be predicted",
+                file=campaign.folder,
+                hint="percussion records need pose, direction and accelerations or deflections",
+            )
+        self.n_poses = len(poses)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """All channel groups."""
+        return tuple(dict.fromkeys(g for r in self.records for g in r.setup.groups))
+
+    def residuals(
+        self,
+        effects: Iterable[Effect],
+        records: Sequence[MeasuredRecord] | None = None,
+        end: float | None = None,
+    ) -> list[FloatArray]:
+        """Whitened residuals of every record, (channels, m): unit variance where all is noise.
+
+        Args:
+            effects: of the model.
+            records: all where None.
+            end: s, look no further.
+        """
+        chosen = self.records if records is None else records
+        wanted = tuple(effects)
+        shared = self.helpers.residuals(wanted, chosen, end) if self.helpers else None
+        return self.own_residuals(wanted, chosen, end) if shared is None else shared
+
+    def own_residuals(
+        self, effects: Iterable[Effect], records: Sequence[MeasuredRecord], end: float | None
+    ) -> list[FloatArray]:
+        """As `residuals`, by this process alone."""
+        model = self.model.with_effects(effects)
+        # A trial far off may diverge; its residual is then no number, and it is dropped.
+        # One after the other: threads would wait for the interpreter most of the time.
+        with np.errstate(all="ignore"):
+            return [residual(record, model, end) for record in records]
+
+    @contextmanager
+    def pinned(self, effects: Iterable[Effect]) -> Iterator[None]:
+        """Within the block, samples near edges are those of this model, whatever is tried.
+
+        What moves edges changes which samples are known. A sample that is left out costs what
+        noise does on average, one that is not costs what it happens to: by a choice among
+        thousands of them a fit gains as much as a small cause does.
+        """
+        self.pin((next(_numbers), tuple(effects)))
+        try:
+            yield
+        finally:
+            self.unpin()
+
+    def pin(self, pin: Pin) -> None:
+        """As `pinned`, until `unpin`."""
+        model = self.model.with_effects(pin[1])
+        self.pins.append(pin)
+        for record in self.records:
+            record._pinned.append(near_edges(record.setup, model))
+
+    def unpin(self) -> None:
+        """Undo the last `pin`."""
+        self.pins.pop()
+        for record in self.records:
+            record._pinned.pop()
+
+    def predictions(
+        self, effects: Iterable[Effect], records: Sequence[MeasuredRecord] | None = None
+    ) -> list[dict[str, FloatArray]]:
+        """What every channel would read."""
+        model = self.model.with_effects(effects)
+        chosen = self.records if records is None else records
+        return [record.setup.predict(model) for record in chosen]
+
+
+def _noise(
+    campaign: Campaign,
+    setups: Sequence[PercussionSetup],
+    values: Sequence[Mapping[str, FloatArray]],
+) -> dict[str, Noise]:
+    """From the quiet time where there is enough of it, else from all that can be used."""
+    from picchio.diagnosis.percussion.data.noise import quiet_noise
+
+    found = quiet_noise(setups, values)
+    if any(c.name not in found for s in setups for c in s.channels):
+        from picchio.measurement.noise.estimate import noise_levels
+
+        found = {**noise_levels(campaign), **found}
+    return found
+
+
+def residual(record: MeasuredRecord, model: Model, end: float | None = None) -> FloatArray:
+    """One record's whitened residual (channels, m) up to a time."""
+    from picchio.diagnosis.percussion.data.residual_kernel import whitened
+
+    setup = record.until(end)
+    predicted = setup.predict(model)
+    count = setup.samples.count
+    hums = [e for e in model.effects if e.name == "mains_hum" and setup.name not in e.hidden]
+    if hums:
+        rows = {name: values[:count] - predicted[name] for name, values in record.values.items()}
+        for hum in hums:
+            take_out_line(rows, setup, hum.target, hum.values["frequency"])
+        predicted = {name: record.values[name][:count] - row for name, row in rows.items()}
+    masked = _kept_edges(record, setup, model)
+    out, room, known = np.empty((len(record.values), count)), np.empty(count), np.zeros(0, bool)
+    for i, channel in enumerate(record.channels):
+        name = channel.name
+        foretold = predicted[name]
+        offset = 0.0
+        if setup.steady or channel.kind.name in POSITION_KINDS:
+            offset = float((record.values[name][:count] - foretold).sum()) / count
+        unknown = known
+        if masked is not None and channel.kind.name in _JUMPING:
+            # Before the filter, which would spread what is not known, and after it; there as
+            # large as noise, lest a fit gain by moving edges towards samples it misses.
+            unknown = masked[channel.group]
+        whitened(
+            record.values[name], foretold, offset, unknown, record.filler(name),
+            *record.noise[name].model.filters, room, out[i],
+        )  # fmt: skip
+    return out
+
+
+def signal_power(records: Sequence[MeasuredRecord]) -> float:
+    """Sum of squares of all that was measured, in units of the noise."""
+    return float(
+        sum(
+            ((values - values.mean()) ** 2).sum() / record.noise[name].std ** 2
+            for record in records
+            for name, values in record.values.items()
+        )
+    )
+
+
+def take_out_line(
+    rows: dict[str, FloatArray], setup: PercussionSetup, group: str, frequency: float
+) -> tuple[float, float]:
+    """Subtract the best sine of one frequency, common to a group's channels.
+
+    Returns:
+        its cosine and sine amplitude.
+    """
+    names = [c.name for c in setup.channels if c.group == group and c.name in rows]
+    if not names:
+        return 0.0, 0.0
+    phase = 2.0 * np.pi * frequency * setup.samples.times
+    basis = np.stack([np.cos(phase), np.sin(phase)])
+    mean = np.mean([rows[name] for name in names], axis=0)
+    found = np.linalg.lstsq(basis.T, mean, rcond=None)[0]
+    for name in names:
+        rows[name] = rows[name] - found @ basis
+    return float(found[0]), float(found[1])
+
+
+def _kept_edges(
+    record: MeasuredRecord, setup: PercussionSetup, model: Model
+) -> dict[str, BoolArray] | None:
+    """As `near_edges`, which most trials leave as it was, or as it was pinned."""
+    if record._pinned:
+        fixed = record._pinned[-1]
+        count = setup.samples.count
+        return None if fixed is None else {g: mask[:count] for g, mask in fixed.items()}
+    key = (setup.samples, model.key("blows", "sensor"))
+    return record._edges.get(key, lambda: near_edges(setup, model))

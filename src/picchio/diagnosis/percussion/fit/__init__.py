@@ -1,0 +1,1 @@
+"""Fitting a hypothesis to records: unknowns, slopes, least squares."""

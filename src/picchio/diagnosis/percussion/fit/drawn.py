@@ -1,0 +1,410 @@
+"""Fits of the numbers that an effect draws anew in every record, together with all others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from picchio.core.arrays import BoolArray, FloatArray
+from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.fit.least_squares import (
+    HOPELESS,
+    Fit,
+    bounded_step,
+    fit,
+    prior_cost,
+    prior_weights,
+)
+from picchio.diagnosis.percussion.fit.slopes import jacobian
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.search.screen import current_hidden, hidden_columns, with_hidden
+from picchio.model.effects.effect import Effect
+
+# What numbers that are drawn anew in every record cost: they come from one distribution.
+
+
+def drawn_cost(fall: float, count: int, samples: int) -> float:
+    """What a fit must pay for numbers drawn from a normal distribution of unknown width.
+
+    A number that is told by the data with a standard deviation far below the width costs as much as
+    any other, ln(samples) by BIC; one that is hardly told is not free to begin with. Minus twice
+    the logarithm of the likelihood, integrated over the numbers: with the same information h of
+    each and the width that is likeliest, h * width^2 = fall / count - 1, that is
+    count (1 + ln(fall / count)). (Laird and Ware, Biometrics 38 (1982) 963, doi:10.2307/2529876.)
+
+    Args:
+        fall: of chi-square, by the numbers together.
+        count: of the numbers.
+        samples: of the data.
+
+    Returns:
+        the cost in units of chi-square, at least what the numbers gain by chance.
+    """
+    if count < 1 or fall <= count:
+        return max(fall, 0.0)
+    return count * min(1.0 + math.log(fall / count), math.log(max(samples, 2)))
+
+
+def with_drawn(hypothesis: Hypothesis, label: str, fall: float, count: int) -> Hypothesis:
+    """The hypothesis with what an effect's drawn numbers gain written down."""
+    others = tuple(item for item in hypothesis.drawn if item[0] != label)
+    return replace(hypothesis, drawn=(*others, (label, fall, count)))
+
+
+def width_spread(width: float, fall: float, count: int) -> float:
+    """Standard deviation of the width of a distribution, from numbers drawn from it.
+
+    Args:
+        width: of the distribution, without what noise adds.
+        fall: of chi-square, by the numbers together.
+        count: of the numbers.
+    """
+    if fall <= count or count < 1:
+        return width
+    return width * fall / (fall - count) / math.sqrt(2.0 * count)
+
+
+# Where each blow fell, found blow by blow: a start for what all blows' times together must fit.
+#
+# A blow that comes late changes nothing before it. So the first blow and what follows it until the
+# second tell stiffnesses and force; then the second blow's time is looked for in what follows it
+# until the third; and so on.
+
+# How far a blow is looked for, in intervals of the blows; how finely at first, parts of a sample;
+# and how often the model is asked on either side of where that leads.
+_SPAN = 0.2
+_FINER = 4
+_MOVES = 3
+# After so many blows the rest is fitted again.
+_REFIT = (1, 2, 4, 8)
+
+Hidden = Mapping[str, tuple[float, ...]]
+
+
+def blow_by_blow(
+    problem: Problem,
+    start: Fit,
+    hypothesis_with: Callable[[Hypothesis, Hidden], Hypothesis],
+) -> Hypothesis:
+    """The blows' times of every record, and the rest fitted to them.
+
+    Args:
+        problem: data and noise.
+        start: what is known so far; its records and its end are used.
+        hypothesis_with: (hypothesis, record -> (hits,) s) -> the hypothesis with these times.
+    """
+    records = start.records
+    late = {r.name: np.zeros(int(r.setup.blows.hit.max()) + 1) for r in records}
+    here = hypothesis_with(start.hypothesis, _frozen(late))
+    for hit in range(1, max(numbers.size for numbers in late.values())):
+        struck = [r for r in records if hit < late[r.name].size]
+        first = min((hit - _SPAN) * r.setup.blows.interval for r in struck)
+        if start.end is not None and first > start.end:
+            break
+        if hit in _REFIT:
+            here = fit(problem, here, records, first, iterations=3).hypothesis
+        found = _best_times(problem, here, hypothesis_with, struck, late, hit)
+        for record, time in zip(struck, found, strict=True):
+            late[record.name][hit] = time
+        here = hypothesis_with(here, _frozen(late))
+    return here
+
+
+def _best_times(
+    problem: Problem,
+    here: Hypothesis,
+    hypothesis_with: Callable[[Hypothesis, Hidden], Hypothesis],
+    struck: Sequence[MeasuredRecord],
+    late: Mapping[str, FloatArray],
+    hit: int,
+) -> FloatArray:
+    """(records,) s: when this blow came.
+
+    A blow's response is nearly its own, whatever moves already: so it is found once, and moved
+    about to see where it fits best. Then the model has the word, at a few times about that one.
+    """
+    interval = np.array([r.setup.blows.interval for r in struck])
+    end = float(((hit + 1 - _SPAN) * interval).max())
+
+    def at(times: FloatArray) -> Hypothesis:
+        trial = dict(late)
+        for record, time in zip(struck, times, strict=True):
+            trial[record.name] = late[record.name].copy()
+            trial[record.name][hit] = time
+        return hypothesis_with(here, _frozen(trial))
+
+    def cost(times: FloatArray) -> FloatArray:
+        there = problem.residuals(at(times).effects, struck, end)
+        out = np.empty(len(struck))
+        for i, (record, residual) in enumerate(zip(struck, there, strict=True)):
+            own = _window(record.until(end).samples.times, hit, interval[i])
+            out[i] = float((residual[:, own] ** 2).sum())
+        return np.where(np.isfinite(out), out, np.inf)
+
+    # Without it: so late that nothing of it is seen. A sample is known or not in both alike.
+    never = at(np.full(len(struck), 2.0 * end))
+    longer = end + _SPAN * float(interval.max())
+    with problem.pinned(never.effects):
+        gone = problem.residuals(never.effects, struck, longer)
+        there = problem.residuals(at(np.zeros(len(struck))).effects, struck, longer)
+    middle, spacing = np.empty(len(struck)), np.empty(len(struck))
+    for i, (record, without, with_it) in enumerate(zip(struck, gone, there, strict=True)):
+        samples = record.setup.samples
+        own = _window(record.until(longer).samples.times, hit, interval[i])
+        most = int(np.ceil(_SPAN * interval[i] / samples.step))
+        place = _place(without, without - with_it, own, most)
+        middle[i], spacing[i] = place * samples.step, samples.step / _FINER
+    return _refined(cost, middle, spacing)
+
+
+def _window(times: FloatArray, hit: int, interval: float) -> BoolArray:
+    """Which samples tell when a blow came: from when it may have to when the next may."""
+    first, last = (hit - _SPAN) * interval, (hit + 1 - _SPAN) * interval
+    return np.asarray((times >= first) & (times < last))
+
+
+def _place(without: FloatArray, response: FloatArray, own: BoolArray, most: int) -> float:
+    """By how many samples a response is to be moved to explain most of what is seen without it.
+
+    Args:
+        without: (channels, m) residual without the blow.
+        response: (channels, m) what the blow adds to the prediction, in the same units.
+        own: (m,) where it is looked for.
+        most: samples, to either side.
+    """
+    index = np.flatnonzero(own)
+    if not index.size or not (np.isfinite(without).all() and np.isfinite(response).all()):
+        return 0.0
+    room = most + 1
+    padded = np.pad(response, ((0, 0), (room, room)))
+    seen = without[:, index]
+    best, lowest = 0.0, np.inf
+    for step in range(-most * _FINER, most * _FINER + 1):
+        whole = step // _FINER
+        part = step / _FINER - whole
+        here = index + room - whole
+        moved = (1.0 - part) * padded[:, here] + part * padded[:, here - 1]
+        value = float(((seen - moved) ** 2).sum())
+        if value < lowest:
+            best, lowest = step / _FINER, value
+    return best
+
+
+def _refined(
+    cost: Callable[[FloatArray], FloatArray], middle: FloatArray, spacing: FloatArray
+) -> FloatArray:
+    """The lowest point of a parabola about the best of three times, (records,) s."""
+    for _ in range(_MOVES):
+        before, here, after = cost(middle - spacing), cost(middle), cost(middle + spacing)
+        with np.errstate(all="ignore"):
+            bend = before - 2.0 * here + after
+            vertex = np.where(bend > 0.0, 0.5 * (before - after) / bend, 0.0)
+        lowest = np.minimum(np.minimum(before, here), after)
+        side = np.where(lowest == here, 0.0, np.where(lowest == before, -1.0, 1.0))
+        inside = (side == 0.0) & np.isfinite(vertex)
+        middle = middle + spacing * np.where(inside, vertex, side)
+        if inside.all():
+            break
+    return middle
+
+
+def _frozen(late: Mapping[str, FloatArray]) -> dict[str, tuple[float, ...]]:
+    return {name: tuple(float(x) for x in numbers) for name, numbers in late.items()}
+
+
+_ROUNDS = 6
+_SHARES = (1.0, 0.5, 0.25, 0.1)
+_CONVERGED = 1e-4
+_SMALLEST = 1e-6  # of the singular values of what a record's blows can do
+
+
+def fit_latent(
+    problem: Problem, start: Fit, kind: type[Effect], target: str, rival: float = np.inf
+) -> Fit:
+    """Fit the hidden numbers of every record and the unknowns common to all.
+
+    Blows' times are looked for blow by blow first, unless they are known in all of these records.
+    Then all are moved at once, by Gauss and Newton's step, where that helps; else in turns. What
+    stays far above the cost of a `rival` is given up.
+    """
+    if kind.name == "mains_hum":
+        return _priced_hum(problem, start, target)
+    here = start
+    jitter = kind.name == "pulse_jitter"
+    known_in = set(current_hidden(start.hypothesis, kind.name))
+    if jitter and not {r.name for r in start.records} <= known_in:
+        begun = blow_by_blow(problem, start, lambda old, late: with_hidden(old, kind, dict(late)))
+        here = fit(problem, begun, start.records, start.end, iterations=2)
+    for turn in range(_ROUNDS):
+        before = here.cost
+        if turn > 1 and before > HOPELESS * rival:
+            break
+        columns = hidden_columns(problem, here, kind)
+        together = _together(problem, here, kind, columns) if jitter else None
+        here = together or _in_turns(problem, here, kind, columns)
+        if (turn or together) and before - here.cost < _CONVERGED * here.cost:
+            break
+    return _told_times(here, kind, columns) if jitter else _told_share(here, kind)
+
+
+def _told_times(here: Fit, kind: type[Effect], columns: Sequence[FloatArray]) -> Fit:
+    """With the width of the blows' times, without what noise adds to it, and what they cost."""
+    known = _numbers(here, kind)
+    moved, fall, count = 0.0, 0.0, 0
+    for record, own in zip(here.records, columns, strict=True):
+        numbers = known[record.name][1 : 1 + own.shape[1]]
+        moved += float(numbers @ numbers)
+        fall += float(((own @ numbers) ** 2).sum())
+        count += own.shape[1]
+    std = math.sqrt(moved / max(count, 1) * max(1.0 - count / max(fall, 1e-300), 0.0))
+    return _priced(_with_own(here, kind, std=std), f"{kind.name}:tool", fall, count)
+
+
+def _told_share(here: Fit, kind: type[Effect]) -> Fit:
+    """With the share of the blows that are missing."""
+    hidden = current_hidden(here.hypothesis, kind.name)
+    numbers = np.concatenate([np.array(v)[1:] for v in hidden.values()])
+    return _with_own(here, kind, fraction=float(numbers.mean()))
+
+
+def _with_own(here: Fit, kind: type[Effect], **values: float) -> Fit:
+    """With the effect's own parameter as its hidden numbers have it."""
+    effects = tuple(
+        e.with_values(**values) if e.name == kind.name else e for e in here.hypothesis.effects
+    )
+    return replace(here, hypothesis=replace(here.hypothesis, effects=effects))
+
+
+def _priced_hum(problem: Problem, here: Fit, target: str) -> Fit:
+    """With what the lines' sines and cosines cost, by how much chi-square falls by them."""
+    label = f"mains_hum:{target}"
+    effects = tuple(e for e in here.hypothesis.effects if e.label != label)
+    without = problem.residuals(effects, here.records, here.end)
+    fall = sum(float((r * r).sum()) for r in without) - here.chi_square
+    return _priced(here, label, fall, 2 * len(here.records))
+
+
+def _priced(here: Fit, label: str, fall: float, count: int) -> Fit:
+    return replace(here, hypothesis=with_drawn(here.hypothesis, label, fall, count))
+
+
+def _in_turns(
+    problem: Problem, here: Fit, kind: type[Effect], columns: Sequence[FloatArray]
+) -> Fit:
+    """Hidden numbers first, record by record; then what is common to all."""
+    known = _numbers(here, kind)
+    largest = 0.45 * here.records[0].setup.blows.interval
+    wanted = {}
+    for record, residual, slopes in zip(here.records, here.residuals, columns, strict=True):
+        numbers = known[record.name].copy()
+        if slopes.shape[1]:
+            numbers[1 : 1 + slopes.shape[1]] += np.linalg.lstsq(
+                slopes, -residual.ravel(), rcond=_SMALLEST
+            )[0]
+        if kind.name == "pulse_jitter":
+            wanted[record.name] = np.clip(numbers, -largest, largest)
+        else:
+            wanted[record.name] = np.round(np.clip(numbers, 0.0, 1.0))
+    hidden = {name: tuple(numbers) for name, numbers in wanted.items()}
+    if kind.name == "pulse_jitter":
+        hidden = _shortened(problem, here, kind, known, wanted)
+    hypothesis = with_hidden(here.hypothesis, kind, hidden)
+    return fit(problem, hypothesis, here.records, here.end, iterations=2)
+
+
+def _together(
+    problem: Problem, here: Fit, kind: type[Effect], columns: Sequence[FloatArray]
+) -> Fit | None:
+    """One step of hidden and common numbers at once; None where it does not help.
+
+    What each record's hidden numbers can do is projected out first, so that the equations are no
+    larger than the common unknowns (Golub and Pereyra, doi:10.1137/0710036).
+    """
+    unknowns = here.hypothesis.unknowns()
+    if not unknowns:
+        return None
+    slopes = jacobian(problem, here.hypothesis, here.records, here.end, here.residuals)
+    vector, weights = here.hypothesis.vector(), prior_weights(here.hypothesis)
+    means = np.array([u.prior[0] if u.prior else 0.0 for u in unknowns])
+    normal = np.diag(weights**2)
+    gradient = weights**2 * (vector - means)
+    for residual, common, own in zip(here.residuals, slopes, columns, strict=True):
+        alive = np.linalg.norm(own, axis=0) > 0.0
+        basis = np.linalg.qr(own[:, alive])[0] if alive.any() else own[:, :0]
+        free = common - basis @ (basis.T @ common)
+        normal = normal + free.T @ free
+        gradient = gradient + free.T @ residual.ravel()
+    if not np.isfinite(normal).all():
+        return None
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-12 * np.diag(normal).max() + 1e-300))
+    lower, upper = np.array([u.lower for u in unknowns]), np.array([u.upper for u in unknowns])
+    step = bounded_step(normal, gradient, scale, 1e-6, vector, lower, upper)
+    known = _numbers(here, kind)
+    largest = 0.45 * here.records[0].setup.blows.interval
+    for share in _SHARES:
+        hidden = {}
+        for record, residual, common, own in zip(
+            here.records, here.residuals, slopes, columns, strict=True
+        ):
+            numbers = known[record.name].copy()
+            if own.shape[1]:
+                right = -(residual.ravel() + common @ step)
+                moved = np.linalg.lstsq(own, right, rcond=_SMALLEST)[0]
+                numbers[1 : 1 + own.shape[1]] += share * moved
+            hidden[record.name] = tuple(np.clip(numbers, -largest, largest))
+        hypothesis = with_hidden(here.hypothesis.at(vector + share * step), kind, hidden)
+        try:
+            there = problem.residuals(hypothesis.effects, here.records, here.end)
+        except InputError:
+            continue
+        cost = float(sum((r * r).sum() for r in there)) + prior_cost(hypothesis)
+        if cost < here.cost:
+            return replace(here, hypothesis=hypothesis, residuals=there, jacobians=None, cost=cost)
+    return None
+
+
+def _numbers(here: Fit, kind: type[Effect]) -> dict[str, FloatArray]:
+    """Every record's hidden numbers, 0 where none are known."""
+    current = current_hidden(here.hypothesis, kind.name)
+    return {
+        r.name: np.array(
+            current.get(r.name, np.zeros(int(r.setup.blows.hit.max()) + 1)), dtype=float
+        )
+        for r in here.records
+    }
+
+
+def _shortened(
+    problem: Problem,
+    here: Fit,
+    kind: type[Effect],
+    known: dict[str, FloatArray],
+    wanted: dict[str, FloatArray],
+) -> dict[str, tuple[float, ...]]:
+    """Each record's step to what is wanted, halved until it helps that record."""
+    best = {name: tuple(numbers) for name, numbers in known.items()}
+    before = {
+        r.name: float((x * x).sum()) for r, x in zip(here.records, here.residuals, strict=True)
+    }
+    left = list(here.records)
+    for share in _SHARES:
+        trial = {
+            r.name: tuple(known[r.name] + share * (wanted[r.name] - known[r.name])) for r in left
+        }
+        effects = with_hidden(here.hypothesis, kind, {**best, **trial}).effects
+        there = problem.residuals(effects, left, here.end)
+        worse = []
+        for record, residual in zip(left, there, strict=True):
+            if float((residual * residual).sum()) < before[record.name]:
+                best[record.name] = trial[record.name]
+            else:
+                worse.append(record)
+        left = worse
+        if not left:
+            break
+    return best

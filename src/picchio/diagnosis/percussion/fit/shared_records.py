@@ -1,0 +1,147 @@
+"""Records shared out among the cores, where one step of a search needs the last one's result."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
+from typing import Any
+
+from picchio.core.arrays import FloatArray
+from picchio.diagnosis.percussion.data.problem import Pin, Problem
+from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.fit.workers import worker_count
+from picchio.model.effects.effect import Effect
+
+# Numbers of a residual (channels x samples, all records) below which sending costs what it saves.
+_WORTH_SENDING = 10_000
+
+
+@contextmanager
+def shared_out(problem: Problem) -> Iterator[None]:
+    """Within the block, other processes predict their part of the records.
+
+    They are forked, so they have the problem as it is now; which effects, which records and up to
+    when is sent, residuals come back. Results are the same. Where there is one core, or no safe
+    fork (not on Linux), nothing is shared.
+    """
+    count = worker_count(problem.workers) - 1
+    if count < 1 or problem.helpers is not None:
+        yield
+        return
+    helpers = _Helpers(problem, count)
+    problem.helpers = helpers
+    try:
+        yield
+    finally:
+        problem.helpers = None
+        helpers.close()
+
+
+class _Helpers:
+    """The processes, and what passes between them and this one."""
+
+    def __init__(self, problem: Problem, count: int) -> None:
+        self._problem, self._owner = problem, os.getpid()
+        self._places = {record.name: i for i, record in enumerate(problem.records)}
+        self._ends: list[Connection] = []
+        context = multiprocessing.get_context("fork")
+        self._processes = []
+        for _ in range(count):
+            mine, its = context.Pipe()
+            self._ends.append(mine)
+            # Were our ends open in it, it would not notice that we are gone.
+            process = context.Process(
+                target=_serve, args=(problem, its, list(self._ends)), daemon=True
+            )
+            process.start()
+            its.close()
+            self._processes.append(process)
+
+    def residuals(
+        self, effects: Sequence[Effect], records: Sequence[MeasuredRecord], end: float | None
+    ) -> list[FloatArray] | None:
+        """(channels, m) of every record; None where sharing is not worth it or not possible."""
+        parts = len(self._ends) + 1
+        numbers = sum(len(r.values) * r.until(end).samples.count for r in records)
+        known = all(r.name in self._places for r in records)
+        if os.getpid() != self._owner or parts == 1 or not known or len(records) < parts:
+            return None
+        if numbers < _WORTH_SENDING:
+            return None
+        bounds = [len(records) * k // parts for k in range(parts + 1)]
+        shares = [records[a:b] for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+        pins = tuple(self._problem.pins)
+        asked: list[Connection] = []
+        told: list[Any] = []
+        try:
+            for connection, share in zip(self._ends, shares[1:], strict=True):
+                places = [self._places[r.name] for r in share]
+                connection.send((tuple(effects), places, end, pins))
+                asked.append(connection)
+            try:
+                told.append(self._problem.own_residuals(effects, shares[0], end))
+            finally:
+                # Whatever happens here, what was asked for is taken, or it would answer the next.
+                told += [connection.recv() for connection in asked]
+        except (EOFError, OSError):  # one of them was killed: go on alone
+            self.close()
+            return None
+        found: list[FloatArray] = []
+        for answer in told:
+            if isinstance(answer, Exception):
+                raise answer
+            found += answer
+        return found
+
+    def close(self) -> None:
+        """Let them end."""
+        for connection in self._ends:
+            connection.close()
+        for process in self._processes:
+            process.join(timeout=1.0)
+            if process.is_alive():
+                process.kill()
+        self._ends, self._processes = [], []
+
+
+def _serve(problem: Problem, connection: Connection, others: Sequence[Connection]) -> None:
+    """Answer until the other end is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for other in others:
+        other.close()
+    warnings.simplefilter("ignore")
+    problem.helpers = None
+    while True:
+        try:
+            effects, places, end, pins = connection.recv()
+        except (EOFError, OSError):
+            return
+        answer: list[FloatArray] | Exception
+        try:
+            _pin(problem, pins)
+            records = [problem.records[i] for i in places]
+            answer = problem.own_residuals(effects, records, end)
+        except Exception as error:
+            answer = error
+        try:
+            connection.send(answer)
+        except OSError:
+            return
+
+
+def _pin(problem: Problem, pins: Sequence[Pin]) -> None:
+    """Pin what is pinned there, no more and no less."""
+    same = 0
+    for mine, wanted in zip(problem.pins, pins, strict=False):
+        if mine[0] != wanted[0]:
+            break
+        same += 1
+    while len(problem.pins) > same:
+        problem.unpin()
+    for pin in pins[same:]:
+        problem.pin(pin)

@@ -1,0 +1,228 @@
+"""Effects as a vector of unknowns: transforms, bounds, and what is known beforehand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from picchio.campaign.tables import Tolerance
+from picchio.core.arrays import FloatArray
+from picchio.model.effects.effect import Effect
+from picchio.model.effects.registry import effect_class
+from picchio.robot.flexible_robot import FlexibleRobot
+
+# Nominal values within so many standard deviations are nuisances, not causes.
+TOLERATED = 2.0
+_STEP_LOG = 1e-3
+_STEP_LINEAR = 1e-2
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One number of one effect, as the fit sees it: u = log(value) or value / scale.
+
+    Attributes:
+        effect: which of the effects.
+        name: its parameter.
+        logarithmic: the transform.
+        scale: of a linear one.
+        lower, upper: bounds of u.
+        prior: (mean, standard deviation) of u, or None.
+    """
+
+    effect: int
+    name: str
+    logarithmic: bool
+    scale: float
+    lower: float
+    upper: float
+    prior: tuple[float, float] | None = None
+
+    def value(self, u: float) -> float:
+        """The parameter's value."""
+        return math.exp(u) if self.logarithmic else u * self.scale
+
+    def coordinate(self, value: float) -> float:
+        """U of a value."""
+        return math.log(value) if self.logarithmic else value / self.scale
+
+    def slope(self, u: float) -> float:
+        """D value / d u."""
+        return math.exp(u) if self.logarithmic else self.scale
+
+    @property
+    def step(self) -> float:
+        """For differences."""
+        return _STEP_LOG if self.logarithmic else _STEP_LINEAR
+
+
+NUISANCE_KEYS = {
+    "joint_stiffness": "stiffness",
+    "modal_damping": "damping_ratio",
+    "force_amplitude": "force",
+}
+
+
+def nuisances(robot: FlexibleRobot) -> tuple[Effect, ...]:
+    """Stiffness of every joint, damping and force: never quite as stated."""
+    stiffness = effect_class("joint_stiffness")
+    return (
+        *(stiffness(name) for name in robot.flexible_names),
+        effect_class("modal_damping")("robot"),
+        effect_class("force_amplitude")("tool"),
+    )
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """Nuisances and causes with their values.
+
+    Attributes:
+        effects: nuisances first, then the causes.
+        tolerance: of the nuisances.
+        n_nuisances: how many.
+        freed: labels of nuisances that may leave their tolerance: they are causes then.
+        scales: label.parameter -> size of a linear parameter.
+        drawn: (label, fall of chi-square, count) of numbers drawn anew in every record.
+    """
+
+    effects: tuple[Effect, ...]
+    tolerance: Tolerance
+    n_nuisances: int
+    freed: frozenset[str] = frozenset()
+    scales: tuple[tuple[str, float], ...] = ()
+    drawn: tuple[tuple[str, float, int], ...] = ()
+
+    @classmethod
+    def baseline(cls, robot: FlexibleRobot, tolerance: Tolerance) -> Hypothesis:
+        """The nominal model with its nuisances."""
+        found = nuisances(robot)
+        return cls(found, tolerance, len(found))
+
+    @property
+    def causes(self) -> tuple[Effect, ...]:
+        """The effects that are no nuisances, and the nuisances that are freed."""
+        freed = tuple(e for e in self.effects[: self.n_nuisances] if e.label in self.freed)
+        return freed + self.effects[self.n_nuisances :]
+
+    @property
+    def labels(self) -> frozenset[str]:
+        """Labels of the causes."""
+        return frozenset(effect.label for effect in self.causes)
+
+    def plus(self, effect: Effect) -> Hypothesis:
+        """With one more cause; a nuisance becomes one by being freed."""
+        for i, known in enumerate(self.effects[: self.n_nuisances]):
+            if known.label == effect.label:
+                effects = list(self.effects)
+                at = min(max(known.values["scale"] * effect.values["scale"], 0.05), 20.0)
+                effects[i] = known.with_values(scale=at)
+                return replace(self, effects=tuple(effects), freed=self.freed | {effect.label})
+        scales = {
+            p.name: abs(effect.values[p.name]) for p in effect.parameters if not p.logarithmic
+        }
+        sizes = [v for v in scales.values() if v > 0.0 and math.isfinite(v)]
+        typical = max(sizes) if sizes else 1.0
+        own = tuple(
+            (f"{effect.label}.{name}", value if value > 0.0 else _companion(name, typical))
+            for name, value in scales.items()
+        )
+        return replace(self, effects=(*self.effects, effect), scales=self.scales + own)
+
+    def joined(self, cause: Effect) -> Hypothesis:
+        """With one more cause, at just the values that it has in another hypothesis."""
+        more = self.plus(cause)
+        effects = tuple(cause if e.label == cause.label else e for e in more.effects)
+        return replace(more, effects=effects)
+
+    def minus(self, label: str) -> Hypothesis:
+        """Without one of the causes; a nuisance that was freed goes back into its tolerance."""
+        if label in self.freed:
+            effects = tuple(
+                self._tolerated(effect) if effect.label == label else effect
+                for effect in self.effects
+            )
+            return replace(self, effects=effects, freed=self.freed - {label})
+        kept = tuple(
+            e for i, e in enumerate(self.effects) if i < self.n_nuisances or e.label != label
+        )
+        drawn = tuple(item for item in self.drawn if item[0] != label)
+        return replace(self, effects=kept, drawn=drawn)
+
+    def _tolerated(self, nuisance: Effect) -> Effect:
+        """At the tolerated value nearest to where it is: a jump from there would skip cycles."""
+        lower, upper = self._tolerance(nuisance)
+        return nuisance.with_values(scale=min(max(nuisance.values["scale"], lower), upper))
+
+    def _tolerance(self, nuisance: Effect) -> tuple[float, float]:
+        sigma = getattr(self.tolerance, NUISANCE_KEYS[nuisance.name])
+        return max(1.0 - TOLERATED * sigma, 0.05), 1.0 + TOLERATED * sigma
+
+    def unknowns(self) -> list[Unknown]:
+        """What the fit may move."""
+        found = []
+        scales = dict(self.scales)
+        for i, effect in enumerate(self.effects):
+            nuisance = i < self.n_nuisances
+            for p in effect.parameters:
+                if effect.discrete or _fixed(effect, p.name):
+                    continue
+                prior = None
+                lower, upper = p.lower, p.upper
+                if nuisance:
+                    sigma = getattr(self.tolerance, NUISANCE_KEYS[effect.name])
+                    if sigma == 0.0:
+                        continue
+                    if effect.label not in self.freed:
+                        lower, upper = self._tolerance(effect)
+                        prior = (0.0, sigma)
+                scale = scales.get(f"{effect.label}.{p.name}", 1.0)
+                if p.logarithmic:
+                    low = math.log(lower) if lower > 0 else -700.0
+                    found.append(Unknown(i, p.name, True, 1.0, low, math.log(upper), prior))
+                else:
+                    found.append(Unknown(i, p.name, False, scale, lower / scale, upper / scale))
+        return found
+
+    def vector(self) -> FloatArray:
+        """The present values of the unknowns."""
+        return np.array(
+            [u.coordinate(self.effects[u.effect].values[u.name]) for u in self.unknowns()]
+        )
+
+    def at(self, vector: Sequence[float] | FloatArray) -> Hypothesis:
+        """With other values."""
+        changes: dict[int, dict[str, float]] = {}
+        for unknown, u in zip(self.unknowns(), vector, strict=True):
+            clipped = min(max(float(u), unknown.lower), unknown.upper)
+            changes.setdefault(unknown.effect, {})[unknown.name] = unknown.value(clipped)
+        effects = tuple(
+            effect.with_values(**_inside(effect, changes[i])) if i in changes else effect
+            for i, effect in enumerate(self.effects)
+        )
+        return replace(self, effects=effects)
+
+
+def _inside(effect: Effect, values: dict[str, float]) -> dict[str, float]:
+    # log and exp leave a bound by a rounding.
+    bounds = {p.name: (p.lower, p.upper) for p in effect.parameters}
+    return {name: min(max(v, bounds[name][0]), bounds[name][1]) for name, v in values.items()}
+
+
+def _fixed(effect: Effect, name: str) -> bool:
+    """Parameters that are found in another way than by the fit."""
+    return effect.latent is not None
+
+
+def _companion(name: str, typical: float) -> float:
+    """Size of a linear parameter that starts at zero beside others that do not."""
+    if name in ("modal_share",):
+        return 1.0
+    if name == "smoothing":
+        return 1e-3
+    if name == "damping":
+        return 0.02 * typical
+    return typical

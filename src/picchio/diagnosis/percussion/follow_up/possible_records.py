@@ -1,0 +1,91 @@
+"""Records that might be taken next: other poses and directions, softer, warmer, later."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from picchio.campaign.channels import parse_channel
+from picchio.core.arrays import FloatArray
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.model.geometry import Geometry
+from picchio.prediction.percussion import PercussionSetup
+
+_POSES = 6
+_DIRECTIONS = 3
+_SEED = 20160401
+_SOFTER = 0.3
+_OTHERWISE = 15.0
+
+
+def possible_records(problem: Problem, like: MeasuredRecord) -> Iterator[PercussionSetup]:
+    """Poses and directions, some that were measured and some not, with every sensor there is.
+
+    Args:
+        problem: the campaign.
+        like: the record whose blows are used.
+    """
+    rng = np.random.default_rng(_SEED)
+    every = max(1, len(problem.records) // 3)
+    poses = [r.setup.geometry for r in problem.records[::every]]
+    chain = like.setup.geometry.chain
+    poses += [Geometry(chain, _pose(problem, rng)) for _ in range(_POSES)]
+    # What is measured next without a word on the weather is measured as the last record was.
+    last = max(problem.records, key=lambda r: r.setup.conditions.days or 0.0).setup.conditions
+    usual = replace(like.setup, conditions=replace(last, record="next"))
+    for geometry in poses:
+        for direction in _directions(rng):
+            yield _setup(problem, usual, geometry, direction)
+
+
+def _span(problem: Problem) -> float:
+    """Days from the first record to the last."""
+    known = [r.setup.conditions.days for r in problem.records]
+    days = [day for day in known if day is not None]
+    return max(days) - min(days) if days else 0.0
+
+
+def varied(problem: Problem, setup: PercussionSetup) -> dict[str, PercussionSetup]:
+    """The same record with softer blows, in a warmer or cooler room, later."""
+    now, span = setup.conditions, _span(problem)
+    found = {"force": replace(setup, blows=setup.blows.change(height=_SOFTER * setup.blows.height))}
+    if now.temperature is not None:
+        kelvin = now.temperature + _OTHERWISE * (-1.0 if now.temperature > 0.0 else 1.0)
+        found["temperature"] = replace(setup, conditions=replace(now, temperature=kelvin))
+    if now.days is not None and span > 0.0:  # as long again: what drifts is known no further
+        found["days"] = replace(setup, conditions=replace(now, days=now.days + span))
+    return found
+
+
+def _pose(problem: Problem, rng: np.random.Generator) -> FloatArray:
+    robot = problem.robot
+    seen = np.array([r.setup.geometry.pose for r in problem.records])
+    low = np.maximum(robot.lower, seen.min(axis=0) - 0.6)
+    high = np.minimum(robot.upper, seen.max(axis=0) + 0.6)
+    return np.asarray(rng.uniform(low, np.maximum(high, low)))
+
+
+def _directions(rng: np.random.Generator) -> list[FloatArray]:
+    turned = rng.normal(size=(_DIRECTIONS - 1, 3))
+    return [np.eye(3)[int(rng.integers(3))], *(d / np.linalg.norm(d) for d in turned)]
+
+
+def _setup(
+    problem: Problem, like: PercussionSetup, geometry: Geometry, direction: FloatArray
+) -> PercussionSetup:
+    """The record that would be taken, with every sensor that could be had."""
+    frame = problem.robot.tool_frame
+    names = [f"deflection.{n}" for n in problem.robot.flexible_names]
+    names += [f"accelerometer.{frame}.{a}" for a in "xyz"]
+    channels = {c.name: c for c in like.channels}
+    channels |= {name: parse_channel(name)[0] for name in names}
+    rotation = geometry.motion(frame).rotation
+    return replace(
+        like,
+        geometry=geometry,
+        blows=like.blows.change(direction=direction, tool_rotation=rotation),
+        channels=tuple(channels.values()),
+    )

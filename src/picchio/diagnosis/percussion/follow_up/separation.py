@@ -1,0 +1,129 @@
+"""By how much a record would tell rivals apart, whatever else is refitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.fit.least_squares import Fit
+from picchio.prediction.percussion import PercussionSetup
+
+_SENSORS = ("deflection", "accelerometer")
+# Relative noise of a sensor that the campaign does not have.
+_NEW_SENSOR = 0.01
+
+
+def new_noise(problem: Problem, setups: Sequence[PercussionSetup], best: Fit) -> dict[str, float]:
+    """Group -> standard deviation of the noise of sensors that the campaign does not have.
+
+    A hundredth of what they would read in all these records, and the same in each: what moves
+    little there is told by them no better.
+    """
+    model = problem.model.with_effects(best.hypothesis.effects)
+    squares: dict[str, list[float]] = {}
+    for setup in setups:
+        try:
+            read = setup.predict(model)
+        except InputError:  # the model is none there
+            continue
+        for channel in setup.channels:
+            if not _known(problem, channel.name):
+                mean = float(np.mean(read[channel.name] ** 2))
+                squares.setdefault(channel.group, []).append(mean)
+    return {g: max(_NEW_SENSOR * float(np.sqrt(np.mean(s))), 1e-300) for g, s in squares.items()}
+
+
+def _known(problem: Problem, name: str) -> float:
+    """Standard deviation of a channel's noise; 0 where the campaign does not have it."""
+    return problem.noise[name].std if name in problem.noise else 0.0
+
+
+@dataclass(frozen=True)
+class Separation:
+    """By how much chi-square would tell the best model from each of its rivals.
+
+    Attributes:
+        if_best: (rivals,) should the best be the true one, and the rival be refitted.
+        if_rival: (rivals,) the other way round. The two differ where what one claims is within
+            the tolerance of something that the other may refit.
+    """
+
+    if_best: FloatArray
+    if_rival: FloatArray
+
+
+def separation(
+    problem: Problem,
+    setup: PercussionSetup,
+    best: Fit,
+    rivals: Sequence[Fit],
+    fresh: Mapping[str, float],
+) -> dict[str, Separation]:
+    """Sensor -> by how much a record would tell each rival, whichever is refitted.
+
+    Args:
+        problem: what was measured.
+        setup: the record that might be taken.
+        best: the best fit, with its Jacobian.
+        rivals: what else it might be, with theirs.
+        fresh: `new_noise`.
+    """
+    fits = (best, *rivals)
+    read = [setup.predict(problem.model.with_effects(f.hypothesis.effects)) for f in fits]
+    moves = [_moves(problem, setup, f, at) for f, at in zip(fits, read, strict=True)]
+    own = [c.name for c in setup.channels if c.group in problem.groups]
+    noise = {c.name: _known(problem, c.name) or fresh[c.group] for c in setup.channels}
+    found = {}
+    for sensor in _SENSORS:
+        rows = own + [n for n in read[0] if n.startswith(f"{sensor}.") and n not in own]
+        slopes = [np.concatenate([m[n] / noise[n] for n in rows]) if m else None for m, _ in moves]
+        told = np.zeros((2, len(rivals)))
+        for k in range(1, len(fits)):
+            left = np.concatenate([(read[k][n] - read[0][n]) / noise[n] for n in rows])
+            told[:, k - 1] = [_left(left, slopes[m], moves[m][1]) for m in (k, 0)]
+        found[sensor] = Separation(told[0], told[1])
+    return found
+
+
+def _moves(
+    problem: Problem, setup: PercussionSetup, fitted: Fit, here: dict[str, FloatArray]
+) -> tuple[dict[str, FloatArray], FloatArray]:
+    """Channel -> (samples, unknowns) of a fitted model, and the unknowns' covariance."""
+    if fitted.jacobians is None:
+        return {}, np.zeros((0, 0))
+    covariance = fitted.covariance()
+    vector = fitted.hypothesis.vector()
+    steps = np.clip(np.sqrt(np.maximum(covariance.diagonal(), 0.0)), 1e-6, 1e-3)
+    columns: dict[str, list[FloatArray]] = {name: [] for name in here}
+    for k, step in enumerate(steps):
+        moved = vector.copy()
+        moved[k] += step
+        effects = fitted.hypothesis.at(moved).effects
+        there = setup.predict(problem.model.with_effects(effects))
+        for name in here:
+            columns[name].append((there[name] - here[name]) / step)
+    return {name: np.stack(c, axis=1) for name, c in columns.items()}, covariance
+
+
+def _left(left: FloatArray, slopes: FloatArray | None, covariance: FloatArray) -> float:
+    """Chi-square of a difference after what the unknowns, within what is known, can do."""
+    total = float(left @ left)
+    if slopes is None:
+        return total
+    scaled = slopes @ _root(covariance)
+    right = scaled.T @ left
+    return total - float(right @ np.linalg.solve(np.eye(right.size) + scaled.T @ scaled, right))
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """(n, n) whose product with its transpose is the covariance, singular or not."""
+    scale = np.sqrt(np.maximum(covariance.diagonal(), 0.0))
+    outer = np.outer(scale, scale)
+    related = np.where(outer > 0.0, covariance / np.where(outer > 0.0, outer, 1.0), 0.0)
+    values, vectors = np.linalg.eigh(0.5 * (related + related.T))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))

@@ -1,0 +1,481 @@
+"""Screening: how much of what is left could each effect explain, at a size that matters?
+
+Each effect is really put into the model, at a finite size, and the change it makes is compared
+with the residual after the nuisances' own changes are taken out of both: no derivative, which
+misses what only acts beyond a threshold.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.fit.drawn import blow_by_blow, drawn_cost
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, prior_weights
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.model.effects.effect import Effect
+from picchio.model.effects.registry import effect_class
+from picchio.model.effects.scales import Scales
+
+# Trials of an effect made smaller or larger.
+
+
+def moves_one_each(trials: Sequence[Effect]) -> bool:
+    """Whether the trials move one parameter each, as a vector's components."""
+    moved = [tuple(p.name for p in t.parameters if t.values[p.name] != p.neutral) for t in trials]
+    return len(trials) > 1 and len(set(moved)) == len(moved) and all(len(m) == 1 for m in moved)
+
+
+def acts_either_way(kind: type[Effect], faint: bool) -> bool:
+    """Whether an effect may have either sign; a `faint` factor acts as a difference does."""
+    return all(
+        (p.neutral == 0.0 and p.lower < 0.0) or (faint and p.neutral == 1.0 and p.logarithmic)
+        for p in kind.parameters
+    )
+
+
+def smallest(trials: Sequence[Effect]) -> Effect:
+    """Of trials of an effect of one parameter, that which is nearest to doing nothing."""
+
+    def size(trial: Effect) -> float:
+        (p,) = trial.parameters
+        value = trial.values[p.name]
+        return abs(math.log(value)) if p.logarithmic and p.neutral == 1.0 else abs(value)
+
+    return min(trials, key=size)
+
+
+def scaled(trial: Effect, weight: float, signed: bool) -> Effect:
+    """The trial made larger or smaller as the residual asks."""
+    size = float(np.clip(abs(weight), 0.05, 8.0))
+    return bounded(trial, resized(trial, math.copysign(size, weight) if signed else size))
+
+
+def resized(trial: Effect, size: float) -> dict[str, float]:
+    """A trial's values with its distance from doing nothing so many times as large."""
+    values = dict(trial.values)
+    for p in trial.parameters:
+        value = values[p.name]
+        if value == p.neutral or not math.isfinite(value):
+            continue
+        if p.neutral == 0.0 and not p.logarithmic:
+            new = value * size
+        elif p.neutral == 1.0 and p.logarithmic:
+            new = math.exp(math.log(value) * float(np.clip(size, -3.0, 3.0)))
+        elif math.isinf(p.neutral) and p.name in ("stiffness", "limit"):
+            new = value / size if p.name == "stiffness" else value
+        else:
+            continue
+        values[p.name] = min(max(new, p.lower), p.upper)
+    return {p.name: values[p.name] for p in trial.parameters if values[p.name] != p.neutral}
+
+
+def bounded(trial: Effect, values: dict[str, float]) -> Effect:
+    """The effect with values brought within their bounds."""
+    bounds = {p.name: (p.lower, p.upper) for p in trial.parameters}
+    inside = {k: min(max(v, bounds[k][0]), bounds[k][1]) for k, v in values.items()}
+    return type(trial)(trial.target, **inside)
+
+
+# Effects that draw numbers anew in every record: jitter, missed hits, the phase of the hum.
+
+LATENT = ("pulse_jitter", "missed_hits", "mains_hum")
+_SHIFT = 2e-4  # s
+_WEAKER = 0.2
+_MAINS = (50.0, 60.0)
+# Late blows that the screening tries.
+_LOOKED_AT = 1.8
+
+
+def latent_gain(
+    problem: Problem,
+    known: Fit,
+    kind: type[Effect],
+    target: str,
+    project: Projector,
+    left: FloatArray,
+) -> Suspect:
+    """How much of the residual the effect's hidden numbers could explain."""
+    if kind.name == "mains_hum":
+        best, gain = kind(target, amplitude=0.0, frequency=_MAINS[0]), 0.0
+        for frequency in _MAINS:
+            hum = kind(target, amplitude=0.0, frequency=frequency)
+            there = problem.residuals(known.hypothesis.plus(hum).effects, known.records, known.end)
+            fall = known.chi_square - sum(float((r * r).sum()) for r in there)
+            if fall > gain:
+                best, gain = hum, fall
+        return _promise(best, gain, 2 * len(known.records), known.samples)
+    start = kind(target)
+    fall, numbers = 0.0, 0
+    for residual, columns in zip(
+        known.residuals, hidden_columns(problem, known, kind), strict=True
+    ):
+        if columns.shape[1] == 0:
+            continue
+        weights = np.linalg.lstsq(columns, -residual.ravel(), rcond=1e-6)[0]
+        fall += float((residual**2).sum() - ((residual.ravel() + columns @ weights) ** 2).sum())
+        numbers += columns.shape[1]
+    if kind.name == "pulse_jitter" and known.end is not None:
+        fall = max(fall, _late_share(problem, known, kind) * float(left @ left))
+    if kind.discrete:
+        return Suspect(start, fall, numbers, (start,))
+    return _promise(start, fall, numbers, known.samples)
+
+
+def _promise(start: Effect, fall: float, count: int, samples: int) -> Suspect:
+    """A suspect with numbers that are drawn: they cost less than as many free ones."""
+    cost = drawn_cost(fall, count, samples)
+    return Suspect(start, fall, 1 + cost / math.log(max(samples, 2)), (start,))
+
+
+def _late_share(problem: Problem, known: Fit, kind: type[Effect]) -> float:
+    """What share of the residual the times of the first late blows explain.
+
+    A blow that comes late by more than its own edges' width is not seen in any slope.
+    """
+    interval = min(r.setup.blows.interval for r in known.records)
+    end = min((1 + _LOOKED_AT) * interval, known.end or math.inf)
+    try:
+        first = fit(problem, known.hypothesis, known.records, end, iterations=3)
+        early = replace(first, end=end)
+        begun = blow_by_blow(problem, early, lambda old, late: with_hidden(old, kind, dict(late)))
+        late = fit(problem, begun, known.records, end, iterations=2)
+    except InputError:  # led to where there is no model
+        return 0.0
+    return max(1.0 - late.chi_square / max(first.chi_square, 1e-300), 0.0)
+
+
+def hidden_columns(problem: Problem, known: Fit, kind: type[Effect]) -> list[FloatArray]:
+    """The residual's change with every blow's shift or weakening, per record."""
+    hypothesis = known.hypothesis
+    current = current_hidden(hypothesis, kind.name)
+    most = max(int(r.setup.blows.hit.max()) + 1 for r in known.records)
+    step = _SHIFT if kind.name == "pulse_jitter" else _WEAKER
+    found: list[list[FloatArray]] = [[] for _ in known.records]
+    for hit in range(1, most):
+        hidden = {}
+        for record in known.records:
+            count = int(record.setup.blows.hit.max()) + 1
+            numbers = np.array(current.get(record.name, np.zeros(count)), dtype=float)
+            if hit < count:
+                numbers[hit] += step
+            hidden[record.name] = tuple(numbers)
+        there = problem.residuals(
+            with_hidden(hypothesis, kind, hidden).effects, known.records, known.end
+        )
+        for i, (record, new, old) in enumerate(
+            zip(known.records, there, known.residuals, strict=True)
+        ):
+            if hit <= record.setup.blows.hit.max():
+                found[i].append(((new - old) / step).ravel())
+    return [
+        np.stack(columns, axis=1) if columns else np.zeros((r.size, 0))
+        for columns, r in zip(found, known.residuals, strict=True)
+    ]
+
+
+def current_hidden(hypothesis: Hypothesis, name: str) -> dict[str, tuple[float, ...]]:
+    """Record -> an effect's hidden numbers, as far as they are known."""
+    for effect in hypothesis.effects:
+        if effect.name == name:
+            return dict(effect.hidden)
+    return {}
+
+
+def with_hidden(
+    hypothesis: Hypothesis, kind: type[Effect], hidden: dict[str, tuple[float, ...]]
+) -> Hypothesis:
+    """With an effect's hidden numbers (record -> numbers), and the effect if it was not there."""
+    effects = tuple(e.with_hidden(hidden) if e.name == kind.name else e for e in hypothesis.effects)
+    if kind.name not in {e.name for e in hypothesis.effects}:
+        effects = (*effects, kind("tool").with_hidden(hidden))
+    return replace(hypothesis, effects=effects)
+
+
+def hidden_cost(hypothesis: Hypothesis, n_records: int, samples: int) -> float:
+    """What the causes' hidden numbers cost, in units of chi-square."""
+    known = {label: drawn_cost(fall, count, samples) for label, fall, count in hypothesis.drawn}
+    total = 0.0
+    for effect in hypothesis.causes:
+        count = 0.0
+        if effect.name == "mains_hum":
+            count = 2 * n_records
+        elif effect.name == "pulse_jitter":
+            count = sum(max(len(v) - 1, 0) for v in effect.hidden.values())
+        elif effect.name == "missed_hits":  # yes or no: a bit each, not a number
+            bits = sum(max(len(v) - 1, 0) for v in effect.hidden.values())
+            total += bits * math.log(2.0) * math.log(max(samples, 2))
+        total += min(known.get(effect.label, math.inf), count * math.log(max(samples, 2)))
+    return total
+
+
+def hum_lines(problem: Problem, found: Fit) -> Hypothesis:
+    """The hum's amplitude and phases of every record written into its effect."""
+    from picchio.diagnosis.percussion.data.problem import take_out_line
+
+    hypothesis = found.hypothesis
+    effects = list(hypothesis.effects)
+    for i, effect in enumerate(effects):
+        if effect.name != "mains_hum":
+            continue
+        others = [e for k, e in enumerate(effects) if k != i]
+        predictions = problem.predictions(others)
+        hidden = {}
+        for record, predicted in zip(problem.records, predictions, strict=True):
+            rows = {n: v - predicted[n] for n, v in record.values.items()}
+            frequency = effect.values["frequency"]
+            hidden[record.name] = take_out_line(rows, record.setup, effect.target, frequency)
+        amplitude = float(np.sqrt(np.mean([a * a + b * b for a, b in hidden.values()])))
+        kind = effect_class("mains_hum")
+        effects[i] = kind(effect.target, amplitude=amplitude, frequency=effect.values["frequency"])
+        effects[i] = effects[i].with_hidden(hidden)
+    return replace(hypothesis, effects=tuple(effects))
+
+
+_FAINT = 20.0
+_SOME = 3
+# A first look is at every so-manyth record; what promises there less than so much of its share of
+# what is asked for is not looked at further.
+_EVERY = 3
+_FIRST = 0.6
+_CHANCE = 4.0
+# A trial that changes the data by so many times what is left beyond noise is tried smaller, too.
+_LARGE = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Suspect:
+    """An effect and how much of the residual it could explain.
+
+    Attributes:
+        effect: at the size it was tried.
+        gain: fall of chi-square that the screening promises.
+        numbers: how many free numbers the effect has; what costs less counts as a part of one.
+        starts: other sizes to start the fit from, the best first.
+    """
+
+    effect: Effect
+    gain: float
+    numbers: float
+    starts: tuple[Effect, ...]
+
+    @property
+    def label(self) -> str:
+        """Effect and target."""
+        return self.effect.label
+
+
+class Projector:
+    """Takes what the nuisances and the causes found so far can do out of a change."""
+
+    def __init__(self, fit: Fit) -> None:
+        assert fit.jacobians is not None
+        weights = prior_weights(fit.hypothesis)
+        jacobian = np.concatenate([*fit.jacobians, np.diag(weights)])
+        norms = np.linalg.norm(jacobian, axis=0)
+        # What stands at its bound is no longer free to explain anything.
+        vector = fit.hypothesis.vector()
+        inside = [
+            u.lower + 1e-6 < x < u.upper - 1e-6
+            for u, x in zip(fit.hypothesis.unknowns(), vector, strict=True)
+        ]
+        keep = (norms > 0.0) & np.array(inside, dtype=bool)
+        q, r = np.linalg.qr(jacobian[:, keep] / norms[keep])
+        good = np.abs(r.diagonal()) > 1e-8
+        self.basis = q[:, good]
+        self.extra = weights.size
+
+    def __call__(self, flat: FloatArray) -> FloatArray:
+        """(samples,) or (samples, k) made orthogonal to the nuisances."""
+        pad = np.zeros((self.extra, *flat.shape[1:]))
+        full = np.concatenate([flat, pad])
+        return np.asarray(full - self.basis @ (self.basis.T @ full))
+
+
+def flat(parts: Sequence[FloatArray]) -> FloatArray:
+    """All records' residuals in one row."""
+    return np.concatenate([part.ravel() for part in parts])
+
+
+class Screen:
+    """Tells every candidate's promise.
+
+    Args:
+        problem: data and noise.
+        fit: of what is known so far, with its Jacobian; the same records and time are used.
+        scales: sizes that matter.
+        faint: whether only what hardly stands out of the noise is looked for. A typical size is
+            then far too large: late in a record it no longer looks like a small one.
+        enough: a fall of chi-square below which a promise is of no use.
+        early: whether these are the first few cycles, where a narrow resonance can be met.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        fit: Fit,
+        scales: Scales,
+        faint: bool = False,
+        enough: float = 0.0,
+        early: bool = False,
+    ) -> None:
+        self.problem, self.fit, self.scales = problem, fit, scales
+        self.faint, self.early = faint, early
+        self.project = Projector(fit)
+        self.left = self.project(flat(fit.residuals))
+        self.enough, self.first = enough, None
+        # Chance alone promises one or two: below that a glance tells nothing.
+        if enough * _FIRST / _EVERY > _CHANCE and len(fit.records) > _EVERY:
+            self.first = Screen(problem, _part(fit), scales, faint)
+
+    @property
+    def total(self) -> float:
+        """Chi-square that is left to explain."""
+        return float(self.left @ self.left)
+
+    @property
+    def beyond(self) -> float:
+        """Standard deviations that are left beyond noise, all in all."""
+        count = self.left.size
+        return math.sqrt(max(self.total - count, 3.0 * math.sqrt(2.0 * count)))
+
+    # A trial far too large may diverge: it is tried smaller.
+    @np.errstate(over="ignore", invalid="ignore")
+    def suspect(self, candidate: tuple[type[Effect], str]) -> Suspect | None:
+        """What an effect at a target promises; None where it can't act, or is known already."""
+        kind, target = candidate
+        if f"{kind.name}:{target}" in self.fit.hypothesis.labels:
+            return None
+        if kind.name in LATENT:
+            return latent_gain(self.problem, self.fit, kind, target, self.project, self.left)
+        if kind.discrete and self.faint:
+            return None  # what has no small size would have been seen before
+        if self.first is not None:
+            glance = self.first.suspect(candidate)
+            if glance is None or glance.gain < _FIRST * self.enough / _EVERY:
+                return glance
+        bare = kind(target)
+        sizes = bare.early_trials(self.scales) if self.early else bare.trials(self.scales)
+        trials = [kind(target, **values) for values in sizes]
+        if self.faint:
+            if acts_either_way(kind, faint=True) and len(kind.parameters) == 1:
+                trials = [smallest(trials)]  # the others would become the same
+            trials = [self._faint(trial) for trial in trials]
+        return _judged(*self._changes(trials), self.left, self.faint)
+
+    def _changes(self, trials: Sequence[Effect]) -> tuple[list[Effect], list[FloatArray]]:
+        """The trials, smaller ones where they are far too large, and what they change."""
+        fit, base = self.fit, flat(self.fit.residuals)
+
+        def change(trial: Effect) -> FloatArray | None:
+            try:
+                effects = fit.hypothesis.plus(trial).effects
+                return flat(self.problem.residuals(effects, fit.records, fit.end)) - base
+            except InputError:  # at this size the model is none
+                return None
+
+        components = moves_one_each(trials)
+        kept: list[Effect] = []
+        columns: list[FloatArray] = []
+        for trial in trials:
+            moved = change(trial)
+            if moved is None:
+                continue
+            tried = [(trial, moved)]
+            large = float(np.linalg.norm(moved)) / self.beyond
+            if large > _LARGE and not self.faint and not trial.discrete:
+                smaller = type(trial)(trial.target, **resized(trial, 1.0 / large))
+                moved = change(smaller) if smaller.values != trial.values else None
+                if moved is not None:  # of a vector's components one size each
+                    tried = [(smaller, moved)] if components else [*tried, (smaller, moved)]
+            for one, moved in tried:
+                columns.append(self.project(moved[:, None])[:, 0])
+                kept.append(one)
+        return kept, columns
+
+    def _faint(self, trial: Effect) -> Effect:
+        """The trial so small that it changes the data by some standard deviations all in all."""
+        fit = self.fit
+        # The first few: what one direction of the force does not show another does.
+        some = fit.records[:_SOME]
+        try:
+            effects = fit.hypothesis.plus(trial).effects
+            there = flat(self.problem.residuals(effects, some, fit.end))
+        except InputError:
+            return trial
+        change = float(np.linalg.norm(there - flat(fit.residuals[: len(some)])))
+        change *= math.sqrt(len(fit.records) / len(some))
+        if not change > _FAINT:
+            return trial
+        values = resized(trial, _FAINT / change)
+        return type(trial)(trial.target, **values)
+
+    def ranked(self, suspects: Iterable[Suspect | None]) -> list[Suspect]:
+        """The most promising first."""
+        found = [s for s in suspects if s is not None]
+        return sorted(found, key=lambda s: -(s.gain - s.numbers * math.log(self.left.size)))
+
+
+def _part(fit: Fit) -> Fit:
+    """Every third record of a fit, as if it had been fitted to those alone."""
+    assert fit.jacobians is not None
+    return replace(
+        fit,
+        records=fit.records[::_EVERY],
+        residuals=fit.residuals[::_EVERY],
+        jacobians=fit.jacobians[::_EVERY],
+    )
+
+
+def _judged(
+    kept: Sequence[Effect], columns: Sequence[FloatArray], left: FloatArray, faint: bool
+) -> Suspect | None:
+    """What the trials of one effect explain of what is left, by the change each makes."""
+    if not kept:
+        return None
+    moves = np.stack(columns, axis=1)
+    size = np.linalg.norm(moves, axis=0)
+    alive = size > 1e-6
+    if not alive.any():
+        return None
+    moves, size = moves[:, alive], size[alive]
+    kept = [t for t, a in zip(kept, alive, strict=True) if a]
+    # the residual falls by the part of it that the change (of either size) can undo
+    alone = (moves.T @ -left) / size**2
+    gains = np.where(alone > 0.0, (alone * size) ** 2, 0.0)
+    linear = acts_either_way(type(kept[0]), faint)
+    if linear:
+        gains = (alone * size) ** 2
+    numbers = len(kept[0].parameters)
+    if kept[0].discrete:
+        # nothing lies between its sizes: the residual as it would be
+        totals = np.array([((left + m) ** 2).sum() for m in moves.T])
+        gains = (left**2).sum() - totals
+        order = np.argsort(-gains)
+        starts = tuple(kept[i] for i in order[:2])
+        return Suspect(starts[0], float(gains[order[0]]), 4, starts)
+    if moves_one_each(kept):
+        weights = np.linalg.lstsq(moves, -left, rcond=None)[0]
+        total = float(left @ left - ((left + moves @ weights) ** 2).sum())
+        values: dict[str, float] = {}
+        for trial, weight in zip(kept, weights, strict=True):
+            for p in trial.parameters:
+                if trial.values[p.name] != p.neutral:
+                    values[p.name] = float(np.clip(weight, -6.0, 6.0)) * trial.values[p.name]
+        start = bounded(kept[0], values)
+        return Suspect(start, total, numbers, (start,))
+    order = np.argsort(-gains)
+    starts = tuple(scaled(kept[i], float(alone[i]), linear) for i in order[:2])
+    span = float(left @ left - _leave(moves, left))
+    return Suspect(starts[0], max(float(gains[order[0]]), 0.7 * span), numbers, starts)
+
+
+def _leave(moves: FloatArray, left: FloatArray) -> float:
+    weights = np.linalg.lstsq(moves, -left, rcond=None)[0]
+    return float(((left + moves @ weights) ** 2).sum())

@@ -1,0 +1,1 @@
+"""Counting stress cycles by rainflow."""

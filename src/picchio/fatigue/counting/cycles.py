@@ -1,0 +1,111 @@
+"""Counted load cycles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray, as_floats
+from picchio.core.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Cycles:
+    """Load cycles, in the order in which they closed; the residue's last.
+
+    Attributes:
+        range: (c,) largest less smallest value of each cycle, in the history's unit.
+        mean: (c,) their mean, in the history's unit.
+        count: (c,) how often each was counted: 1, or 0.5 for half a cycle.
+    """
+
+    range: FloatArray
+    mean: FloatArray
+    count: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("range", "mean", "count"):
+            array = as_floats(getattr(self, name), f"cycles.{name}").copy()
+            if array.ndim != 1 or array.shape != np.shape(self.range):
+                raise InputError(
+                    "range, mean and count must be 1-D and equally long",
+                    key=f"cycles.{name}",
+                    value=np.shape(array),
+                )
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        if (self.range < 0).any() or (self.count < 0).any():
+            raise InputError("range and count must not be negative", key="cycles")
+
+    @property
+    def amplitude(self) -> FloatArray:
+        """(c,) half the range."""
+        return self.range / 2.0
+
+    @property
+    def total(self) -> float:
+        """The number of cycles."""
+        return float(self.count.sum())
+
+    def __len__(self) -> int:
+        return len(self.range)
+
+    def __add__(self, other: Cycles) -> Cycles:
+        return Cycles.trusted(
+            np.concatenate((self.range, other.range)),
+            np.concatenate((self.mean, other.mean)),
+            np.concatenate((self.count, other.count)),
+        )
+
+    def repeated(self, times: float) -> Cycles:
+        """The same cycles `times` over: counts are multiplied."""
+        return Cycles(self.range, self.mean, self.count * float(times))
+
+    def shifted(self, mean: float) -> Cycles:
+        """The same cycles about a mean that is higher by `mean` (gravity's share, say)."""
+        return Cycles(self.range, self.mean + float(mean), self.count)
+
+    def scaled(self, factor: float) -> Cycles:
+        """The cycles of the history times `factor`; a negative one turns the means over."""
+        return Cycles(self.range * abs(float(factor)), self.mean * float(factor), self.count)
+
+    def binned(self, width: float) -> Cycles:
+        """Fewer cycles: ranges and means rounded away from zero to multiples of `width`.
+
+        On the safe side: no range or mean becomes smaller. Nothing here bins unless asked to.
+
+        Args:
+            width: of the classes, positive, in the history's unit.
+
+        Raises:
+            InputError: a width that is not positive and finite.
+        """
+        step = float(as_floats(width, "width"))
+        if step <= 0:
+            raise InputError("must be positive", key="width", value=width)
+        # A value on a class's edge stays there, whatever its last bit.
+        size = np.ceil(self.range / step - 1e-12)
+        mean = np.sign(self.mean) * np.ceil(np.abs(self.mean) / step - 1e-12)
+        classes, where = np.unique(np.stack((size, mean)), axis=1, return_inverse=True)
+        count = np.bincount(where.ravel(), weights=self.count, minlength=classes.shape[1])
+        return Cycles(classes[0] * step, classes[1] * step, count)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain lists, for JSON."""
+        return {name: getattr(self, name).tolist() for name in ("range", "mean", "count")}
+
+    @classmethod
+    def trusted(cls, range: FloatArray, mean: FloatArray, count: FloatArray) -> Cycles:
+        """Cycles of arrays that nobody else holds and that need no check (a million of them)."""
+        new = object.__new__(cls)
+        for name, array in (("range", range), ("mean", mean), ("count", count)):
+            array.flags.writeable = False
+            object.__setattr__(new, name, array)
+        return new
+
+    @classmethod
+    def none(cls) -> Cycles:
+        """No cycles at all."""
+        return cls(np.empty(0), np.empty(0), np.empty(0))

@@ -1,0 +1,1 @@
+"""S-N curves in shear: the curve, its library, its fit to tests."""

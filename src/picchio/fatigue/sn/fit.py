@@ -1,0 +1,312 @@
+"""Fit an S-N curve to test data with run-outs, each parameter with a confidence interval."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from picchio.core.arrays import FloatArray, as_floats
+from picchio.core.errors import InputError, PicchioWarning
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.fatigue.sn.likelihood import Likelihood, maximise
+from picchio.fatigue.sn.profile import Profile
+
+# A fitted S-N curve: its parameters with their intervals, and how sure the line is.
+
+METHOD = (
+    "maximum likelihood; Basquin's line with an endurance limit; log-normal strength and "
+    "life; profile likelihood intervals with Student's t threshold, scatter by the Cox-Reid "
+    "adjusted profile"
+)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted value and its confidence interval; an end that the data do not bound is 0 or inf."""
+
+    value: float
+    low: float
+    high: float
+
+    def to_dict(self) -> dict[str, float | None]:
+        """For JSON; an infinite end is None."""
+        return {
+            name: (float(v) if np.isfinite(v) else None)
+            for name, v in (("value", self.value), ("low", self.low), ("high", self.high))
+        }
+
+
+@dataclass(frozen=True)
+class SNFit:
+    """A fitted S-N curve.
+
+    Attributes:
+        slope: k of N ~ amplitude^-k.
+        knee: cycles at the knee; None where no run-out shows one.
+        endurance_limit: Pa, median. Without a knee: the median strength at `reference_cycles`.
+        design: Pa, the same at `design_survival`.
+        scatter: standard deviation of log10 strength at a given life, free of the bias of maximum
+            likelihood. It holds the specimens' strength and the scatter of life by itself, so at
+            the endurance limit it is on the safe side.
+        strength_share: share of the scatter's variance that is the specimens' strength, which
+            alone counts at the endurance limit (maximum likelihood; few tests show it badly).
+        design_survival: the probability that `design` is for.
+        reference_cycles: where the strengths are given.
+        level: of the intervals, two-sided.
+        failures: number of failed specimens.
+        run_outs: number of survivors.
+        log_likelihood: at the maximum, natural, density in ln cycles, penalty included.
+        assumptions: what was assumed, in words.
+        covariance: (3, 3) of ln endurance limit, ln knee and ln slope, widened for small samples
+            as the intervals are; zeros for a knee that is none.
+    """
+
+    slope: Estimate
+    knee: Estimate | None
+    endurance_limit: Estimate
+    design: Estimate
+    scatter: Estimate
+    strength_share: float
+    design_survival: float
+    reference_cycles: float
+    level: float
+    failures: int
+    run_outs: int
+    log_likelihood: float
+    assumptions: tuple[str, ...]
+    covariance: tuple[tuple[float, ...], ...] = ()
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        told = {
+            "slope k": (self.slope, 1.0),
+            "knee [cycles]": (self.knee, 1.0),
+            "endurance limit, median [MPa]": (self.endurance_limit, 1e-6),
+            f"the same at {100 * self.design_survival:g} % survival [MPa]": (self.design, 1e-6),
+            "scatter of log10 strength": (self.scatter, 1.0),
+        }
+        rows = [(name, e.value * f, e.low * f, e.high * f) for name, (e, f) in told.items() if e]
+        columns = ("", "best", f"{100 * self.level:g} % from", "to")
+        title = f"S-N fit: {self.failures} failures, {self.run_outs} run-outs"
+        return sheet(title, None, columns, rows, "; ".join(self.assumptions))
+
+    def curve(self, survival: float = 0.5, name: str = "fitted") -> SNCurve:
+        """The fitted curve as an `SNCurve`, moved to a probability of survival.
+
+        Args:
+            survival: of a specimen; the fit's own uncertainty is not in it (see `design.low`).
+            name: what to call it.
+        """
+        median = SNCurve(
+            name=name,
+            strength=self.endurance_limit.value,
+            cycles=self.reference_cycles,
+            slopes=(self.slope.value,),
+            knees=(self.reference_cycles,) if self.knee is not None else (),
+            survival=0.5,
+            scatter=self.scatter.value,
+            source=f"fitted to {self.failures} failures and {self.run_outs} run-outs by picchio",
+            assumptions=self.assumptions,
+        )
+        return median if survival == 0.5 else median.at_survival(survival)
+
+    def band(self, cycles: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Where the median line itself may lie: pointwise interval at `level`.
+
+        By 4,000 draws of limit, knee and slope from their normal approximation, so near the
+        parameters' own intervals and not equal to them.
+
+        Args:
+            cycles: (k,) lives.
+
+        Returns:
+            lowest and highest median strength (k,), Pa.
+        """
+        at = np.log(as_floats(cycles, "cycles"))
+        knee = np.log(self.reference_cycles)
+        centre = np.array([np.log(self.endurance_limit.value), knee, np.log(self.slope.value)])
+        rng = np.random.default_rng(0)
+        draws = rng.multivariate_normal(centre, self.covariance, 4000, check_valid="ignore")
+        above = (draws[:, 1:2] - at) / np.exp(draws[:, 2:3])
+        if self.knee is not None:
+            above = np.maximum(above, 0.0)
+        tail = 50.0 * (1.0 - self.level)
+        low, high = np.percentile(np.exp(draws[:, :1] + above), [tail, 100.0 - tail], axis=0)
+        return low, high
+
+    def to_dict(self) -> dict[str, Any]:
+        """The `picchio-sn/1` record."""
+        names = ("slope", "endurance_limit", "design", "scatter")
+        return {
+            "format": "picchio-sn/1",
+            "method": METHOD,
+            **{name: getattr(self, name).to_dict() for name in names},
+            "knee": None if self.knee is None else self.knee.to_dict(),
+            "strength_share": self.strength_share,
+            "design_survival": self.design_survival,
+            "reference_cycles": self.reference_cycles,
+            "level": self.level,
+            "failures": self.failures,
+            "run_outs": self.run_outs,
+            "log_likelihood": self.log_likelihood,
+            "assumptions": list(self.assumptions),
+        }
+
+
+__all__ = ["METHOD", "Estimate", "SNFit", "fit_sn"]
+
+
+def fit_sn(
+    amplitude: npt.ArrayLike,
+    cycles: npt.ArrayLike,
+    failed: npt.ArrayLike,
+    *,
+    level: float = 0.90,
+    survival: float = 0.975,
+    knee: bool | None = None,
+) -> SNFit:
+    """Fit slope, knee, endurance limit and scatter by maximum likelihood.
+
+    The model is `picchio.fatigue.sn.likelihood`'s. Intervals invert the profile likelihood with
+    the threshold n ln(1 + t^2 / (n - 2)) that is exact for a regression line, n being the number
+    of failures that would inform the scatter as much as these tests do; the scatter's inverts the
+    adjusted profile likelihood of Cox and Reid (J. R. Statist. Soc. B 49, 1987).
+
+    How often 90 % intervals held the truth in 2,000 sets of 30 tests, and of 100, with about a
+    quarter of run-outs (slope, knee, limit, design, scatter; standard error 0.7 points):
+
+    - scatter half strength, half life: 90, 91, 89, 89, 89 %; and 92, 92, 90, 90, 91 %
+    - a quarter strength: 89, 89, 94, 89, 88 %; and 90, 90, 92, 90, 89 %
+    - all strength: 87, 89, 89, 90, 88 %; and 83, 80, 88, 89, 91 %
+    - all life, the limit the same for all: 84, 85, 100, 87, 83 %; and 87, 81, 63, 79, 83 %
+
+    So where the scatter is all of one kind the intervals are too narrow, the more so with many
+    tests, and `assumptions` says so where the tests show it.
+
+    Args:
+        amplitude: (n,) stress amplitudes, Pa.
+        cycles: (n,) cycles at failure, or reached without.
+        failed: (n,) True where the specimen failed, False for a run-out.
+        level: of the two-sided intervals.
+        survival: probability that the design strength is for.
+        knee: True: fit a knee. False: a straight line, run-outs censored. None: a knee where the
+            tests have run-outs.
+
+    Raises:
+        InputError: arrays that do not match, values that are not positive, a `level` or
+            `survival` that is no probability, or tests that cannot show a slope or a scatter.
+    """
+    tests = _check(amplitude, cycles, failed, level, survival)
+    run_outs = int((~tests.failed).sum())
+    with_knee = run_outs > 0 if knee is None else knee
+    notes = [f"{tests.failed.sum()} failures, {run_outs} run-outs taken as tests stopped alive"]
+    if with_knee:
+        notes.append("about half of the scatter is strength unless the tests know better")
+    else:
+        notes.append("no knee: a straight line")
+    if with_knee and run_outs == 0:
+        raise InputError("needs run-outs", key="knee", value=knee)
+    if knee is None and not with_knee:
+        warnings.warn(
+            "the tests have no run-out, so the fit has no knee and no endurance limit",
+            PicchioWarning,
+            stacklevel=2,
+        )
+    free = [0, 1, 2, 3, 4] if with_knee else [0, 2, 3]
+    tests = dataclasses.replace(tests, limited=with_knee)
+    theta = _best(tests, free)
+    median = Profile(tests, theta, free, level)
+    at_quantile = theta.copy()
+    z = _normal_quantile(survival)
+    at_quantile[0] -= z * np.exp(theta[3])
+    design = Profile(dataclasses.replace(tests, z=z), at_quantile, free, level)
+
+    share = float(1.0 / (1.0 + np.exp(-median.theta[4])))
+    if with_knee and not 0.2 < share < 0.8:
+        kind = "strength" if share > 0.5 else "life by itself"
+        notes.append(f"the scatter is nearly all of {kind}: the intervals are too narrow then")
+
+    def estimate(profile: Profile, index: int) -> Estimate:
+        low, high = profile.interval(index)
+        return Estimate(*(float(np.exp(v)) for v in (profile.theta[index], low, high)))
+
+    spread, low, high = (float(np.exp(v) / np.log(10.0)) for v in median.scatter())
+    scatter = Estimate(spread, low, high)
+    return SNFit(
+        slope=estimate(median, 2),
+        knee=estimate(median, 1) if with_knee else None,
+        endurance_limit=estimate(median, 0),
+        design=dataclasses.replace(
+            estimate(design, 0),
+            # With the same scatter as `curve`, so that both say the same.
+            value=float(np.exp(median.theta[0])) * 10.0 ** (-z * spread),
+        ),
+        scatter=scatter,
+        strength_share=share,
+        design_survival=survival,
+        reference_cycles=float(f"{np.exp(median.theta[1]):.12g}"),
+        level=level,
+        failures=int(tests.failed.sum()),
+        run_outs=run_outs,
+        log_likelihood=median.value,
+        assumptions=tuple(notes),
+        covariance=median.covariance(),
+    )
+
+
+def _check(amplitude: Any, cycles: Any, failed: Any, level: float, survival: float) -> Likelihood:
+    stress, life = as_floats(amplitude, "amplitude"), as_floats(cycles, "cycles")
+    broke = np.asarray(failed)
+    if broke.dtype != np.bool_ and not np.isin(broke, (0, 1)).all():
+        raise InputError("must be true or false", key="failed", value=failed)
+    broke = broke.astype(bool)
+    if stress.ndim != 1 or not stress.shape == life.shape == broke.shape:
+        raise InputError(
+            "amplitude, cycles and failed must be 1-D and equally long",
+            key="tests",
+            value=(stress.shape, life.shape, broke.shape),
+        )
+    for key, values in (("amplitude", stress), ("cycles", life)):
+        if values.size and values.min() <= 0:
+            raise InputError("must be positive", key=key, value=float(values.min()))
+    for key, value in (("level", level), ("survival", survival)):
+        if not 0.0 < value < 1.0:
+            raise InputError("must lie between 0 and 1", key=key, value=value)
+    if broke.sum() < 6:
+        raise InputError("needs at least 6 failures", key="tests", value=int(broke.sum()))
+    if len(np.unique(stress[broke])) < 2:
+        raise InputError("needs failures at two stresses at least", key="tests")
+    return Likelihood(np.log(stress), np.log(life), broke)
+
+
+def _best(tests: Likelihood, free: list[int]) -> FloatArray:
+    """The maximum, from several starts: the likelihood can have more than one."""
+    stress, life = tests.stress[tests.failed], tests.cycles[tests.failed]
+    slope = float(np.clip(-np.polyfit(stress, life, 1)[0], 1.0, 60.0))
+    # Without a knee the strength is told at a round number of cycles amid the failures.
+    decade = np.log(10.0) * np.round(np.mean(life) / np.log(10.0))
+    knees = np.quantile(life, [0.4, 0.7, 0.95]) if 1 in free else [decade]
+    best: tuple[float, FloatArray] | None = None
+    for knee in knees:
+        limit = float(np.mean(stress) - (knee - np.mean(life)) / slope)
+        spread = max(float(np.std(life + slope * stress)) / slope, 1e-4)
+        for share in (-1.0, 2.0) if 4 in free else (0.0,):
+            start = np.array([limit, knee, np.log(slope), np.log(spread), share])
+            value, theta = maximise(tests, start, free)
+            if np.isfinite(value) and (best is None or value > best[0]):
+                best = (value, theta)
+    if best is None or best[1][3] < np.log(1e-6):
+        raise InputError("the tests lie on a line: no scatter can be estimated", key="tests")
+    return best[1]
+
+
+def _normal_quantile(probability: float) -> float:
+    from statistics import NormalDist
+
+    return NormalDist().inv_cdf(probability)

@@ -1,0 +1,79 @@
+"""The S-N curves that can be named: data files that ship with picchio, and the user's own."""
+
+from __future__ import annotations
+
+import warnings
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Literal
+
+from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.toml import Positive, StrictModel, parse_toml
+from picchio.fatigue.sn.curve import MinerRule, SNCurve
+
+DEFAULT_SN_CURVE = "42CrMo4-QT-shaft"
+PAPER_SN_CURVE = "nie-2016"
+SN_FORMAT = "picchio-sn-curve/1"
+
+
+class SNCurveFile(StrictModel):
+    """What an S-N curve's TOML file holds; units and meaning as in `SNCurve`."""
+
+    name: str
+    kind: Literal["shear"]
+    strength: Positive
+    cycles: Positive
+    slopes: tuple[Positive, ...]
+    knees: tuple[Positive, ...] = ()
+    miner: MinerRule = "original"
+    survival: Positive | None = None
+    scatter: Positive | None = None
+    ultimate_shear: Positive | None = None
+    yield_shear: Positive | None = None
+    tensile_strength: Positive | None = None
+    source: str
+    warning: str = ""
+    assumptions: tuple[str, ...] = ()
+
+
+def sn_curve_names() -> tuple[str, ...]:
+    """The names of the curves that ship with picchio, the default first."""
+    others = sorted(set(_shipped()) - {DEFAULT_SN_CURVE})
+    return (DEFAULT_SN_CURVE, *others)
+
+
+def load_sn_curve(name_or_path: str | Path, *, quiet: bool = False) -> SNCurve:
+    """An S-N curve by name, or from a user's TOML file (`picchio-sn-curve/1`).
+
+    Args:
+        name_or_path: one of `sn_curve_names()`, or a path (it ends in .toml, or has a folder).
+        quiet: do not pass on the warning that the curve carries.
+
+    Raises:
+        InputError: an unknown name, or a file that is missing or wrong.
+    """
+    text = str(name_or_path)
+    if text in _shipped():
+        curve = _read(_shipped()[text])
+    elif text.endswith(".toml") or "/" in text or Path(text).is_file():
+        curve = _read(Path(text))
+    else:
+        raise InputError("no such S-N curve", key="sn_curve", value=text, choices=sn_curve_names())
+    if curve.warning and not quiet:
+        warnings.warn(f"S-N curve {curve.name}: {curve.warning}", PicchioWarning, stacklevel=2)
+    return curve
+
+
+def _read(path: Path) -> SNCurve:
+    content = parse_toml(path, SNCurveFile, format=SN_FORMAT)
+    try:
+        return SNCurve(**content.model_dump())
+    except InputError as error:
+        raise InputError(str(error), file=path) from None
+
+
+@cache
+def _shipped() -> dict[str, Path]:
+    folder = Path(str(files("picchio.fatigue"))) / "data" / "sn"
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}

@@ -1,0 +1,139 @@
+"""Read S-N tests from a table: stress amplitude, cycles, and whether the specimen failed."""
+
+from __future__ import annotations
+
+import csv
+import re
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.files import read_text
+
+_UNITS = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "n/mm^2": 1e6, "n/mm2": 1e6, "gpa": 1e9,
+          "psi": 6894.757293168361, "ksi": 6894757.293168361}  # fmt: skip
+_FAILED = {"failure", "failed", "fail", "fracture", "true", "1", "yes", "broken"}
+_ALIVE = {"runout", "run-out", "run out", "survived", "survivor", "false", "0", "no", "alive"}
+
+
+@dataclass(frozen=True)
+class SNTests:
+    """S-N tests.
+
+    Attributes:
+        amplitude: (n,) Pa.
+        cycles: (n,) at failure, or reached without.
+        failed: (n,) bool.
+        assumptions: what the reader had to assume.
+    """
+
+    amplitude: FloatArray
+    cycles: FloatArray
+    failed: np.ndarray
+    assumptions: tuple[str, ...] = ()
+
+
+def read_sn_tests(path: str | Path, *, run_out_cycles: float | None = None) -> SNTests:
+    """Read a table with a header, separated by comma, semicolon or tab.
+
+    Columns are known by the words in their names: "stress", "load" or "amplitude" with a unit in
+    brackets (`Stress [MPa]`), "cycles" or "life", and (optional) "outcome", "failed", "result" or
+    "comment" with words such as Failure and RunOut.
+
+    Args:
+        path: the file.
+        run_out_cycles: without an outcome column, tests that reached this many cycles are
+            run-outs. None: the longest life, if two tests at least share it exactly.
+
+    Raises:
+        InputError: missing columns, an unknown unit, or a cell that can't be read (with its row).
+    """
+    rows = _rows(path)
+    header = [cell.strip() for cell in rows[0]]
+    stress = _column(header, path, "stress", "load", "amplitude")
+    cycles = _column(header, path, "cycles", "life")
+    outcome = _find(header, "outcome", "failed", "result", "comment")
+    factor = _unit(header[stress], path)
+    table = [
+        (_number(row, stress, path, i), _number(row, cycles, path, i))
+        for i, row in enumerate(rows[1:], start=2)
+    ]
+    values = np.array(table, dtype=float).reshape(-1, 2)
+    notes: tuple[str, ...] = ()
+    if outcome is not None:
+        failed = np.array([_failed(row, outcome, path, i) for i, row in enumerate(rows[1:], 2)])
+    else:
+        failed, notes = _by_cycles(values[:, 1], run_out_cycles)
+    return SNTests(values[:, 0] * factor, values[:, 1], failed, notes)
+
+
+def _rows(path: str | Path) -> list[list[str]]:
+    lines = [line for line in read_text(path).splitlines() if line.strip()]
+    if len(lines) < 2:
+        raise InputError("has no tests: a header and one row at least", file=path)
+    delimiter = max("\t;,", key=lines[0].count)
+    return list(csv.reader(lines, delimiter=delimiter))
+
+
+def _find(header: list[str], *words: str) -> int | None:
+    for word in words:
+        for i, name in enumerate(header):
+            if word in name.lower():
+                return i
+    return None
+
+
+def _column(header: list[str], path: str | Path, *words: str) -> int:
+    found = _find(header, *words)
+    if found is None:
+        raise InputError(f"no column named like {words[0]!r}", file=path, value=header)
+    return found
+
+
+def _unit(name: str, path: str | Path) -> float:
+    found = re.search(r"[\[(]\s*([^\])]+?)\s*[\])]", name)
+    unit = found.group(1).lower() if found else ""
+    if unit not in _UNITS:
+        raise InputError(
+            "the stress needs a unit in brackets", file=path, key=name, value=unit, choices=_UNITS
+        )
+    return _UNITS[unit]
+
+
+def _number(row: list[str], index: int, path: str | Path, line: int) -> float:
+    text = row[index].strip() if index < len(row) else ""
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not (np.isfinite(value) and value > 0):
+        raise InputError("must be a positive number", file=path, key=f"row {line}", value=text)
+    return value
+
+
+def _failed(row: list[str], index: int, path: str | Path, line: int) -> bool:
+    text = row[index].strip().lower() if index < len(row) else ""
+    if text in _FAILED:
+        return True
+    if text in _ALIVE:
+        return False
+    raise InputError(
+        "unknown outcome", file=path, key=f"row {line}", value=text, choices=("Failure", "RunOut")
+    )
+
+
+def _by_cycles(
+    cycles: FloatArray, run_out_cycles: float | None
+) -> tuple[np.ndarray, tuple[str, ...]]:
+    longest = float(cycles.max())
+    if run_out_cycles is None and int((cycles == longest).sum()) < 2:
+        return np.ones(len(cycles), dtype=bool), ("no outcome column: every test failed",)
+    limit = longest if run_out_cycles is None else float(run_out_cycles)
+    note = f"no outcome column: tests that reached {limit:g} cycles are run-outs"
+    if run_out_cycles is None:
+        warnings.warn(note, PicchioWarning, stacklevel=3)
+    return cycles < limit, (note,)

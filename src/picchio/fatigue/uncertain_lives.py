@@ -1,0 +1,226 @@
+"""Uncertain lives: sample the inputs, summarise the life, and share its variance out.
+
+The functions here take samples and lives, not robots: the study that runs a robot's model on the
+samples (`picchio.studies.uncertainty`) and any other model can use them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from statistics import NormalDist
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from picchio.core.arrays import FloatArray, as_floats
+from picchio.core.errors import InputError
+
+Samples = dict[str, FloatArray]
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """One uncertain input.
+
+    Attributes:
+        median: its middle value.
+        spread: standard deviation: of the value over the median ("normal"), of its natural
+            logarithm ("lognormal"); half the width over the median ("uniform").
+        shape: of its distribution.
+    """
+
+    median: float
+    spread: float
+    shape: Literal["normal", "lognormal", "uniform"] = "lognormal"
+
+    def __post_init__(self) -> None:
+        if self.shape not in ("normal", "lognormal", "uniform"):
+            raise InputError(
+                "unknown shape",
+                key="shape",
+                value=self.shape,
+                choices=("normal", "lognormal", "uniform"),
+            )
+        as_floats(self.median, "median")
+        if float(as_floats(self.spread, "spread")) < 0:
+            raise InputError("must not be negative", key="spread", value=self.spread)
+
+    def at(self, probability: FloatArray) -> FloatArray:
+        """Its quantiles at probabilities in (0, 1)."""
+        if self.shape == "uniform":
+            return self.median * (1.0 + self.spread * (2.0 * probability - 1.0))
+        from scipy.special import ndtri
+
+        score = self.spread * ndtri(probability)
+        return np.asarray(
+            self.median * (np.exp(score) if self.shape == "lognormal" else 1.0 + score)
+        )
+
+
+@dataclass(frozen=True)
+class LifeSpread:
+    """What is known of an uncertain life.
+
+    Attributes:
+        p10: the life that 90 % of the samples exceed; inf where they have no end.
+        p50: the median.
+        p90: the life that 10 % exceed.
+        endless: share of samples whose life has no end.
+        shares: first-order Sobol index of each input: the share of the variance of ln measure
+            that it explains alone.
+        totals: total-order index: with its interactions.
+        samples: how many lives.
+    """
+
+    p10: float
+    p50: float
+    p90: float
+    endless: float
+    shares: dict[str, float]
+    totals: dict[str, float]
+    samples: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON; a life without end is None."""
+        lives = {
+            k: (v if math.isfinite(v) else None)
+            for k, v in (("p10", self.p10), ("p50", self.p50), ("p90", self.p90))
+        }
+        return {**lives, "endless": self.endless, "shares": self.shares, "totals": self.totals,
+                "samples": self.samples}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Which values of the inputs to run a model on (Saltelli's scheme on Sobol points).
+
+    Attributes:
+        values: {name: (m,)}: the inputs' values, m = (inputs + 2) * samples.
+        samples: of each block.
+    """
+
+    values: Samples
+    samples: int
+
+    def summarise(self, lives: npt.ArrayLike, measure: npt.ArrayLike) -> LifeSpread:
+        """Quantiles of the lives, and each input's share of the variance of ln measure.
+
+        Args:
+            lives: (m,) one for each run, inf allowed.
+            measure: (m,) positive and finite: utilisation, since lives may have no end.
+
+        Raises:
+            InputError: a wrong number of them, NaN, or a measure that is not positive.
+        """
+        names = list(self.values)
+        runs = (len(names) + 2) * self.samples
+        life = np.asarray(lives, dtype=np.float64)
+        size = np.asarray(measure, dtype=np.float64)
+        for key, array in (("life", life), ("measure", size)):
+            if array.shape != (runs,) or np.isnan(array).any():
+                raise InputError(f"the model must give {runs} numbers", key=key)
+        if not (np.isfinite(size) & (size > 0)).all():
+            raise InputError("must be positive and finite", key="measure")
+        log = np.log(size).reshape(-1, self.samples)
+        first, total = _sobol(log[0], log[1], log[2:])
+        both = life[: 2 * self.samples]
+        p10, p50, p90 = (
+            float(np.quantile(both, p, method="inverted_cdf")) for p in (0.1, 0.5, 0.9)
+        )
+        return LifeSpread(
+            p10=p10,
+            p50=p50,
+            p90=p90,
+            endless=float(np.isinf(both).mean()),
+            shares=dict(zip(names, first, strict=True)),
+            totals=dict(zip(names, total, strict=True)),
+            samples=2 * self.samples,
+        )
+
+
+def design(inputs: Mapping[str, Uncertain], *, samples: int = 1024, seed: int = 0) -> Design:
+    """Where to run a model, for `Design.summarise`.
+
+    Saltelli et al., Comput. Phys. Commun. 181 (2010) 259-270, on scrambled Sobol points.
+
+    Args:
+        inputs: what is uncertain, by name; independent of each other.
+        samples: a power of two.
+        seed: of the scrambling; the same seed gives the same points.
+
+    Raises:
+        InputError: no inputs, or samples that are no power of two.
+    """
+    if not inputs:
+        raise InputError("needs one uncertain input at least", key="inputs")
+    if samples < 8 or samples & (samples - 1):
+        raise InputError("must be a power of two, 8 or more", key="samples", value=samples)
+    from scipy.stats import qmc
+
+    n = len(inputs)
+    points = qmc.Sobol(2 * n, scramble=True, rng=np.random.default_rng(seed)).random(samples)
+    points = np.clip(points, 1e-12, 1.0 - 1e-12)
+    a, b = points[:, :n], points[:, n:]
+    blocks = [a, b]
+    for i in range(n):
+        mixed = a.copy()
+        mixed[:, i] = b[:, i]
+        blocks.append(mixed)
+    runs = np.concatenate(blocks)
+    return Design({name: inputs[name].at(runs[:, i]) for i, name in enumerate(inputs)}, samples)
+
+
+def propagate(
+    inputs: Mapping[str, Uncertain],
+    model: Callable[[Samples], tuple[npt.ArrayLike, npt.ArrayLike]],
+    *,
+    samples: int = 1024,
+    seed: int = 0,
+) -> LifeSpread:
+    """P10, P50 and P90 of an uncertain life, and each input's share of the variance.
+
+    Args:
+        inputs: as in `design`.
+        model: takes {name: (m,)} and gives lives and measures, each (m,).
+        samples: as in `design`; the model runs (inputs + 2) * samples times.
+        seed: as in `design`.
+
+    Raises:
+        InputError: as `design` and `Design.summarise`.
+    """
+    plan = design(inputs, samples=samples, seed=seed)
+    return plan.summarise(*model(plan.values))
+
+
+def _sobol(
+    at_a: FloatArray, at_b: FloatArray, mixed: FloatArray
+) -> tuple[list[float], list[float]]:
+    """First-order (Saltelli 2010) and total (Jansen 1999) indices; zeros without variance."""
+    variance = float(np.concatenate((at_a, at_b)).var())
+    if variance < 1e-24:
+        return [0.0] * len(mixed), [0.0] * len(mixed)
+    centre = float(np.concatenate((at_a, at_b)).mean())
+    first = [float(np.mean((at_b - centre) * (m - at_a)) / variance) for m in mixed]
+    total = [float(0.5 * np.mean((at_a - m) ** 2) / variance) for m in mixed]
+    return first, total
+
+
+def strength_factor(survival: float, scatter: float, probability: npt.ArrayLike) -> FloatArray:
+    """Factor on a curve's strength for a specimen of given rank.
+
+    Multiplies a curve stated for `survival` so that a share `probability` of specimens is weaker.
+
+    Args:
+        survival: of the curve as it stands.
+        scatter: standard deviation of log10 strength.
+        probability: (...) rank of the specimen among all, in (0, 1).
+    """
+    from scipy.special import ndtri
+
+    rank = as_floats(probability, "probability")
+    if ((rank <= 0) | (rank >= 1)).any() or not 0 < survival < 1:
+        raise InputError("must lie between 0 and 1", key="probability", value=probability)
+    return np.asarray(10.0 ** (scatter * (ndtri(rank) + NormalDist().inv_cdf(survival))))

@@ -1,0 +1,1 @@
+"""The noise of every channel, estimated without a model of the robot."""

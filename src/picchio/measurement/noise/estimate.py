@@ -1,0 +1,257 @@
+"""The noise of every channel of a campaign: level, spectrum, hum, and a filter that whitens it."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import replace
+
+import numpy as np
+
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
+from picchio.core.arrays import FloatArray
+from picchio.measurement.noise.autoregression import (
+    AutoRegression,
+    fit_autoregression,
+    relative_error,
+)
+from picchio.measurement.noise.hum import Line, take_out_hum
+from picchio.measurement.noise.level import Noise, NoiseSource
+from picchio.measurement.noise.pieces import (
+    METHODS,
+    Piece,
+    fast_pieces,
+    quiet_pieces,
+    repeat_pieces,
+    ring_down_pieces,
+    steady_period,
+    steady_pieces,
+)
+from picchio.measurement.noise.window import Window, read_window
+
+# Collects stretches of noise record by record, and makes one estimate of them a channel.
+
+# Enough for 0.6 %: more is not kept.
+_ENOUGH = 1 << 14
+# Fewer than this from surer sources, and the ring-down is looked at.
+_TOO_FEW = 1500
+_REPEAT_SAMPLES = 16384
+_REPEATS_KEPT = 24 << 20
+# A source may say this much more than a surer one and still be believed.
+_SLACK = 1.08
+
+
+def repeat_key(record: Record) -> tuple[object, ...] | None:
+    """What two records have in common that repeat each other; None where nothing says so."""
+    if record.kind == "motion" or record.pose is None or record.direction is None:
+        return None
+    pose = record.pose
+    where = tuple(sorted(pose.items())) if isinstance(pose, dict) else tuple(pose)
+    blows = record.excitation.model_dump(exclude_none=True)
+    return (where, tuple(np.round(record.direction, 9)), tuple(sorted(blows.items())))
+
+
+class NoiseCollector:
+    """Takes windows one by one and keeps of each only what is noise.
+
+    Args:
+        campaign: whose records will come, in its order.
+    """
+
+    def __init__(self, campaign: Campaign) -> None:
+        self.units: dict[str, str] = {}
+        self.periods: dict[str, tuple[float, float]] = {}
+        self._pieces: dict[tuple[str, int], dict[str, list[Piece]]] = defaultdict(
+            lambda: defaultdict(list)
+        )
+        self._rates: dict[int, float] = {}
+        self._resolution: dict[str, float] = {}
+        self._range: dict[str, float] = {}
+        self._left: dict[tuple[object, ...], int] = defaultdict(int)
+        self._before: dict[tuple[object, ...], Window] = {}
+        self._kept = 0
+        for record in campaign:
+            key = repeat_key(record)
+            if key is not None:
+                self._left[key] += 1
+
+    def add(self, window: Window) -> None:
+        """Take the next record's window."""
+        rate = self._rate(window.rate)
+        for name, values in window.arrays.items():
+            self.units[name] = window.record.channel(name).unit
+            self._note_resolution(name, values)
+        for name, piece in quiet_pieces(window):
+            self._put(name, rate, piece)
+        found = steady_period(window)
+        if found is not None:
+            self.periods[window.record.file] = found
+            for name, piece in steady_pieces(window, found[1]):
+                self._put(name, rate, piece)
+        self._repeat(window, rate)
+        if window.record.kind == "motion":
+            for name, piece in fast_pieces(window):
+                self._put(name, rate, piece)
+        elif not window.steady and self._poor(window, rate):
+            for name, piece in ring_down_pieces(window):
+                self._put(name, rate, piece)
+
+    def _rate(self, rate: float) -> int:
+        for key, known in self._rates.items():
+            if abs(known / rate - 1.0) < 1e-3:
+                return key
+        self._rates[len(self._rates)] = rate
+        return len(self._rates) - 1
+
+    def _note_resolution(self, name: str, values: FloatArray) -> None:
+        steps = np.abs(np.diff(values))
+        steps = steps[steps > 0.0]
+        if not steps.size:
+            return
+        least = float(steps.min())
+        # A grid: every step is a whole number of the smallest.
+        multiples = steps / least
+        on_grid = np.abs(multiples - np.round(multiples)) < 1e-3 * np.maximum(multiples, 1.0)
+        if not on_grid.all() or steps.size < 32 or float(multiples.max()) > 1e6:
+            least = 0.0
+        self._resolution[name] = min(self._resolution.get(name, np.inf), least)
+
+    def _put(self, name: str, rate: int, piece: Piece) -> None:
+        kept = self._pieces[name, rate][piece.method]
+        if sum(p.samples for p in kept) < _ENOUGH:
+            m = min(piece.values.size, _ENOUGH)
+            share = m / piece.values.size
+            short = piece.time[:m].copy(), piece.values[:m].copy()
+            kept.append(replace(piece, time=short[0], values=short[1],
+                                samples=piece.samples * share))  # fmt: skip
+
+    def _poor(self, window: Window, rate: int) -> bool:
+        """Whether some channel of this record has too little noise to judge by so far."""
+        return any(
+            sum(p.samples for pieces in self._pieces[name, rate].values() for p in pieces)
+            < _TOO_FEW
+            for name in window.arrays
+        )
+
+    def _repeat(self, window: Window, rate: int) -> None:
+        key = repeat_key(window.record)
+        if key is None:
+            return
+        self._left[key] -= 1
+        before = self._before.pop(key, None)
+        if before is not None:
+            self._kept -= before.time.size * (len(before.arrays) + 1)
+            if abs(before.rate / window.rate - 1.0) < 1e-6:
+                for name, piece in repeat_pieces(before, window):
+                    self._put(name, rate, piece)
+        if self._left[key] > 0 and self._kept < _REPEATS_KEPT // 8:
+            m = _REPEAT_SAMPLES
+            arrays = {name: values[:m].copy() for name, values in window.arrays.items()}
+            kept = Window(window.record, window.time[:m].copy(), arrays, False, window.rate)
+            self._before[key] = kept
+            self._kept += kept.time.size * (len(arrays) + 1)
+
+    def finish(self) -> dict[str, Noise]:
+        """The estimates."""
+        found: dict[str, list[Noise]] = defaultdict(list)
+        for (name, rate), by_method in self._pieces.items():
+            noise = self._estimate(name, self._rates[rate], by_method)
+            if noise is not None:
+                found[name].append(noise)
+        result = {}
+        for name in self.units:
+            ranked = sorted(found.get(name, []), key=lambda noise: noise.error)
+            if ranked:
+                result[name] = replace(ranked[0], others={n.rate: n for n in ranked[1:]})
+        return result
+
+    def _estimate(self, name: str, rate: float, by_method: dict[str, list[Piece]]) -> Noise | None:
+        sources: list[NoiseSource] = []
+        chosen: list[Piece] = []
+        lines: tuple[Line, ...] = ()
+        resolution = self._resolution.get(name, 0.0)
+        resolution = resolution if np.isfinite(resolution) else 0.0
+        for method in METHODS:
+            if not by_method.get(method):
+                continue
+            # In repeats the blows' own harmonics differ, and may lie at the mains' frequency.
+            seek = method != "fast changes" and (method != "repeats" or not chosen)
+            pieces, hum = take_out_hum(by_method[method], rate) if seek else (
+                by_method[method], ())  # fmt: skip
+            model = _model(pieces)
+            lines = lines or hum
+            self._weigh(method, pieces, model, sources, chosen)
+        if not chosen:
+            return None
+        used = [source for source in sources if source.used]
+        rough = all(source.method == "fast changes" for source in used)
+        model = _model(chosen)
+        floor = resolution / np.sqrt(12.0)
+        if model.variance < floor**2:
+            model = AutoRegression(np.zeros(0), floor**2)
+        error = relative_error(model, sum(p.samples for p in chosen))
+        return Noise(name, self.units[name], rate, float(np.sqrt(model.variance)), error, model,
+                     lines, resolution, tuple(sources), rough)  # fmt: skip
+
+    @staticmethod
+    def _weigh(method: str, pieces: list[Piece], model: AutoRegression,
+               sources: list[NoiseSource], chosen: list[Piece]) -> None:  # fmt: skip
+        """Believe a source unless it says clearly more, or less, than a surer one."""
+        std = float(np.sqrt(model.variance))
+        error = relative_error(model, sum(p.samples for p in pieces))
+        surer = [s for s in sources if s.used]
+        used = True
+        if surer:
+            known = min(surer, key=lambda s: s.error)
+            # A short stretch of slow noise looks whiter than it is, and its error smaller.
+            least = relative_error(model, sum(p.samples for p in chosen))
+            doubt = 4.0 * np.hypot(max(known.error, least), error)
+            less, more = std < known.std / (_SLACK + doubt), std > known.std * (_SLACK + doubt)
+            if method == "fast changes":
+                used = False
+            elif more or known.std == 0.0:
+                used = known.std == 0.0 and std == 0.0
+            elif less:
+                # The surer one is not as quiet as it should be: something moved there.
+                sources[:] = [_dropped(s) for s in sources]
+                chosen.clear()
+        sources.append(NoiseSource(method, std, error, len({p.record for p in pieces}), used))
+        if used:
+            chosen.extend(pieces)
+
+
+def _dropped(source: NoiseSource) -> NoiseSource:
+    return replace(source, used=False)
+
+
+def _model(pieces: list[Piece]) -> AutoRegression:
+    """The autoregression of pieces, with the variance that their means took given back."""
+    return fit_autoregression(
+        [p.values for p in pieces], mean_removed=[p.mean_removed for p in pieces]
+    )
+
+
+__all__ = ["Line", "Noise", "NoiseSource", "noise_levels"]
+
+
+def noise_levels(campaign: Campaign) -> dict[str, Noise]:
+    """The noise of every channel, estimated from the records themselves.
+
+    From the quiet time before the first blow and after the robot has rung down, from what is not
+    periodic in steady records, from repeats, and, where these give too little, from what damped
+    waves leave of the ring-down. Motion records have repeats at best, and else a rough floor.
+    Only the leading part of a long record is read.
+
+    Args:
+        campaign: read record by record.
+
+    Returns:
+        {channel: noise}; a channel without any stretch to judge by is missing.
+
+    Raises:
+        InputError: a sample that cannot be read.
+    """
+    collector = NoiseCollector(campaign)
+    for record in campaign:
+        collector.add(read_window(record))
+    return collector.finish()

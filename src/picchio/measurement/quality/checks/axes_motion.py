@@ -1,0 +1,158 @@
+"""Swapped or flipped joints in motion records: signals that must follow from one another.
+
+A position's derivative is the velocity; the motor side follows the link side; the torque carries
+gravity and the masses: M(q) a + g(q), with the rest (friction, products of velocities) small.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.measurement.noise.window import Window
+from picchio.measurement.quality.check import Check, Context, Finding
+from picchio.measurement.quality.scan import RecordScan
+
+_SAMPLES = 400
+_SMOOTH = 0.05
+_FEWEST = 50
+
+
+class MotionAxesCheck(Check):
+    """Positions, velocities and torques of motion records against one another."""
+
+    name = "joints"
+    what = "motion: positions, velocities and torques consistent with one another and with gravity"
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._torques: dict[str, list[tuple[FloatArray, FloatArray]]] = defaultdict(list)
+
+    def record(self, scan: RecordScan) -> Iterator[Finding]:
+        """Velocity, motor and reference against position; torques are kept for the end."""
+        window = scan.window
+        if window.record.kind != "motion":
+            return
+        joints = _joints(window)
+        for joint, position in joints.items():
+            for kind in ("motor_position", "reference_position"):
+                other = window.arrays.get(f"{kind}.{joint}")
+                if other is None or other is position:
+                    continue
+                yield from self._follows(scan, f"{kind}.{joint}", other, position,
+                                         f"position of {joint}")  # fmt: skip
+            velocity = window.arrays.get(f"velocity.{joint}")
+            if velocity is not None:
+                yield from self._follows(scan, f"velocity.{joint}", velocity,
+                                         np.gradient(_smooth(position, window), window.step),
+                                         f"derivative of {joint}'s position",
+                                         zero=True)  # fmt: skip
+        self._keep_torques(window, joints)
+
+    def _follows(self, scan: RecordScan, name: str, values: FloatArray, leader: FloatArray,
+                 what: str, zero: bool = False) -> Iterator[Finding]:  # fmt: skip
+        a, b = leader - (0.0 if zero else leader.mean()), values - (0.0 if zero else values.mean())
+        power, other = float(a @ a), float(b @ b)
+        if a.size < _FEWEST or power <= 0.0 or other <= 0.0:
+            return
+        if min(np.ptp(a), np.ptp(b)) < 100.0 * np.median(np.abs(np.diff(values))) * 0.05:
+            return
+        likeness = float(a @ b) / np.sqrt(power * other)
+        slope = float(a @ b) / power
+        moved = float(np.ptp(leader)) > 0.02
+        if not moved:
+            return
+        if likeness < -0.7:
+            yield self.found("warning", f"runs against the {what}: its sign is flipped",
+                             "correct the sign", record=scan.file, channel=name,
+                             value=likeness)  # fmt: skip
+        elif likeness < 0.5:
+            yield self.found("warning", f"does not follow the {what} (correlation "
+                             f"{likeness:.2f})", "are joints swapped?", record=scan.file,
+                             channel=name, value=likeness)  # fmt: skip
+        elif not 0.6 < slope < 1.6:
+            degrees = " (57.3: degrees?)" if 0.8 < max(slope, 1 / slope) / 57.3 < 1.25 else ""
+            yield self.found("warning", f"is {slope:.3g} times the {what}{degrees}",
+                             "check its unit, and the gear ratio", record=scan.file,
+                             channel=name, value=slope)  # fmt: skip
+
+    def _keep_torques(self, window: Window, joints: dict[str, FloatArray]) -> None:
+        robot = self.context.robot
+        measured = [j for j in joints if f"torque.{j}" in window.arrays]
+        if robot is None or not measured or any(j not in robot.joint_names for j in joints):
+            return
+        smooth = {joint: _smooth(values, window) for joint, values in joints.items()}
+        m = window.time.size
+        edge = round(2.0 * _SMOOTH * window.rate)
+        if m < 4 * edge + _FEWEST:
+            return
+        acceleration = {j: np.gradient(np.gradient(v, window.step), window.step)
+                        for j, v in smooth.items()}  # fmt: skip
+        index = np.linspace(edge, m - edge - 1, min(_SAMPLES, m - 2 * edge)).astype(int)
+        size = len(robot.joint_names)
+        pose, fast = np.zeros((index.size, size)), np.zeros((index.size, size))
+        for joint in joints:
+            at = robot.joint_names.index(joint)
+            pose[:, at], fast[:, at] = smooth[joint][index], acceleration[joint][index]
+        must = np.array([
+            robot.rigid.mass_matrix(q) @ a + robot.rigid.gravity_torque(q)
+            for q, a in zip(pose, fast, strict=True)
+        ])  # fmt: skip
+        for joint in measured:
+            velocity = np.gradient(smooth[joint], window.step)[index]
+            seen = _smooth(window.arrays[f"torque.{joint}"], window)[index]
+            basis = np.column_stack([np.ones(index.size), np.tanh(velocity / 0.01), velocity])
+            q, _ = np.linalg.qr(basis)
+            left = [v - q @ (q.T @ v) for v in (seen, must)]
+            self._torques[joint].append((left[0], left[1]))
+
+    def finish(self) -> Iterator[Finding]:
+        """Torques against gravity and masses, all records together."""
+        robot = self.context.robot
+        if robot is None:
+            return
+        for joint, rows in self._torques.items():
+            own = robot.joint_names.index(joint)
+            seen = np.concatenate([row[0] for row in rows])
+            must = np.concatenate([row[1] for row in rows])
+            size = np.linalg.norm(must, axis=0) * np.linalg.norm(seen)
+            likeness = np.where(size > 0.0, (seen @ must) / np.where(size > 0.0, size, 1.0), 0.0)
+            strong = np.linalg.norm(must[:, own]) > 0.05 * np.linalg.norm(must, axis=0).max()
+            best = int(np.abs(likeness).argmax())
+            if likeness[own] < -0.6 and strong:
+                yield self.found("warning", "runs against gravity and the masses: its sign is "
+                                 f"flipped (correlation {likeness[own]:.2f})",
+                                 "correct the sign of the torque, or of the position",
+                                 channel=f"torque.{joint}", value=float(likeness[own]))  # fmt: skip
+            elif best != own and abs(likeness[best]) > 0.93 and likeness[own] < 0.4 and strong:
+                yield self.found("warning", f"follows what {robot.joint_names[best]} must carry, "
+                                 f"not {joint}: joints are swapped", "relabel the columns",
+                                 channel=f"torque.{joint}", value=float(likeness[own]))  # fmt: skip
+            elif likeness[own] > 0.8 and strong:
+                slope = float(seen @ must[:, own] / (must[:, own] @ must[:, own]))
+                if not 0.125 < slope < 8.0:
+                    yield self.found("warning", f"is {slope:.3g} times what gravity and the masses "
+                                     "ask for", "check its unit, the gear ratio, and the payload",
+                                     channel=f"torque.{joint}", value=slope)  # fmt: skip
+
+
+def _joints(window: Window) -> dict[str, FloatArray]:
+    """{joint: (m,) position}: the link side where it is known, else the motor side."""
+    found: dict[str, FloatArray] = {}
+    for kind in ("motor_position", "position"):
+        for name, values in window.arrays.items():
+            channel = window.record.channel(name)
+            if channel.kind.name == kind and channel.subject:
+                found[channel.subject] = values
+    return found
+
+
+def _smooth(values: FloatArray, window: Window) -> FloatArray:
+    """(m,) a Gaussian mean over a twentieth of a second, ends held."""
+    from scipy.ndimage import gaussian_filter1d
+
+    return np.asarray(gaussian_filter1d(values, max(1.0, 0.5 * _SMOOTH * window.rate),
+                                        mode="nearest"))  # fmt: skip

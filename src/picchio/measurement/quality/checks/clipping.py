@@ -1,0 +1,131 @@
+"""Does a sensor run into its limit? Flat tops, exact or under noise."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.measurement.quality.check import Check, Context, Finding
+from picchio.measurement.quality.scan import ChannelScan, RecordScan
+
+_MOTION = ("torque", "accelerometer", "acceleration")
+_KEPT = 4000
+
+
+class ClippingCheck(Check):
+    """Values that pile up at the largest one, as only a limit makes them."""
+
+    name = "clipping"
+    what = "sensors that reach their limit (flat tops)"
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._tops: dict[str, list[tuple[str, str, FloatArray, FloatArray]]] = defaultdict(list)
+        self._told: set[str] = set()
+
+    def record(self, scan: RecordScan) -> Iterator[Finding]:
+        """Flat tops that are exact; what may be one under noise is kept until the end."""
+        for name, seen in scan.channels.items():
+            channel = scan.record.channel(name)
+            if seen.constant or channel.kind.name == "temperature":
+                continue
+            motion = scan.record.kind == "motion"
+            if motion and channel.kind.name not in _MOTION:
+                continue  # a machine may stand still where its range ends
+            if name == "force" and scan.record.excitation.kind in (None, "pulse_train"):
+                continue  # a rectangle's top is flat
+            values = scan.window.arrays[name]
+            flat = _exact(values, seen, self.context)
+            if flat:
+                self._told.add(channel.group)
+                yield self._told_of(scan.file, name, *flat, channel.unit)
+            elif not motion:
+                keep = np.argsort(np.abs(values))[-_KEPT:]
+                keep.sort()
+                self._tops[channel.group].append((scan.file, name, keep, values[keep]))
+
+    def _told_of(self, file: str, name: str, limit: float, samples: int, unit: str) -> Finding:
+        return self.found(
+            "warning",
+            f"reaches its limit of {limit:.4g} {unit}: {samples} samples lie exactly there",
+            "set a larger range and repeat; until then leave these samples out",
+            record=file, channel=name, value=limit, unit=unit,
+        )  # fmt: skip
+
+    def finish(self) -> Iterator[Finding]:
+        """Groups whose largest values pile up within the noise of one level."""
+        for group, tops in self._tops.items():
+            if group in self._told:
+                continue
+            # Channel by channel: one limit may be reached by a small one of the group alone.
+            found = [
+                finding
+                for name in dict.fromkeys(name for _, name, _, _ in tops)
+                for finding in self._piled(name, [top for top in tops if top[1] == name])
+            ]
+            yield from found or self._piled(group, tops)
+
+    def _piled(
+        self, group: str, tops: list[tuple[str, str, FloatArray, FloatArray]]
+    ) -> Iterator[Finding]:
+        std = max(self.context.std(name) for _, name, _, _ in tops)
+        if std <= 0.0:
+            return
+        most = max(float(np.abs(v).max()) for _, _, _, v in tops)
+        hum = max(self.context.hum(name) for _, name, _, _ in tops)
+        # The noise comes after the limit: the level is below the largest reading.
+        width = 2.5 * std + hum
+        limit = most - 1.2 * width
+        if limit < 12.0 * width:
+            return
+        at, below, runs, both = 0, 0, 0, set()
+        files = []
+        for file, _, index, values in tops:
+            size = np.abs(values)
+            inside = np.abs(size - limit) <= 1.2 * width
+            at += int(inside.sum())
+            below += int((np.abs(size - (limit - 3.0 * width)) <= 1.2 * width).sum())
+            places = index[inside]
+            groups = np.split(places, np.flatnonzero(np.diff(places) > 2) + 1)
+            longer = [g for g in groups if g.size >= 3]
+            if longer:
+                runs += len(longer)
+                files.append(file)
+            both.update(np.sign(values[inside]).tolist())
+        enough = len(set(files)) >= 2 or (len(both) == 2 and runs >= 4)
+        if at >= 15 and at > 4.0 * max(below, 1) and runs >= 3 and enough:
+            yield self.found(
+                "warning",
+                f"seems to reach a limit of about {limit:.4g}: {at} samples of "
+                f"{len(set(files))} records pile up there, {below} as far below it",
+                "set a larger range and repeat; until then leave these samples out",
+                record=files[0] if len(set(files)) == 1 else None, channel=group, value=limit,
+            )  # fmt: skip
+
+
+def _exact(values: FloatArray, seen: ChannelScan, context: Context) -> tuple[float, int] | None:
+    """(limit, samples) where samples in a row lie exactly at an extreme, and pile up there."""
+    for limit in (seen.most, seen.least):
+        at = values == limit
+        count = int(at.sum())
+        if count < 4:
+            continue
+        longest = _longest(at)
+        steps = np.unique(values)
+        resolution = float(np.diff(steps).min()) if steps.size > 1 else 0.0
+        sign = 1.0 if limit == seen.most else -1.0
+        # On a coarse grid tops are flat anyway, but not fuller than the next levels together.
+        span = max(3.0 * resolution, 0.01 * (seen.most - seen.least))
+        near = int(((sign * (limit - values) > 0.0) & (sign * (limit - values) <= span)).sum())
+        silent = abs(limit) <= 0.02 * max(abs(seen.most), abs(seen.least))
+        if longest >= 3 and count > 2.0 * near and not silent:
+            return limit, count
+    return None
+
+
+def _longest(mask: FloatArray) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return int((edges[1::2] - edges[::2]).max()) if edges.size else 0

@@ -1,0 +1,1 @@
+"""Effects on the blows: when, how hard, how long, which way."""

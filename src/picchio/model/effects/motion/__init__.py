@@ -1,0 +1,1 @@
+"""Effects that show while the robot moves: friction, ripple, delays."""

@@ -1,0 +1,1 @@
+"""Effects that make the response no longer proportional to the force."""

@@ -1,0 +1,1 @@
+"""Effects that depend on the date or on the temperature."""

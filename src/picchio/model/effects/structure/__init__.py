@@ -1,0 +1,1 @@
+"""Effects on the robot's equations of motion: masses, springs, dampers."""

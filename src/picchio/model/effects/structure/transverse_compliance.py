@@ -1,0 +1,50 @@
+"""A joint's bearing yields sideways."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from picchio.model.effects.effect import Effect
+from picchio.model.effects.scales import Scales
+from picchio.model.effects.structure.yielding import (
+    MODAL_SHARE,
+    yielding_damping,
+    yielding_stiffness,
+)
+from picchio.model.plant import Plant
+
+
+class TransverseCompliance(Effect):
+    """The joint's frame tilts about the two axes perpendicular to its own, isotropically."""
+
+    name = "transverse_compliance"
+    where = "structure"
+    target_kind = "joint or link"
+    parameters = (
+        yielding_stiffness("tilting stiffness of the bearing", upper=1e12),
+        yielding_damping("tilting damping of the bearing", upper=1e8),
+        MODAL_SHARE,
+    )
+    meaning = "bearing or link bends across the joint's axis"
+    source = "Klimchik et al., Robotics and CIM 30 (2014) 488 (models of more than axial springs)"
+
+    def structure(self, plant: Plant) -> None:
+        """Let the two hinges at the joint move."""
+        plant.modal_share = self.values["modal_share"]
+        joint = plant.check_joint(self.target)
+        for i in (1, 2):
+            plant.add_coordinate(
+                f"hinge.{joint}.{i}", self.values["stiffness"], self.values["damping"]
+            )
+
+    def trials(self, scales: Scales) -> list[dict[str, float]]:
+        """Four and sixteen times as stiff as the joint: what is stiff leaves slowly."""
+        return self._stiffer(scales, (4.0, 16.0))
+
+    def early_trials(self, scales: Scales) -> list[dict[str, float]]:
+        """From three to a hundred times as stiff as the joint, a sixth in frequency apart."""
+        return self._stiffer(scales, [3.0 * 1.35**i for i in range(12)])
+
+    def _stiffer(self, scales: Scales, times: Sequence[float]) -> list[dict[str, float]]:
+        k, m = scales.stiffness[self.target], scales.inertia[self.target]
+        return [{"stiffness": n * k, "damping": 0.04 * (n * k * m) ** 0.5} for n in times]

@@ -1,0 +1,340 @@
+"""The robot's dynamics about a pose to second order, in more coordinates than its joints.
+
+A measurement sees more than the linear model: M, J and gravity change with the deflection,
+and the base or a bearing may yield where the URDF has it rigid. Here the robot stands on six
+further coordinates of its base and two hinges beside every flexible joint; which of them move
+is for the model to say.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.robot.flexible_robot import FlexibleRobot
+
+# The robot's Pinocchio model on a base that moves, with two hinges beside every joint.
+#
+# The base's six joints and the hinges stand still in the robot as its URDF has it; an effect on the
+# model may let some of them yield.
+
+BASE_AXES = ("x", "y", "z", "rx", "ry", "rz")
+
+
+def widen(robot: FlexibleRobot, source: Any) -> tuple[Any, dict[int, int], list[str]]:
+    """The wide model, where each of the source's joints is in it, and who has hinges.
+
+    Args:
+        robot: whose flexible revolute joints get hinges, perpendicular to the joint's axis.
+        source: its Pinocchio model.
+
+    Returns:
+        the model; its joint's number by the source's; the names of the joints with hinges, whose
+        joints are "hinge.<joint>.1" and ".2". The base's are "base.x" to "base.rz".
+    """
+    root = root_position(robot)
+    model = pin.Model()
+    model.gravity = source.gravity
+    parent = 0
+    kinds = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ,
+             pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)  # fmt: skip
+    for i, (axis, kind) in enumerate(zip(BASE_AXES, kinds, strict=True)):
+        place = pin.SE3(np.eye(3), root if i == 0 else np.zeros(3))
+        parent = model.addJoint(parent, kind(), place, f"base.{axis}")
+    from_root = pin.SE3(np.eye(3), -root)
+    model.appendBodyToJoint(parent, from_root.act(source.inertias[0]), pin.SE3.Identity())
+    where, hinges = {0: parent}, []
+    for i in range(1, source.njoints):
+        name, place = source.names[i], source.jointPlacements[i]
+        if source.parents[i] == 0:
+            place = from_root * place
+        at = where[source.parents[i]]
+        turns, own = _axis(source.joints[i])
+        if turns and name in robot.flexible_names:
+            hinges.append(name)
+            first, second = _perpendicular(own)
+            for k, side in enumerate((first, second)):
+                joint = pin.JointModelRevoluteUnaligned(side)
+                at = model.addJoint(at, joint, place, f"hinge.{name}.{k + 1}")
+                place = pin.SE3.Identity()
+        kind = pin.JointModelRevoluteUnaligned if turns else pin.JointModelPrismaticUnaligned
+        where[i] = model.addJoint(at, kind(own), place, name)
+        model.appendBodyToJoint(where[i], source.inertias[i], pin.SE3.Identity())
+    return model, where, hinges
+
+
+def root_position(robot: FlexibleRobot) -> FloatArray:
+    """(3,) m, where the root link stands; the base turns about it."""
+    model = robot.rigid._model
+    root = model.frames[robot.rigid.frame(robot.tree.root)]
+    return np.array(root.placement.translation)
+
+
+def _axis(joint: Any) -> tuple[bool, FloatArray]:
+    """Whether a joint of one degree of freedom turns, and its axis in its own frame."""
+    column = np.array(joint.createData().S).reshape(6)
+    angular = column[3:]
+    return bool(np.abs(angular).max() > 0.5), angular if np.abs(angular).max() > 0.5 else column[:3]
+
+
+def _perpendicular(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Two unit vectors that are perpendicular to an axis and to each other."""
+    helper = np.eye(3)[int(np.abs(axis).argmin())]
+    first = np.cross(axis, helper)
+    first /= np.linalg.norm(first)
+    return first, np.cross(axis, first)
+
+
+__all__ = ["BASE_AXES", "Inertia", "Motion", "WideChain"]
+
+_STEP = 1e-4  # rad or m, of the central differences
+
+
+@dataclass(frozen=True, eq=False)
+class Inertia:
+    """Mass matrix and gravity about a pose, over c coordinates.
+
+    Attributes:
+        mass: (c, c) kg m^2.
+        mass_gradient: (c, c, c), [k, i, j] = dM_ij/dq_k.
+        gravity: (c,) N m, the torque that holds the arm.
+        gravity_gradient: (c, c) N m/rad.
+        gravity_curvature: (c, c, c), [k, i, j] = d2 g_i/dq_j dq_k.
+    """
+
+    mass: FloatArray
+    mass_gradient: FloatArray
+    gravity: FloatArray
+    gravity_gradient: FloatArray
+    gravity_curvature: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """How a frame moves with c coordinates, to second order; world axes.
+
+    Attributes:
+        jacobian: (6, c), linear, then angular.
+        gradient: (c, 6, c), [k, r, i] = dJ_ri/dq_k.
+        rotation: (3, 3), the frame's axes at the pose.
+    """
+
+    jacobian: FloatArray
+    gradient: FloatArray
+    rotation: FloatArray
+
+    def at(self, offset: FloatArray) -> Motion:
+        """The motion of a point (3,) m fixed in the frame."""
+        lever = self.rotation @ offset
+        linear, angular = self.jacobian[:3], self.jacobian[3:]
+        jacobian = self.jacobian.copy()
+        jacobian[:3] = linear + _cross(angular, lever)
+        gradient = self.gradient.copy()
+        turned = np.cross(angular.T, lever)  # (c, 3): the lever's change by each coordinate
+        for k in range(len(gradient)):
+            gradient[k, :3] += _cross(self.gradient[k, 3:], lever) + _cross(angular, turned[k])
+        return Motion(jacobian, gradient, self.rotation)
+
+    def take(self, columns: list[int]) -> Motion:
+        """The motion with some of the coordinates."""
+        return Motion(
+            self.jacobian[:, columns],
+            np.ascontiguousarray(self.gradient[np.ix_(columns, range(6), columns)]),
+            self.rotation,
+        )
+
+
+def _cross(columns: FloatArray, lever: FloatArray) -> FloatArray:
+    """(3, c) cross (3,)."""
+    return np.cross(columns.T, lever).T
+
+
+class WideChain:
+    """The robot on further coordinates.
+
+    Args:
+        robot: the robot.
+
+    Attributes:
+        coordinates: their names: the flexible joints first, then "base.x" to "base.rz" and
+            "hinge.<joint>.1" and ".2" for every flexible revolute joint.
+    """
+
+    def __init__(self, robot: FlexibleRobot) -> None:
+        self.robot = robot
+        source = robot.rigid._model
+        self._model, self._joint, hinges = widen(robot, source)
+        self._frames = {
+            frame.name: (self._joint[frame.parentJoint], self._own_frame(frame))
+            for frame in source.frames
+            if frame.type == pin.FrameType.BODY
+        }
+        self.coordinates = (
+            *robot.flexible_names,
+            *(f"base.{axis}" for axis in BASE_AXES),
+            *(f"hinge.{name}.{i}" for name in hinges for i in (1, 2)),
+        )
+        self._columns = self._selection(hinges)
+
+    def _own_frame(self, frame: Any) -> Any:
+        placement = frame.placement
+        return self._from_root * placement if frame.parentJoint == 0 else placement
+
+    @property
+    def _from_root(self) -> Any:
+        """From the last base joint to the world: undo where the root stands."""
+        return pin.SE3(np.eye(3), -root_position(self.robot))
+
+    def _selection(self, hinges: list[str]) -> FloatArray:
+        """(nv of the wide model, c): which joints a coordinate moves; mimics follow."""
+        robot, model = self.robot, self._model
+        follow = robot.rigid._follow
+        columns = np.zeros((model.nv, len(self.coordinates)))
+        source_names = list(robot.rigid._model.names)[1:]
+        for row, name in enumerate(source_names):
+            at = model.joints[self._joint[robot.rigid._model.getJointId(name)]].idx_v
+            columns[at, : len(robot.flexible_names)] = follow[row, robot.flexible_index]
+        n = len(robot.flexible_names)
+        for i in range(6):
+            columns[i, n + i] = 1.0
+        for h, name in enumerate(hinges):
+            for i in (0, 1):
+                joint = model.joints[model.getJointId(f"hinge.{name}.{i + 1}")]
+                columns[joint.idx_v, n + 6 + 2 * h + i] = 1.0
+        return columns
+
+    def index(self, coordinate: str) -> int:
+        """Where a coordinate stands in `coordinates`.
+
+        Raises:
+            InputError: there is no such coordinate.
+        """
+        try:
+            return self.coordinates.index(coordinate)
+        except ValueError:
+            raise InputError(
+                "no such coordinate", value=coordinate, choices=self.coordinates
+            ) from None
+
+    def _q(self, pose: FloatArray) -> FloatArray:
+        rigid, q = self.robot.rigid, np.zeros(self._model.nq)
+        every = rigid._follow @ pose + rigid._offset
+        for row, name in enumerate(list(rigid._model.names)[1:]):
+            q[self._model.joints[self._joint[rigid._model.getJointId(name)]].idx_q] = every[row]
+        return q
+
+    def _with(self, inertias: str | tuple[str, FloatArray]) -> Any:
+        """The wide model with other inertias: the robot's, one link's own, or a point mass."""
+        if inertias == "robot":
+            return self._model
+        model = self._model.copy()
+        for i in range(model.njoints):
+            model.inertias[i] = pin.Inertia.Zero()
+        if isinstance(inertias, tuple):
+            frame, offset = inertias
+            joint, placement = self._frame(frame)
+            point = placement.act(np.asarray(offset, dtype=float))
+            model.inertias[joint] = pin.Inertia(1.0, point, np.zeros((3, 3)))
+        else:
+            joint, placement = self._frame(inertias)
+            model.inertias[joint] = placement.act(_link_inertia(self.robot, inertias))
+        return model
+
+    def has_frame(self, link: str) -> bool:
+        """Whether this is a link, or the point where the tool's force acts."""
+        return link in self._frames
+
+    def _frame(self, link: str) -> tuple[int, Any]:
+        if link not in self._frames:
+            raise InputError("no such link", value=link, choices=self._frames)
+        return self._frames[link]
+
+    def inertia(
+        self, pose: FloatArray, inertias: str | tuple[str, FloatArray] = "robot"
+    ) -> Inertia:
+        """Mass matrix and gravity about a pose (nv,), to second order.
+
+        Args:
+            pose: (nv,) rad or m.
+            inertias: "robot"; a link's name, for what that link alone adds; or a link's name
+                and a point (3,) m in it, for what 1 kg there adds.
+
+        Raises:
+            InputError: no such link.
+        """
+        model = self._with(inertias)
+        data, q, columns = model.createData(), self._q(pose), self._columns
+
+        def mass(at: FloatArray) -> FloatArray:
+            full = np.array(pin.crba(model, data, at)).reshape(model.nv, model.nv)
+            return columns.T @ full @ columns
+
+        def gradient(at: FloatArray) -> FloatArray:
+            full = np.array(pin.computeGeneralizedGravityDerivatives(model, data, at))
+            return columns.T @ full.reshape(model.nv, model.nv) @ columns
+
+        gravity = columns.T @ np.array(pin.computeGeneralizedGravity(model, data, q))
+        slope = gradient(q)
+        steps = [_STEP * column for column in columns.T]
+        d_mass = [(mass(q + s) - mass(q - s)) / (2 * _STEP) for s in steps]
+        d_slope = [(gradient(q + s) - gradient(q - s)) / (2 * _STEP) for s in steps]
+        here = mass(q)
+        if inertias == "robot":
+            gravity, slope = self._balanced(pose, gravity, slope)
+        return Inertia(here, np.array(d_mass), gravity, slope, np.array(d_slope))
+
+    def _balanced(
+        self, pose: FloatArray, gravity: FloatArray, slope: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """What gravity balancers add, which Pinocchio knows nothing of."""
+        robot, n = self.robot, len(self.robot.flexible_names)
+        rigid = robot.rigid.gravity_torque(pose)[robot.flexible_index]
+        gravity, slope = gravity.copy(), slope.copy()
+        gravity[:n] += robot.gravity_torque(pose) - rigid
+        own = robot.rigid.gravity_gradient(pose)[np.ix_(robot.flexible_index, robot.flexible_index)]
+        slope[:n, :n] += robot.gravity_stiffness(pose) - own
+        return gravity, slope
+
+    def motion(self, pose: FloatArray, link: str) -> Motion:
+        """How the origin of a link's frame moves, to second order.
+
+        Raises:
+            InputError: no such link.
+        """
+        joint, placement = self._frame(link)
+        model, q, columns = self._model, self._q(pose), self._columns
+        data = model.createData()
+
+        def jacobian(at: FloatArray) -> FloatArray:
+            pin.computeJointJacobians(model, data, at)
+            full = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
+            full = np.array(full).reshape(6, model.nv) @ columns
+            lever = data.oMi[joint].rotation @ placement.translation
+            full[:3] += _cross(full[3:], lever)
+            return full
+
+        here = jacobian(q)
+        rotation = np.array((data.oMi[joint] * placement).rotation)
+        gradient = [
+            (jacobian(q + _STEP * s) - jacobian(q - _STEP * s)) / (2 * _STEP) for s in columns.T
+        ]
+        return Motion(here, np.array(gradient), rotation)
+
+
+def _link_inertia(robot: FlexibleRobot, link: str) -> Any:
+    own = robot.tree.links.get(link)
+    if own is None:
+        raise InputError(
+            "the URDF gives this link no mass",
+            value=link,
+            choices=[name for name, inertial in robot.tree.links.items() if inertial],
+        )
+    ixx, ixy, ixz, iyy, iyz, izz = own.inertia
+    matrix = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+    turn = pin.rpy.rpyToMatrix(*own.rpy)
+    return pin.Inertia(own.mass, np.array(own.xyz), turn @ matrix @ turn.T)

@@ -1,0 +1,105 @@
+"""From a reproduction to one self-contained HTML file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from importlib.resources import files
+from typing import Any
+
+from picchio.paper.assumptions import INPUTS
+from picchio.paper.figures.base import PaperFigure
+from picchio.paper.run import Reproduction
+from picchio.paper.verdict import Verdict
+from picchio.studies.assessment.result import format_count
+from picchio.visuals.report.assessment import number
+from picchio.visuals.report.page import inline_svg
+
+_MARKS = {"holds": "good", "holds only if": "partly", "does not hold": "bad",
+          "cannot be known": "open"}  # fmt: skip
+REDRAWN = ("fig-4", "fig-8", "fig-9", "fig-10", "fig-11", "fig-12", "fig-13-15")
+
+
+def reproduction_report(found: Reproduction, *, command: str = "picchio reproduce") -> str:
+    """The page: claims, Table 2, what does not fit, the life, figures, assumptions, equations.
+
+    It needs nothing from outside, prints, and follows the reader's light or dark theme.
+
+    Args:
+        found: of `picchio.paper.reproduce`.
+        command: the command line that gave this.
+
+    Returns:
+        the HTML.
+    """
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    folder, shared = files("picchio.paper") / "page_files", files("picchio.visuals.report")
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters.update(
+        number=number, count=format_count, mark=_MARKS.__getitem__, gap=_gap, value=_value,
+        power=lambda x: Markup(power(float(x))),
+    )  # fmt: skip
+    template = environment.from_string((folder / "page.html.j2").read_text("utf-8"))
+    style = (shared / "style.css").read_text("utf-8") + (folder / "page.css").read_text("utf-8")
+    shown: dict[str, Any] = {
+        name: inline_svg(figure.plot().axes[0], figure.alt, name.replace("-", ""))
+        for name, figure in found.figures.items()
+    }
+    return template.render(
+        style=Markup(style),
+        r=found,
+        a=found.answer,
+        printed=found.study.printed,
+        inputs=INPUTS,
+        svg=shown,
+        redrawn=[found.figures[name] for name in REDRAWN],
+        extra=_extra(found.figures, REDRAWN),
+        counts=found.counts,
+        total=len(found.claims),
+        worlds=len(found.study.worlds),
+        steps=found.steps,
+        endless=math.isinf(found.steps[-1].rivets),
+        units={i.name: f" [{i.unit}]" if i.unit not in ("", "–") else "" for i in INPUTS},
+        gaps=[e.gap for e in found.equations if e.gap is not None],
+        verdicts={tried.claim.name: str(tried.finding.verdict) for tried in found.claims},
+        of_abstract=sum(
+            tried.finding.verdict is Verdict.HOLDS
+            for tried in found.claims
+            if tried.sentence.page == found.study.printed.abstract_page
+        ),
+        influence={row.name: row for row in found.influences},
+        command=command,
+    )
+
+
+def _extra(figures: dict[str, PaperFigure], shown: Sequence[str]) -> list[PaperFigure]:
+    """The figures that stand nowhere else on the page."""
+    return [figures[name] for name in ("fig-9-found",) if name in figures and name not in shown]
+
+
+def power(value: float) -> str:
+    """A number such as 3.08 x 10^6, as HTML."""
+    if not math.isfinite(value):
+        return "∞"
+    if value == 0 or 1e-3 <= abs(value) < 1e5:
+        return f"{value:.3g}"
+    digits, exponent = f"{value:.2e}".split("e")
+    return f"{digits}\N{MULTIPLICATION SIGN}10<sup>{int(exponent)}</sup>"
+
+
+def _gap(value: float | None) -> str:
+    if value is None:
+        return "–"
+    return "0" if value == 0 else f"{value:.0e}"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, float) and value >= 1e6:
+        return f"{value / 1e9:.4g}e9"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return str(value)

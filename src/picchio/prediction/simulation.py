@@ -1,0 +1,192 @@
+"""The campaign that a test plan would give: for planning a test before doing it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.channels import Channel
+from picchio.campaign.record import Record
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.core.provenance import provenance
+from picchio.model.effects.effect import Effect
+from picchio.model.model import Model
+from picchio.prediction.percussion import PercussionSetup, percussion_setups
+from picchio.prediction.plan import Plan, PlannedRecord
+from picchio.robot.flexible_robot import FlexibleRobot
+
+
+def simulate(
+    robot: FlexibleRobot,
+    plan: Plan,
+    effects: Sequence[Effect] = (),
+    *,
+    robot_name: str | None = None,
+    gravity_stiffness: bool = True,
+    suffix: str = ".csv",
+    inputs: Sequence[str | Path] = (),
+    progress: Callable[[int, int], None] | None = None,
+) -> Campaign:
+    """Simulate a plan: the model's exact prediction of every channel, plus white noise.
+
+    What an effect draws anew in every record (jitter, missed hits, the phase of a hum) is drawn
+    from the plan's seed.
+
+    Args:
+        robot: the robot, with the effects it was saved with.
+        plan: what is to be measured.
+        effects: besides those of the plan and of a saved robot.
+        robot_name: what the campaign calls the robot; its own name where None.
+        gravity_stiffness: whether gravity's change with the deflection counts.
+        suffix: ".csv" or ".parquet", of the records' files.
+        inputs: files to name, with their hashes, in the provenance.
+        progress: called with (done, total) records.
+
+    Returns:
+        a campaign in memory.
+
+    Raises:
+        InputError: a pose, joint, frame or effect that does not fit the robot.
+    """
+    plan.check()
+    channels = _channels(robot, plan)
+    digits = max(2, len(str(plan.count)))
+    names = [f"r{index + 1:0{digits}d}{suffix}" for index in range(plan.count)]
+    rng = np.random.default_rng([plan.seed, 1])
+    every = [*(table.build() for table in plan.effect), *effects]
+    hidden = [_with_hidden(effect, names, plan.burst or 1, rng) for effect in every]
+    model = Model(robot, gravity_stiffness).with_effects(hidden)
+    records = [
+        _blank(name, planned, plan, [c for c, _ in channels])
+        for name, planned in zip(names, plan.records(), strict=True)
+    ]
+    table: dict[str, Any] = {
+        "robot": robot_name or robot.name,
+        "tool": robot.tool_frame,
+        "excitation": _excitation(plan),
+        "tolerance": plan.tolerance.model_dump(),
+        "notes": plan.notes,
+    }
+    setups = percussion_setups(robot, Campaign.from_records(records, **table))
+    filled = []
+    for index, (record, setup) in enumerate(zip(records, setups, strict=True)):
+        filled.append(_filled(record, setup, model, channels, [plan.seed, 2, index], plan))
+        if progress is not None:
+            progress(index + 1, len(records))
+    return Campaign.from_records(filled, **table, provenance=_origin(plan, every, inputs))
+
+
+def _channels(robot: FlexibleRobot, plan: Plan) -> list[tuple[Channel, float]]:
+    """Channels and the standard deviation of their noise, SI."""
+    found: dict[str, tuple[Channel, float]] = {}
+    for number, sensor in enumerate(plan.sensor):
+        try:
+            members = sensor.expand(robot)
+        except InputError as error:
+            key = f"sensor[{number}]" + (f".{error.key}" if error.key else "")
+            raise InputError(error.problem, key=key, value=error.value,
+                             choices=error.choices) from None  # fmt: skip
+        for channel, noise in members:
+            if channel.name in found:
+                raise InputError("is measured twice", key=f"sensor[{number}].channels",
+                                 value=channel.name)  # fmt: skip
+            found[channel.name] = (channel, noise)
+    return list(found.values())
+
+
+def _excitation(plan: Plan) -> dict[str, Any]:
+    table = plan.excitation.model_dump(exclude_none=True)
+    if plan.burst is not None:
+        table["hits"] = plan.burst
+    if "force" not in table and plan.levels:
+        table["force"] = plan.levels[0]
+    return table
+
+
+def _blank(name: str, planned: PlannedRecord, plan: Plan, channels: Sequence[Channel]) -> Record:
+    """The record with its clock and nothing in its channels."""
+    before, after = plan.samples
+    time = np.arange(-before, after) / plan.sample_rate
+    direction = np.array(planned.direction, dtype=float)
+    more: dict[str, Any] = {"force": planned.level, "time": planned.time,
+                            "temperature": planned.temperature}  # fmt: skip
+    return Record.from_arrays(
+        name,
+        time,
+        {channel.name: np.zeros(time.size) for channel in channels},
+        units={channel.name: channel.unit for channel in channels},
+        pose=planned.pose,
+        direction=(direction / np.linalg.norm(direction)).tolist(),
+        **{key: value for key, value in more.items() if value is not None},
+    )
+
+
+def _filled(
+    record: Record,
+    setup: PercussionSetup,
+    model: Model,
+    channels: Sequence[tuple[Channel, float]],
+    seed: Sequence[int],
+    plan: Plan,
+) -> Record:
+    rng = np.random.default_rng(list(seed))
+    predicted = setup.predict(model)
+    values: dict[str, FloatArray] = {}
+    for channel, std in channels:
+        clean = predicted[channel.name]
+        noisy = clean + std * rng.standard_normal(clean.size)
+        values[channel.name] = noisy - noisy.mean() if plan.burst is None else noisy
+    given = record.table.model_dump(exclude_none=True, exclude={"file"})
+    units = {channel.name: channel.unit for channel, _ in channels}
+    return Record.from_arrays(record.file, record.time, values, units=units, **given)
+
+
+def _with_hidden(
+    effect: Effect, names: Sequence[str], hits: int, rng: np.random.Generator
+) -> Effect:
+    """An effect that draws numbers anew in every record, with them drawn.
+
+    A record's first blow is its t = 0, so it is neither shifted nor missing.
+    """
+    if effect.latent is None or effect.hidden:
+        return effect
+    drawn: dict[str, tuple[float, ...]] = {}
+    for name in names:
+        if effect.latent == "shift":
+            values = effect.values["std"] * rng.standard_normal(hits)
+            values[0] = 0.0
+        elif effect.latent == "missing":
+            values = (rng.random(hits) < effect.values["fraction"]).astype(float)
+            values[0] = 0.0
+        elif effect.latent == "cosine and sine":
+            phase = rng.uniform(0.0, 2.0 * np.pi)
+            values = effect.values["amplitude"] * np.array([np.cos(phase), np.sin(phase)])
+        else:
+            raise InputError("draws numbers that simulate does not know", key=effect.label,
+                             value=effect.latent)  # fmt: skip
+        drawn[name] = tuple(float(value) for value in values)
+    return effect.with_hidden(drawn)
+
+
+def _origin(plan: Plan, effects: Sequence[Effect], inputs: Sequence[str | Path]) -> dict[str, Any]:
+    """Where the campaign comes from, for its [provenance]."""
+    made = provenance(inputs, seed=plan.seed)
+    origin: dict[str, Any] = {
+        "picchio": made["picchio"],
+        "simulated": True,
+        "seed": plan.seed,
+        "inputs": made["inputs"],
+        "libraries": {k: v for k, v in made["libraries"].items() if v is not None},
+    }
+    if effects:
+        origin["effects"] = [
+            {"effect": e.name, "target": e.target,
+             "parameters": {k: v for k, v in e.values.items() if np.isfinite(v)}}
+            for e in effects
+        ]  # fmt: skip
+    return origin

@@ -1,0 +1,316 @@
+"""Write a sidecar's values into a URDF as `picchio:` annotations, touching nothing else.
+
+The file is not parsed and written back: the new elements are cut into its bytes, so comments,
+order, other tools' tags and even odd spacing stay as they are. What comes out is read back
+before it is handed over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from xml.parsers import expat
+from xml.sax.saxutils import quoteattr
+
+from lxml import etree
+from pydantic import BaseModel
+
+from picchio.core.errors import InputError
+from picchio.robot.annotations.flexibility import Source, check_names
+from picchio.robot.annotations.inline import IN_JOINT, IN_ROBOT, read_annotations
+from picchio.robot.annotations.sidecar import JointEntry, Sidecar, given
+from picchio.robot.urdf.check import read_tree
+from picchio.robot.urdf.xml import NAMESPACE, parse_urdf, read_urdf_bytes
+
+# Where in a URDF's bytes annotations stand and where new ones go.
+
+
+@dataclass(frozen=True)
+class Edit:
+    """Replace `length` bytes from `start` by a text."""
+
+    start: int
+    length: int
+    text: str
+
+
+@dataclass
+class Place:
+    """One element that can carry annotations.
+
+    Args:
+        insert: byte where new elements go: before the closing tag and its white space.
+        lead: white space before each, a line break included where children have lines of
+            their own; None until a child is seen.
+        old: byte ranges of the present annotations, with the white space before them.
+    """
+
+    insert: int = 0
+    lead: str | None = None
+    old: list[tuple[int, int]] = field(default_factory=list)
+
+    def see_child(self, blank: str) -> None:
+        """Take the lead over from a child that has a line of its own, else from the first."""
+        if self.lead is None or ("\n" in blank and "\n" not in self.lead):
+            line = blank.rpartition("\n")
+            self.lead = line[1] + line[2]
+
+
+@dataclass
+class Places:
+    """Every place of a file.
+
+    Args:
+        root_name_end: byte after `<robot`.
+        newline: as the file has it.
+        at: by ("joint", its name) or ("robot", the annotation's name).
+    """
+
+    root_name_end: int
+    newline: str
+    at: dict[tuple[str, str], Place]
+
+
+ROBOT_TAGS = ("tool", "gun", "base")
+
+
+def find_places(content: bytes, namespace: str) -> Places:
+    """Read the places off a URDF that has been checked before.
+
+    Args:
+        content: the file's bytes, in a superset of ASCII.
+        namespace: of the annotations.
+
+    Raises:
+        ValueError: expat cannot follow the file's encoding.
+    """
+    reader = _Reader(content, namespace)
+    reader.parse()
+    newline = "\r\n" if b"\r\n" in content else "\n"
+    return Places(reader.root_name_end, newline, reader.places)
+
+
+class _Reader:
+    """Walks the file with expat, which knows the byte it is at."""
+
+    def __init__(self, content: bytes, namespace: str) -> None:
+        self.content = content
+        self.namespace = namespace
+        self.places: dict[tuple[str, str], Place] = {}
+        self.root_name_end = 0
+        self._parser = expat.ParserCreate(namespace_separator=" ")
+        self._parser.StartElementHandler = self._start
+        self._parser.EndElementHandler = self._end
+        # Of each open element whether it is self-closing: expat then reports the end of
+        # `<limit/>` at the byte after it, where another element's closing tag may stand.
+        self._open: list[bool] = []
+        self._joint: Place | None = None
+        self._robot = {tag: Place() for tag in ROBOT_TAGS}
+
+    def parse(self) -> None:
+        try:
+            self._parser.Parse(self.content, True)
+        except (expat.ExpatError, LookupError) as error:
+            raise ValueError(str(error)) from None
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        start = self._parser.CurrentByteIndex
+        end = _tag_end(self.content, start)
+        self._open.append(self.content[end - 2 : end] == b"/>")
+        depth = len(self._open)
+        blank = self._blank_before(start)
+        old = (start - len(blank), end)
+        mine = tag.startswith(f"{self.namespace} ")
+        if depth == 1:
+            self.root_name_end = _name_end(self.content, start)
+        elif depth == 2:
+            if tag == "joint":
+                self._joint = self.places["joint", attributes["name"]] = Place()
+            for name, place in self._robot.items():
+                place.see_child(blank)
+                if tag == f"{self.namespace} {name}":
+                    place.old.append(old)
+        elif depth == 3 and self._joint is not None:
+            self._joint.see_child(blank)
+            if mine:
+                self._joint.old.append(old)
+
+    def _end(self, tag: str) -> None:
+        depth = len(self._open)
+        if not self._open.pop():
+            start = self._parser.CurrentByteIndex
+            blank = self._blank_before(start)
+            self._close(tag, depth, start - len(blank), _tag_end(self.content, start))
+        if depth == 2:
+            self._joint = None
+
+    def _close(self, tag: str, depth: int, insert: int, end: int) -> None:
+        """A closing tag that, with the white space before it, stands at insert..end."""
+        if depth == 1:
+            for name, place in self._robot.items():
+                place.insert = insert
+                self.places["robot", name] = place
+        elif depth == 2 and self._joint is not None:
+            self._joint.insert = insert
+        elif tag.startswith(f"{self.namespace} "):
+            name = tag.removeprefix(f"{self.namespace} ")
+            holder = self._robot.get(name) if depth == 2 else self._joint if depth == 3 else None
+            if holder is not None:
+                holder.old[-1] = (holder.old[-1][0], end)
+
+    def _blank_before(self, place: int) -> str:
+        begin = place
+        while begin > 0 and self.content[begin - 1 : begin] in (b" ", b"\t", b"\r", b"\n"):
+            begin -= 1
+        return self.content[begin:place].decode("ascii")
+
+
+def _name_end(content: bytes, start: int) -> int:
+    place = start + 1
+    while content[place : place + 1] not in (b" ", b"\t", b"\r", b"\n", b"/", b">", b""):
+        place += 1
+    return place
+
+
+def _tag_end(content: bytes, start: int) -> int:
+    """The byte after the tag that starts at `start`; a ">" in an attribute does not end it."""
+    quote = b""
+    for place in range(start, len(content)):
+        byte = content[place : place + 1]
+        if quote:
+            quote = b"" if byte == quote else quote
+        elif byte in (b'"', b"'"):
+            quote = byte
+        elif byte == b">":
+            return place + 1
+    return len(content)
+
+
+def annotate(urdf: str | Path, sidecar: Sidecar) -> bytes:
+    """The URDF's bytes with the sidecar's values in them.
+
+    What the URDF's own annotations say beside the sidecar's values is kept.
+
+    Args:
+        urdf: the file; it is not changed.
+        sidecar: the values to write.
+
+    Raises:
+        InputError: the URDF or the sidecar cannot be used together, the URDF's encoding is
+            not a superset of ASCII, or the result would not read back as the same values.
+    """
+    path = Path(urdf)
+    content = read_urdf_bytes(path)
+    root = parse_urdf(content, path)
+    tree = read_tree(root, path)
+    check_names(tree, Source("sidecar", sidecar))
+    before = read_annotations(root, path) or Sidecar()
+    if b"\0" in content:
+        raise InputError("only URDFs in UTF-8 or another superset of ASCII can be annotated",
+                         file=path)  # fmt: skip
+    prefix = next((key for key, address in root.nsmap.items() if address == NAMESPACE and key), "")
+    try:
+        places = find_places(content, NAMESPACE)
+    except ValueError as error:
+        raise InputError(f"cannot be annotated in this encoding: {error}", file=path) from None
+    expected: dict[tuple[str, str], dict[str, Any]] = {}
+    edits = []
+    if not prefix:
+        prefix = "picchio"
+        edits.append(Edit(places.root_name_end, 0, f' xmlns:{prefix}="{NAMESPACE}"'))
+    for name, entry in sidecar.joint.items():
+        merged = {**given(before.joint.get(name)), **given(entry)}
+        if "stiffness" in given(entry):
+            merged.pop("stiffness_curve", None)
+        if "stiffness_curve" in given(entry):
+            merged.pop("stiffness", None)
+        JointEntry.model_validate({key: _plain(value) for key, value in merged.items()})
+        expected["joint", name] = merged
+        edits += _replace(places, ("joint", name), _joint_elements(prefix, merged))
+    for tag in IN_ROBOT:
+        values = {**given(getattr(before, tag)), **given(getattr(sidecar, tag))}
+        if given(getattr(sidecar, tag)):
+            expected["robot", tag] = values
+            edits += _replace(places, ("robot", tag), [_element(prefix, tag, values, {})])
+    result = _apply(content, edits, places.newline)
+    _read_back(result, path, root, expected)
+    return result
+
+
+def _read_back(
+    result: bytes,
+    path: Path,
+    before: etree._Element,
+    expected: Mapping[tuple[str, str], Mapping[str, Any]],
+) -> None:
+    """Refuse a result that picchio's own reader would refuse, or read as something else."""
+    try:
+        root = parse_urdf(result, path)
+        read_tree(root, path)
+        found = read_annotations(root, path) or Sidecar()
+    except InputError as error:
+        raise InputError(f"cannot be annotated, the result would not read back: {error.problem}",
+                         file=path, key=error.key) from None  # fmt: skip
+    for (kind, name), values in expected.items():
+        entry = found.joint.get(name) if kind == "joint" else getattr(found, name)
+        if given(entry) != values:
+            raise InputError("cannot be annotated, the result would not read back as the values "
+                             "given", file=path, key=f"{kind}.{name}")  # fmt: skip
+    if _outline(root) != _outline(before):
+        raise InputError("cannot be annotated without a change to its own elements", file=path)
+
+
+def _outline(root: etree._Element) -> list[tuple[str, dict[str, str]]]:
+    """Everything but the annotations, in the file's order."""
+    return [(str(element.tag), {str(key): str(text) for key, text in element.attrib.items()})
+            for element in root.iter(etree.Element)
+            if not str(element.tag).startswith(f"{{{NAMESPACE}}}")]  # fmt: skip
+
+
+def _joint_elements(prefix: str, values: Mapping[str, Any]) -> list[str]:
+    elements = []
+    for tag, (target, attributes) in IN_JOINT.items():
+        if target is None:
+            own = {key: value for key, value in values.items() if key in attributes}
+        else:
+            own = values[target].model_dump(exclude_none=True) if target in values else {}
+        if own:
+            elements.append(_element(prefix, tag, own, attributes))
+    return elements
+
+
+def _element(prefix: str, tag: str, values: Mapping[str, Any], order: Mapping[str, str]) -> str:
+    names = [name for name in order if name in values] or list(values)
+    text = " ".join(f"{name}={quoteattr(_text(values[name]))}" for name in names)
+    return f"<{prefix}:{tag} {text}/>"
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, tuple):
+        return " ".join(_text(part) for part in value)
+    return repr(value) if isinstance(value, float) else str(value)
+
+
+def _plain(value: Any) -> Any:
+    return value.model_dump() if isinstance(value, BaseModel) else value
+
+
+def _replace(places: Places, where: tuple[str, str], elements: list[str]) -> list[Edit]:
+    """Take the old annotations at a place out and put new ones in."""
+    place = places.at[where]
+    edits = [Edit(start, end - start, "") for start, end in place.old]
+    lines = "".join(f"{place.lead or ''}{element}" for element in elements)
+    return [*edits, Edit(place.insert, 0, lines)]
+
+
+def _apply(content: bytes, edits: list[Edit], newline: str) -> bytes:
+    # From the end, so that earlier places stay where they are; of two at one place the
+    # insertion goes in last and stands first.
+    for edit in sorted(edits, key=lambda e: (e.start, e.length), reverse=True):
+        text = edit.text.replace("\n", newline).encode("ascii", "xmlcharrefreplace")
+        content = content[: edit.start] + text + content[edit.start + edit.length :]
+    return content

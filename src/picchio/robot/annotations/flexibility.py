@@ -1,0 +1,158 @@
+"""Which joints are flexible, how, and who says so.
+
+Several sources may speak about a joint. The first that gives a value wins: an argument, the
+sidecar, the URDF's `picchio:` annotation, Drake's tags, the SRDF. The origin of every value
+is kept. Tags that mean a spring beside the drive (Gazebo `springStiffness`, SDF
+`spring_stiffness`, `<dynamics>`) are never read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from picchio.core.errors import InputError
+from picchio.robot.annotations.sidecar import JointEntry, Sidecar, given
+from picchio.robot.joint import Balancer, Joint, Shaft, StiffnessCurve
+from picchio.robot.urdf.tree import MOVABLE, UrdfJoint, UrdfTree
+
+DEFAULT_DAMPING_RATIO = 0.03
+# One of these excludes the other, wherever they stand.
+_TOGETHER = {"stiffness": "stiffness_curve", "stiffness_curve": "stiffness"}
+
+
+@dataclass(frozen=True)
+class Source:
+    """A sidecar-like record and where it is from.
+
+    Args:
+        label: shown as the origin, such as "flex.toml" or "robot.urdf, picchio annotation".
+        content: what it says.
+        file: named in errors, or None for an argument.
+        strict: unknown joints are an error (a sidecar), not passed over (an SRDF).
+    """
+
+    label: str
+    content: Sidecar
+    file: str | None = None
+    strict: bool = True
+
+    def origin(self, source: str | None) -> str:
+        """The label, with the value's own source where it has one."""
+        return f"{self.label}: {source}" if source else self.label
+
+
+def flexible_joints(
+    tree: UrdfTree, sources: Sequence[Source]
+) -> tuple[dict[str, Joint], dict[str, str]]:
+    """Merge the sources.
+
+    Args:
+        tree: the robot.
+        sources: the strongest first.
+
+    Returns:
+        Flexible joints by name in the URDF's order, and origins such as
+        `{"joint_1.stiffness": "flex.toml: 'Dumas 2011'"}`.
+
+    Raises:
+        InputError: an unknown joint, one that cannot be flexible, values that do not fit it.
+    """
+    for source in sources:
+        check_names(tree, source)
+    joints: dict[str, Joint] = {}
+    origins: dict[str, str] = {}
+    for name, urdf in tree.joints.items():
+        values, where = _merge(name, sources)
+        if "stiffness" not in values and "stiffness_curve" not in values:
+            continue
+        joints[name] = _joint(urdf, values, where, tree)
+        if "damping_ratio" not in values:
+            where["damping_ratio"] = "picchio's default, not measured"
+        origins.update({f"{name}.{key}": text for key, text in where.items()})
+    return joints, origins
+
+
+def check_names(tree: UrdfTree, source: Source) -> None:
+    """Refuse joints that the robot does not have or that cannot be flexible.
+
+    Raises:
+        InputError: with the joints that can be.
+    """
+    for name, entry in source.content.joint.items():
+        key = f"joint.{name}"
+        if name not in tree.joints:
+            if source.strict:
+                raise InputError("the robot has no joint of this name", file=source.file,
+                                 key="joint", value=name, choices=tree.movable())  # fmt: skip
+            continue
+        urdf = tree.joints[name]
+        if not (given(entry).keys() & {"stiffness", "stiffness_curve"}):
+            continue
+        if urdf.type not in MOVABLE:
+            raise InputError(f"a {urdf.type} joint cannot be flexible", file=source.file, key=key,
+                             hint="flexible joints are revolute, continuous or "
+                             "prismatic")  # fmt: skip
+        if urdf.mimic is not None:
+            raise InputError(f"mimics {urdf.mimic.joint!r} and has no spring of its own",
+                             file=source.file, key=key,
+                             hint=f"give {urdf.mimic.joint!r} the stiffness")  # fmt: skip
+
+
+def _merge(name: str, sources: Sequence[Source]) -> tuple[dict[str, Any], dict[str, str]]:
+    values: dict[str, Any] = {}
+    where: dict[str, str] = {}
+    for source in sources:
+        entry = source.content.joint.get(name)
+        if entry is None:
+            continue
+        written = given(entry)
+        for key, value in written.items():
+            if key == "source" or key in values or _TOGETHER.get(key) in values:
+                continue
+            # An estimate is a statement about the stiffness given beside it.
+            if key == "estimated" and not {"stiffness", "stiffness_curve"} & written.keys():
+                continue
+            values[key] = value
+            where[key] = source.origin(entry.source)
+    return values, where
+
+
+def _joint(urdf: UrdfJoint, values: dict[str, Any], where: dict[str, str], tree: UrdfTree) -> Joint:
+    kind = "prismatic" if urdf.type == "prismatic" else "revolute"
+    if kind == "prismatic":
+        for key in ("shaft", "balancer"):
+            if key in values:
+                raise InputError(f"a prismatic joint has no torsion {key}; its spring is in N/m "
+                                 "and its load a force", key=f"joint.{urdf.name}.{key}",
+                                 file=where[key])  # fmt: skip
+    curve = values.get("stiffness_curve")
+    shaft = values.get("shaft")
+    balancer = values.get("balancer")
+    return Joint(
+        name=urdf.name,
+        kind=kind,
+        stiffness=curve.k1 if curve else values["stiffness"],
+        damping_ratio=values.get("damping_ratio", DEFAULT_DAMPING_RATIO),
+        shaft=Shaft(**shaft.model_dump()) if shaft else None,
+        reducer=values.get("reducer"),
+        effort_limit=urdf.effort if urdf.effort > 0 else float("inf"),
+        lower=urdf.lower,
+        upper=urdf.upper,
+        rotor_inertia=values.get("rotor_inertia"),
+        gear_ratio=values.get("gear_ratio"),
+        stiffness_curve=StiffnessCurve(**curve.model_dump()) if curve else None,
+        balancer=Balancer(**balancer.model_dump()) if balancer else None,
+        estimated=values.get("estimated", False),
+    )
+
+
+def all_joint_entries(sources: Sequence[Source], key: str) -> dict[str, JointEntry]:
+    """Every joint's strongest entry that gives this key, flexible or not."""
+    found: dict[str, JointEntry] = {}
+    for source in sources:
+        for name, entry in source.content.joint.items():
+            if key in given(entry):
+                found.setdefault(name, entry)
+    return found

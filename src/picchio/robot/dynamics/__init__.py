@@ -1,0 +1,1 @@
+"""Rigid-body dynamics at a pose, by Pinocchio."""

@@ -1,0 +1,116 @@
+"""Poses as users give them, checked."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError, PicchioWarning
+
+if TYPE_CHECKING:
+    from picchio.robot.flexible_robot import FlexibleRobot
+
+
+Array = NDArray[np.float64]
+
+
+def check_pose(
+    values: Any,
+    joint_names: tuple[str, ...],
+    named_poses: Mapping[str, tuple[float, ...]],
+    listed: tuple[str, ...],
+) -> Array:
+    """A pose (nv,).
+
+    Args:
+        values: a list in the order of `joint_names`, a mapping by joint name with the rest at
+            zero, or the name of a pose.
+        joint_names: every coordinate.
+        named_poses: poses by name.
+        listed: the joints a shorter list may be about; the others are at zero.
+
+    Raises:
+        InputError: wrong length, unknown names, not finite numbers.
+    """
+    if (
+        isinstance(values, np.ndarray)
+        and values.shape == (len(joint_names),)
+        and values.dtype == np.float64
+        and np.isfinite(values).all()
+    ):
+        return values.copy() if values.flags.writeable else values
+    if isinstance(values, str):
+        if values not in named_poses:
+            raise InputError("the robot has no pose of this name", key="pose", value=values,
+                             choices=named_poses)  # fmt: skip
+        return np.array(named_poses[values])
+    if isinstance(values, Mapping):
+        pose = np.zeros(len(joint_names))
+        for name, value in values.items():
+            if name not in joint_names:
+                raise InputError("the robot has no joint of this name", key="pose", value=name,
+                                 choices=joint_names)  # fmt: skip
+            pose[joint_names.index(name)] = _finite(value, str(name))
+        return pose
+    return _from_list(values, joint_names, listed)
+
+
+def _from_list(values: Any, joint_names: tuple[str, ...], listed: tuple[str, ...]) -> Array:
+    try:
+        numbers = list(values)
+    except TypeError:
+        raise InputError("a pose is a list of numbers", key="pose", value=values) from None
+    names = joint_names if len(numbers) == len(joint_names) else listed
+    if len(numbers) != len(names):
+        raise InputError(
+            f"a pose of this robot has {len(listed)} numbers ({', '.join(listed)})",
+            key="pose",
+            value=len(numbers),
+        )
+    pose = np.zeros(len(joint_names))
+    for name, value in zip(names, numbers, strict=True):
+        pose[joint_names.index(name)] = _finite(value, name)
+    return pose
+
+
+def _finite(value: Any, joint: str) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = float("nan")
+    if isinstance(value, (bool, str)) or not np.isfinite(number):
+        raise InputError("is not a finite number", key=f"pose: {joint}", value=value)
+    return number
+
+
+# Poses beyond the joints' limits: allowed, but told.
+
+# More than three turns either way is rather a pose in degrees.
+_TURNS = 3.0
+
+
+def warn_beyond_limits(robot: FlexibleRobot, poses: Iterable[FloatArray], what: str) -> None:
+    """Warn of every joint that stands beyond its limits, and of what looks like degrees.
+
+    Args:
+        robot: whose limits count.
+        poses: (nv,) each, rad or m.
+        what: how to name them.
+    """
+    every = list(poses)
+    beyond: dict[str, int] = {}
+    for pose in every:
+        for name in robot.limit_violations(pose):
+            beyond[name] = beyond.get(name, 0) + 1
+    far = max((float(np.abs(pose).max()) for pose in every if pose.size), default=0.0)
+    hint = "; angles are in radians" if far > 2.0 * np.pi * _TURNS else ""
+    for name, count in beyond.items():
+        of = "" if len(every) == 1 else f" in {count} of {len(every)} poses"
+        warnings.warn(
+            f"{what}: {name} is beyond its limits{of}{hint}", PicchioWarning, stacklevel=3
+        )

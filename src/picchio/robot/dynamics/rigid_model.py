@@ -1,0 +1,261 @@
+"""Pinocchio's model of the rigid robot, with every call guarded.
+
+Pinocchio crashes the interpreter on an unknown frame and corrupts memory when a model is
+changed behind its data. Here the model is built once and never changed, frames are looked up
+by name first, and every thread has its own data.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from picchio.core.errors import InputError
+from picchio.robot.tool import Vector
+from picchio.robot.urdf.tree import UrdfTree
+
+Array = NDArray[np.float64]
+_STDERR_LOCK = threading.Lock()
+
+
+class RigidModel:
+    """Dynamics of the rigid robot in the coordinates that are free: mimic joints follow.
+
+    Args:
+        text: normalised URDF.
+        tree: the robot's own tree, for its mimic joints.
+        gravity: m/s^2, world.
+
+    Raises:
+        InputError: Pinocchio refuses the URDF; the message has its reason.
+    """
+
+    def __init__(self, text: str, tree: UrdfTree, gravity: Vector) -> None:
+        self._text, self._tree, self._gravity = text, tree, gravity
+        self._model = _build(text, tree.path)
+        self._model.gravity.linear = np.asarray(gravity, dtype=float)
+        every = list(self._model.names)[1:]
+        free = [name for name in every if name not in tree.joints or not tree.joints[name].mimic]
+        self.joint_names: tuple[str, ...] = tuple(free)
+        # q = follow @ pose + offset; the identity where nothing mimics.
+        self._follow, self._offset = _mimic_matrix(tree, every, free)
+        self._plain = len(every) == len(free)
+        self._all = len(every)
+        self._frames: dict[str, int] = {
+            frame.name: index
+            for index, frame in enumerate(self._model.frames)
+            if frame.type == pin.FrameType.BODY
+        }
+        self._local = threading.local()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return RigidModel, (self._text, self._tree, self._gravity)
+
+    @property
+    def nv(self) -> int:
+        """Degrees of freedom."""
+        return len(self.joint_names)
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Names of all links."""
+        return tuple(self._frames)
+
+    def _data(self) -> Any:
+        data = getattr(self._local, "data", None)
+        if data is None:
+            data = self._local.data = self._model.createData()
+        return data
+
+    def _q(self, pose: Array) -> Array:
+        if pose.shape != (self.nv,):
+            raise InputError("a pose of the wrong shape", key="pose", value=pose.shape,
+                             choices=[str((self.nv,))])  # fmt: skip
+        return pose if self._plain else self._follow @ pose + self._offset
+
+    def _reduce(self, matrix: Any) -> Array:
+        # Pinocchio's bindings flatten matrices of one row or column.
+        full = np.array(matrix).reshape(self._all, self._all)
+        return full if self._plain else self._follow.T @ full @ self._follow
+
+    def followed(self, joint: str) -> tuple[Array, float]:
+        """A joint's position as row (nv,) @ pose + shift: more than a one where it mimics."""
+        row = list(self._model.names).index(joint) - 1
+        return self._follow[row], float(self._offset[row])
+
+    def frame(self, link: str) -> int:
+        """Pinocchio's index of a link's frame.
+
+        Raises:
+            InputError: no such link.
+        """
+        index = self._frames.get(link)
+        if index is None:
+            raise InputError("no such frame", key="frame", value=link, choices=self._frames)
+        return index
+
+    def _check_frame(self, frame: int) -> None:
+        if not 0 <= frame < self._model.nframes:  # Pinocchio would crash
+            raise InputError("no such frame", key="frame", value=frame)
+
+    def mass_matrix(self, pose: Array) -> Array:
+        """Joint-space mass matrix (nv, nv), kg m^2, kg m, kg."""
+        matrix = pin.crba(self._model, self._data(), self._q(pose))
+        return self._reduce(matrix)
+
+    def jacobian(self, pose: Array, frame: int) -> Array:
+        """Jacobian (6, nv) of a frame's origin, world axes: linear m/rad, then angular."""
+        self._check_frame(frame)
+        matrix = pin.computeFrameJacobian(
+            self._model, self._data(), self._q(pose), frame, pin.LOCAL_WORLD_ALIGNED
+        )
+        full = np.array(matrix).reshape(6, self._all)
+        return full if self._plain else full @ self._follow
+
+    def mass_and_jacobian(
+        self, poses: Array, frame: int, index: NDArray[np.intp] | None = None
+    ) -> tuple[Array, Array]:
+        """Mass matrices (p, n, n) and a frame's linear Jacobians (p, 3, n) at many poses.
+
+        Two Pinocchio calls a pose and nothing else: the floor under the cost of a map.
+
+        Args:
+            poses: (p, nv).
+            frame: of `frame`.
+            index: (n,) which coordinates are wanted; all if not given.
+        """
+        self._check_frame(frame)
+        if poses.ndim != 2 or poses.shape[1] != self.nv:
+            raise InputError("poses of the wrong shape", key="poses", value=poses.shape,
+                             choices=[f"(p, {self.nv})"])  # fmt: skip
+        model, data, size = self._model, self._data(), self._all
+        crba, frame_jacobian, world = pin.crba, pin.computeFrameJacobian, pin.LOCAL_WORLD_ALIGNED
+        # The bindings flatten matrices of one row or column.
+        flat = size == 1
+        mass = np.empty((len(poses), size * size) if flat else (len(poses), size, size))
+        jacobian = np.empty((len(poses), 6) if flat else (len(poses), 6, size))
+        every = poses if self._plain else poses @ self._follow.T + self._offset
+        for k, q in enumerate(np.ascontiguousarray(every)):
+            mass[k] = crba(model, data, q)
+            jacobian[k] = frame_jacobian(model, data, q, frame, world)
+        mass = mass.reshape(len(poses), size, size)
+        jacobian = jacobian.reshape(len(poses), 6, size)[:, :3]
+        follow = self._follow if index is None else self._follow[:, index]
+        if self._plain and follow.shape[1] == size and (follow == np.eye(size)).all():
+            return mass, jacobian
+        if ((follow != 0.0).sum(axis=0) == 1).all() and (follow.max(axis=0) == 1.0).all():
+            rows = follow.argmax(axis=0)  # picking is many times faster than multiplying
+            return mass[:, rows[:, None], rows], jacobian[:, :, rows]
+        return follow.T @ mass @ follow, jacobian @ follow
+
+    def gravity_torque(self, pose: Array) -> Array:
+        """Torque (nv,) that holds the arm against gravity, N m (N)."""
+        torque = pin.computeGeneralizedGravity(self._model, self._data(), self._q(pose))
+        full = np.array(torque).reshape(self._all)
+        return full if self._plain else self._follow.T @ full
+
+    def gravity_gradient(self, pose: Array) -> Array:
+        """Its derivative (nv, nv) by the pose, N m/rad."""
+        matrix = pin.computeGeneralizedGravityDerivatives(self._model, self._data(), self._q(pose))
+        return self._reduce(matrix)
+
+    def inverse_dynamics(self, poses: Array, velocities: Array, accelerations: Array) -> Array:
+        """Torques (m, nv) that the bodies' motion takes, N m (N); arguments (m, nv) each."""
+        model, data = self._model, self._data()
+        offset, zero = self._offset, np.zeros(self._all)
+        full = [
+            np.ascontiguousarray(x if self._plain else x @ self._follow.T + shift)
+            for x, shift in ((poses, offset), (velocities, zero), (accelerations, zero))
+        ]
+        every = [np.array(pin.rnea(model, data, *state)) for state in zip(*full, strict=True)]
+        torque = np.array(every).reshape(len(poses), self._all)
+        return torque if self._plain else torque @ self._follow
+
+    def point_load(
+        self, poses: Array, velocities: Array, accelerations: Array, frame: int
+    ) -> Array:
+        """Torques (m, nv) for each kg at a frame's origin: J^T (acceleration less gravity)."""
+        self._check_frame(frame)
+        model, data = self._model, self._data()
+        world, gravity = pin.LOCAL_WORLD_ALIGNED, self._model.gravity.linear
+        found = np.empty((len(poses), self.nv))
+        for i, pose in enumerate(poses):
+            q = self._q(pose)
+            v, a = velocities[i], accelerations[i]
+            if not self._plain:
+                v, a = self._follow @ v, self._follow @ a
+            pin.forwardKinematics(model, data, q, v, a)
+            linear = pin.getFrameClassicalAcceleration(model, data, frame, world).linear - gravity
+            jacobian = np.array(pin.computeFrameJacobian(model, data, q, frame, world))
+            torque = linear @ jacobian.reshape(6, self._all)[:3]
+            found[i] = torque if self._plain else torque @ self._follow
+        return found
+
+    def placement(self, pose: Array, frame: int) -> tuple[Array, Array]:
+        """World position (3,) in m and rotation (3, 3) of a frame."""
+        self._check_frame(frame)
+        data = self._data()
+        pin.forwardKinematics(self._model, data, self._q(pose))
+        placement = pin.updateFramePlacement(self._model, data, frame)
+        return np.array(placement.translation), np.array(placement.rotation)
+
+    def total_mass(self) -> float:
+        """Mass of all bodies that can move, kg."""
+        return float(sum(body.mass for body in list(self._model.inertias)[1:]))
+
+
+def _mimic_matrix(tree: UrdfTree, every: list[str], free: list[str]) -> tuple[Array, Array]:
+    column = {name: index for index, name in enumerate(free)}
+    follow = np.zeros((len(every), len(free)))
+    offset = np.zeros(len(every))
+    joints: Mapping[str, Any] = tree.joints
+    for row, name in enumerate(every):
+        factor, shift = 1.0, 0.0
+        while name in joints and joints[name].mimic is not None:
+            mimic = joints[name].mimic
+            shift += factor * mimic.offset
+            factor *= mimic.multiplier
+            name = mimic.joint
+        follow[row, column[name]] = factor
+        offset[row] = shift
+    return follow, offset
+
+
+def _build(text: str, path: Path) -> pin.Model:
+    with _caught_stderr() as said:
+        try:
+            return pin.buildModelFromXML(text)
+        except Exception as error:
+            reason = str(error)
+    # urdfdom gives its reason on C++'s stderr only.
+    spoken = " ".join(said[0].split()) if said else ""
+    raise InputError(f"Pinocchio refuses this URDF: {spoken or reason}", file=path)
+
+
+@contextmanager
+def _caught_stderr() -> Iterator[list[str]]:
+    """Collect what C++ writes to stderr in this block."""
+    said: list[str] = []
+    with _STDERR_LOCK, tempfile.TemporaryFile() as sink:
+        try:
+            kept = os.dup(2)
+        except OSError:  # stderr is closed
+            yield said
+            return
+        os.dup2(sink.fileno(), 2)
+        try:
+            yield said
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+            sink.seek(0)
+            said.append(sink.read(4000).decode("utf-8", "replace"))

@@ -1,0 +1,1 @@
+"""Inverse kinematics: every branch of poses that put the tool on a point."""

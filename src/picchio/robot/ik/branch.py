@@ -1,0 +1,104 @@
+"""Which of several poses that reach the same point is meant.
+
+Arms of three joints: "elbow-up" or "elbow-down". Any arm: words such as "joint_3+" and
+"joint_5-", the sign of that joint's angle, alone or in a list.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from picchio.core.errors import InputError
+from picchio.robot.urdf.tree import MOVABLE
+
+if TYPE_CHECKING:
+    from picchio.robot.flexible_robot import FlexibleRobot
+
+Array = NDArray[np.float64]
+ELBOW = ("elbow-up", "elbow-down")
+
+
+def choose_branch(
+    robot: FlexibleRobot, poses: list[Array], branch: str | Sequence[str], point: Any = None
+) -> Array:
+    """The first pose on the asked branch.
+
+    Args:
+        robot: the robot.
+        poses: (nv,) each, the preferred first; at least one.
+        branch: "any", "elbow-up", "elbow-down", one sign word or several.
+        point: named in errors.
+
+    Raises:
+        InputError: an unknown word, or no pose on this branch.
+    """
+    words = branch_words(robot, branch)
+    for pose in poses:
+        if all(_fits(robot, pose, word) for word in words):
+            return pose
+    labels = sorted({branch_label(robot, pose) for pose in poses})
+    raise InputError("the point cannot be reached on this branch within the limits",
+                     key="branch", value=" ".join(words), choices=["any", *labels],
+                     hint=f"point {point}")  # fmt: skip
+
+
+def branch_label(robot: FlexibleRobot, pose: Array) -> str:
+    """The branch a pose is on: "elbow-up" or "elbow-down", or the signs of the joints."""
+    names = tool_joints(robot)
+    if len(names) == 3:
+        return ELBOW[0] if _elbow_is_up(robot, pose, names) else ELBOW[1]
+    index = robot.joint_names.index
+    return " ".join(f"{name}{'+' if pose[index(name)] >= 0 else '-'}" for name in names)
+
+
+def tool_joints(robot: FlexibleRobot) -> list[str]:
+    """The joints between the base and the tool, in that order; mimics are not among them."""
+    chain = robot.tree.chain(robot.tool.frame)
+    return [joint.name for joint in chain if joint.type in MOVABLE and joint.mimic is None]
+
+
+def branch_words(robot: FlexibleRobot, branch: str | Sequence[str]) -> list[str]:
+    """The words of a branch, checked.
+
+    Raises:
+        InputError: no word, or one that this robot does not have.
+    """
+    words = branch.replace(",", " ").split() if isinstance(branch, str) else list(branch)
+    names = tool_joints(robot)
+    valid = ["any", *(ELBOW if len(names) == 3 else ()), *(n + s for n in names for s in "+-")]
+    if not words:
+        raise InputError("no branch given", key="branch", choices=valid)
+    for word in words:
+        if word not in valid:
+            raise InputError("unknown branch", key="branch", value=word, choices=valid)
+    return words
+
+
+def _fits(robot: FlexibleRobot, pose: Array, word: str) -> bool:
+    if word == "any":
+        return True
+    if word in ELBOW:
+        return _elbow_is_up(robot, pose, tool_joints(robot)) == (word == ELBOW[0])
+    value = pose[robot.joint_names.index(word[:-1])]
+    return bool(value >= 0) if word[-1] == "+" else bool(value <= 0)
+
+
+def _elbow_is_up(robot: FlexibleRobot, pose: Array, names: list[str]) -> bool:
+    """Whether the third joint lies above the line from the second joint to the tool."""
+    shoulder, _ = robot.frame_placement(pose, names[1])
+    elbow, _ = robot.frame_placement(pose, names[2])
+    tool = robot.state(pose).tool_position
+    up = -np.asarray(robot.mounting.gravity)
+    line = tool - shoulder
+    across = (elbow - shoulder) - line * ((elbow - shoulder) @ line) / max(
+        float(line @ line), 1e-12
+    )
+    height = float(across @ up)
+    if abs(height) > 1e-9 * float(np.linalg.norm(up)):
+        return height > 0
+    # A vertical line has no upper side: the side away from the base's axis is called up.
+    return float(across @ (shoulder - np.asarray(robot.mounting.xyz) + line)) >= 0

@@ -1,0 +1,93 @@
+"""The motions of a redundant arm that leave the tool where it is.
+
+An arm of seven joints that holds a point and a tool axis has two such motions left (the roll
+about the axis and the elbow's swivel), an arm of six has one. All poses along them do the same
+work with different vibration: a placement study chooses among them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from picchio.robot.ik.chain import tool_chain
+from picchio.robot.ik.chain_kernel import forward
+from picchio.robot.ik.inverse_kinematics import tables_of
+from picchio.robot.ik.kernel import relax
+
+if TYPE_CHECKING:
+    from picchio.robot.flexible_robot import FlexibleRobot
+
+Array = NDArray[np.float64]
+
+
+def self_motion_basis(
+    robot: FlexibleRobot, pose: ArrayLike, *, keep_axis: bool = True, tolerance: float = 1e-6
+) -> Array:
+    """Orthonormal directions (nv, r) in which the joints can move, the tool standing still.
+
+    Args:
+        robot: the robot.
+        pose: (nv,) rad or m.
+        keep_axis: keep the tool's axis, too; otherwise only the point.
+        tolerance: singular values of the task below this share of the largest are none.
+
+    Raises:
+        InputError: as `FlexibleRobot.pose`.
+    """
+    chain = tool_chain(robot)
+    jacobian = _task(robot, robot.pose(pose), keep_axis)[1]
+    _, values, rows = np.linalg.svd(jacobian)
+    rank = int((values > tolerance * values[0]).sum()) if len(values) else 0
+    basis = np.zeros((robot.rigid.nv, len(chain.index) - rank))
+    basis[chain.index] = rows[rank:].T
+    return basis
+
+
+def move_along_self_motion(
+    robot: FlexibleRobot, pose: ArrayLike, towards: ArrayLike, *, keep_axis: bool = True
+) -> Array:
+    """The pose nearest to another that can be reached from `pose` with the tool standing still.
+
+    Args:
+        robot: the robot.
+        pose: (nv,) where to start, within the limits.
+        towards: (nv,) where to go as far as the tool allows.
+        keep_axis: keep the tool's axis, too; otherwise only the point.
+
+    Returns:
+        A pose (nv,) within the limits; a local optimum.
+
+    Raises:
+        InputError: as `FlexibleRobot.pose`.
+    """
+    chain = tool_chain(robot)
+    start, goal = robot.pose(pose), robot.pose(towards)
+    residual, _ = _task(robot, start, keep_axis)
+    weight = _weight(chain.reach, keep_axis)
+    # The task of standing still: the target is where the tool is now.
+    axis = residual[3:] / weight if keep_axis else np.zeros(3)
+    q = start[chain.index].copy()
+    relax(
+        tables_of(chain), q, goal[chain.index], chain.lower, chain.upper, residual[:3].copy(),
+        axis, weight, 400,
+    )  # fmt: skip
+    moved = start.copy()
+    moved[chain.index] = q
+    return moved
+
+
+def _weight(reach: float, keep_axis: bool) -> float:
+    return 0.3 * reach if keep_axis else 0.0
+
+
+def _task(robot: FlexibleRobot, pose: Array, keep_axis: bool) -> tuple[Array, Array]:
+    """The tool's place and weighted axis (6,), and their Jacobian (6, k)."""
+    chain = tool_chain(robot)
+    residual, jacobian = np.empty(6), np.empty((6, len(chain.index)))
+    zero = np.zeros(3)
+    weight = _weight(chain.reach, keep_axis)
+    forward(tables_of(chain), pose[chain.index], residual, jacobian, zero, zero, weight)
+    return residual, jacobian

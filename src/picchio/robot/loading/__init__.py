@@ -1,0 +1,1 @@
+"""From what a user calls a robot to a `FlexibleRobot`."""

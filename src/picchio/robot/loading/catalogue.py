@@ -1,0 +1,87 @@
+"""The list of robots that can be named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from picchio.core.errors import InputError
+from picchio.robot.annotations.inline import read_annotations
+from picchio.robot.annotations.sidecar import Sidecar, given, read_sidecar
+from picchio.robot.loading.find import FoundRobot, example_robots, shipped_robots
+from picchio.robot.urdf.check import read_tree
+from picchio.robot.urdf.xml import parse_urdf, read_urdf_bytes
+
+
+@dataclass(frozen=True)
+class RobotEntry:
+    """One robot of the list.
+
+    Args:
+        name: what it is called.
+        urdf: its file.
+        dof: movable joints that do not mimic another.
+        flexible: the joints that could be flexible: revolute, continuous or prismatic.
+        with_stiffness: those whose stiffness is known.
+        stiffness_source: where the stiffnesses are from, or None where there are none.
+        estimated: some stiffness is an estimate.
+        problem: why the robot cannot be loaded, or None.
+    """
+
+    name: str
+    urdf: Path
+    dof: int
+    flexible: tuple[str, ...]
+    with_stiffness: tuple[str, ...]
+    stiffness_source: str | None
+    estimated: bool = False
+    problem: str | None = None
+
+
+def list_robots(*, examples: bool = True) -> list[RobotEntry]:
+    """The robots of this project, then those of example-robot-data.
+
+    Args:
+        examples: also read example-robot-data's 69 URDFs.
+    """
+    shipped = shipped_robots()
+    found = list(shipped.values())
+    if examples:
+        found += [
+            FoundRobot(name, urdf) for name, urdf in example_robots().items() if name not in shipped
+        ]
+    return [describe_robot(robot) for robot in found]
+
+
+def describe_robot(robot: FoundRobot) -> RobotEntry:
+    """One entry; a robot that cannot be loaded has its reason as `problem`."""
+    name = robot.name or robot.urdf.stem
+    try:
+        root = parse_urdf(read_urdf_bytes(robot.urdf), robot.urdf)
+        tree = read_tree(root, robot.urdf)
+        annotation = read_annotations(root, robot.urdf)
+        sidecar, file = annotation, robot.urdf
+        if annotation is None and robot.flex is not None:
+            sidecar, file = read_sidecar(robot.flex), robot.flex
+    except InputError as error:
+        return RobotEntry(name, robot.urdf, 0, (), (), None, problem=str(error))
+    flexible = tuple(tree.movable())
+    known, source, estimated = _stiffness(sidecar, file)
+    return RobotEntry(name, robot.urdf, len(flexible), flexible, known, source, estimated)
+
+
+def _stiffness(sidecar: Sidecar | None, file: Path) -> tuple[tuple[str, ...], str | None, bool]:
+    joints = sidecar.joint if sidecar else {}
+    known = {
+        name: entry
+        for name, entry in joints.items()
+        if given(entry).keys() & {"stiffness", "stiffness_curve"}
+    }
+    if not known:
+        return (), None, False
+    sources = sorted({entry.source for entry in known.values() if entry.source})
+    place = f"{file.parent.name}/{file.name}"
+    text = sources[0] if sources else place
+    if len(sources) > 1:
+        text += f" (and {len(sources) - 1} more in {place})"
+    return tuple(known), text, any(entry.estimated for entry in known.values())

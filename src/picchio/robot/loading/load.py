@@ -1,0 +1,212 @@
+"""Load a robot: URDF, annotations, sidecar and SRDF into one `FlexibleRobot`."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from lxml import etree
+
+from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.toml import validate
+from picchio.robot.annotations.flexibility import Source, all_joint_entries, flexible_joints
+from picchio.robot.annotations.inline import read_annotations
+from picchio.robot.annotations.other_tags import read_drake
+from picchio.robot.annotations.sidecar import FORMAT, Sidecar, read_sidecar
+from picchio.robot.annotations.srdf import Srdf, find_srdf
+from picchio.robot.annotations.tool_choice import choose_gun, choose_mounting, choose_tool
+from picchio.robot.dynamics.rigid_model import RigidModel
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.joint import Joint
+from picchio.robot.loading.find import FoundRobot, find_robot
+from picchio.robot.loading.mass_check import check_masses
+from picchio.robot.loading.saved_model import is_saved_model, read_saved_model
+from picchio.robot.tool import Gun
+from picchio.robot.urdf.check import read_tree
+from picchio.robot.urdf.normalised import normalise
+from picchio.robot.urdf.tree import UrdfTree
+from picchio.robot.urdf.xml import parse_urdf, read_urdf_bytes
+
+
+def load_robot(
+    robot: str | Path,
+    *,
+    flex: str | Path | None = None,
+    tool: str | None = None,
+    values: Mapping[str, Mapping[str, object]] | None = None,
+    allow_rigid: bool = False,
+) -> FlexibleRobot:
+    """Load a robot by name or path.
+
+    Args:
+        robot: a name from `picchio robots`, a path to a URDF or to a robot's folder, a
+            `package://` address, or a saved model (`picchio-model/1`, a .toml file).
+        flex: a sidecar `picchio-sidecar/1`.
+        tool: the frame that carries the tool.
+        values: values that win over every file, by joint and key, as in a sidecar:
+            `{"joint_1": {"stiffness": 1e5}}`.
+        allow_rigid: accept a robot none of whose joints is flexible.
+
+    Raises:
+        InputError: with the file, the key, the value and the valid choices.
+    """
+    if is_saved_model(robot):
+        return _load_saved(Path(robot), flex=flex, tool=tool, values=values)
+    found = find_robot(robot)
+    root = parse_urdf(read_urdf_bytes(found.urdf), found.urdf)
+    tree = read_tree(root, found.urdf)
+    srdf = find_srdf(tree)
+    sources, flex_file = _sources(root, found, flex, values, srdf)
+    joints, origins = flexible_joints(tree, sources)
+    _check_balancers(sources, joints)
+    _warn_of_damping(joints, origins)
+    chosen_tool, tool_origins = choose_tool(tree, tool, sources, srdf)
+    gun, gun_origins = choose_gun(sources)
+    mounting, base_origins = choose_mounting(sources)
+    _warn(tree)
+    urdf = normalise(tree, chosen_tool, gun, mounting)
+    rigid = RigidModel(urdf.text, tree, mounting.gravity)
+    if gun is not None and urdf.recoil_joint is not None:
+        joints[urdf.recoil_joint] = _recoil(urdf.recoil_joint, gun)
+    if not joints and not allow_rigid:
+        raise InputError(
+            "no joint of this robot has a stiffness",
+            file=found.urdf,
+            key="joint",
+            hint="give a sidecar (--flex FILE) with [joint.NAME] stiffness = ...; joints that "
+            f"can be flexible: {', '.join(tree.movable()[:12]) or 'none'}",
+        )
+    result = FlexibleRobot(
+        name=found.name or tree.name,
+        source=found.urdf,
+        task_path=found.task,
+        files=_files(found.urdf, flex_file, srdf),
+        tree=tree,
+        tool=chosen_tool,
+        gun=gun,
+        mounting=mounting,
+        flexible_joints=tuple(joints[name] for name in rigid.joint_names if name in joints),
+        origin_of={**origins, **tool_origins, **gun_origins, **base_origins},
+        named_poses=_named_poses(srdf, rigid.joint_names),
+        rigid=rigid,
+        tool_point=urdf.tool_point,
+    )
+    check_masses(result)
+    return result
+
+
+def _load_saved(
+    path: Path,
+    *,
+    flex: str | Path | None,
+    tool: str | None,
+    values: Mapping[str, Mapping[str, object]] | None,
+) -> FlexibleRobot:
+    """The robot of a saved model, its effects with it."""
+    saved = read_saved_model(path)
+    robot = load_robot(saved.robot, flex=flex or saved.flex, tool=tool or saved.tool, values=values)
+    tables = tuple(table.model_dump() for table in saved.effect)
+    return replace(robot, effect_tables=tables, files=(*robot.files, path))
+
+
+def _sources(
+    root: etree._Element,
+    found: FoundRobot,
+    flex: str | Path | None,
+    values: Mapping[str, Mapping[str, object]] | None,
+    srdf: Srdf | None,
+) -> tuple[list[Source], Path | None]:
+    """Everything that speaks about the joints, the strongest first, and the sidecar used."""
+    annotation = read_annotations(root, found.urdf)
+    flex_file = Path(flex) if flex is not None else None
+    # A robot folder's own sidecar stands in for an annotation, never beside one.
+    if flex_file is None and annotation is None:
+        flex_file = found.flex
+    sources = []
+    if values:
+        given = validate({"format": FORMAT, "joint": {k: dict(v) for k, v in values.items()}},
+                         Sidecar, format=FORMAT)  # fmt: skip
+        sources.append(Source("argument", given))
+    if flex_file is not None:
+        sidecar = read_sidecar(flex_file)
+        _check_owner(sidecar, flex_file, found, str(root.get("name")))
+        sources.append(Source(flex_file.name, sidecar, str(flex_file)))
+    urdf = found.urdf.name
+    if annotation is not None:
+        sources.append(Source(f"{urdf}, picchio annotation", annotation, str(found.urdf)))
+    if (drake := read_drake(root)) is not None:
+        sources.append(Source(f"{urdf}, drake tags", drake, str(found.urdf), strict=False))
+    if srdf is not None and srdf.rotors is not None:
+        sources.append(Source(f"{srdf.path.name}, rotor_params", srdf.rotors,
+                              str(srdf.path), strict=False))  # fmt: skip
+    return sources, flex_file
+
+
+def _check_owner(sidecar: Sidecar, file: Path, found: FoundRobot, name: str) -> None:
+    """Warn of a sidecar that names another robot: arms of one maker share their joints' names."""
+    known = {text.removesuffix("_robot") for text in (found.name, name, found.urdf.stem) if text}
+    if sidecar.robot is not None and sidecar.robot.removesuffix("_robot") not in known:
+        warnings.warn(
+            f"{file}: says that it belongs to robot {sidecar.robot!r}, not to {found.urdf}",
+            PicchioWarning,
+            stacklevel=4,
+        )
+
+
+def _warn(tree: UrdfTree) -> None:
+    remarks = list(tree.remarks)
+    if tree.locked():
+        remarks.append(
+            "joints of several degrees of freedom are held fixed: " + ", ".join(tree.locked())
+        )
+    for remark in remarks:
+        warnings.warn(f"{tree.path}: {remark}", PicchioWarning, stacklevel=3)
+
+
+def _warn_of_damping(joints: Mapping[str, Joint], origins: Mapping[str, str]) -> None:
+    for name, joint in joints.items():
+        if joint.damping_ratio > 1:
+            origin = origins[f"{name}.damping_ratio"]
+            warnings.warn(
+                f"joint {name!r}: damping_ratio {joint.damping_ratio:g} is above 1 (it does "
+                f"not swing), which is unusual; from {origin}",
+                PicchioWarning,
+                stacklevel=3,
+            )
+
+
+def _recoil(name: str, gun: Gun) -> Joint:
+    return Joint(name, "prismatic", gun.recoil_stiffness or 0.0, gun.damping_ratio)
+
+
+def _check_balancers(sources: list[Source], joints: Mapping[str, Joint]) -> None:
+    for name in all_joint_entries(sources, "balancer"):
+        if name not in joints:
+            raise InputError(
+                "a balancer beside a rigid joint changes nothing",
+                key=f"joint.{name}.balancer",
+                hint="give the joint a stiffness",
+            )
+
+
+def _files(urdf: Path, flex: Path | None, srdf: Srdf | None) -> tuple[Path, ...]:
+    return tuple(file for file in (urdf, flex, srdf.path if srdf else None) if file)
+
+
+def _named_poses(srdf: Srdf | None, names: tuple[str, ...]) -> dict[str, tuple[float, ...]]:
+    if srdf is None:
+        return {}
+    return {
+        pose: tuple(values.get(name, 0.0) for name in names) for pose, values in srdf.poses.items()
+    }
+
+
+def load_tree(urdf: Path) -> UrdfTree:
+    """Only the checked tree of a URDF, without Pinocchio.
+
+    Raises:
+        InputError: with the true reason why this is no robot.
+    """
+    return read_tree(parse_urdf(read_urdf_bytes(urdf), urdf), urdf)

@@ -1,0 +1,131 @@
+"""`picchio-model/1`: a robot, its sidecar, and the effects that a diagnosis found."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from picchio.core.errors import InputError
+from picchio.core.toml import Finite, StrictModel, parse_toml, read_toml
+
+FORMAT = "picchio-model/1"
+
+
+class EffectTable(StrictModel):
+    """One `[[effect]]`.
+
+    Attributes:
+        effect: its name.
+        target: joint, link, axis, channel group, "tool" or "robot".
+        parameters: name -> value, SI.
+        hidden: record -> numbers drawn anew in every record.
+    """
+
+    effect: Annotated[str, Field(min_length=1)]
+    target: Annotated[str, Field(min_length=1)]
+    parameters: dict[str, Finite] = Field(default_factory=dict)
+    hidden: dict[str, list[Finite]] = Field(default_factory=dict)
+
+
+class SavedModel(StrictModel):
+    """A saved model as it is written.
+
+    Attributes:
+        robot: a name, or a URDF relative to this file.
+        flex: sidecar, relative to this file.
+        tool: frame that carries the tool.
+        notes: for people.
+        provenance: where it comes from.
+        effect: how the world departs from the robot's files.
+    """
+
+    robot: Annotated[str, Field(min_length=1)]
+    flex: str | None = None
+    tool: str | None = None
+    notes: str | None = None
+    provenance: dict[str, Any] | None = None
+    effect: list[EffectTable] = Field(default_factory=list)
+
+
+def is_saved_model(robot: str | Path) -> bool:
+    """Whether a file says that it is a saved model, of whatever version."""
+    path = Path(robot)
+    if path.suffix != ".toml" or not path.is_file():
+        return False
+    try:
+        return str(read_toml(path).get("format", "")).startswith(FORMAT.partition("/")[0])
+    except InputError:  # what is wrong with it, others say
+        return False
+
+
+def read_saved_model(path: Path) -> SavedModel:
+    """Read a saved model; robot and sidecar come back as paths where they stand beside it.
+
+    Raises:
+        InputError: syntax, an unknown format, misspelt keys.
+    """
+    found = parse_toml(path, SavedModel, format=FORMAT)
+    changes: dict[str, Any] = {}
+    for key in ("robot", "flex"):
+        value = getattr(found, key)
+        if value is not None and (path.parent / value).exists():
+            changes[key] = os.path.normpath(path.parent / value)
+    return found.model_copy(update=changes)
+
+
+def saved_model_text(
+    robot: str,
+    effects: Sequence[Mapping[str, Any]],
+    *,
+    flex: str | Path | None = None,
+    tool: str | None = None,
+    notes: str | None = None,
+    folder: Path | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> str:
+    """A saved model as TOML.
+
+    Args:
+        robot: a name or the path of a URDF.
+        effects: tables with effect, target, parameters and, where needed, hidden.
+        flex: sidecar.
+        tool: frame that carries the tool.
+        notes: for people.
+        folder: where the file will stand; paths are written relative to it.
+        provenance: where it comes from.
+    """
+    import tomlkit
+
+    document = tomlkit.document()
+    document["format"] = FORMAT
+    document["robot"] = _relative(robot, folder)
+    if flex is not None:
+        document["flex"] = _relative(str(flex), folder)
+    for key, value in (("tool", tool), ("notes", notes), ("provenance", provenance)):
+        if value is not None:
+            document[key] = value
+    tables = tomlkit.aot()
+    for effect in effects:
+        table = tomlkit.table()
+        table["effect"], table["target"] = effect["effect"], effect["target"]
+        for key in ("parameters", "hidden"):
+            if effect.get(key):
+                inner = tomlkit.inline_table()
+                inner.update(effect[key])
+                table[key] = inner
+        tables.append(table)
+    if effects:
+        document["effect"] = tables
+    return tomlkit.dumps(document)
+
+
+def _relative(name: str, folder: Path | None) -> str:
+    path = Path(name)
+    if not path.exists():
+        return name
+    base = (folder or Path()).resolve()
+    return Path(os.path.relpath(path.resolve(), base)).as_posix()

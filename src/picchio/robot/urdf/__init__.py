@@ -1,0 +1,1 @@
+"""The URDF itself: its bytes, its tree of links and joints, and whether it can move."""

@@ -1,0 +1,133 @@
+"""Is it one tree that can move? What Pinocchio would refuse, accept in silence or crash on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from lxml import etree
+
+from picchio.core.errors import InputError
+from picchio.robot.urdf.tree import MOVABLE, Inertial, UrdfJoint, UrdfTree, read_joints, read_links
+from picchio.robot.urdf.xml import local_name
+
+# Pinocchio's reader recurses link by link, and dense matrices grow with the square.
+MOST_LINKS = 2000
+MOST_MOVABLE = 300
+
+
+def read_tree(root: etree._Element, path: Path) -> UrdfTree:
+    """The checked tree of a URDF.
+
+    Args:
+        root: the parsed XML.
+        path: named in errors.
+
+    Raises:
+        InputError: with the true reason why this is no robot.
+    """
+    if local_name(root) != "robot":
+        raise InputError("the first element must be <robot>", file=path, value=local_name(root))
+    name = root.get("name")
+    if not name:
+        raise InputError("the robot has no name", file=path,
+                         hint='write <robot name="...">')  # fmt: skip
+    links = read_links(root, path)
+    if not links:
+        raise InputError("the robot has no links", file=path)
+    joints = read_joints(root, path)
+    _check_size(links, joints, path)
+    base = _root_link(links, joints, path)
+    remarks = _settle_mimics(joints, path)
+    return UrdfTree(name, links, joints, base, path, tuple(remarks))
+
+
+def _check_size(
+    links: dict[str, Inertial | None], joints: dict[str, UrdfJoint], path: Path
+) -> None:
+    movable = sum(joint.type in MOVABLE for joint in joints.values())
+    for what, count, most in (
+        ("links", len(links), MOST_LINKS),
+        ("movable joints", movable, MOST_MOVABLE),
+    ):
+        if count > most:
+            raise InputError(f"has {count} {what}; at most {most} are accepted", file=path)
+
+
+def _root_link(links: dict[str, Inertial | None], joints: dict[str, UrdfJoint], path: Path) -> str:
+    carrier: dict[str, str] = {}
+    for joint in joints.values():
+        for end in (joint.parent, joint.child):
+            if end not in links:
+                raise InputError("no link of this name", file=path, key=f"joint {joint.name}",
+                                 value=end, choices=links)  # fmt: skip
+        if joint.child in carrier:
+            raise InputError(
+                f"two joints carry link {joint.child!r}: {carrier[joint.child]!r} and "
+                f"{joint.name!r}; a URDF is a tree",
+                file=path,
+            )
+        carrier[joint.child] = joint.name
+    roots = [name for name in links if name not in carrier]
+    if not roots:
+        raise InputError("the joints form a closed loop: every link has a parent", file=path)
+    if len(roots) > 1:
+        raise InputError(
+            "more than one root link: "
+            + ", ".join(repr(name) for name in roots[:4])
+            + (" ..." if len(roots) > 4 else ""),
+            file=path,
+            hint="join them with a joint",
+        )
+    parent = {joint.child: joint.parent for joint in joints.values()}
+    reached = {roots[0]}
+    for link in links:
+        trail: set[str] = set()
+        here = link
+        while here not in reached:
+            if here in trail:
+                raise InputError(f"the joints around link {here!r} form a closed loop", file=path)
+            trail.add(here)
+            here = parent[here]
+        reached |= trail
+    return roots[0]
+
+
+def _settle_mimics(joints: dict[str, UrdfJoint], path: Path) -> list[str]:
+    """Free the joints that mimic nothing that moves, as Pinocchio does; say which."""
+    remarks = []
+    for joint in list(joints.values()):
+        if joint.mimic is None:
+            continue
+        leader = joints.get(joint.mimic.joint)
+        if leader is None or leader.type not in MOVABLE:
+            joints[joint.name] = replace(joint, mimic=None)
+            remarks.append(
+                f"joint {joint.name!r} mimics {joint.mimic.joint!r}, which is no movable joint: "
+                "it is taken as a joint of its own"
+            )
+    for joint in joints.values():
+        seen = [joint.name]
+        while (mimic := joints[seen[-1]].mimic) is not None:
+            if mimic.joint in seen:
+                key = f"joint {joint.name}"
+                raise InputError("mimic joints follow each other in a circle", file=path, key=key)
+            seen.append(mimic.joint)
+    return remarks
+
+
+def bad_inertia(inertial: Inertial) -> str | None:
+    """Why a body's inertia cannot be, or None if it can.
+
+    A tensor must be positive semidefinite. The triangle inequality, which many published
+    URDFs break a little, is left alone.
+    """
+    xx, xy, xz, yy, yz, zz = inertial.inertia
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    principal = np.linalg.eigvalsh(tensor)
+    # CAD exports leave products of inertia of rounding size on a zero diagonal.
+    if principal[0] < -1e-12 - 1e-9 * abs(principal).max():
+        moments = ", ".join(f"{value:.4g}" for value in principal)
+        return f"its inertia is not positive semidefinite (principal moments {moments} kg m^2)"
+    return None

@@ -1,0 +1,318 @@
+"""What picchio needs of a URDF: the tree of links and joints, with masses, axes and limits.
+
+Visuals, collisions, transmissions and simulators' tags are left alone. Reading is stricter
+than Pinocchio's, so that what is wrong is said by name instead of "not a valid URDF".
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from lxml import etree
+
+from picchio.core.errors import InputError
+from picchio.robot.urdf.xml import children, local_name
+
+# Numbers in a URDF's attributes: finite, of sane size, nothing else beside them.
+
+# Above this a sum of squares in the dynamics is on its way to overflow.
+LARGEST = 1e12
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\Z")
+_INFINITE = re.compile(r"[+-]?inf(inity)?\Z", re.IGNORECASE)
+
+
+def to_number(text: str, *, infinite: bool = False) -> float:
+    """A decimal number.
+
+    Args:
+        text: what the file has.
+        infinite: let "inf" and magnitudes above 1e12 stand, as limits may have them.
+
+    Raises:
+        ValueError: not a number, not finite, or above 1e12; the message says which.
+    """
+    stripped = text.strip()
+    if infinite and _INFINITE.match(stripped):
+        return float(stripped)
+    if not _NUMBER.match(stripped):
+        raise ValueError("is not a finite number")
+    value = float(stripped)
+    if infinite:
+        return value
+    if not math.isfinite(value) or abs(value) > LARGEST:
+        raise ValueError(f"is larger than {LARGEST:g}")
+    return value
+
+
+def number(
+    element: etree._Element,
+    attribute: str,
+    path: Path,
+    key: str,
+    *,
+    default: float | None = None,
+    infinite: bool = False,
+) -> float:
+    """A number from an attribute.
+
+    Raises:
+        InputError: missing without a default, or `to_number` refuses it.
+    """
+    text = element.get(attribute)
+    tag = etree.QName(element).localname
+    if text is None:
+        if default is None:
+            raise InputError(f"<{tag}> has no {attribute}", file=path, key=key)
+        return default
+    try:
+        return to_number(text, infinite=infinite)
+    except ValueError as error:
+        raise InputError(f"<{tag} {attribute}> {error}", file=path, key=key, value=text) from None
+
+
+def three_numbers(
+    element: etree._Element, attribute: str, path: Path, key: str, *, default: Vector
+) -> Vector:
+    """Three numbers from an attribute, such as xyz or rpy.
+
+    Raises:
+        InputError: not three, or `to_number` refuses one.
+    """
+    text = element.get(attribute)
+    if text is None:
+        return default
+    tag = etree.QName(element).localname
+    parts = text.split()
+    if len(parts) != 3:
+        raise InputError(f"<{tag} {attribute}> needs three numbers", file=path, key=key, value=text)
+    try:
+        x, y, z = (to_number(part) for part in parts)
+    except ValueError as error:
+        raise InputError(f"<{tag} {attribute}> {error}", file=path, key=key, value=text) from None
+    return x, y, z
+
+
+MOVABLE = ("revolute", "continuous", "prismatic")
+LOCKED = ("floating", "planar")
+JOINT_TYPES = (*MOVABLE, *LOCKED, "fixed")
+Vector = tuple[float, float, float]
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Inertial:
+    """Mass [kg], centre of mass [m] and its frame, inertia about it (ixx ixy ixz iyy iyz izz)."""
+
+    mass: float
+    xyz: Vector
+    rpy: Vector
+    inertia: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """A joint that follows another: position = multiplier x other + offset."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class UrdfJoint:
+    """A joint as the URDF has it: m, rad, N m or N; limits are infinite where it has none."""
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    xyz: Vector
+    rpy: Vector
+    axis: Vector
+    lower: float
+    upper: float
+    effort: float
+    mimic: Mimic | None
+
+
+@dataclass(frozen=True)
+class UrdfTree:
+    """Links and joints in the file's order.
+
+    `root` is the link that no joint carries; `remarks` say what was not taken as written.
+    """
+
+    name: str
+    links: dict[str, Inertial | None]
+    joints: dict[str, UrdfJoint]
+    root: str
+    path: Path
+    remarks: tuple[str, ...] = ()
+
+    def movable(self) -> list[str]:
+        """Joints that can be flexible: revolute, continuous and prismatic, and no mimics."""
+        return [j.name for j in self.joints.values() if j.type in MOVABLE and j.mimic is None]
+
+    def locked(self) -> list[str]:
+        """Joints of several degrees of freedom, which stand still."""
+        return [j.name for j in self.joints.values() if j.type in LOCKED]
+
+    def leaves(self) -> list[str]:
+        """Links that carry no joint."""
+        parents = {joint.parent for joint in self.joints.values()}
+        return [name for name in self.links if name not in parents]
+
+    def chain(self, link: str) -> list[UrdfJoint]:
+        """The joints from the root to a link, in that order."""
+        above = {joint.child: joint for joint in self.joints.values()}
+        path = []
+        while link in above:
+            path.append(above[link])
+            link = above[link].parent
+        return path[::-1]
+
+    def beyond(self, joint: str) -> list[str]:
+        """The links that a joint carries, nearest first."""
+        below: dict[str, list[str]] = {}
+        for other in self.joints.values():
+            below.setdefault(other.parent, []).append(other.child)
+        found = [self.joints[joint].child]
+        for link in found:
+            found.extend(below.get(link, ()))
+        return found
+
+
+def read_links(root: etree._Element, path: Path) -> dict[str, Inertial | None]:
+    """Every link's inertial, None where it has none.
+
+    Raises:
+        InputError: no or duplicate names, numbers that are none, negative mass.
+    """
+    links: dict[str, Inertial | None] = {}
+    for element in children(root, "link"):
+        name = _name(element, path)
+        if name in links:
+            raise InputError("two links have the same name", file=path, key=f"link {name}")
+        links[name] = _inertial(element, path, f"link {name}")
+    return links
+
+
+def _inertial(link: etree._Element, path: Path, key: str) -> Inertial | None:
+    found = children(link, "inertial")
+    if not found:
+        return None
+    if len(found) > 1:
+        raise InputError("has more than one <inertial>", file=path, key=key)
+    xyz, rpy = _origin(found[0], path, key)
+    mass = children(found[0], "mass")
+    inertia = children(found[0], "inertia")
+    for tag, elements in (("mass", mass), ("inertia", inertia)):
+        if len(elements) != 1:
+            raise InputError(f"<inertial> needs one <{tag}>, it has {len(elements)}",
+                             file=path, key=key)  # fmt: skip
+    value = number(mass[0], "value", path, key)
+    if value < 0:
+        raise InputError("the mass is negative", file=path, key=key, value=value)
+    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    tensor = tuple(number(inertia[0], each, path, key) for each in names)
+    return Inertial(value, xyz, rpy, tensor)
+
+
+def read_joints(root: etree._Element, path: Path) -> dict[str, UrdfJoint]:
+    """Every joint by name.
+
+    Raises:
+        InputError: no or duplicate names, an unknown type, missing parents, children or limits,
+            a zero axis, numbers that are none.
+    """
+    joints: dict[str, UrdfJoint] = {}
+    for element in children(root, "joint"):
+        name = _name(element, path)
+        if name in joints:
+            raise InputError("two joints have the same name", file=path, key=f"joint {name}")
+        joints[name] = _joint(element, name, path)
+    return joints
+
+
+def _joint(element: etree._Element, name: str, path: Path) -> UrdfJoint:
+    key = f"joint {name}"
+    kind = element.get("type")
+    if kind not in JOINT_TYPES:
+        raise InputError("unknown joint type", file=path, key=key, value=kind, choices=JOINT_TYPES)
+    xyz, rpy = _origin(element, path, key)
+    axis: Vector = (1.0, 0.0, 0.0)
+    if kind in MOVABLE and (found := children(element, "axis")):
+        axis = three_numbers(found[0], "xyz", path, key, default=axis)
+        if not any(abs(part) > 1e-12 for part in axis):
+            raise InputError("the axis has length zero", file=path, key=key, value=axis)
+    lower, upper, effort = _limits(element, kind, path, key)
+    return UrdfJoint(name, kind, _end(element, "parent", path, key),
+                     _end(element, "child", path, key), xyz, rpy, axis, lower, upper, effort,
+                     _mimic(element, path, key) if kind in MOVABLE else None)  # fmt: skip
+
+
+def _limits(element: etree._Element, kind: str, path: Path, key: str) -> tuple[float, float, float]:
+    unlimited = float("inf")
+    found = children(element, "limit")
+    if kind not in MOVABLE:
+        return -unlimited, unlimited, unlimited
+    if not found:
+        if kind == "continuous":
+            return -unlimited, unlimited, unlimited
+        raise InputError(f"a {kind} joint needs <limit lower= upper= effort= velocity=>, "
+                         "it has none", file=path, key=key)  # fmt: skip
+    for need in ("effort", "velocity"):
+        if found[0].get(need) is None:
+            raise InputError(f"<limit> has no {need}", file=path, key=key)
+    number(found[0], "velocity", path, key, infinite=True)
+    effort = number(found[0], "effort", path, key, infinite=True)
+    if effort < 0:
+        raise InputError("the effort limit is negative", file=path, key=key, value=effort)
+    if kind == "continuous":
+        return -unlimited, unlimited, effort
+    lower = number(found[0], "lower", path, key, default=0.0, infinite=True)
+    upper = number(found[0], "upper", path, key, default=0.0, infinite=True)
+    if lower > upper:
+        raise InputError("the lower limit is above the upper one", file=path, key=key,
+                         value=(lower, upper))  # fmt: skip
+    return lower, upper, effort
+
+
+def _mimic(element: etree._Element, path: Path, key: str) -> Mimic | None:
+    found = children(element, "mimic")
+    if not found:
+        return None
+    return Mimic(
+        found[0].get("joint") or "",
+        number(found[0], "multiplier", path, key, default=1.0),
+        number(found[0], "offset", path, key, default=0.0),
+    )
+
+
+def _origin(element: etree._Element, path: Path, key: str) -> tuple[Vector, Vector]:
+    found = children(element, "origin")
+    if not found:
+        return ZERO, ZERO
+    return (
+        three_numbers(found[0], "xyz", path, key, default=ZERO),
+        three_numbers(found[0], "rpy", path, key, default=ZERO),
+    )
+
+
+def _end(element: etree._Element, tag: str, path: Path, key: str) -> str:
+    found = children(element, tag)
+    link = found[0].get("link") if len(found) == 1 else None
+    if not link:
+        raise InputError(f'needs one <{tag} link="...">', file=path, key=key)
+    return link
+
+
+def _name(element: etree._Element, path: Path) -> str:
+    name = element.get("name")
+    if not name:
+        raise InputError(f"a <{local_name(element)}> has no name (line {element.sourceline})",
+                         file=path)  # fmt: skip
+    return name

@@ -1,0 +1,1 @@
+"""The main job: the life of every joint on a task."""

@@ -1,0 +1,128 @@
+"""What an assessment checks: parts that cannot be, lives that do not hold, the steady state."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError, PicchioWarning
+from picchio.fatigue.miner import life
+from picchio.fatigue.reducer import Reducer, ReducerCheck, load_reducer
+from picchio.fatigue.shaft_stress import check_shaft
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.joint import Joint
+from picchio.studies.assessment.result import JointLife, OperationResult, SteadyStateCheck
+from picchio.studies.tasks import Task
+
+# A shaft that disagrees with its joint's stiffness by more than this is worth a warning.
+_SHAFT_TOLERANCE = 0.05
+
+
+def reducer_of(joint: Joint) -> Reducer | None:
+    """The joint's reducer; one that no catalogue has is told and left unchecked."""
+    if joint.reducer is None:
+        return None
+    try:
+        return load_reducer(joint.reducer)
+    except InputError as error:
+        warnings.warn(f"{joint.name}: {error}; it is left unchecked", PicchioWarning, stacklevel=3)
+        return None
+
+
+def reducer_checks(
+    reducers: tuple[Reducer | None, ...], torques: FloatArray
+) -> list[tuple[str, ReducerCheck | None]]:
+    """Every joint's reducer, by name, against the largest torques of the whole task.
+
+    Args:
+        reducers: (n,) None where a joint names none.
+        torques: (n, 2) N m, largest magnitudes over the task: of gravity and blows together, and
+            of what is held; NaN where they are not known.
+
+    Returns:
+        name and check of each joint; "" and None where there is none.
+    """
+    found: list[tuple[str, ReducerCheck | None]] = []
+    for reducer, (peak, held) in zip(reducers, torques, strict=True):
+        # Each limit is for one of the two: their largest values give each limit's worst pose.
+        if reducer is None:
+            found.append(("", None))
+            continue
+        check = reducer.check_blows(peak, held) if np.isfinite(peak) else None
+        found.append((reducer.name, check))
+    return found
+
+
+def warn_about_shafts(robot: FlexibleRobot) -> None:
+    """Warn of joints without a shaft, and of shafts that do not fit their joint."""
+    bare = [joint.name for joint in robot.flexible_joints if joint.shaft is None]
+    if bare:
+        warnings.warn(
+            f"no shaft is given for {', '.join(bare)}: deflection and torque can be told, stress "
+            "and life can't",
+            PicchioWarning,
+            stacklevel=3,
+        )
+    for joint in robot.flexible_joints:
+        if joint.shaft is None:
+            continue
+        ratio = 1.0 + check_shaft(joint.stiffness, joint.shaft)
+        if ratio < 1.0 - _SHAFT_TOLERANCE:
+            problem = (
+                f"is {1.0 / ratio:.3g} times softer than the joint it is a part of, which cannot "
+                "be: radius, length or stiffness is wrong"
+            )
+        elif ratio > 1.0 + _SHAFT_TOLERANCE:
+            problem = (
+                f"is {ratio:.3g} times stiffer than the joint: something else yields as well, and "
+                "the stress by the paper's formula (from the deflection) is too high by as much"
+            )
+        else:
+            continue
+        warnings.warn(
+            f"{joint.name}: the shaft, by G Jp / l, {problem}", PicchioWarning, stacklevel=3
+        )
+
+
+def warn_about_yield(joints: tuple[JointLife, ...], curves: tuple[SNCurve | None, ...]) -> None:
+    """Warn where gravity and blows together reach the static strength."""
+    for joint, curve in zip(joints, curves, strict=True):
+        if curve is None:
+            continue
+        strength = curve.yield_shear or curve.ultimate_shear
+        if strength is not None and joint.peak_total_stress >= strength:
+            warnings.warn(
+                f"{joint.name}: gravity and blows together reach "
+                f"{joint.peak_total_stress / 1e6:.4g} MPa in shear, and {curve.name} yields at "
+                f"{strength / 1e6:.4g} MPa: no fatigue life holds there",
+                PicchioWarning,
+                stacklevel=3,
+            )
+
+
+def steady_state_checks(
+    joints: tuple[JointLife, ...],
+    task: Task,
+    results: list[OperationResult],
+    checks: list[FloatArray],
+) -> tuple[SteadyStateCheck, ...]:
+    """Peaks and lives over the whole task, whatever the method."""
+    rivets = [operation.rivets for operation in task.operations]
+    found = []
+    for j, joint in enumerate(joints):
+        spent = sum(c[:, j].sum(axis=0) * r for c, r in zip(checks, rivets, strict=True))
+        paper, counted = np.asarray(spent) / task.rivets_per_pass
+        found.append(
+            SteadyStateCheck(
+                joint.name,
+                float(max(r.steady_peak_deflection[:, j].max() for r in results)),
+                float(max(r.rest_peak_deflection[:, j].max() for r in results)),
+                life(float(paper)) if np.isfinite(paper) else math.nan,
+                life(float(counted)) if np.isfinite(counted) else math.nan,
+            )
+        )
+    return tuple(found)

@@ -1,0 +1,295 @@
+"""An assessment in a sentence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+
+# What an assessment found: the life of every joint, and where it goes.
+
+FORMAT = "picchio-assessment/1"
+
+
+@dataclass(frozen=True, eq=False)
+class OperationResult:
+    """One operation, pose by pose.
+
+    Attributes:
+        name: of the operation.
+        direction: (3,) unit vector of the force.
+        excitation: the blows, in words.
+        hits_per_rivet: blows a rivet takes.
+        rivets: at each pose, per pass.
+        poses: (n_poses, nv) rad or m.
+        tool_position: (n_poses, 3) m.
+        natural_frequencies: (n_poses, n) Hz.
+        peak_deflection: (n_poses, n) rad, of the method's own response.
+        steady_peak_deflection: (n_poses, n) rad, exact steady state; NaN where there is none.
+        rest_peak_deflection: (n_poses, n) rad, a rivet from rest; NaN where it has no end.
+        peak_torque: (n_poses, n) N m (N for a prismatic joint), of the vibration, through the
+            spring: what shaft and reducer carry.
+        gravity_torque: (n_poses, n) N m, magnitude.
+        peak_shear_stress: (n_poses, n) Pa, of the vibration; NaN for a joint without a shaft.
+        gravity_shear_stress: (n_poses, n) Pa, magnitude.
+        peak_total_stress: (n_poses, n) Pa, largest magnitude of gravity and vibration together.
+        utilisation: (n_poses, n) of the shafts.
+        reducer_utilisation: (n_poses, n) of the reducers, torque over the limit that binds; NaN
+            where a joint names none.
+        damage_per_rivet: (n_poses, n).
+    """
+
+    name: str
+    direction: FloatArray
+    excitation: str
+    hits_per_rivet: int
+    rivets: float
+    poses: FloatArray
+    tool_position: FloatArray
+    natural_frequencies: FloatArray
+    peak_deflection: FloatArray
+    steady_peak_deflection: FloatArray
+    rest_peak_deflection: FloatArray
+    peak_torque: FloatArray
+    gravity_torque: FloatArray
+    peak_shear_stress: FloatArray
+    gravity_shear_stress: FloatArray
+    peak_total_stress: FloatArray
+    utilisation: FloatArray
+    reducer_utilisation: FloatArray
+    damage_per_rivet: FloatArray
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, arrays as (pose, joint)."""
+        names = list(self.__dataclass_fields__)
+        return {name: getattr(self, name) for name in names}
+
+
+@dataclass(frozen=True)
+class JointLife:
+    """One joint over the whole task.
+
+    Attributes:
+        name: of the joint.
+        kind: "revolute" or "prismatic"; of a prismatic one, angles are metres, torques newtons.
+        peak_deflection: rad, largest over the task.
+        peak_torque: N m, largest of the vibration.
+        gravity_torque: N m, largest magnitude.
+        peak_shear_stress: Pa, largest of the vibration; NaN without a shaft.
+        gravity_shear_stress: Pa, largest magnitude.
+        peak_total_stress: Pa, largest magnitude of gravity and vibration together, from rest.
+        utilisation: largest equivalent amplitude over the allowable; NaN without a shaft.
+        reducer: its catalogue name; empty where it is not known.
+        reducer_utilisation: largest torque, gravity and blows together, over the limit that binds;
+            NaN without a reducer.
+        damage_per_rivet: mean over the rivets of the task's mix.
+        rivets_to_failure: all rivets of the mix; infinite where the life has no end.
+        sn_curve: name of the curve; empty without a shaft.
+        worst_operation: where the utilisation (or, without a shaft, the deflection) is largest.
+        worst_pose: index of the pose there.
+        damage_share: of each operation in this joint's damage; empty without damage.
+        reducer_governed_by: the limit that binds, such as "repeated peak torque"; empty without.
+        reducer_warnings: what the catalogue does not promise, and which limits are exceeded.
+    """
+
+    name: str
+    kind: str
+    peak_deflection: float
+    peak_torque: float
+    gravity_torque: float
+    peak_shear_stress: float
+    gravity_shear_stress: float
+    peak_total_stress: float
+    utilisation: float
+    reducer: str
+    reducer_utilisation: float
+    damage_per_rivet: float
+    rivets_to_failure: float
+    sn_curve: str
+    worst_operation: str
+    worst_pose: int
+    damage_share: Mapping[str, float] = field(default_factory=dict)
+    reducer_governed_by: str = ""
+    reducer_warnings: tuple[str, ...] = ()
+
+    @property
+    def life(self) -> float:
+        """Rivets to failure; infinite where a shaft has no end, or no shaft is known."""
+        return self.rivets_to_failure if self.sn_curve else float("inf")
+
+    @property
+    def governing_utilisation(self) -> float:
+        """The larger of shaft's and reducer's."""
+        return float(np.nanmax([self.utilisation, self.reducer_utilisation, 0.0]))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+@dataclass(frozen=True)
+class SteadyStateCheck:
+    """What the paper's steady state misjudges, one entry a joint, largest over the task.
+
+    Attributes:
+        joint: name.
+        steady_peak: rad, exact steady state.
+        rest_peak: rad, the rivet as it happens: from rest, ring-down included.
+        paper_life: rivets, by the paper's rule and curve on the steady state.
+        counted_life: rivets, same curve, cycles of the rivet from rest counted by rainflow.
+    """
+
+    joint: str
+    steady_peak: float
+    rest_peak: float
+    paper_life: float
+    counted_life: float
+
+    @property
+    def peak_ratio(self) -> float:
+        """Peak of the rivet over the peak of the steady state."""
+        return self.rest_peak / self.steady_peak if self.steady_peak > 0.0 else float("nan")
+
+    @property
+    def life_ratio(self) -> float:
+        """Life by counted cycles over the paper's life."""
+        if not np.isfinite(self.paper_life) or not np.isfinite(self.counted_life):
+            return float("nan")
+        return self.counted_life / self.paper_life
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, the ratios included."""
+        own = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return own | {"peak_ratio": self.peak_ratio, "life_ratio": self.life_ratio}
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """The life of a robot on a task.
+
+    Attributes:
+        robot: its name.
+        method: "rainflow" or "paper", and its variant.
+        sn_curve: names of the curves used.
+        assumptions: what was taken for granted, a sentence each.
+        joints: one entry a flexible joint.
+        operations: one entry an operation.
+        limiting_joint: shortest life, or largest utilisation where no life has an end; None
+            where no joint has a shaft.
+        rivets_to_failure: of the limiting joint; infinite where the life has no end.
+        steady_state: what the steady state misjudges, one entry a joint.
+        origins: where each value of the robot came from.
+        provenance: version and hashes.
+    """
+
+    robot: str
+    method: str
+    sn_curve: str
+    assumptions: tuple[str, ...]
+    joints: tuple[JointLife, ...]
+    operations: tuple[OperationResult, ...]
+    limiting_joint: str | None
+    rivets_to_failure: float
+    steady_state: tuple[SteadyStateCheck, ...]
+    origins: Mapping[str, str]
+    provenance: Mapping[str, Any]
+
+    def joint(self, name: str) -> JointLife:
+        """The entry of one joint."""
+        return next(joint for joint in self.joints if joint.name == name)
+
+    @property
+    def reducer_warnings(self) -> tuple[str, ...]:
+        """What the reducers' catalogues do not promise, a sentence each, with its joints."""
+        said: dict[str, list[str]] = {}
+        for joint in self.joints:
+            for line in joint.reducer_warnings:
+                said.setdefault(line.removeprefix(f"{joint.reducer}: "), []).append(joint.name)
+        return tuple(f"{', '.join(names)}: {text}" for text, names in said.items())
+
+    def __repr__(self) -> str:
+
+        return f"Assessment({self.robot!r}, method={self.method!r}): {verdict(self)}"
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        joints = self.joints
+        table: dict[str, list[Any]] = {
+            "joint": [j.name for j in joints],
+            "peak deflection [mrad, mm]": [1e3 * j.peak_deflection for j in joints],
+            "peak torque [N m, N]": [j.peak_torque for j in joints],
+        }
+        if any(j.sn_curve for j in joints):
+            table |= {
+                "peak stress [MPa]": [1e-6 * j.peak_shear_stress for j in joints],
+                "utilisation [%]": [100 * j.utilisation for j in joints],
+                "damage a rivet": [j.damage_per_rivet for j in joints],
+                "rivets to failure": [format_count(j.rivets_to_failure) for j in joints],
+            }
+        if any(j.reducer for j in joints):
+            table["reducer used [%]"] = [100 * j.reducer_utilisation for j in joints]
+            table["reducer's limit"] = [j.reducer_governed_by for j in joints]
+        facts = {"method": self.method, "S-N curve": self.sn_curve or None}
+        rows = zip(*table.values(), strict=True)
+        return sheet(f"Assessment of {self.robot}", facts, list(table), rows, verdict(self))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of `picchio-assessment/1`; infinite lives are left as inf."""
+        return {
+            "format": FORMAT,
+            "robot": self.robot,
+            "method": self.method,
+            "sn_curve": self.sn_curve,
+            "joints": [joint.to_dict() for joint in self.joints],
+            "operations": [operation.to_dict() for operation in self.operations],
+            "limiting_joint": self.limiting_joint,
+            "rivets_to_failure": self.rivets_to_failure,
+            "steady_state": [check.to_dict() for check in self.steady_state],
+            "assumptions": list(self.assumptions),
+            "origins": dict(self.origins),
+            "provenance": dict(self.provenance),
+        }
+
+
+def verdict(found: Assessment) -> str:
+    """The result in a sentence."""
+    if found.limiting_joint is None:
+        return (
+            "No joint has a shaft or a reducer, so no life can be told; give them in the sidecar."
+        )
+    joint = next(j for j in found.joints if j.name == found.limiting_joint)
+    if math.isfinite(joint.life):
+        return f"The robot survives {format_count(joint.life)} rivets; {joint.name} fails first."
+    over = [j.name for j in found.joints if j.reducer_utilisation > 1.0]
+    if over:
+        return (
+            f"Blows and gravity exceed the torque limits of the reducer in {', '.join(over)}: no "
+            "life can be promised there."
+        )
+    part = f"reducer {joint.reducer}" if joint.reducer_utilisation > joint.utilisation else "shaft"
+    if not joint.sn_curve:
+        part = f"reducer {joint.reducer}"
+    shafts = any(j.sn_curve for j in found.joints)
+    first = "No shaft fails: every stress stays below its endurance limit. " if shafts else ""
+    return (
+        f"{first}The {part} of {joint.name} comes closest, at "
+        f"{100 * joint.governing_utilisation:.3g} % of its allowable."
+    )
+
+
+def format_count(value: float) -> str:
+    """A number of rivets as people read it; "no end" for infinity."""
+    if math.isnan(value):
+        return "-"
+    if math.isinf(value):
+        return "no end"
+    if value < 10:
+        return f"{value:.3g}"
+    # Four digits are more than the physics deserves.
+    return f"{float(f'{value:.4g}'):,.0f}" if value < 1e12 else f"{value:.3e}"

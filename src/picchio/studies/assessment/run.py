@@ -1,0 +1,269 @@
+"""The main job: how many rivets each joint survives on a task."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.core.provenance import provenance
+from picchio.fatigue.counting.counter import Residue
+from picchio.fatigue.mean_stress import Rule
+from picchio.fatigue.miner import life, peak_damage
+from picchio.fatigue.reducer import Reducer, ReducerCheck
+from picchio.fatigue.shaft_stress import shear_stress
+from picchio.fatigue.sn.curve import MinerRule, SNCurve
+from picchio.fatigue.sn.library import PAPER_SN_CURVE, load_sn_curve
+from picchio.model.model import Model
+from picchio.robot.dynamics.pose import warn_beyond_limits
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.studies.assessment.assumptions import assumptions_of
+from picchio.studies.assessment.checks import (
+    reducer_checks,
+    reducer_of,
+    steady_state_checks,
+    warn_about_shafts,
+    warn_about_yield,
+)
+from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
+from picchio.studies.rivet.life_rules import LifeRule, PaperRule, RainflowRule, curves_of, peak
+from picchio.studies.rivet.loads import loads_at
+from picchio.studies.tasks import Operation, Task
+
+Method = Literal["rainflow", "paper"]
+METHODS: tuple[Method, ...] = ("rainflow", "paper")
+
+
+def assess(
+    robot: FlexibleRobot,
+    task: Task,
+    *,
+    method: Method = "rainflow",
+    sn_curve: str | SNCurve | None = None,
+    residue: Residue = "half-cycles",
+    mean_stress: Rule = "none",
+    miner: MinerRule | None = None,
+    paper_mean_stress: bool = False,
+    gravity_stiffness: bool = False,
+    gravity_balanced: bool = False,
+    steady_check: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> Assessment:
+    """Life of every joint of a robot on a riveting task (paper section 3.4, eqs. 18-22).
+
+    Args:
+        robot: with stiffnesses, and shafts where stresses are wanted.
+        task: operations and poses.
+        method: "rainflow" (each rivet from rest, ring-down included, cycles counted) or
+            "paper" (steady state, peak stress, one cycle a hit).
+        sn_curve: for all joints, instead of their own.
+        residue: rainflow's rule for cycles that do not close.
+        mean_stress: correction for gravity and feed force.
+        miner: what cycles below the endurance limit do.
+        paper_mean_stress: the paper's life at the mean of the poses' peak stresses (Table 2).
+        gravity_stiffness: add dg/dq to the springs.
+        gravity_balanced: gravity leaves no torque in the joints; see `Model`.
+        steady_check: tell, too, what the steady state misjudges; False leaves NaN there and
+            takes about half the time.
+        progress: called with (poses done, poses in all).
+
+    Returns:
+        the assessment.
+
+    Raises:
+        InputError: no flexible joint, an unknown method, a resonance without damping, a
+            ring-down without end.
+    """
+    if method not in METHODS:
+        raise InputError("unknown method", key="method", value=method, choices=METHODS)
+    if paper_mean_stress and method != "paper":
+        raise InputError("belongs to the method paper", key="paper_mean_stress", value=True)
+    if not robot.flexible_joints:
+        raise InputError(
+            "no joint has a stiffness, so nothing can vibrate",
+            file=robot.source,
+            hint="annotate the URDF, or give a sidecar with --flex",
+        )
+    rule: LifeRule = PaperRule() if method == "paper" else RainflowRule(residue, mean_stress, miner)
+    if sn_curve is None and method == "paper":
+        sn_curve = PAPER_SN_CURVE
+    curves = curves_of(robot, sn_curve)
+    warn_about_shafts(robot)
+    for operation in task.operations:
+        warn_beyond_limits(robot, operation.poses, f"operation {operation.name!r}")
+    reducers = tuple(reducer_of(joint) for joint in robot.flexible_joints)
+    paper_curve = load_sn_curve(PAPER_SN_CURVE, quiet=True)
+    model = Model(robot, gravity_stiffness, gravity_balanced)
+    job = _Job(model, rule, curves, reducers, paper_curve, steady_check)
+    total = sum(len(operation.poses) for operation in task.operations)
+    results, checks, torques = [], [], []
+    done = 0
+    for operation in task.operations:
+        rows = []
+        for pose in operation.poses:
+            rows.append(job.at_pose(operation, pose))
+            done += 1
+            if progress is not None:
+                progress(done, total)
+        results.append(_operation_result(operation, rows))
+        checks.append(np.array([row["check"] for row in rows]))
+        torques += [row["reducer_torques"] for row in rows]
+    if paper_mean_stress:
+        results = [_at_mean_stress(result, robot, curves) for result in results]
+    used = reducer_checks(reducers, np.max(torques, axis=0))
+    joints = tuple(
+        _joint_life(j, robot, task, results, curves, *used[j]) for j in range(len(curves))
+    )
+    warn_about_yield(joints, curves)
+    limiting = _limiting(joints)
+    named = [curve.name for curve in dict.fromkeys(c for c in curves if c is not None)]
+    return Assessment(
+        robot=robot.name,
+        method="paper, at the poses' mean stress" if paper_mean_stress else method,
+        sn_curve=", ".join(dict.fromkeys(named)),
+        assumptions=assumptions_of(rule, model, curves, reducers),
+        joints=joints,
+        operations=tuple(results),
+        limiting_joint=limiting.name if limiting else None,
+        rivets_to_failure=limiting.life if limiting else math.inf,
+        steady_state=steady_state_checks(joints, task, results, checks),
+        origins=robot.origins,
+        provenance=provenance([*robot.files, *task.files]),
+    )
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What every pose needs."""
+
+    model: Model
+    rule: LifeRule
+    curves: tuple[SNCurve | None, ...]
+    reducers: tuple[Reducer | None, ...]
+    paper_curve: SNCurve
+    both: bool
+
+    def at_pose(self, operation: Operation, pose: FloatArray) -> dict[str, FloatArray]:
+        """Every joint's numbers at one pose, each (n,)."""
+        robot = self.model.robot
+        loads = loads_at(self.model, operation, pose, need=self.rule.needs, both=self.both)
+        n = len(robot.flexible_joints)
+        columns = ("peak_deflection", "peak_shear_stress", "utilisation", "damage_per_rivet")
+        out = {key: np.full(n, np.nan) for key in columns}
+        out["steady_peak_deflection"] = np.array([peak(load.steady) for load in loads.joints])
+        out["rest_peak_deflection"] = np.array([peak(load.rest) for load in loads.joints])
+        out["check"], out["reducer_torques"] = np.full((2, n, 2), np.nan)
+        own = out[f"{self.rule.needs}_peak_deflection"]
+        out["peak_deflection"] = own.copy()
+        out["peak_torque"] = loads.stiffness * own
+        out["gravity_torque"] = np.abs(loads.gravity_torque)
+        out["gravity_shear_stress"] = np.full(n, np.nan)
+        out["reducer_utilisation"] = np.full(n, np.nan)
+        out["peak_total_stress"] = np.full(n, np.nan)
+        hits = operation.hits_per_rivet
+        for j, (joint, load) in enumerate(zip(robot.flexible_joints, loads.joints, strict=True)):
+            reducer = self.reducers[j]
+            if reducer is not None and load.rest is not None:
+                torques = load.peak_torque_with_gravity, abs(load.stiffness * load.static)
+                out["reducer_torques"][j] = torques
+                out["reducer_utilisation"][j] = reducer.check_blows(*torques).utilisation
+            curve = self.curves[j]
+            if joint.shaft is None or curve is None:
+                continue
+            for key, value in zip(columns, self.rule(joint, load, hits, curve), strict=True):
+                out[key][j] = value
+            out["gravity_shear_stress"][j] = (
+                out["gravity_torque"][j] * joint.shaft.radius / joint.shaft.polar_moment
+            )
+            if load.rest is not None:
+                total = float(shear_stress(load.peak_torque_with_gravity, joint.shaft))
+                out["peak_total_stress"][j] = total
+            if load.steady is not None and load.rest is not None:
+                # The paper's curve on both, so that only the steady state's share shows.
+                out["check"][j] = (
+                    PaperRule()(joint, load, hits, self.paper_curve).damage,
+                    RainflowRule()(joint, load, hits, self.paper_curve).damage,
+                )
+        out["natural_frequencies"] = loads.natural_frequencies
+        out["tool_position"] = loads.tool_position
+        return out
+
+
+def _operation_result(operation: Operation, rows: list[dict[str, FloatArray]]) -> OperationResult:
+    columns = [key for key in rows[0] if key not in ("check", "reducer_torques")]
+    stacked = {key: np.array([row[key] for row in rows]) for key in columns}
+    return OperationResult(
+        name=operation.name,
+        direction=operation.direction,
+        excitation=operation.excitation.describe(),
+        hits_per_rivet=operation.hits_per_rivet,
+        rivets=operation.rivets,
+        poses=operation.poses,
+        **stacked,
+    )
+
+
+def _at_mean_stress(
+    result: OperationResult, robot: FlexibleRobot, curves: tuple[SNCurve | None, ...]
+) -> OperationResult:
+    """The same operation with every pose at the mean of the poses' peak stresses."""
+    changed = result.damage_per_rivet.copy()
+    for j, curve in enumerate(curves):
+        if curve is not None:
+            mean = float(result.peak_shear_stress[:, j].mean())
+            changed[:, j] = peak_damage(mean, result.hits_per_rivet, curve)
+    values = {name: getattr(result, name) for name in result.__dataclass_fields__}
+    return OperationResult(**(values | {"damage_per_rivet": changed}))
+
+
+def _joint_life(
+    j: int,
+    robot: FlexibleRobot,
+    task: Task,
+    results: list[OperationResult],
+    curves: tuple[SNCurve | None, ...],
+    reducer: str,
+    check: ReducerCheck | None,
+) -> JointLife:
+    joint, curve = robot.flexible_joints[j], curves[j]
+    # Miner over every pose and operation: eqs. 19-22 with a_i in the hits, b_i in the rivets.
+    spent = {r.name: float(r.damage_per_rivet[:, j].sum() * r.rivets) for r in results}
+    total = math.fsum(spent.values())
+    per_rivet = total / task.rivets_per_pass
+    ranked = [r.utilisation if curve is not None else r.peak_deflection for r in results]
+    k = int(np.argmax([column[:, j].max() for column in ranked]))
+    shares = {name: value / total for name, value in spent.items()} if total > 0.0 else {}
+    return JointLife(
+        name=joint.name,
+        kind=joint.kind,
+        peak_deflection=float(max(r.peak_deflection[:, j].max() for r in results)),
+        peak_torque=float(max(r.peak_torque[:, j].max() for r in results)),
+        gravity_torque=float(max(r.gravity_torque[:, j].max() for r in results)),
+        peak_shear_stress=float(max(r.peak_shear_stress[:, j].max() for r in results)),
+        gravity_shear_stress=float(max(r.gravity_shear_stress[:, j].max() for r in results)),
+        peak_total_stress=float(max(r.peak_total_stress[:, j].max() for r in results)),
+        utilisation=float(max(r.utilisation[:, j].max() for r in results)),
+        reducer=reducer,
+        reducer_utilisation=float(max(r.reducer_utilisation[:, j].max() for r in results)),
+        damage_per_rivet=per_rivet,
+        rivets_to_failure=life(per_rivet) if curve is not None else math.nan,
+        sn_curve=curve.name if curve is not None else "",
+        worst_operation=results[k].name,
+        worst_pose=int(ranked[k][:, j].argmax()),
+        damage_share=shares,
+        reducer_governed_by=check.governed_by if check is not None else "",
+        reducer_warnings=check.warnings if check is not None else (),
+    )
+
+
+def _limiting(joints: tuple[JointLife, ...]) -> JointLife | None:
+    """The joint that ends the robot's life: the shortest, or else the most utilised part."""
+    known = [joint for joint in joints if joint.sn_curve or joint.reducer]
+    if not known:
+        return None
+    return min(known, key=lambda joint: (joint.life, -joint.governing_utilisation))

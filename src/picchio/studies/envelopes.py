@@ -1,0 +1,269 @@
+"""The direction envelope of every joint at a pose: paper Fig. 9, without sampling directions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from picchio.core.arrays import FloatArray, IndexArray
+from picchio.core.errors import InputError
+from picchio.core.provenance import provenance
+from picchio.excitation.trains import Excitation
+from picchio.model.model import Model
+from picchio.vibration.closed_form.many_directions import peak_deflections
+from picchio.vibration.closed_form.modes import modal_analysis
+from picchio.vibration.closed_form.response import Response, response_from_rest, steady_state
+
+FORMAT = "picchio-envelope/1"
+Quantity = Literal["deflection", "torque", "stress"]
+QUANTITIES: tuple[Quantity, ...] = ("deflection", "torque", "stress")
+
+
+@dataclass(frozen=True, eq=False)
+class DirectionEnvelope:
+    """What a force can do to each joint, by its direction.
+
+    Joint j's deflection under a force along the unit vector n is g_j(t) . n, so its peak is the
+    support function of the curve g_j and its mirror image: max over t of |g_j(t) . n|. Its
+    largest value over n is max |g_j(t)|, along g_j there.
+
+    Attributes:
+        robot: name.
+        joint_names: n names.
+        pose: (nv,) rad or m.
+        tool_position: (3,) m.
+        excitation: the blows.
+        hits: of a burst from rest, or None for the steady state.
+        natural_frequencies: (n,) Hz.
+        peak_deflection: (n,) rad, exact maximum over time and direction.
+        worst_direction: (n, 3) unit vectors, either sign.
+        peak_tool_displacement: m, the tool's largest displacement over time and direction.
+        worst_tool_direction: (3,) the force direction that gives it.
+        torque_factor: (n,) N m/rad, torque per deflection.
+        stress_factor: (n,) Pa/rad, shear stress per deflection; NaN without a shaft.
+        response: the closed form behind it all.
+    """
+
+    robot: str
+    joint_names: tuple[str, ...]
+    pose: FloatArray
+    tool_position: FloatArray
+    excitation: Excitation
+    hits: int | None
+    natural_frequencies: FloatArray
+    peak_deflection: FloatArray
+    worst_direction: FloatArray
+    peak_tool_displacement: float
+    worst_tool_direction: FloatArray
+    torque_factor: FloatArray
+    stress_factor: FloatArray
+    response: Response
+    origin: Mapping[str, Any] = field(default_factory=dict)
+
+    def peak(self, quantity: Quantity = "deflection") -> FloatArray:
+        """(n,) largest value over all directions: rad, N m or Pa; along `worst_direction`."""
+        return self.peak_deflection * self._factor(quantity)
+
+    def _factor(self, quantity: Quantity) -> FloatArray:
+        factors = {
+            "deflection": np.ones_like(self.torque_factor),
+            "torque": self.torque_factor,
+            "stress": self.stress_factor,
+        }
+        if quantity not in factors:
+            raise InputError("unknown", key="quantity", value=quantity, choices=QUANTITIES)
+        return factors[quantity]
+
+    def support(self, directions: ArrayLike, quantity: Quantity = "deflection") -> FloatArray:
+        """Peak of every joint for each direction, exact in time.
+
+        Args:
+            directions: (d, 3) unit vectors.
+            quantity: "deflection" (rad), "torque" (N m) or "stress" (Pa).
+
+        Returns:
+            (n, d).
+        """
+        return peak_deflections(self.response, directions) * self._factor(quantity)[:, None]
+
+    def surface(
+        self, joint: str | int, subdivisions: int = 3, quantity: Quantity = "deflection"
+    ) -> tuple[FloatArray, IndexArray]:
+        """The envelope as a mesh: the paper's double ball.
+
+        Args:
+            joint: name or index.
+            subdivisions: of an icosahedron; 3 gives 642 vertices.
+            quantity: as in `support`.
+
+        Returns:
+            vertices (v, 3), each a direction times the peak for it, and faces (f, 3).
+        """
+        j = self.joint_names.index(joint) if isinstance(joint, str) else joint
+        directions, faces = icosphere(subdivisions)
+        # The envelope is the same both ways along a line, so half of the sphere is computed.
+        half = _upper_half(directions)
+        radius = np.empty(len(directions))
+        radius[half] = self.support(directions[half], quantity)[j]
+        mirror = {tuple(np.round(v, 9) + 0.0): i for i, v in enumerate(directions)}
+        for i in np.flatnonzero(~half):
+            radius[i] = radius[mirror[tuple(np.round(-directions[i], 9) + 0.0)]]
+        return directions * radius[:, None], faces
+
+    def __repr__(self) -> str:
+        peaks = dict(zip(self.joint_names, self.peak_deflection.tolist(), strict=True))
+        return f"DirectionEnvelope({self.robot!r}, peak_deflection={peaks})"
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        columns = ("joint", "peak deflection [mrad, mm]", "worst direction", "peak torque [N m, N]",
+                   "peak stress [MPa]")  # fmt: skip
+        rows = zip(self.joint_names, 1e3 * self.peak_deflection, self.worst_direction.round(3),
+                   self.peak("torque"), 1e-6 * self.peak("stress"), strict=True)  # fmt: skip
+        facts = {
+            "pose [rad, m]": self.pose,
+            "blows": self.excitation.describe(),
+            "response": "steady state" if self.hits is None else f"{self.hits} hits from rest",
+            "natural frequencies [Hz]": self.natural_frequencies,
+        }
+        return sheet(f"Direction envelope of {self.robot}", facts, columns, rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of `picchio-envelope/1`."""
+        blows = {
+            name: getattr(self.excitation, name, None) for name in ("force", "period", "width")
+        }
+        kind = {"PulseTrain": "pulse_train", "HalfSineTrain": "half_sine_train"}
+        name = kind.get(type(self.excitation).__name__, "measured")
+        joints = zip(
+            self.joint_names,
+            self.peak_deflection,
+            self.worst_direction,
+            self.peak("torque"),
+            self.peak("stress"),
+            strict=True,
+        )
+        return {
+            "format": FORMAT,
+            "robot": self.robot,
+            "pose": self.pose,
+            "tool_position": self.tool_position,
+            "excitation": {"kind": name, **blows, "hits": self.hits},
+            "natural_frequencies": self.natural_frequencies,
+            "joints": [
+                {
+                    "name": joint,
+                    "peak_deflection": peak,
+                    "worst_direction": direction,
+                    "peak_torque": torque,
+                    "peak_shear_stress": stress,
+                }
+                for joint, peak, direction, torque, stress in joints
+            ],
+            "tool": {
+                "peak_displacement": self.peak_tool_displacement,
+                "worst_direction": self.worst_tool_direction,
+            },
+            "provenance": dict(self.origin),
+        }
+
+
+def direction_envelope(
+    model: Model, pose: ArrayLike, excitation: Excitation, hits: int | None = None
+) -> DirectionEnvelope:
+    """The exact direction envelope of every joint at a pose.
+
+    Args:
+        model: the robot.
+        pose: (nv,) rad or m.
+        excitation: the blows.
+        hits: of a burst from rest with its ring-down; None for the steady state.
+
+    Raises:
+        InputError: a bad pose, a resonance without damping, no flexible joint.
+    """
+    robot = model.robot
+    if not robot.flexible_joints:
+        raise InputError("no joint has a stiffness, so nothing can vibrate", file=robot.source)
+    checked = robot.pose(pose)
+    state = robot.state(checked)
+    modes = modal_analysis(model.linear_system(checked))
+    response = (
+        steady_state(modes, excitation)
+        if hits is None
+        else response_from_rest(modes, excitation, hits)
+    )
+    worst = response.worst_directions()
+    if not all(np.isfinite(w.value) for w in worst):
+        raise InputError("the deflections overflow", key="force", value=excitation.peak_force)
+    tool, direction = response.worst_combination(state.jacobian)
+    stress = [
+        k * joint.shaft.radius / joint.shaft.polar_moment if joint.shaft else np.nan
+        for joint, k in zip(robot.flexible_joints, state.stiffness, strict=True)
+    ]
+    return DirectionEnvelope(
+        robot=robot.name,
+        joint_names=robot.flexible_names,
+        pose=checked,
+        tool_position=state.tool_position,
+        excitation=excitation,
+        hits=hits,
+        natural_frequencies=modes.natural_frequencies,
+        peak_deflection=np.array([w.value for w in worst]),
+        worst_direction=np.array([w.direction for w in worst]),
+        peak_tool_displacement=tool,
+        worst_tool_direction=direction,
+        torque_factor=np.array(state.stiffness),
+        stress_factor=np.array(stress),
+        response=response,
+        origin=provenance(robot.files),
+    )
+
+
+def icosphere(subdivisions: int) -> tuple[FloatArray, IndexArray]:
+    """Unit vectors (v, 3) and faces (f, 3) of a subdivided icosahedron, v = 10 4^s + 2."""
+    golden = (1.0 + np.sqrt(5.0)) / 2.0
+    corners = [
+        [a, b * golden, 0.0][k:] + [a, b * golden, 0.0][:k]
+        for k in range(3)
+        for a in (-1.0, 1.0)
+        for b in (-1.0, 1.0)
+    ]
+    vertices = [np.array(c) / np.linalg.norm(c) for c in corners]
+    edge = 2.0 / np.sqrt(1.0 + golden**2) * 1.01
+    faces = [
+        (i, j, k) if np.linalg.det([vertices[i], vertices[j], vertices[k]]) > 0 else (i, k, j)
+        for i in range(12)
+        for j in range(i + 1, 12)
+        for k in range(j + 1, 12)
+        if max(np.linalg.norm(vertices[p] - vertices[q]) for p, q in ((i, j), (j, k), (i, k)))
+        < edge
+    ]
+    for _ in range(subdivisions):
+        middle: dict[tuple[int, int], int] = {}
+
+        def halfway(p: int, q: int, middle: dict[tuple[int, int], int] = middle) -> int:
+            key = (min(p, q), max(p, q))
+            if key not in middle:
+                point = vertices[p] + vertices[q]
+                middle[key] = len(vertices)
+                vertices.append(point / np.linalg.norm(point))
+            return middle[key]
+
+        finer = []
+        for i, j, k in faces:
+            a, b, c = halfway(i, j), halfway(j, k), halfway(k, i)
+            finer += [(i, a, c), (a, j, b), (c, b, k), (a, b, c)]
+        faces = finer
+    return np.array(vertices), np.array(faces)
+
+
+def _upper_half(directions: FloatArray) -> FloatArray:
+    """One of each pair of opposite vectors."""
+    x, y, z = np.round(directions, 9).T
+    return np.asarray((z > 0) | ((z == 0) & ((y > 0) | ((y == 0) & (x > 0)))))

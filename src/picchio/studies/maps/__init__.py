@@ -1,0 +1,1 @@
+"""The workspace map: peaks, directions, frequencies and damage all over the workspace."""

@@ -1,0 +1,226 @@
+"""One chunk of a workspace map: a pure function, run here or on any worker."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.excitation.trains import Excitation
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.studies.maps.places import Listed, Places
+from picchio.studies.rivet.batch import batch_damage, stiffness_at
+from picchio.studies.rivet.life_rules import curves_of
+from picchio.vibration.batch.peaks import batch_peaks
+
+# Damage of a rivet all over a map, in one direction or in the worst.
+
+# Half-angles of the search's cones, rad.
+_CONES = (0.5, 0.25, 0.12, 0.06, 0.03)
+_AROUND = 6
+
+
+def damage_of(
+    robot: FlexibleRobot,
+    poses: FloatArray,
+    excitation: Excitation,
+    hits: int,
+    direction: FloatArray | None,
+    begin: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Damage of a rivet for every joint, and the direction of the force it belongs to.
+
+    Damage is not linear in the force, so its worst direction has no closed form: it is searched,
+    beginning where the deflection is worst, on ever narrower cones. Where no direction tried does
+    damage, the beginning is kept.
+
+    Args:
+        robot: with shafts.
+        poses: (p, nv) rad or m.
+        excitation: the blows.
+        hits: of a rivet.
+        direction: (p, 3), or None for the worst of each joint.
+        begin: (p, n, 3) unit vectors, where to begin the search.
+
+    Returns:
+        (p, n) Miner's sums, NaN without a shaft; (p, n, 3) unit vectors.
+    """
+    curves = curves_of(robot)
+    n = len(curves)
+    if direction is not None:
+        unit = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+        found = batch_damage(robot, poses, unit, excitation, hits, curves)
+        return found.damage, np.repeat(unit[:, None], n, axis=1)
+    best = np.full((len(poses), n), np.nan)
+    along = begin.copy()
+    for j in range(n):
+        if curves[j] is None:
+            continue
+        only = [curve if k == j else None for k, curve in enumerate(curves)]
+
+        def cost(directions: FloatArray, j: int = j, only: list = only) -> FloatArray:  # type: ignore[type-arg]
+            """(p, d) damage of joint j for (p, d, 3) directions."""
+            count = directions.shape[1]
+            flat = batch_damage(
+                robot, np.repeat(poses, count, axis=0), directions.reshape(-1, 3), excitation,
+                hits, only,
+            )  # fmt: skip
+            return cast(FloatArray, flat.damage[:, j].reshape(len(poses), count))
+
+        best[:, j], along[:, j] = _worst(cost, along[:, j])
+    return best, along
+
+
+def _worst(cost, start: FloatArray) -> tuple[FloatArray, FloatArray]:  # type: ignore[no-untyped-def]
+    """The largest cost near a start (p, 3), pose by pose, and where."""
+    along = start
+    best = cost(along[:, None])[:, 0]
+    rows = np.arange(len(along))
+    for cone in _CONES:
+        # Two axes across the direction, from the world's axis that is least along it.
+        least = np.eye(3)[np.abs(along).argmin(axis=1)]
+        first = np.cross(along, least)
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        second = np.cross(along, first)
+        turn = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
+        ring = np.cos(turn)[:, None] * first[:, None] + np.sin(turn)[:, None] * second[:, None]
+        tried = np.cos(cone) * along[:, None] + np.sin(cone) * ring
+        costs = cost(tried)
+        k = costs.argmax(axis=1)
+        better = costs[rows, k] > best
+        best = np.where(better, costs[rows, k], best)
+        along = np.where(better[:, None], tried[rows, k], along)
+    return best, along
+
+
+Columns = dict[str, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class MapJob:
+    """All that a chunk needs; it travels to workers as it is.
+
+    Attributes:
+        robot: with stiffnesses.
+        excitation: the blows.
+        places: where.
+        direction: (3,) unit vector, "worst" for each joint's own, or "normal" for the surface's.
+        branch: "all", or words that choose one branch (see `picchio.robot.ik.branch`).
+        hits: of a burst from rest; None for the steady state.
+        damage: of a rivet of so many hits, counted for every joint; None leaves it out.
+    """
+
+    robot: FlexibleRobot
+    excitation: Excitation
+    places: Places
+    direction: tuple[float, float, float] | str
+    branch: str
+    hits: int | None
+    damage: int | None = None
+
+    def compute(self, first: int, last: int) -> Columns:
+        """Rows of the places first to last - 1: one row a point and branch, none out of reach."""
+        robot = self.robot
+        place = np.arange(first, last)
+        rows = self.places.rows(first, last)
+        if self.places.kind == "pose":
+            poses = rows
+        else:
+            poses, place = self._poses(rows, first)
+        mass, jacobian = robot.mass_and_jacobian(poses)
+        stiffness = stiffness_at(robot, poses)
+        found = batch_peaks(
+            mass,
+            jacobian,
+            stiffness,
+            robot.damping_ratio,
+            self.excitation,
+            hits=self.hits,
+            direction=self._direction(place),
+        )
+        position = tool_places(robot, poses)
+        torque = stiffness * found.peak_deflection
+        factor = [
+            joint.shaft.radius / joint.shaft.polar_moment if joint.shaft else np.nan
+            for joint in robot.flexible_joints
+        ]
+        stress = torque * np.array(factor)
+        rank = np.where(np.isfinite(stress).all(axis=1)[:, None], stress, torque)
+        columns = {
+            "place": place,
+            "position": position,
+            "pose": poses,
+            "branch": branch_codes(poses),
+            "natural_frequency": found.natural_frequencies,
+            "peak_deflection": found.peak_deflection,
+            "peak_torque": torque,
+            "peak_shear_stress": stress,
+            "worst_direction": found.direction,
+            "limiting_joint": _argmax(rank),
+        }
+        if self.damage is not None:
+            own = self._direction(place)
+            columns["damage_per_rivet"], columns["damage_direction"] = damage_of(
+                robot, poses, self.excitation, self.damage, own, found.direction
+            )
+        return columns
+
+    def _direction(self, place: FloatArray) -> FloatArray | None:
+        if self.direction == "worst":
+            return None
+        if self.direction == "normal":
+            if not isinstance(self.places, Listed) or self.places.normals is None:
+                raise InputError("the places have no normals", key="direction", value="normal")
+            return self.places.normals[place]
+        return np.tile(np.asarray(self.direction, dtype=float), (len(place), 1))
+
+    def _poses(self, points: FloatArray, first: int) -> tuple[FloatArray, FloatArray]:
+        from picchio.robot.ik.branch import branch_words, choose_branch
+        from picchio.robot.ik.inverse_kinematics import solve_many
+
+        axes = None
+        if not isinstance(self.direction, str):
+            axes = np.tile(-np.asarray(self.direction, dtype=float), (len(points), 1))
+        elif self.direction == "normal":
+            axes = -np.asarray(self._direction(np.arange(first, first + len(points))))
+        solved = solve_many(self.robot, points, axes=axes)
+        if self.branch == "all":
+            return solved.poses, solved.point + first
+        branch_words(self.robot, self.branch)
+        chosen, place = [], []
+        for k in np.unique(solved.point):
+            try:
+                pose = choose_branch(self.robot, list(solved.poses[solved.point == k]), self.branch)
+            except InputError:
+                continue  # this point has no pose on the branch
+            chosen.append(pose)
+            place.append(k + first)
+        return np.array(chosen).reshape(-1, solved.poses.shape[1]), np.array(place, dtype=int)
+
+
+def tool_places(robot: FlexibleRobot, poses: FloatArray) -> FloatArray:
+    """(p, 3) m, world: where the tool's force acts at poses (p, nv)."""
+    from picchio.robot.ik.chain import tool_chain
+    from picchio.robot.ik.chain_kernel import places_of
+    from picchio.robot.ik.inverse_kinematics import tables_of
+    from picchio.robot.tool import RECOIL_JOINT
+
+    if RECOIL_JOINT in robot.joint_names:  # the chain ends before it
+        return np.array([robot.tool_position(pose) for pose in poses]).reshape(-1, 3)
+    chain = tool_chain(robot)
+    found = np.empty((len(poses), 3))
+    places_of(tables_of(chain), np.ascontiguousarray(poses[:, chain.index]), found)
+    return found
+
+
+def branch_codes(poses: FloatArray) -> FloatArray:
+    """Signs of the joints as one number: bit k is set where joint k's position is negative."""
+    return ((poses < 0.0) @ (1 << np.arange(poses.shape[1]))).astype(np.int32)
+
+
+def _argmax(rank: FloatArray) -> FloatArray:
+    known = np.where(np.isnan(rank), -np.inf, rank)
+    return known.argmax(axis=1).astype(np.int32) if len(rank) else np.empty(0, np.int32)

@@ -1,0 +1,177 @@
+"""Chunks of a map joined to one netCDF file or Zarr store, one chunk in memory at a time."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import warnings
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from picchio.core.errors import InputError
+from picchio.studies.maps.chunk import Columns
+
+# Rows written at a time, and of a piece of a Zarr store: a piece is then written once, not again
+# and again with every chunk of the map that falls into it.
+_ROWS = 65536
+
+# Variable: (dimensions, unit, what it is).
+VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "place": (("point",), "1", "index of the asked point or pose"),
+    "position": (("point", "xyz"), "m", "tool point, world"),
+    "pose": (("point", "coordinate"), "rad", "joint positions (m for prismatic joints)"),
+    "branch": (("point",), "1", "bit k is set where joint k's position is negative"),
+    "natural_frequency": (("point", "mode"), "Hz", "undamped natural frequency"),
+    "peak_deflection": (("point", "joint"), "rad", "largest deflection over time"),
+    "peak_torque": (("point", "joint"), "N*m", "largest torque of the vibration"),
+    "peak_shear_stress": (("point", "joint"), "Pa", "largest shear stress of the vibration"),
+    "worst_direction": (("point", "joint", "xyz"), "1", "unit vector of the force"),
+    "limiting_joint": (("point",), "1", "index of the joint with the largest stress or torque"),
+}
+
+# Only in maps that were asked for it.
+EXTRA: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "damage_per_rivet": (("point", "joint"), "1", "Miner's sum of a rivet, cycles by rainflow"),
+    "damage_direction": (("point", "joint", "xyz"), "1", "unit vector of the force for it"),
+}
+
+
+def variables_of(columns: Columns) -> dict[str, tuple[tuple[str, ...], str, str]]:
+    """The variables that a chunk holds."""
+    return VARIABLES | {name: entry for name, entry in EXTRA.items() if name in columns}
+
+
+def join_chunks(target: Path, chunks: Iterable[Columns], attributes: dict[str, Any]) -> None:
+    """Write all rows to `target` in order, under another name until it is whole.
+
+    Raises:
+        InputError: there is no row at all: no point can be reached.
+    """
+    part = target.with_name(f".{target.name}.part")
+    _remove(part)
+    writer = _ZarrWriter if target.suffix == ".zarr" else _NetcdfWriter
+    rows = 0
+    out = writer(part, attributes)
+    try:
+        for columns in _in_blocks(chunks):
+            out.append(columns)
+            rows += len(columns["place"])
+        out.close()
+    except BaseException:
+        _remove(part)
+        raise
+    if not rows:
+        _remove(part)
+        raise InputError("no point of the map can be reached within the joint limits", key="places")
+    _remove(target)
+    os.replace(part, target)
+
+
+def _in_blocks(chunks: Iterable[Columns]) -> Iterator[Columns]:
+    """The same rows, `_ROWS` at a time; the last block may be shorter, none is empty."""
+    held: list[Columns] = []
+    count = 0
+    for columns in chunks:
+        held.append(columns)
+        count += len(columns["place"])
+        while count >= _ROWS:
+            whole = {name: np.concatenate([part[name] for part in held]) for name in columns}
+            yield {name: values[:_ROWS] for name, values in whole.items()}
+            held = [{name: values[_ROWS:].copy() for name, values in whole.items()}]
+            count -= _ROWS
+    if count:
+        yield {name: np.concatenate([part[name] for part in held]) for name in held[0]}
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _coordinates(attributes: dict[str, Any]) -> dict[str, list[str]]:
+    return {
+        "joint": attributes["joint"],
+        "coordinate": attributes["coordinate"],
+        "xyz": ["x", "y", "z"],
+    }
+
+
+class _NetcdfWriter:
+    def __init__(self, path: Path, attributes: dict[str, Any]) -> None:
+        import h5netcdf
+
+        self._attributes = attributes
+        self._rows = 0
+        self._file = h5netcdf.File(path, "w")
+        self._ready = False
+
+    def _prepare(self, columns: Columns) -> None:
+        import h5py
+
+        file = self._file
+        names = _coordinates(self._attributes)
+        file.dimensions = {"point": None, "mode": columns["natural_frequency"].shape[1]} | {
+            name: len(values) for name, values in names.items()
+        }
+        for name, values in names.items():
+            label = file.create_variable(name, (name,), dtype=h5py.string_dtype())
+            label[:] = np.array(values, dtype=object)
+        for name, (dims, unit, meaning) in variables_of(columns).items():
+            variable = file.create_variable(name, dims, columns[name].dtype)
+            variable.attrs["units"] = unit
+            variable.attrs["long_name"] = meaning
+        for key, value in self._attributes.items():
+            if key not in names:
+                file.attrs[key] = value
+        self._ready = True
+
+    def append(self, columns: Columns) -> None:
+        if not self._ready:
+            self._prepare(columns)
+        first, self._rows = self._rows, self._rows + len(columns["place"])
+        self._file.resize_dimension("point", self._rows)
+        for name in variables_of(columns):
+            self._file.variables[name][first : self._rows] = columns[name]
+
+    def close(self) -> None:
+        self._file.close()
+
+
+class _ZarrWriter:
+    def __init__(self, path: Path, attributes: dict[str, Any]) -> None:
+        self._path, self._attributes, self._mode = path, attributes, "w"
+
+    def append(self, columns: Columns) -> None:
+        import xarray
+
+        data = {
+            name: (dims, columns[name], {"units": unit, "long_name": meaning})
+            for name, (dims, unit, meaning) in variables_of(columns).items()
+        }
+        names = _coordinates(self._attributes)
+        others = {k: v for k, v in self._attributes.items() if k not in names}
+        if self._mode == "w":
+            texts = {name: np.array(values, dtype=object) for name, values in names.items()}
+            chunk = xarray.Dataset(data, coords=texts, attrs=others)
+            rows = {name: {"chunks": (_ROWS, *(columns[name].shape[1:]))} for name in data}
+            chunk.to_zarr(self._path, mode="w", consolidated=False, encoding=rows)
+            self._mode = "a"
+        else:
+            # An append writes the attributes anew: without them they, and provenance, are gone.
+            xarray.Dataset(data, attrs=others).to_zarr(
+                self._path, mode="a", append_dim="point", consolidated=False
+            )
+
+    def close(self) -> None:
+        if self._mode == "a":
+            import zarr
+
+            with warnings.catch_warnings():
+                # Zarr 3 has consolidated metadata ahead of its own specification.
+                warnings.simplefilter("ignore")
+                zarr.consolidate_metadata(str(self._path))

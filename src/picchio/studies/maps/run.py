@@ -1,0 +1,251 @@
+"""The workspace map: peaks, directions and frequencies all over the workspace (paper Fig. 10).
+
+The work is cut into chunks. Each finished chunk is a file of its own, written whole or not at all,
+so that a map that was stopped goes on where it was and a killed worker loses only its own chunk.
+The chunks are then joined, one at a time, to one netCDF file or Zarr store.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from picchio.core.errors import InputError, PicchioError
+from picchio.core.files import atomic_write
+from picchio.core.provenance import provenance
+from picchio.excitation.trains import Excitation
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.studies.maps.chunk import Columns, MapJob
+from picchio.studies.maps.files import join_chunks
+from picchio.studies.maps.places import Places
+from picchio.vibration.closed_form.response import unit_vector
+
+if TYPE_CHECKING:
+    import xarray
+
+CHUNK = 4096
+MOST_PLACES = 10**10
+ENDINGS = (".nc", ".zarr")
+# Fewer places than this are not worth starting workers for.
+_WORTH_WORKERS = 50_000
+
+
+def workspace_map(
+    robot: FlexibleRobot,
+    places: Places,
+    excitation: Excitation,
+    out: str | Path,
+    *,
+    direction: Any = "worst",
+    branch: str = "all",
+    hits: int | None = None,
+    damage: int | None = None,
+    chunk: int = CHUNK,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    restart: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> xarray.Dataset:
+    """Compute a map, or go on with one that was stopped, and open it.
+
+    Args:
+        robot: with stiffnesses.
+        places: points or poses; see `picchio.studies.maps.places`.
+        excitation: the blows.
+        out: `.nc` for netCDF, `.zarr` for Zarr. Unfinished work is kept beside it.
+        direction: (3,) for one force direction, "worst" for each joint's own worst, "normal" for
+            the surface's normal.
+        branch: "all" branches of the inverse kinematics, "any" one, or words that choose.
+        hits: of a burst from rest; None for the steady state.
+        damage: count the damage of a rivet of so many hits, too, from rest with its ring-down; for
+            the worst direction it is searched, which takes many times as long.
+        chunk: places at a time.
+        workers: processes; up to one, this process does the work itself. As many as cores, and
+            none for small maps, if not given.
+        scheduler: address of a dask scheduler to use instead.
+        restart: throw away what an interrupted map has left, instead of going on.
+        progress: called with (places done, places in all).
+
+    Returns:
+        the dataset, lazily opened: `position`, `pose`, `natural_frequency`, `peak_deflection`,
+        `worst_direction` and more, a row a point and branch.
+
+    Raises:
+        InputError: an unknown ending, direction or branch; no flexible joint; no row at all.
+    """
+    target = Path(out)
+    if target.suffix not in ENDINGS:
+        raise InputError("unknown ending", key="out", value=target.name, choices=ENDINGS)
+    if not target.parent.is_dir():
+        raise InputError("the folder does not exist", file=target)
+    if not robot.flexible_joints:
+        raise InputError("no joint has a stiffness, so nothing can vibrate", file=robot.source)
+    if not isinstance(direction, str):
+        direction = tuple(float(c) for c in unit_vector(direction))
+    elif direction not in ("worst", "normal"):
+        raise InputError("unknown", key="direction", value=direction, choices=["worst", "normal"])
+    if branch != "all":
+        from picchio.robot.ik.branch import branch_words
+
+        branch_words(robot, branch)
+    if chunk < 1:
+        raise InputError("must be at least 1", key="chunk", value=chunk)
+    if len(places) > MOST_PLACES:
+        raise InputError(
+            f"{len(places):.3g} places are more than the {MOST_PLACES:.0e} of one map",
+            key="places",
+            hint="take a wider spacing or a coarser grid",
+        )
+    if damage is not None and damage < 1:
+        raise InputError("must be at least 1", key="damage", value=damage)
+    if damage is not None and all(joint.shaft is None for joint in robot.flexible_joints):
+        raise InputError(
+            "no joint has a shaft, so no damage can be told",
+            key="damage",
+            hint="give shafts in a sidecar",
+        )
+    job = MapJob(robot, excitation, places, direction, branch, hits, damage)
+    if restart:
+        shutil.rmtree(_folder_of(target), ignore_errors=True)
+    folder = _open_folder(target, job, chunk)
+    spans = [(k, min(k + chunk, len(places))) for k in range(0, len(places), chunk)]
+    missing = [span for span in spans if not _file(folder, span).exists()]
+    done = len(places) - sum(last - first for first, last in missing)
+    for span in _run(job, folder, missing, workers, scheduler):
+        done += span[1] - span[0]
+        if progress is not None:
+            progress(done, len(places))
+    join_chunks(target, (_read(_file(folder, span)) for span in spans), _attributes(job))
+    shutil.rmtree(folder)
+    return open_map(target)
+
+
+def open_map(path: str | Path) -> xarray.Dataset:
+    """Open a map lazily.
+
+    Raises:
+        InputError: no such file, or none that can be read.
+    """
+    import xarray
+
+    target = Path(path)
+    if not target.exists():
+        raise InputError("no such file", file=target)
+    try:
+        if target.suffix == ".zarr":
+            return xarray.open_zarr(target, consolidated=False)
+        return xarray.open_dataset(target, engine="h5netcdf")
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(f"cannot be read as a map: {error}", file=target) from None
+
+
+def _folder_of(target: Path) -> Path:
+    return target.with_name(f".{target.name}.chunks")
+
+
+def _open_folder(target: Path, job: MapJob, chunk: int) -> Path:
+    """The folder of finished chunks; one that belongs to another map is not touched."""
+    folder = _folder_of(target)
+    plan = {
+        "robot": [hashlib.sha256(path.read_bytes()).hexdigest() for path in job.robot.files],
+        "tool": job.robot.tool_frame,
+        "joints": [repr(joint) for joint in job.robot.flexible_joints],
+        "mounting": repr(job.robot.mounting),
+        "excitation": job.excitation.describe(),
+        "places": job.places.describe(),
+        "direction": job.direction,
+        "branch": job.branch,
+        "hits": job.hits,
+        "damage": job.damage,
+        "chunk": chunk,
+        "picchio": provenance()["picchio"],
+    }
+    text = json.dumps(plan, sort_keys=True)
+    label = folder / "plan.json"
+    if label.exists() and label.read_text() != text:
+        raise InputError(
+            "holds the unfinished chunks of another map",
+            file=folder,
+            hint="--restart throws them away; or write to another file",
+        )
+    folder.mkdir(exist_ok=True)
+    if not label.exists():
+        with atomic_write(label) as stream:
+            stream.write(text)
+    return folder
+
+
+def _file(folder: Path, span: tuple[int, int]) -> Path:
+    return folder / f"{span[0]:015d}.npz"
+
+
+def _read(path: Path) -> Columns:
+    with np.load(path) as stored:
+        return {name: stored[name] for name in stored.files}
+
+
+def compute_chunk(job: MapJob, folder: Path, span: tuple[int, int]) -> tuple[int, int]:
+    """Compute one chunk and write its file; what a worker does."""
+    columns = job.compute(*span)
+    with atomic_write(_file(folder, span), "wb") as stream:
+        np.savez(stream, **columns)  # type: ignore[arg-type]
+    return span
+
+
+def _run(
+    job: MapJob,
+    folder: Path,
+    missing: list[tuple[int, int]],
+    workers: int | None,
+    scheduler: str | None,
+) -> Iterator[tuple[int, int]]:
+    places = sum(last - first for first, last in missing)
+    alone = places < _WORTH_WORKERS if workers is None else workers <= 1
+    if not missing or (scheduler is None and alone):
+        for span in missing:
+            yield compute_chunk(job, folder, span)
+        return
+    try:
+        from distributed import Client, LocalCluster, as_completed
+    except ImportError:
+        raise PicchioError(
+            "maps on several workers need dask: pip install 'picchio[map]'"
+        ) from None
+    cluster = None
+    if scheduler is None:
+        cluster = LocalCluster(
+            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None
+        )
+    try:
+        with Client(cluster or scheduler) as client:
+            shared = client.scatter(job, broadcast=True)
+            futures = client.map(
+                compute_chunk, [shared] * len(missing), [folder] * len(missing), missing,
+                pure=False, retries=3,
+            )  # fmt: skip
+            for future in as_completed(futures):
+                yield future.result()
+    finally:
+        if cluster is not None:
+            cluster.close()
+
+
+def _attributes(job: MapJob) -> dict[str, Any]:
+    return {
+        "format": "picchio-map/1",
+        "robot": job.robot.name,
+        "joint": list(job.robot.flexible_names),
+        "coordinate": list(job.robot.joint_names),
+        "excitation": job.excitation.describe(),
+        "direction": str(job.direction),
+        "branch": job.branch,
+        "hits": job.hits or 0,
+        "hits_of_damage": job.damage or 0,
+        "provenance": json.dumps(provenance(job.robot.files)),
+    }

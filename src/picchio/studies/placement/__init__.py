@@ -1,0 +1,1 @@
+"""Where to put the work so that the robot lasts longest."""

@@ -1,0 +1,250 @@
+"""Which of the poses that reach a rivet place is taken: least damage, then least utilisation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray, IndexArray
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.ik.chain import Chain, tool_chain
+from picchio.robot.ik.inverse_kinematics import TOLERANCE, tables_of
+from picchio.robot.ik.kernel import solve_points
+from picchio.studies.placement.loads import Loads
+from picchio.studies.placement.search import Spot
+from picchio.studies.placement.work import Work
+
+# Points that fill a box evenly, the same every time.
+
+
+def spread_evenly(count: int, dims: int, seed: int = 0) -> FloatArray:
+    """(count, dims) points in the unit box, the middle first.
+
+    The additive recurrence of generalised golden ratios: M. Roberts, "The unreasonable
+    effectiveness of quasirandom sequences" (2018). Another seed goes on where this one ends.
+    """
+    ratio = 2.0
+    for _ in range(60):
+        ratio = (1.0 + ratio) ** (1.0 / (dims + 1))
+    steps = ratio ** -np.arange(1.0, dims + 1.0)
+    return np.asarray((0.5 + np.outer(np.arange(count) + seed * count, steps)) % 1.0)
+
+
+# Poses that reach the work where it stands: candidates by inverse kinematics, many at once.
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Poses that reach the work at b placements, c at most a rivet place; NaN where none.
+
+    Attributes:
+        moves: (b, 4), all within reach.
+        poses: one array (b, c, nv) a rivet place.
+    """
+
+    moves: FloatArray
+    poses: tuple[FloatArray, ...]
+
+
+@dataclass(eq=False)
+class Reach:
+    """What an arm can reach of a work, wherever that stands.
+
+    Attributes:
+        robot: the arm.
+        work: what is moved.
+        chain: the arm's joints as tables.
+    """
+
+    robot: FlexibleRobot
+    work: Work
+    chain: Chain = field(init=False)
+    _middle: FloatArray = field(init=False)
+    _groups: list[IndexArray] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.chain = tool_chain(self.robot)
+        ends = self.chain.lower + self.chain.upper
+        self._middle = np.where(np.isfinite(ends), 0.5 * ends, 0.0)
+        # The outermost first: where a placement is out of reach they tell.
+        groups = [np.flatnonzero(self.work.group == g) for g in np.unique(self.work.group)]
+        gap = np.linalg.norm(self.work.position - self.work.centre, axis=1)
+        self._groups = sorted(groups, key=lambda members: -gap[members[0]])
+
+    @property
+    def redundant(self) -> bool:
+        """Whether a point (and axis) leaves the arm a motion of its own."""
+        return len(self.chain.index) > (3 if self.work.axis is None else 5)
+
+    def everywhere(self, times: int = 1, seed: int = 0) -> FloatArray:
+        """First guesses (s, joints) all over the joints' ranges; angles at most once round."""
+        chain, middle = self.chain, self._middle
+        starts = times * (8 if len(chain.index) <= 3 else 24)
+        reach = np.where(chain.wraps, np.pi, 1.0)
+        lower = np.maximum(chain.lower, middle - reach)
+        upper = np.minimum(chain.upper, middle + reach)
+        return lower + spread_evenly(starts, len(lower), seed) * (upper - lower)
+
+    def candidates(self, moves: FloatArray, seeds: Sequence[FloatArray]) -> Candidates:
+        """Poses within the limits, of the placements where every rivet can be reached.
+
+        Args:
+            moves: (b, 4) m, rad.
+            seeds: first guesses (s, joints), one array of them a rivet place.
+        """
+        work, chain = self.work, self.chain
+        alive = self._within_reach(moves)
+        poses: list[FloatArray] = [np.empty(0)] * len(work.group)
+        for members in self._groups:
+            guesses = np.unique(np.vstack([seeds[k] for k in members]).round(9), axis=0)
+            q = self._solve(int(members[0]), moves[alive], guesses)
+            reached = ~np.isnan(q[:, :, 0]).all(axis=1)
+            alive, q = alive[reached], q[reached]
+            poses = [p[reached] if p.ndim == 3 else p for p in poses]
+            for k in members:
+                full = np.tile(work.pose[k], (*q.shape[:2], 1))
+                full[:, :, chain.index] = q
+                poses[k] = full
+            if not len(alive):
+                break
+        most = max(p.shape[1] if p.ndim == 3 else 0 for p in poses)
+        whole = []
+        for p in poses:
+            padded = np.full((len(alive), most, work.pose.shape[1]), np.nan)
+            if len(alive):
+                missing = np.asarray(np.isnan(p).any(axis=-1))
+                padded[:, : p.shape[1]] = np.where(missing[..., None], np.nan, p)
+            whole.append(padded)
+        return Candidates(moves[alive], tuple(whole))
+
+    def _within_reach(self, moves: FloatArray) -> FloatArray:
+        """Which moves (b, 4) leave no place farther away than the arm is long."""
+        if not self.chain.wraps.all():
+            return np.arange(len(moves))
+        far = np.zeros(len(moves))
+        for members in self._groups:
+            at = self.work.positions(moves, int(members[0]))
+            far = np.maximum(far, np.linalg.norm(at - self.chain.offset[0], axis=1))
+        return np.flatnonzero(far <= self.chain.reach * (1.0 + 1e-9))
+
+    def _solve(self, place: int, moves: FloatArray, guesses: FloatArray) -> FloatArray:
+        """Poses (b, s, joints) of one place, NaN where a guess led nowhere new."""
+        work, chain = self.work, self.chain
+        guesses = np.ascontiguousarray(np.clip(guesses, chain.lower, chain.upper))
+        targets = work.positions(moves, place).reshape(-1, 3)
+        axes, weight = np.zeros_like(targets), 0.0
+        if work.axis is not None:
+            axes = work.directions(moves, work.axis[place]).reshape(-1, 3)
+            weight = max(0.3 * chain.reach, 1e-3)
+        q = np.empty((len(moves), len(guesses), len(chain.index)))
+        error = np.empty(q.shape[:2])
+        solve_points(
+            tables_of(chain), guesses, self._middle, chain.wraps, chain.lower, chain.upper,
+            targets, axes, weight, False, q, error,
+        )  # fmt: skip
+        q[error >= TOLERANCE] = np.nan
+        _drop_twins(q)
+        return q
+
+
+def _drop_twins(q: FloatArray) -> None:
+    """Of the same poses (b, c, joints) at a placement all but the first become NaN."""
+    for c in range(1, q.shape[1]):
+        same = (np.abs(q[:, :c] - q[:, c : c + 1]) < 1e-6).all(axis=-1).any(axis=-1)
+        q[same, c] = np.nan
+
+
+_SWEEPS = 3
+
+
+def cost_tables(
+    work: Work, loads: Loads, candidates: Candidates, period: float | None
+) -> tuple[FloatArray, FloatArray]:
+    """Damage and utilisation (k, b, c, n); infinite where there is no pose."""
+    n = len(loads.robot.flexible_joints)
+    shape = (len(work.group), *candidates.poses[0].shape[:2], n)
+    damage, used = np.full(shape, np.inf), np.full(shape, np.inf)
+    for operation in np.unique(work.operation):
+        places = np.flatnonzero(work.operation == operation)
+        stacked = np.stack([candidates.poses[k] for k in places])
+        there = ~np.isnan(stacked).any(axis=-1)
+        if not there.any():
+            continue
+        turned = np.stack([work.directions(candidates.moves, work.direction[k]) for k in places])
+        along = np.broadcast_to(turned[:, :, None], (*there.shape, 3))[there]
+        cost = loads.at(int(operation), stacked[there], along, period)
+        for table, values in zip((damage, used), cost, strict=True):
+            own = np.full((*there.shape, n), np.inf)
+            own[there] = np.where(np.isfinite(values), values, np.inf)
+            table[places] = own
+    return damage, used
+
+
+def choose(
+    share: FloatArray,
+    b: int,
+    move: FloatArray,
+    period: float | None,
+    candidates: Candidates,
+    damage: FloatArray,
+    used: FloatArray,
+) -> tuple[Spot | None, FloatArray]:
+    """The best pose of every rivet place at one placement, and which candidates they are.
+
+    Args:
+        share: (k,) of the mix's rivets that are set at each place.
+        b: which placement.
+        move: (4,) of it.
+        period: s, of the blows, or None.
+        candidates: the poses.
+        damage: (k, b, c, n), see `cost_tables`.
+        used: likewise.
+
+    Returns:
+        the spot, None where a place has no pose; (k,) indices.
+    """
+    worst_used = used[:, b].max(axis=-1)
+    spent = np.where(np.isfinite(worst_used), damage[:, b].max(axis=-1), np.inf)
+    least = spent.min(axis=-1, keepdims=True) if spent.size else np.full((1, 1), np.inf)
+    pick = np.where(spent <= least, worst_used, np.inf).argmin(axis=-1)
+    rows = np.arange(len(pick))
+    if not spent.size or not np.isfinite(spent[rows, pick]).all():
+        return None, pick
+    own = damage[:, b] * share[:, None, None]
+    own[~np.isfinite(worst_used)] = np.inf
+    total = own[rows, pick].sum(axis=0)
+    if total.max() > 0.0:
+        pick, total = _exchange(own, worst_used, pick, total)
+    spot = Spot(
+        np.array(move),
+        period,
+        np.array([candidates.poses[k][b, pick[k]] for k in rows]),
+        float(total.max()),
+        float(worst_used[rows, pick].max()),
+    )
+    return spot, pick
+
+
+def _exchange(
+    own: FloatArray, used: FloatArray, pick: FloatArray, total: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Another pose at a place wherever that spares the weakest joint, until none does.
+
+    Joints share a robot: the pose that spares one may cost another, so the places' choices hang
+    together through the sum.
+    """
+    for _ in range(_SWEEPS):
+        changed = False
+        for k in range(len(pick)):
+            others = total - own[k, pick[k]]
+            weakest = (others + own[k]).max(axis=-1)
+            best = int(np.lexsort((used[k], weakest))[0])
+            if weakest[best] < weakest[pick[k]] * (1.0 - 1e-12):
+                pick[k], changed = best, True
+                total = np.maximum(others + own[k, best], 0.0)
+        total = own[np.arange(len(pick)), pick].sum(axis=0)
+        if not changed:
+            break
+    return pick, total

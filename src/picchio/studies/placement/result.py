@@ -1,0 +1,180 @@
+"""What a placement study found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from picchio.core.arrays import FloatArray
+from picchio.studies.placement.search import Spot
+
+FORMAT = "picchio-placement/1"
+
+
+@dataclass(frozen=True)
+class JointUse:
+    """One joint over the whole task.
+
+    Attributes:
+        name: of the joint.
+        rivets_to_failure: of the mix; infinite where the life has no end or is not known.
+        utilisation: largest over the rivet places; of the shaft or the reducer, or of the URDF's
+            effort limit where no joint has either.
+    """
+
+    name: str
+    rivets_to_failure: float
+    utilisation: float
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """The work at one place, as exactly as `assess` has it.
+
+    Attributes:
+        spot: the move, the period and the poses.
+        joints: one entry a flexible joint.
+        base_position: (3,) m, where the base stands if the base is moved instead of the work.
+        base_heading: rad, how far the base is turned then, about the vertical.
+    """
+
+    spot: Spot
+    joints: tuple[JointUse, ...]
+    base_position: FloatArray
+    base_heading: float
+
+    @property
+    def limiting_joint(self) -> str:
+        """Shortest life, or the largest utilisation where no life has an end."""
+        return min(self.joints, key=lambda j: (j.rivets_to_failure, -j.utilisation)).name
+
+    @property
+    def rivets_to_failure(self) -> float:
+        """Of the weakest joint."""
+        return min(joint.rivets_to_failure for joint in self.joints)
+
+    @property
+    def utilisation(self) -> float:
+        """Of the most utilised joint."""
+        return max(joint.utilisation for joint in self.joints)
+
+    def to_dict(self, centre: FloatArray) -> dict[str, Any]:
+        """Plain values; an infinite life is left as inf."""
+        x, y, z, heading = (float(c) for c in self.spot.move)
+        return {
+            "rivets_to_failure": self.rivets_to_failure,
+            "utilisation": self.utilisation,
+            "limiting_joint": self.limiting_joint,
+            "work": {"shift": [x, y, z], "heading": heading, "about": centre},
+            "base": {"position": self.base_position, "heading": self.base_heading},
+            "period": self.spot.period,
+            "joints": [vars(joint) for joint in self.joints],
+            "poses": self.spot.poses,
+        }
+
+
+@dataclass(frozen=True)
+class Off:
+    """The work a little beside where it should be, the robot following on its branch.
+
+    Attributes:
+        shift: (3,) m.
+        rivets_to_failure: infinite where the life has no end; NaN where it cannot be reached.
+        utilisation: NaN where it cannot be reached.
+    """
+
+    shift: tuple[float, float, float]
+    rivets_to_failure: float
+    utilisation: float
+
+    @property
+    def reached(self) -> bool:
+        """Whether every rivet can still be set."""
+        return not math.isnan(self.utilisation)
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Where to put the work.
+
+    Attributes:
+        robot: its name.
+        by_effort: ranked by torque over the URDF's effort limits, for want of shafts and reducers.
+        start: where the work is now, with the task's own poses.
+        start_valid: whether these are within the joints' limits and free of self-collisions.
+        best: the best place found.
+        off: what it costs to be beside it.
+        centre: (3,) m, of the work now; it turns about the vertical through it.
+        placements: how many were tried all over.
+        reached: at how many of these every rivet could be set.
+        nearby: how many more were tried near the best of them.
+        self_collision: what was checked, in words.
+        assumptions: what was taken for granted, a sentence each.
+        provenance: version, seed and hashes.
+    """
+
+    robot: str
+    by_effort: bool
+    start: Standing
+    start_valid: bool
+    best: Standing
+    off: tuple[Off, ...]
+    centre: FloatArray
+    placements: int
+    reached: int
+    nearby: int
+    self_collision: str
+    assumptions: tuple[str, ...]
+    provenance: Mapping[str, Any]
+
+    @property
+    def moved(self) -> bool:
+        """Whether anything was gained."""
+        return self.best is not self.start
+
+    @property
+    def life_gain(self) -> float:
+        """By how much longer the weakest joint lives; NaN where neither life has an end."""
+        start, best = self.start.rivets_to_failure, self.best.rivets_to_failure
+        return best / start if math.isfinite(start) else math.nan
+
+    @property
+    def utilisation_gain(self) -> float:
+        """By how much less the most utilised joint is utilised."""
+        best = self.best.utilisation
+        return self.start.utilisation / best if best > 0.0 else math.inf
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+        from picchio.studies.assessment.result import format_count
+
+        rows = [
+            (a.name, format_count(a.rivets_to_failure), 100 * a.utilisation,
+             format_count(b.rivets_to_failure), 100 * b.utilisation)
+            for a, b in zip(self.start.joints, self.best.joints, strict=True)
+        ]  # fmt: skip
+        columns = ("joint", "rivets, now", "utilisation [%]", "rivets, best", "utilisation [%]")
+        facts = {"work moved by [m, rad]": self.best.spot.move}
+        return sheet(f"Placement of the work of {self.robot}", facts, columns, rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of `picchio-placement/1`; infinite lives are left as inf."""
+        return {
+            "format": FORMAT,
+            "robot": self.robot,
+            "ranked_by": "effort" if self.by_effort else "life, then utilisation",
+            "start": self.start.to_dict(self.centre) | {"valid": self.start_valid},
+            "best": self.best.to_dict(self.centre),
+            "gain": {"life": self.life_gain, "utilisation": self.utilisation_gain},
+            "off": [vars(off) | {"reached": off.reached} for off in self.off],
+            "searched": {
+                "placements": self.placements,
+                "reached": self.reached,
+                "nearby": self.nearby,
+            },
+            "self_collision": self.self_collision,
+            "assumptions": list(self.assumptions),
+            "provenance": dict(self.provenance),
+        }

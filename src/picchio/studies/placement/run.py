@@ -1,0 +1,298 @@
+"""Where to put the work so that the robot lasts longest.
+
+The work may be shifted and turned about the vertical (or the base the other way: only how they
+stand to each other counts). At every placement each rivet takes the best of the poses that reach
+it: all branches, the roll about the tool's axis, the null space of a redundant arm. First many
+placements spread over what is allowed, then a pattern search from the best few of them.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.provenance import provenance
+from picchio.fatigue.miner import life
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.ik.chain import tool_chain
+from picchio.studies.assessment.checks import reducer_of
+from picchio.studies.placement.loads import Loads, with_period
+from picchio.studies.placement.result import JointUse, Off, Placement, Standing
+from picchio.studies.placement.search import ROUNDS, SHIFTS, Search, Spot, descend
+from picchio.studies.placement.self_collision import SelfCollision
+from picchio.studies.placement.work import Work
+from picchio.studies.rivet.life_rules import curves_of
+from picchio.studies.tasks import Task
+
+PLACEMENTS = 400
+_DESCENTS = 3
+_PERIODS = 7
+
+
+def place(
+    robot: FlexibleRobot,
+    task: Task,
+    *,
+    move: Sequence[float] | None = None,
+    period_range: tuple[float, float] | None = None,
+    placements: int = PLACEMENTS,
+    off: float = 0.05,
+    margin: float = 0.0,
+    sn_curve: str | SNCurve | None = None,
+    self_collision: bool = True,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> Placement:
+    """The placement, poses and hit rate that spare the weakest joint most.
+
+    Lives are those of `assess` by its default method, gravity stiffness off.
+
+    Args:
+        robot: with stiffnesses, and shafts or reducers (or else effort limits).
+        task: the work; the tool's places are read off its poses.
+        move: how far the work may go each way: x, y, z in m, heading in rad; half the arm's
+            reach and a half turn if not given. Zeros leave it where it is: poses alone.
+        period_range: s, shortest and longest period of the blows; as the task says if not given.
+        placements: how many within reach are tried all over before the search goes local.
+        off: m, how far beside the best place `off` of the result looks.
+        margin: m; the best place must leave every rivet within reach when the work stands so far
+            beside it along x, y or z. Without one the best place may be at the very edge of reach.
+        sn_curve: for all joints, instead of their own.
+        self_collision: check for it where the URDF has meshes.
+        seed: moves what is tried.
+        progress: called with (steps done, steps in all): placements all over, then rounds of the
+            local searches.
+
+    Returns:
+        the placement; never worse than the start where the start is within the limits, and
+        always within them.
+
+    Raises:
+        InputError: no flexible joint, nothing to rank joints by, a bad range, no place at all
+            where every rivet can be set.
+    """
+    if not robot.flexible_joints:
+        raise InputError("no joint has a stiffness, so nothing can vibrate", file=robot.source)
+    if placements < 1:
+        raise InputError("must be at least 1", key="placements", value=placements)
+    if not (math.isfinite(off) and off > 0.0):
+        raise InputError("must be positive", key="off", value=off)
+    if not (math.isfinite(margin) and margin >= 0.0):
+        raise InputError("must not be negative", key="margin", value=margin)
+    curves = curves_of(robot, sn_curve)
+    loads = Loads.of(robot, task, curves, tuple(reducer_of(j) for j in robot.flexible_joints))
+    work = Work.of(robot, task)
+    half = _half(robot, move)
+    periods = _periods(task, period_range)
+    meshes: SelfCollision | str = "not asked for"
+    if self_collision:
+        meshes = SelfCollision.of(robot, work.pose[0])
+    search = Search(work, loads, meshes if isinstance(meshes, SelfCollision) else None, margin)
+    start = _start(search)
+    beyond = any(robot.limit_violations(pose) for pose in work.pose)
+    valid = not beyond and not search.colliding(work.pose)
+    if not valid:
+        warnings.warn(
+            "the work now stands where joints are beyond their limits or links collide: it is "
+            "no candidate for the best place",
+            PicchioWarning,
+            stacklevel=2,
+        )
+    best = _search(search, start if valid else None, half, periods, placements, seed, progress)
+    now = _standing(search, start)
+    if best is None:
+        raise InputError(
+            "nowhere within the range can every rivet be set", key="move", value=half.tolist()
+        )
+    then = _standing(search, best)
+    if valid and not _exact(then).better_than(_exact(now)):
+        then = now
+    return Placement(
+        robot=robot.name,
+        by_effort=loads.by_effort,
+        start=now,
+        start_valid=valid,
+        best=then,
+        off=_beside(search, then.spot, off),
+        centre=work.centre,
+        placements=search.tried,
+        reached=search.reached,
+        nearby=search.nearby,
+        self_collision=(
+            f"{meshes.pairs} pairs of links" if isinstance(meshes, SelfCollision) else meshes
+        ),
+        assumptions=_assumptions(loads, meshes),
+        provenance=provenance([*robot.files, *task.files], seed=seed),
+    )
+
+
+def _half(robot: FlexibleRobot, move: Sequence[float] | None) -> FloatArray:
+    if move is None:
+        reach = 0.5 * tool_chain(robot).reach
+        return np.array([reach, reach, reach, np.pi])
+    half = np.asarray(move, dtype=float)
+    if half.shape != (4,) or not np.isfinite(half).all() or (half < 0.0).any():
+        raise InputError(
+            "must be four numbers that are not negative: x, y, z in m and the heading",
+            key="move",
+            value=list(move),
+        )
+    half[3] = min(half[3], np.pi)
+    return half
+
+
+def _periods(task: Task, wanted: tuple[float, float] | None) -> tuple[float, float] | None:
+    if wanted is None:
+        return None
+    low, high = (float(p) for p in wanted)
+    if not (0.0 < low <= high < math.inf):
+        raise InputError(
+            "must be two positive periods in s, the shorter first", key="period-range", value=wanted
+        )
+    for operation in task.operations:
+        with_period(operation.excitation, low)  # refuses blows longer than that
+    return low, high
+
+
+def _start(search: Search) -> Spot:
+    """The work where it is, poses as given."""
+    damage, used = _costs(search, np.zeros(4), None, search.work.pose, compiled=True)
+    total = (damage * search.work.share[:, None]).sum(axis=0)
+    return Spot(np.zeros(4), None, search.work.pose, float(total.max()), float(used.max()))
+
+
+def _costs(
+    search: Search, move: FloatArray, period: float | None, poses: FloatArray, *, compiled: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Damage and utilisation (k, n) of every rivet place."""
+    work = search.work
+    along = work.direction @ work.turn(move[3]).T
+    damage = np.empty((len(poses), len(search.loads.robot.flexible_joints)))
+    used = np.empty_like(damage)
+    for operation in np.unique(work.operation):
+        own = work.operation == operation
+        damage[own], used[own] = search.loads.at(
+            int(operation), poses[own], along[own], period, compiled=compiled
+        )
+    return damage, used
+
+
+def _search(
+    search: Search,
+    start: Spot | None,
+    half: FloatArray,
+    periods: tuple[float, float] | None,
+    placements: int,
+    seed: int,
+    progress: Callable[[int, int], None] | None,
+) -> Spot | None:
+    rng = np.random.default_rng(seed)
+    rates = [None] if periods is None else list(np.linspace(*periods, _PERIODS))
+    total = placements + (_DESCENTS + 1) * ROUNDS
+
+    def tell(done: int) -> None:
+        if progress is not None:
+            progress(min(done, total), total)
+
+    found = search.explore(half, rates, placements, seed, tell)
+    chosen: list[Spot] = [] if start is None else [start]
+    if start is not None and periods is not None:
+        own = search.loads.task.operations[0].excitation.period
+        if periods[0] <= own <= periods[1]:
+            chosen = [_with_period(start, own)]
+    for spot in found:
+        if len(chosen) > _DESCENTS:
+            break
+        if any(_near(spot, other, half) for other in chosen[1 if start else 0 :]):
+            continue
+        settled = _settle(search, spot, seed)
+        if settled is not None:
+            chosen.append(settled)
+    step = 0.5 * half / placements**0.25
+    ended = []
+    for k, spot in enumerate(chosen):
+
+        def step_done(number: int, done: int = placements + k * ROUNDS) -> None:
+            tell(done + number)
+
+        ended.append(descend(search, spot, step, half, periods, rng, step_done))
+    tell(total)
+    return min(ended, key=lambda s: (s.damage, s.utilisation), default=None)
+
+
+def _with_period(spot: Spot, period: float) -> Spot:
+    return Spot(spot.move, period, spot.poses, spot.damage, spot.utilisation)
+
+
+def _near(one: Spot, other: Spot, half: FloatArray) -> bool:
+    gap = np.abs(one.move - other.move)
+    gap[3] = min(gap[3], 2.0 * np.pi - gap[3])
+    return bool((gap <= 0.15 * half).all()) and one.period == other.period
+
+
+def _settle(search: Search, spot: Spot, seed: int) -> Spot | None:
+    """The spot, checked; with other poses where links would touch; None where none are left."""
+    worst = Spot(spot.move, spot.period, spot.poses, math.inf, math.inf)
+    everywhere = search.reach.everywhere(4, seed)
+    for seeds in (
+        [q[None, search.reach.chain.index] for q in spot.poses],
+        [everywhere] * len(spot.poses),
+    ):
+        found = search.score(search.reach.candidates(spot.move[None], seeds), spot.period, worst)
+        if found and found[0] is not None:
+            return found[0]
+    return None
+
+
+def _standing(search: Search, spot: Spot) -> Standing:
+    """The same spot by the exact path."""
+    damage, used = _costs(search, spot.move, spot.period, spot.poses, compiled=False)
+    total = (damage * search.work.share[:, None]).sum(axis=0)
+    joints = tuple(
+        JointUse(joint.name, life(float(total[j])), float(used[:, j].max()))
+        for j, joint in enumerate(search.loads.robot.flexible_joints)
+    )
+    mounting = search.loads.robot.mounting
+    base, heading = search.work.base_move(spot.move, np.asarray(mounting.xyz, dtype=float))
+    return Standing(spot, joints, base, heading)
+
+
+def _exact(standing: Standing) -> Spot:
+    spot, rivets = standing.spot, standing.rivets_to_failure
+    damage = 1.0 / rivets if rivets > 0.0 else math.inf
+    return Spot(spot.move, spot.period, spot.poses, damage, standing.utilisation)
+
+
+def _beside(search: Search, spot: Spot, off: float) -> tuple[Off, ...]:
+    """What it costs to be beside the best place by `off` m along x, y and z."""
+    result = []
+    for shift, score in zip(off * SHIFTS, search.beside(spot, off), strict=True):
+        at = (float(shift[0]), float(shift[1]), float(shift[2]))
+        rivets = math.nan if score is None else life(score.damage)
+        result.append(Off(at, rivets, math.nan if score is None else score.utilisation))
+    return tuple(result)
+
+
+def _assumptions(loads: Loads, meshes: SelfCollision | str) -> tuple[str, ...]:
+    lines = [
+        "gravity stiffness off; each rivet starts from rest and rings down before the next",
+        "the work keeps its shape and its place to gravity: it is shifted, and turned about the "
+        "vertical; the force and the tool's axis turn with it",
+        "the tool turns freely about its axis",
+        "the robot may change its branch between any two rivets",
+        "nothing is known of obstacles around robot and work, nor whether the tool fits",
+    ]
+    if loads.by_effort:
+        lines.append(
+            "no joint has a shaft or a reducer: utilisation is the largest torque, gravity and "
+            "blows together, over the URDF's effort limit, and no life can be told"
+        )
+    if isinstance(meshes, str):
+        lines.append(f"self-collisions are not checked: {meshes}")
+    return tuple(lines)

@@ -1,0 +1,141 @@
+"""Compiled damage of a rivet at many poses: exact response, rainflow, S-N curve, Miner's sum."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+from picchio.core.arrays import FloatArray
+from picchio.fatigue.counting.kernel import finish, push
+from picchio.vibration.batch.modal_kernel import coefficients, modes_of
+from picchio.vibration.batch.turning_kernel import most_samples, turning_values
+from picchio.vibration.closed_form.response import RING_DOWN_LEVEL
+
+_BLOCK = 16
+
+
+@njit(cache=True, error_model="numpy")
+def cost_of(amplitude: float, knots: FloatArray, lines: FloatArray) -> float:
+    """Damage of one cycle: one over its life.
+
+    Args:
+        amplitude: Pa.
+        knots: (k,) Pa, falling; see `curve_tables`.
+        lines: (k + 1, 3): cycles and amplitude of a point on each line, and its slope.
+    """
+    line = 0
+    while line < knots.shape[0] and knots[line] > amplitude:
+        line += 1
+    slope = lines[line, 2]
+    if amplitude <= 0.0:
+        return 0.0
+    ratio = amplitude / lines[line, 1]
+    if slope == np.inf:
+        return 0.0
+    return np.exp(slope * np.log(ratio)) / lines[line, 0]
+
+
+@njit(cache=True, error_model="numpy")
+def history_damage(turns, factor, knots, lines, stack, ranges, means):  # type: ignore[no-untyped-def]
+    """Miner's sum of a history: closed cycles whole, the residue as half cycles.
+
+    Args:
+        turns: (t,) turning points, any unit.
+        factor: Pa per that unit.
+        knots: see `cost_of`.
+        lines: see `cost_of`.
+        stack: at least (t,), scratch.
+        ranges: at least (t // 2 + 1,), scratch.
+        means: likewise.
+    """
+    total = 0.0
+    depth, closed = push(turns, stack, 0, ranges, means)
+    for c in range(closed):
+        total += cost_of(0.5 * factor * ranges[c], knots, lines)
+    depth, closed = finish(stack, depth, ranges, means)
+    for c in range(closed):
+        total += cost_of(0.5 * factor * ranges[c], knots, lines)
+    for c in range(depth - 1):
+        total += 0.5 * cost_of(0.5 * factor * abs(stack[c + 1] - stack[c]), knots, lines)
+    return total
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def damages(  # type: ignore[no-untyped-def]
+    start, duration, constant, slope, amplitude, wave, mass, jacobian, stiffness, joint_ratio,
+    along, factor, enough, knots, lines, known, frequency, lowest, highest, damage,
+):  # fmt: skip
+    """Extremes and damage of one rivet at many poses.
+
+    Args:
+        start: (m,) s, of the pieces of a burst; see `PiecewiseForce` for these.
+        duration: (m,) s, the last endless.
+        constant: (m,) N.
+        slope: (m,) N/s.
+        amplitude: (m,) complex N.
+        wave: (m,) rad/s.
+        mass: (p, n, n) kg m^2.
+        jacobian: (p, 3, n) m.
+        stiffness: (p, n) N m/rad.
+        joint_ratio: (n,) damping ratios.
+        along: (p, 3) force directions.
+        factor: (n,) 1/m^3, shear stress per torque; zero without a shaft.
+        enough: (n,) Pa, amplitudes below this do no damage.
+        knots: (n, k) Pa, of the S-N curves; see `cost_of`.
+        lines: (n, k + 1, 3).
+        known: (n,) how many of the k knots a curve has; below zero for a joint without one.
+        frequency: (p, n) Hz, out; NaN where the mass matrix is not positive definite.
+        lowest: (p, n) rad, out; NaN where a mode is not underdamped: take the exact path there.
+        highest: (p, n) rad, out.
+        damage: (p, n) out; zero for a joint without a curve.
+    """
+    poses, n = stiffness.shape
+    for block in prange((poses + _BLOCK - 1) // _BLOCK):
+        work, vectors, shapes = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+        omega, ratio = np.empty(n), np.empty(n)
+        weights, limit, count = np.empty((n, n)), np.empty(n), np.empty(n)
+        poles = np.empty(n, dtype=np.complex128)
+        rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
+        length = duration.copy()
+        for s in range(block * _BLOCK, min(poses, (block + 1) * _BLOCK)):
+            frequency[s, :] = np.nan
+            lowest[s, :] = np.nan
+            if not modes_of(
+                mass[s], stiffness[s], joint_ratio, work, vectors, omega, ratio, shapes
+            ):
+                continue
+            under, slowest = True, np.inf
+            for i in range(n):
+                frequency[s, i] = omega[i] / (2.0 * np.pi)
+                under = under and 0.0 < ratio[i] < 1.0 - 1e-6
+                slowest = min(slowest, ratio[i] * omega[i])
+            if not under:
+                continue
+            for i in range(n):
+                poles[i] = complex(-ratio[i] * omega[i], omega[i] * np.sqrt(1.0 - ratio[i] ** 2))
+                moved = 0.0
+                for d in range(3):
+                    for j in range(n):
+                        moved += jacobian[s, d, j] * shapes[j, i] * along[s, d]
+                for j in range(n):
+                    weights[j, i] = shapes[j, i] * moved
+            for j in range(n):
+                stress = factor[j] * stiffness[s, j]
+                limit[j] = 2.0 * enough[j] / stress if stress > 0.0 else np.inf
+            coefficients(poles, duration, constant, slope, amplitude, wave, False, rows)
+            length[-1] = -np.log(RING_DOWN_LEVEL) / slowest
+            size = most_samples(poles, wave, length)
+            turns = np.empty((n, size))
+            turning_values(
+                poles, rows, wave, length, constant, slope, amplitude, weights, limit, turns, count
+            )
+            stack, ranges, means = np.empty(size), np.empty(size), np.empty(size)
+            for j in range(n):
+                own = turns[j, : int(count[j])]
+                lowest[s, j], highest[s, j] = own.min(), own.max()
+                damage[s, j] = 0.0
+                if known[j] >= 0 and highest[s, j] - lowest[s, j] >= limit[j]:
+                    damage[s, j] = history_damage(
+                        own, factor[j] * stiffness[s, j], knots[j, : known[j]],
+                        lines[j, : known[j] + 1], stack, ranges, means,
+                    )  # fmt: skip

@@ -1,0 +1,148 @@
+"""How a joint's load under one rivet becomes damage: two named methods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, Protocol
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.fatigue.counting.counter import Residue
+from picchio.fatigue.mean_stress import Rule
+from picchio.fatigue.miner import damage, peak_damage, utilisation
+from picchio.fatigue.shaft_stress import shear_stress, shear_stress_from_deflection
+from picchio.fatigue.sn.curve import MinerRule, SNCurve
+from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, load_sn_curve
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.joint import Joint
+from picchio.studies.rivet.loads import JointLoad
+
+
+class JointDamage(NamedTuple):
+    """Peak deflection (rad), peak stress (Pa), utilisation and damage of one rivet."""
+
+    peak_deflection: float
+    peak_stress: float
+    utilisation: float
+    damage: float
+
+
+class LifeRule(Protocol):
+    """A method that turns a joint's load into damage."""
+
+    @property
+    def needs(self) -> Literal["rest", "steady"]:
+        """Which response it looks at."""
+
+    def __call__(self, joint: Joint, load: JointLoad, hits: int, sn_curve: SNCurve) -> JointDamage:
+        """Damage of one rivet of `hits` blows; the joint has a shaft."""
+
+    def assumptions(self) -> tuple[str, ...]:
+        """What the method takes for granted, a sentence each."""
+
+
+def peak(values: FloatArray | None) -> float:
+    """Largest absolute value, NaN for None."""
+    return float("nan") if values is None else float(np.abs(values).max())
+
+
+@dataclass(frozen=True)
+class RainflowRule:
+    """From rest, ring-down included, cycles counted by rainflow, Miner's rule.
+
+    Attributes:
+        residue: how rainflow treats what does not close.
+        mean_stress: the correction; "none" for smooth ductile shafts.
+        miner: what cycles below the endurance limit do; None leaves it to the curve.
+    """
+
+    residue: Residue = "half-cycles"
+    mean_stress: Rule = "none"
+    miner: MinerRule | None = None
+
+    @property
+    def needs(self) -> Literal["rest", "steady"]:
+        """The rivet as it happens."""
+        return "rest"
+
+    def __call__(self, joint: Joint, load: JointLoad, hits: int, sn_curve: SNCurve) -> JointDamage:
+        """Damage of one rivet; the hits are in the load already."""
+        assert joint.shaft is not None
+        assert load.rest is not None
+        cycles = load.stress_cycles(joint, self.residue).shifted(load.static_stress(joint))
+        return JointDamage(
+            peak(load.rest),
+            peak(shear_stress(load.stiffness * load.rest, joint.shaft)),
+            utilisation(cycles, sn_curve, self.mean_stress),
+            damage(cycles, sn_curve, self.mean_stress, self.miner),
+        )
+
+    def assumptions(self) -> tuple[str, ...]:
+        """What the method takes for granted."""
+        return (
+            "each rivet starts from rest and rings down before the next",
+            "stress k x r / Jp at the surface of a solid round shaft",
+            f"cycles by rainflow (ASTM E1049), residue as {self.residue}",
+            f"mean stress (gravity, feed force): {self.mean_stress}",
+            "Miner's sum of 1 is failure",
+        )
+
+
+@dataclass(frozen=True)
+class PaperRule:
+    """Nie et al. 2016: steady state, peak stress as amplitude, one cycle a hit."""
+
+    @property
+    def needs(self) -> Literal["rest", "steady"]:
+        """The paper looks at the steady state alone."""
+        return "steady"
+
+    def __call__(self, joint: Joint, load: JointLoad, hits: int, sn_curve: SNCurve) -> JointDamage:
+        """Damage of one rivet."""
+        assert joint.shaft is not None
+        deflection = peak(load.steady)
+        stress = float(shear_stress_from_deflection(deflection, joint.shaft))
+        return JointDamage(
+            deflection, stress, stress / sn_curve.allowable, peak_damage(stress, hits, sn_curve)
+        )
+
+    def assumptions(self) -> tuple[str, ...]:
+        """What the method takes for granted."""
+        return (
+            "the steady state is reached at the first hit",
+            "stress G r x / l (paper eqs. 14-17)",
+            "the peak stress is the amplitude, and each hit is one cycle",
+            "gravity and feed force leave the life alone",
+            "Miner's sum of 1 is failure",
+        )
+
+
+# Which S-N curve belongs to which joint.
+
+
+def curves_of(
+    robot: FlexibleRobot, override: str | SNCurve | None = None
+) -> tuple[SNCurve | None, ...]:
+    """The S-N curve of every flexible joint; None for a joint without a shaft.
+
+    Args:
+        robot: whose shafts name their curves; one that names none has the default.
+        override: a curve, its name or its file, for all joints.
+
+    Raises:
+        InputError: an unknown name, or a file that is missing or wrong.
+    """
+    loaded: dict[str, SNCurve] = {}
+    curves: list[SNCurve | None] = []
+    for joint in robot.flexible_joints:
+        if joint.shaft is None:
+            curves.append(None)
+        elif isinstance(override, SNCurve):
+            curves.append(override)
+        else:
+            name = override or joint.shaft.sn_curve or DEFAULT_SN_CURVE
+            if name not in loaded:
+                loaded[name] = load_sn_curve(name)
+            curves.append(loaded[name])
+    return tuple(curves)

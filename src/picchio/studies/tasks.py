@@ -1,0 +1,211 @@
+"""A riveting task: operations, each a direction, a blow train and the poses it is done in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.core.toml import Finite, Positive, StrictModel, parse_toml, validate
+from picchio.excitation.table import ExcitationTable, Kind
+from picchio.excitation.trains import Excitation
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.vibration.closed_form.response import unit_vector
+
+FORMAT = "picchio-task/1"
+# An arm of fewer joints cannot choose where its tool points.
+_LEAST_JOINTS_TO_AIM = 5
+
+
+# A rivet takes a dozen; more than this is a slip, and would fill the memory.
+Hits = Annotated[int, Field(gt=0, le=10_000, strict=True)]
+
+
+class OperationTable(StrictModel):
+    """One `[[operation]]`; keys of the excitation given here override the task's."""
+
+    name: str
+    direction: list[Finite]
+    poses: list[list[Finite] | dict[str, Finite]] | None = None
+    points: list[list[Finite]] | None = None
+    branch: str | list[str] = "any"
+    rivets: Positive = 1.0
+    hits_per_rivet: Hits | None = None
+    excitation: ExcitationTable | None = None
+    kind: Kind | None = None
+    force: Positive | None = None
+    period: Positive | None = None
+    width: Positive | None = None
+    preload: Finite | None = None
+    file: str | None = None
+
+    def own_excitation(self) -> ExcitationTable:
+        """The excitation's keys given here, in a table of their own or flat."""
+        flat = {
+            name: value
+            for name in ExcitationTable.model_fields
+            if (value := getattr(self, name)) is not None
+        }
+        return (self.excitation or ExcitationTable()).overridden_by(ExcitationTable(**flat))
+
+
+class TaskTable(StrictModel):
+    """A task file as it is written."""
+
+    hits_per_rivet: Hits = 12
+    excitation: ExcitationTable = ExcitationTable()
+    operation: list[OperationTable] = Field(min_length=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Operation:
+    """Riveting in one direction at some poses.
+
+    Attributes:
+        name: for the reader.
+        direction: (3,) unit vector, world: where the tool's force pushes the robot.
+        excitation: the blows.
+        hits_per_rivet: blows a rivet takes.
+        poses: (n_poses, nv) rad or m.
+        rivets: at each pose, per pass of the task.
+    """
+
+    name: str
+    direction: FloatArray
+    excitation: Excitation
+    hits_per_rivet: int
+    poses: FloatArray
+    rivets: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """All that a robot does before it starts again.
+
+    Attributes:
+        operations: in the order of the file.
+        files: every file read, for provenance.
+    """
+
+    operations: tuple[Operation, ...]
+    files: tuple[Path, ...] = ()
+
+    def __repr__(self) -> str:
+        names = [op.name for op in self.operations]
+        return f"Task(operations={names}, rivets_per_pass={self.rivets_per_pass:g})"
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        rows = [
+            (op.name, op.direction, len(op.poses), op.rivets, op.hits_per_rivet,
+             op.excitation.describe())
+            for op in self.operations
+        ]  # fmt: skip
+        columns = ("operation", "force along", "poses", "rivets a pose", "hits a rivet", "blows")
+        return sheet(f"Task: {self.rivets_per_pass:g} rivets a pass", None, columns, rows)
+
+    @property
+    def rivets_per_pass(self) -> float:
+        """Rivets set in one pass of the task."""
+        return sum(op.rivets * len(op.poses) for op in self.operations)
+
+
+def load_task(path: str | Path, robot: FlexibleRobot) -> Task:
+    """Read a `picchio-task/1` file for a robot; points become poses.
+
+    Raises:
+        InputError: anything wrong in the file, with its key; an unreachable point.
+    """
+    table = parse_toml(path, TaskTable, format=FORMAT)
+    return _build(table, robot, Path(path))
+
+
+def task_from_dict(data: Mapping[str, Any], robot: FlexibleRobot) -> Task:
+    """The task that a file with this content would give; `format` may be left out."""
+    content = {"format": FORMAT, **data}
+    return _build(validate(content, TaskTable, format=FORMAT), robot, None)
+
+
+def _build(table: TaskTable, robot: FlexibleRobot, file: Path | None) -> Task:
+    operations = []
+    reached: dict[tuple[object, ...], FloatArray] = {}
+    files = [file] if file is not None else []
+    names: set[str] = set()
+    for k, entry in enumerate(table.operation):
+        key = f"operation[{k}]"
+        if entry.name in names:
+            raise InputError("names two operations", file=file, key=f"{key}.name", value=entry.name)
+        names.add(entry.name)
+        merged = table.excitation.overridden_by(entry.own_excitation())
+        if merged.preload is None and robot.gun is not None and robot.gun.feed_force:
+            merged = merged.overridden_by(ExcitationTable(preload=robot.gun.feed_force))
+        own = entry.own_excitation() != ExcitationTable()
+        excitation = merged.build(file=file, key=key if own else "excitation")
+        if merged.file is not None and file is not None:
+            files.append(file.parent / merged.file)
+        try:
+            direction = unit_vector(entry.direction)
+        except InputError as error:
+            raise InputError(
+                error.problem, file=file, key=f"{key}.direction", value=entry.direction
+            ) from None
+        operations.append(
+            Operation(
+                entry.name,
+                direction,
+                excitation,
+                entry.hits_per_rivet or table.hits_per_rivet,
+                _poses(entry, robot, direction, reached, file, key),
+                entry.rivets,
+            )
+        )
+    return Task(tuple(operations), tuple(files))
+
+
+def _poses(
+    entry: OperationTable,
+    robot: FlexibleRobot,
+    direction: FloatArray,
+    reached: dict[tuple[object, ...], FloatArray],
+    file: Path | None,
+    key: str,
+) -> FloatArray:
+    if entry.poses is None and entry.points is None:
+        raise InputError("needs poses or points", file=file, key=key)
+    if entry.poses is not None and entry.points is not None:
+        raise InputError("has both poses and points; give one", file=file, key=key)
+    given: list[Any] = (entry.poses if entry.poses is not None else entry.points) or []
+    what = "poses" if entry.poses is not None else "points"
+    if not given:
+        raise InputError("is empty", file=file, key=f"{key}.{what}")
+    poses = []
+    for i, value in enumerate(given):
+        here = f"{key}.{what}[{i}]"
+        try:
+            if what == "poses":
+                pose = robot.pose(value)
+            else:
+                if len(value) != 3:
+                    raise InputError("a point has three coordinates in metres")
+                # Tasks repeat their points from operation to operation; each is solved once.
+                aim = None if len(robot.joint_names) < _LEAST_JOINTS_TO_AIM else -direction
+                known = (*value, str(aim), str(entry.branch))
+                if known not in reached:
+                    reached[known] = robot.inverse_kinematics(value, axis=aim, branch=entry.branch)
+                pose = reached[known]
+        except InputError as error:
+            if error.key == "branch":
+                here, value = f"{key}.branch", error.value
+            raise InputError(
+                error.problem, file=file, key=here, value=value, choices=error.choices,
+                hint=error.hint,
+            ) from None  # fmt: skip
+        poses.append(pose)
+    return np.array(poses)

@@ -1,0 +1,1 @@
+"""The same in compiled code, for many poses or many variations."""

@@ -1,0 +1,171 @@
+"""Compiled peaks over time, and over all directions, for many poses."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.vibration.batch.modal_kernel import coefficients, exponential, modes_of
+from picchio.vibration.batch.top_kernel import (
+    TERMS,
+    Samples,
+    highest,
+    joint_norms,
+    room_for,
+    sample,
+    steps_of,
+)
+
+_BLOCK = 128
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _pose_peaks(
+    periodic: bool,
+    start: FloatArray,
+    duration: FloatArray,
+    constant: FloatArray,
+    slope: FloatArray,
+    amplitude: ComplexArray,
+    wave: FloatArray,
+    omega: FloatArray,
+    ratio: FloatArray,
+    shapes: FloatArray,
+    push: FloatArray,
+    poles: ComplexArray,
+    rows: ComplexArray,
+    peak: FloatArray,
+    direction: FloatArray,
+    dims: int,
+    g: FloatArray,
+    terms: FloatArray,
+    room: Samples,
+) -> Samples:
+    """Peaks of one pose; returns the room for samples, which may have grown."""
+    n = push.shape[0]
+    for i in range(n):
+        poles[i] = complex(-ratio[i] * omega[i], omega[i] * np.sqrt(1.0 - ratio[i] ** 2))
+    coefficients(poles, duration, constant, slope, amplitude, wave, periodic, rows)
+    endless = np.isinf(duration[-1])
+    length = duration
+    if endless:
+        length = duration.copy()
+        length[-1] = 2.0 * np.pi / omega[0]
+    while True:
+        count, total = 0, 0.0
+        for p in range(length.shape[0]):
+            count += steps_of(length[p], max(omega[n - 1], wave[p]))
+            total += length[p]
+        if count > room.time.shape[0]:
+            room = room_for(n, 2 * count)
+        sample(poles, rows, length, wave, omega[n - 1], room.eta, room.rate, room.time)
+        done = True
+        for j in range(n):
+            peak[j] = joint_norms(j, count, room.eta, shapes, push, dims, room.g, room.norm)
+            if endless and done:
+                # Nothing after the samples can be larger than what is left of the modes.
+                left = 0.0
+                for d in range(dims):
+                    most = 0.0
+                    for i in range(n):
+                        z = rows[i, -1, 0] * exponential(poles[i], length[-1])
+                        most += abs(shapes[j, i] * push[i, d]) * abs(z) / poles[i].imag
+                    left += most * most
+                done = left <= peak[j]
+        if done or length[-1] > 1e3 * np.pi / (ratio[0] * omega[0]):
+            break
+        length[-1] *= 2.0
+    for j in range(n):
+        direction[j, 0], direction[j, 1], direction[j, 2] = 0.0, 0.0, 1.0
+        if peak[j] > 0.0:
+            peak[j] = highest(
+                j, count, periodic, total, room.time, room.norm, room.eta, room.rate, start, poles,
+                rows, constant, slope, amplitude, wave, shapes, push, g, terms, direction,
+            )  # fmt: skip
+    return room
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def peaks(
+    periodic: bool,
+    start: FloatArray,
+    duration: FloatArray,
+    constant: FloatArray,
+    slope: FloatArray,
+    amplitude: ComplexArray,
+    wave: FloatArray,
+    mass: FloatArray,
+    jacobian: FloatArray,
+    stiffness: FloatArray,
+    joint_ratio: FloatArray,
+    along: FloatArray,
+    frequency: FloatArray,
+    peak: FloatArray,
+    direction: FloatArray,
+) -> None:
+    """Natural frequencies and peak deflections at many poses.
+
+    Args:
+        periodic: steady state, or from rest with an endless last piece.
+        start: (m,) s, of the pieces of the force; see `PiecewiseForce` for these.
+        duration: (m,) s.
+        constant: (m,) N.
+        slope: (m,) N/s.
+        amplitude: (m,) complex, N.
+        wave: (m,) rad/s.
+        mass: (p, n, n) kg m^2.
+        jacobian: (p, 3, n) m.
+        stiffness: (p, n) N m/rad.
+        joint_ratio: (n,) damping ratios.
+        along: (p, 3) force directions, or (0, 3) for the worst of all directions.
+        frequency: (p, n) Hz, out; NaN where the pose's mass matrix is not positive definite.
+        peak: (p, n) rad, out; NaN where a mode is not underdamped: take the exact path there.
+        direction: (p, n, 3) out; of a fixed direction, itself.
+    """
+    poses, n = stiffness.shape
+    dims = 3 if along.shape[0] == 0 else 1
+    for block in prange((poses + _BLOCK - 1) // _BLOCK):
+        work = np.empty((n, n))
+        vectors = np.empty((n, n))
+        omega = np.empty(n)
+        ratio = np.empty(n)
+        shapes = np.empty((n, n))
+        push = np.empty((n, 3))
+        found = np.empty((n, 3))
+        g = np.empty(3)
+        terms = np.empty((TERMS, 3))
+        room = room_for(n, 256)
+        poles = np.empty(n, dtype=np.complex128)
+        rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
+        for s in range(block * _BLOCK, min(poses, (block + 1) * _BLOCK)):
+            frequency[s, :] = np.nan
+            peak[s, :] = np.nan
+            direction[s, :, :] = np.nan
+            if not modes_of(
+                mass[s], stiffness[s], joint_ratio, work, vectors, omega, ratio, shapes
+            ):
+                continue
+            under = True
+            for i in range(n):
+                frequency[s, i] = omega[i] / (2.0 * np.pi)
+                under = under and 0.0 < ratio[i] < 1.0 - 1e-6
+            if not under:
+                continue
+            push[:] = 0.0
+            for i in range(n):
+                for d in range(3):
+                    moved = 0.0
+                    for j in range(n):
+                        moved += jacobian[s, d, j] * shapes[j, i]
+                    if dims == 3:
+                        push[i, d] = moved
+                    else:
+                        push[i, 0] += moved * along[s, d]
+            room = _pose_peaks(
+                periodic, start, duration, constant, slope, amplitude, wave, omega, ratio,
+                shapes, push, poles, rows, peak[s], found, dims, g, terms, room,
+            )  # fmt: skip
+            for j in range(n):
+                for d in range(3):
+                    direction[s, j, d] = found[j, d] if dims == 3 else along[s, d]

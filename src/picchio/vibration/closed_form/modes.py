@@ -1,0 +1,158 @@
+"""Modes of a linear system, real or complex, as poles and residues."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.model.linear_system import LinearSystem, undamped_modes
+
+# Largest off-diagonal term of S^T C S, relative to its diagonal, that counts as rounding.
+_DECOUPLED = 1e-10
+# Two equal poles make the residues infinite though the response is smooth in the damping:
+# damping this close to critical is moved by this much, which moves the response as little.
+_CRITICAL = 1e-10
+_DEFECTIVE = 1e7
+_NUDGE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """The system in modal form.
+
+    The response of output j to a force F(t) n is the sum over poles of
+    Re(residue[j, p] . n z_p(t)) with z_p' = pole_p z_p + F. Poles below the real axis are
+    left out, their share is in the residues of their conjugates.
+
+    Attributes:
+        natural_frequencies: (n,) Hz, undamped, ascending.
+        damping_ratios: (n,) of the undamped modes: the diagonal of S^T C S over 2 omega.
+        mode_shapes: (n, n), mass-normalised undamped modes, one a column.
+        poles: (p,) complex, 1/s.
+        residues: (m, p, 3) complex, output per newton along x, y, z.
+        decoupled: whether the damping leaves the undamped modes uncoupled.
+        output_names: m names.
+    """
+
+    natural_frequencies: FloatArray
+    damping_ratios: FloatArray
+    mode_shapes: FloatArray
+    poles: ComplexArray
+    residues: ComplexArray
+    decoupled: bool
+    output_names: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"Modes(natural_frequencies={self.natural_frequencies.round(3).tolist()} Hz)"
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        rows = zip(range(1, 1 + len(self.natural_frequencies)), self.natural_frequencies,
+                   100 * self.damping_ratios, strict=True)  # fmt: skip
+        columns = ("mode", "natural frequency [Hz]", "damping ratio [%]")
+        return sheet(f"Modes of {', '.join(self.output_names)}", None, columns, rows)
+
+    def frequency_response(self, angular_frequency: FloatArray) -> ComplexArray:
+        """Deflection per newton at angular frequencies (k,) rad/s: (m, 3, k) complex, rad/N."""
+        s = 1j * np.asarray(angular_frequency, dtype=float)
+        below = 0.5 * self.residues.conj()
+        above = 0.5 * self.residues
+        return np.einsum("mpd,pk->mdk", above, 1.0 / (s - self.poles[:, None])) + np.einsum(
+            "mpd,pk->mdk", below, 1.0 / (s - self.poles.conj()[:, None])
+        )
+
+
+def modal_analysis(system: LinearSystem) -> Modes:
+    """Poles and residues of a linear system.
+
+    Where the damping is proportional to the modes (paper eq. 11) the poles are those of single
+    oscillators, under-, over- or undamped. Other damping couples them: the complex modes of the
+    state-space form are taken, exact all the same.
+
+    Args:
+        system: M, C, K, and where force goes in.
+
+    Returns:
+        the modes.
+
+    Raises:
+        InputError: M or K is not positive definite.
+
+    Source: Ewins, Modal Testing (2000), ch. 2; Golla and Hughes state-space form.
+    """
+    omega, shapes = undamped_modes(system.mass_matrix, system.stiffness_matrix)
+    damping = shapes.T @ system.damping_matrix @ shapes
+    scale = np.sqrt(np.abs(np.outer(damping.diagonal(), damping.diagonal())))
+    off_diagonal = damping - np.diag(damping.diagonal())
+    decoupled = bool((np.abs(off_diagonal) <= _DECOUPLED * (scale + scale.max())).all())
+
+    ratio = damping.diagonal() / (2.0 * omega)
+    participation = shapes.T @ system.input_matrix
+    output = system.output_matrix @ shapes
+    if decoupled:
+        poles, left, right = _oscillators(omega, ratio)
+    else:
+        poles, left, right = _complex_modes(omega, damping)
+    residues = np.einsum("mi,ip,pk,kd->mpd", output, left, right, participation)
+    return Modes(
+        natural_frequencies=omega / (2.0 * np.pi),
+        damping_ratios=ratio,
+        mode_shapes=shapes,
+        poles=poles,
+        residues=np.where((poles.imag > 0.0)[None, :, None], 2.0 * residues, residues),
+        decoupled=decoupled,
+        output_names=system.output_names,
+    )
+
+
+def _oscillators(
+    omega: FloatArray, ratio: FloatArray
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Poles of uncoupled oscillators: 1/((s - a)(s - b)) = (1/(s - a) - 1/(s - b))/(a - b)."""
+    poles, modes, weights = [], [], []
+    for i, (w, zeta) in enumerate(zip(omega, ratio, strict=True)):
+        if abs(zeta * zeta - 1.0) < _CRITICAL:
+            zeta = np.sqrt(1.0 + _CRITICAL)
+        if zeta < 1.0:
+            damped = w * np.sqrt(1.0 - zeta * zeta)
+            poles.append(-zeta * w + 1j * damped)
+            modes.append(i)
+            weights.append(1.0 / (2j * damped))
+        else:
+            # The slow pole from the product of both, so that strong damping loses no digits.
+            root = np.sqrt(zeta * zeta - 1.0)
+            fast = -w * (zeta + root)
+            poles += [w * w / fast, fast]
+            modes += [i, i]
+            weights += [1.0 / (2.0 * w * root), -1.0 / (2.0 * w * root)]
+    count = len(poles)
+    left = np.zeros((omega.size, count), dtype=complex)
+    right = np.zeros((count, omega.size), dtype=complex)
+    for p, (i, weight) in enumerate(zip(modes, weights, strict=True)):
+        left[i, p] = weight
+        right[p, i] = 1.0
+    return np.array(poles, dtype=complex), left, right
+
+
+def _complex_modes(
+    omega: FloatArray, damping: FloatArray
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Complex modes of eta'' + damping eta' + omega^2 eta = f, state (omega eta, eta')."""
+    n = omega.size
+
+    def solve(damping: FloatArray) -> tuple[FloatArray, FloatArray]:
+        state = np.block([[np.zeros((n, n)), np.diag(omega)], [-np.diag(omega), -damping]])
+        return np.linalg.eig(state)
+
+    poles, vectors = solve(damping)
+    if np.linalg.cond(vectors) > _DEFECTIVE:
+        # Equal poles share one vector; a hair more damping parts them (see _CRITICAL).
+        step = np.diag(damping.diagonal() * _NUDGE * np.arange(1, n + 1))
+        poles, vectors = solve(damping + step)
+    inverse = np.linalg.inv(vectors)
+    keep = poles.imag >= 0.0
+    left = vectors[:n] / omega[:, None]
+    return poles[keep], left[:, keep], inverse[keep, n:]

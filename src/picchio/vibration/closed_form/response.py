@@ -1,0 +1,353 @@
+"""A closed-form response: its values at any time, its turning points, its worst direction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from picchio.core.arrays import ComplexArray, FloatArray, IndexArray
+from picchio.core.errors import InputError
+from picchio.excitation.piecewise import PiecewiseForce
+from picchio.excitation.trains import Excitation
+from picchio.vibration.closed_form.extrema import Grid, golden_maximum, refine_roots
+from picchio.vibration.closed_form.modes import Modes
+
+# A ring-down is followed until its envelope has fallen to this share of its start.
+RING_DOWN_LEVEL = 1e-4
+
+
+class Peak(NamedTuple):
+    """Largest absolute deflection of one joint: value (rad, with its sign) and time (s)."""
+
+    value: float
+    time: float
+
+
+class WorstDirection(NamedTuple):
+    """Over all directions: value (rad), direction (3,) unit vector, time (s)."""
+
+    value: float
+    direction: FloatArray
+    time: float
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """The deflection of every joint, in closed form, for a force in any direction.
+
+    Attributes:
+        modes: the system.
+        force: the history that acts; of a periodic response, one period.
+        states: (p, m) complex, N s, modal states at the start of every piece of the force.
+        periodic: whether the response repeats with the force's period.
+    """
+
+    modes: Modes
+    force: PiecewiseForce
+    states: ComplexArray
+    periodic: bool
+
+    @property
+    def horizon(self) -> float:
+        """Until when there is anything to see, s: the period, or the ring-down's end.
+
+        Raises:
+            InputError: an undamped mode rings for ever.
+        """
+        if np.isfinite(self.force.end):
+            return float(self.force.end)
+        slowest = -float(self.modes.poles.real.max())
+        if slowest <= 0.0:
+            raise InputError(
+                "a mode has no damping: after the blows it rings for ever, and a rivet has no end",
+                key="damping_ratio",
+                value=0.0,
+                hint="give the joints a damping ratio above 0",
+            )
+        return float(self.force.start[-1] - np.log(RING_DOWN_LEVEL) / slowest)
+
+    def _locate(self, time: ArrayLike) -> tuple[IndexArray, FloatArray]:
+        t = np.asarray(time, dtype=float)
+        if self.periodic:
+            t = np.mod(t, self.force.end)
+        elif (t < 0.0).any() or (t > self.force.end).any():
+            raise InputError("time must lie within the force history", key="time")
+        index = np.searchsorted(self.force.start, t, side="right") - 1
+        return index, t - self.force.start[index]
+
+    def _modal(self, index: IndexArray, u: FloatArray) -> ComplexArray:
+        """Modal states (p, k) at `u` seconds after the start of piece `index`."""
+        poles = self.modes.poles
+        free = np.exp(poles[:, None] * u) * self.states[:, index]
+        return free + self.force.convolve(poles, index, u)
+
+    def unit_deflection(self, time: ArrayLike) -> FloatArray:
+        """g_j(t): deflection of joint j for the force along x, y and z.
+
+        Args:
+            time: (k,) s.
+
+        Returns:
+            (m, 3, k) rad; the deflection for direction n is the sum over axis 1 with n.
+        """
+        modal = self._modal(*self._locate(np.atleast_1d(time)))
+        return np.einsum("mpd,pk->mdk", self.modes.residues, modal).real
+
+    def deflection(self, time: ArrayLike, direction: ArrayLike) -> FloatArray:
+        """Deflection of every joint for one force direction.
+
+        Args:
+            time: (k,) s.
+            direction: (3,) unit vector, world.
+
+        Returns:
+            (m, k) rad.
+        """
+        modal = self._modal(*self._locate(np.atleast_1d(time)))
+        return (self._along(direction) @ modal).real
+
+    def velocity(self, time: ArrayLike, direction: ArrayLike) -> FloatArray:
+        """Deflection rate of every joint, (m, k) rad/s."""
+        modal = self._modal(*self._locate(np.atleast_1d(time)))
+        return ((self._along(direction) * self.modes.poles) @ modal).real
+
+    def acceleration(self, time: ArrayLike, direction: ArrayLike) -> FloatArray:
+        """Second derivative of every joint's deflection, (m, k) rad/s^2; jumps with the force."""
+        index, u = self._locate(np.atleast_1d(time))
+        weighted = self._along(direction) * self.modes.poles
+        rate = self.modes.poles[:, None] * self._modal(index, u)
+        return (weighted @ (rate + self.force.in_piece(index, u))).real
+
+    def _along(self, direction: ArrayLike) -> ComplexArray:
+        return self.modes.residues @ unit_vector(direction)
+
+    def turning_points(self, direction: ArrayLike) -> list[tuple[FloatArray, FloatArray]]:
+        """Every extremum of every joint's deflection, found from the closed form.
+
+        A response from rest starts at time 0 with deflection 0 and, after a ring-down, ends at
+        rest. A periodic one starts and ends at the same turning point, one period later.
+
+        Args:
+            direction: (3,) unit vector.
+
+        Returns:
+            for each output, (time (k,) s, deflection (k,) rad).
+        """
+        along = self._along(direction)
+        grid = Grid.of(self.modes.poles, self.force, self.horizon)
+        modal = self._modal(grid.index, grid.local)
+        result = []
+        for row in along:
+            on_grid = self._slope_of(row, modal, grid.index, grid.local)
+            index, u = refine_roots(grid, on_grid, partial(self._slope, row))
+            time = self.force.start[index] + u
+            value = (row @ self._modal(index, u)).real
+            result.append(self._close(time, value, row))
+        return result
+
+    def _slope(
+        self, row: ComplexArray, index: IndexArray, u: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """First and second derivative of one output."""
+        return self._slope_of(row, self._modal(index, u), index, u)
+
+    def _slope_of(
+        self, row: ComplexArray, modal: ComplexArray, index: IndexArray, u: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        # Not by BLAS: its threads cost more than these few rows.
+        weighted = row * self.modes.poles
+        first, second = np.einsum("dp,pk->dk", [weighted, weighted * self.modes.poles], modal).real
+        return first, second + weighted.sum().real * self.force.in_piece(index, u)
+
+    def _close(
+        self, time: FloatArray, value: FloatArray, row: ComplexArray
+    ) -> tuple[FloatArray, FloatArray]:
+        if self.periodic:
+            if not time.size:  # a constant
+                start = (row @ self.states[:, :1]).real
+                return np.zeros(1), start
+            return np.append(time, time[0] + self.force.end), np.append(value, value[0])
+        end = self.horizon
+        last = 0.0
+        if np.isfinite(self.force.end):
+            here, u = self._locate(np.array([end]))
+            last = float((row @ self._modal(here, u)).real[0])
+        return np.concatenate([[0.0], time, [end]]), np.concatenate([[0.0], value, [last]])
+
+    def peaks(self, direction: ArrayLike) -> list[Peak]:
+        """The largest absolute deflection of every joint for one direction, exact in time."""
+        result = []
+        for time, value in self.turning_points(direction):
+            k = int(np.abs(value).argmax())
+            result.append(Peak(float(value[k]), float(time[k])))
+        return result
+
+    def worst_directions(self) -> list[WorstDirection]:
+        """The largest deflection of every joint over all force directions, no direction sampled.
+
+        The deflection for direction n is g(t) . n, so its maximum over unit n and time is
+        max |g(t)|, reached along g. Where g vanishes the direction is +z.
+
+        Returns:
+            one for each output; either sign of the direction gives the same deflection.
+        """
+        grid = Grid.of(self.modes.poles, self.force, self.horizon, density=2)
+        modal = self._modal(grid.index, grid.local)
+        result = []
+        for residue in self.modes.residues:
+            if np.abs(residue).max() == 0.0:
+                result.append(WorstDirection(0.0, np.array([0.0, 0.0, 1.0]), 0.0))
+                continue
+            on_grid = self._norm_slope_of(residue, modal, grid.index, grid.local)
+            index, u = refine_roots(grid, on_grid, partial(self._norm_slope, residue))
+            # The grid itself as well: a monotonic response has its maximum at an end.
+            index, u = np.append(grid.index, index), np.append(grid.local, u)
+            g = np.einsum("pd,pk->dk", residue, self._modal(index, u)).real
+            norm = np.sqrt((g * g).sum(axis=0))
+            k = int(norm.argmax())
+            time = float(self.force.start[index[k]] + u[k])
+            direction = g[:, k] / norm[k] if norm[k] > 0 else np.array([0.0, 0.0, 1.0])
+            result.append(WorstDirection(float(norm[k]), direction, time))
+        return result
+
+    def worst_combination(self, rows: FloatArray) -> tuple[float, FloatArray]:
+        """Largest length of a vector output over time and all force directions.
+
+        The output rows @ x(t) is G(t) n with G (r, 3), so its largest length over unit n is G's
+        largest singular value, along its right singular vector.
+
+        Args:
+            rows: (r, m), such as the tool's Jacobian for its displacement.
+
+        Returns:
+            the value (per unit of the rows) and the direction (3,).
+        """
+        grid = Grid.of(self.modes.poles, self.force, self.horizon, density=2)
+        residues = np.einsum("rm,mpd->rpd", rows, self.modes.residues)
+
+        def largest(index: IndexArray, u: FloatArray) -> FloatArray:
+            g = np.einsum("rpd,pk->krd", residues, self._modal(index, u)).real
+            return np.asarray(np.linalg.svd(g, compute_uv=False)[:, 0])
+
+        size = largest(grid.index, grid.local)
+        index, u = golden_maximum(grid, size, largest)
+        k = int(np.argmax(final := largest(index, u)))
+        at = np.einsum("rpd,pk->krd", residues, self._modal(index[k : k + 1], u[k : k + 1])).real[0]
+        return float(final[k]), np.linalg.svd(at)[2][0]
+
+    def _norm_slope(
+        self, residue: ComplexArray, index: IndexArray, u: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """First and second derivative of |g|^2 / 2."""
+        return self._norm_slope_of(residue, self._modal(index, u), index, u)
+
+    def _norm_slope_of(
+        self, residue: ComplexArray, modal: ComplexArray, index: IndexArray, u: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        poles = self.modes.poles[:, None]
+        g = (residue.T @ modal).real
+        v = ((residue * poles).T @ modal).real
+        a = ((residue * poles**2).T @ modal).real
+        a += (residue * poles).sum(axis=0).real[:, None] * self.force.in_piece(index, u)
+        return (g * v).sum(axis=0), (v * v).sum(axis=0) + (g * a).sum(axis=0)
+
+
+def unit_vector(direction: ArrayLike) -> FloatArray:
+    """The direction with length 1.
+
+    Raises:
+        InputError: not three finite numbers, or all zero.
+    """
+    n = np.asarray(direction, dtype=float)
+    if n.shape != (3,) or not np.isfinite(n).all():
+        raise InputError("must be three finite numbers", key="direction", value=direction)
+    length = float(np.linalg.norm(n))
+    if length == 0.0:
+        raise InputError("has zero length", key="direction", value=[float(c) for c in n])
+    return n / length
+
+
+# The exact response of every mode to a force in pieces.
+
+# |1 - exp(pole T)| below this: the blows keep step with a mode that nothing damps.
+_RESONANCE = 1e-10
+
+
+def steady_state(modes: Modes, excitation: Excitation | PiecewiseForce) -> Response:
+    """The exact periodic response, no Fourier sum: paper eq. 13 without truncation.
+
+    Between the jumps of the force each mode is a free decay about a particular solution; the
+    state that repeats after one period follows from one division.
+
+    Args:
+        modes: the system.
+        excitation: the blows; of a `PiecewiseForce`, one period.
+
+    Returns:
+        the response over one period.
+
+    Raises:
+        InputError: an undamped mode in resonance with the blows: no steady state exists.
+    """
+    force = excitation.one_period() if isinstance(excitation, Excitation) else excitation
+    if not np.isfinite(force.end):
+        raise InputError("a steady state needs a force with a finite period")
+    zero = np.zeros(modes.poles.size, dtype=complex)
+    after_one_period = _propagate(modes.poles, force, zero)[:, -1]
+    remaining = -np.expm1(modes.poles * force.end)  # 1 - exp(pole T)
+    undamped = modes.poles.real >= 0.0
+    stuck = undamped & (np.abs(remaining) < _RESONANCE)
+    if stuck.any():
+        frequency = float(np.abs(modes.poles[stuck][0].imag)) / (2.0 * np.pi)
+        raise InputError(
+            f"the mode at {frequency:.6g} Hz has no damping and is in resonance with blows every "
+            f"{force.end:g} s: its vibration grows without end",
+            key="damping_ratio",
+            value=0.0,
+            hint="give the joints a damping ratio above 0, or another period",
+        )
+    states = _propagate(modes.poles, force, after_one_period / remaining)
+    return Response(modes, force, states[:, :-1], periodic=True)
+
+
+def response_from_rest(
+    modes: Modes, excitation: Excitation | PiecewiseForce, hits: int | None = None
+) -> Response:
+    """The exact response to a burst from rest, ring-down included.
+
+    Args:
+        modes: the system.
+        excitation: the blows, or a force history (whose last piece may be endless).
+        hits: how many blows, for an `Excitation`.
+
+    Returns:
+        the response from the first blow on.
+
+    Raises:
+        InputError: hits below 1, or none given for an excitation.
+    """
+    if isinstance(excitation, Excitation):
+        if hits is None:
+            raise InputError("how many hits the burst has must be given", key="hits")
+        force = excitation.burst(hits)
+    else:
+        force = excitation
+    rest = np.zeros(modes.poles.size, dtype=complex)
+    return Response(modes, force, _propagate(modes.poles, force, rest)[:, :-1], periodic=False)
+
+
+def _propagate(poles: ComplexArray, force: PiecewiseForce, state: ComplexArray) -> ComplexArray:
+    """Modal states at every piece's start and at the end: (p, m + 1)."""
+    duration = np.where(np.isfinite(force.duration), force.duration, 0.0)
+    index = np.arange(duration.size)
+    gained = force.convolve(poles, index, duration)
+    kept = np.exp(poles[:, None] * duration)
+    states = np.empty((poles.size, duration.size + 1), dtype=complex)
+    states[:, 0] = state
+    for i in index:
+        states[:, i + 1] = kept[:, i] * states[:, i] + gained[:, i]
+    return states

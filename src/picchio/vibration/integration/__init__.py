@@ -1,0 +1,1 @@
+"""Motion to second order in the deflections, nonlinear elements included."""

@@ -1,0 +1,106 @@
+"""Dry friction within a step: a joint is held still where it can be, compiled."""
+
+# mypy: disable-error-code="no-untyped-def"
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from picchio.vibration.integration.step_kernel import taylor
+
+COULOMB = 3
+_FRICTION_SWEEPS = 4
+_IDEAL = 2e-5  # rad/s, below which friction is taken as ideal
+
+
+@njit(cache=True, nogil=True)
+def _smooth_friction(free, gain, limit, smooth):
+    """The f with f = limit tanh((free - gain f) / smooth), by bisection and Newton."""
+    low, high = -limit, limit
+    f = min(max(free / (gain + smooth / max(limit, 1e-300)), low), high)
+    for _ in range(60):
+        t = np.tanh((free - gain * f) / smooth)
+        wrong = f - limit * t
+        if wrong > 0.0:
+            high = f
+        else:
+            low = f
+        step = wrong / (1.0 + limit * (1.0 - t * t) * gain / smooth)
+        new = f - step
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if abs(new - f) <= 1e-9 * limit:
+            return new
+        f = new
+    return f
+
+
+@njit(cache=True, nogil=True)
+def _ideal_friction(before, free, gain, limit):
+    """Mean and last value of ideal friction in a step, from the rate before and after it.
+
+    A joint that slides towards rest comes to it within the step at `part`; from there it is held
+    where friction can, or slides the other way. Without this the friction of a step in which the
+    joint turns round would have the last part's sign all through, an impulse wrong by as much as
+    the step is long. The rate is a straight line in each part.
+    """
+    change = free - before
+    side = 1.0 if before > 0.0 else -1.0
+    slope = change - side * gain * limit
+    if before != 0.0 and (before + slope) * side > 0.0:
+        return side * limit, side * limit  # it slides all through
+    part = min(max(-before / slope, 0.0), 1.0) if before != 0.0 else 0.0
+    if abs(change) <= gain * limit:
+        mean = min(max(free / gain, -limit), limit)
+        held = mean
+        if part < 1.0:
+            held = min(max((mean - side * limit * part) / (1.0 - part), -limit), limit)
+        return mean, held
+    last = limit if change > 0.0 else -limit
+    return last * (1.0 - part) + side * limit * part, last
+
+
+@njit(cache=True, nogil=True)
+def stick(
+    old, last, new, n, rows, kinds, parameters, friction, kick, zero, length, regular,
+    from_start, from_end, inverse, ik, ic, fastest,
+):  # fmt: skip
+    """Dry friction of a step: it holds a joint still where it can, else it has its limit.
+
+    `old` and `new` are the states before and after, (2N,); the mean over the step goes to
+    `friction`, the value at its end to `last`, and `new` is moved by it.
+    """
+    for e in range(kinds.size):
+        if kinds[e] != COULOMB:
+            continue
+        if regular:
+            for i in range(2 * n):
+                total = 0.0
+                for j in range(n):
+                    total += (from_start[i, j] + from_end[i, j]) * rows[e, j]
+                kick[e, i] = total
+        else:
+            taylor(zero, rows[e], rows[e], length, inverse, ik, ic, fastest, kick[e])
+        friction[e] = 0.0
+    for _ in range(_FRICTION_SWEEPS):
+        for e in range(kinds.size):
+            if kinds[e] != COULOMB:
+                continue
+            rate = 0.0
+            gain = 0.0
+            before = 0.0
+            for j in range(n):
+                before += rows[e, j] * old[n + j]
+                rate += rows[e, j] * new[n + j]
+                gain += rows[e, j] * kick[e, n + j]
+            free = rate + gain * friction[e]  # the rate without this friction
+            limit, smooth = parameters[e, 0], parameters[e, 1]
+            if smooth <= _IDEAL:
+                wanted, last[e] = _ideal_friction(before, free, gain, limit)
+            else:
+                wanted = _smooth_friction(free, gain, limit, smooth)
+                last[e] = wanted
+            change = wanted - friction[e]
+            friction[e] = wanted
+            for i in range(2 * n):
+                new[i] -= change * kick[e, i]

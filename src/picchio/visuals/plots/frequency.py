@@ -1,0 +1,180 @@
+"""Measured and simulated frequency response over each other, with the coherence."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
+
+from picchio.campaign.channels import Channel
+from picchio.excitation.trains import Excitation
+from picchio.prediction.residual import Transfer
+from picchio.vibration.closed_form.modes import Modes
+from picchio.vibration.closed_form.response import unit_vector
+from picchio.visuals.plots.diagnosis import BEFORE, MEASURED, plain_numbers, shown_unit
+from picchio.visuals.plots.style import (
+    BLUE,
+    GREEN,
+    INK,
+    MUTED,
+    axes_or_new,
+    direction_label,
+    look,
+    plain,
+    styled,
+)
+
+# The robot's modes: where they lie and which joints move in them.
+
+
+@styled
+def plot_natural_frequencies(
+    modes: Modes, ax: Axes | None = None, *, excitation: Excitation | None = None
+) -> Axes:
+    """Natural frequency (Hz) and damping of every mode; the blows' harmonics as thin lines.
+
+    Args:
+        modes: of the robot at a pose.
+        ax: where to draw.
+        excitation: blows whose harmonics to mark.
+    """
+    frequency = modes.natural_frequencies
+    ax = axes_or_new(ax, height=1.1 + 0.32 * frequency.size)
+    if excitation is not None:
+        harmonics = np.arange(1, int(1.25 * frequency.max() * excitation.period) + 2)
+        for k, f in enumerate(harmonics / excitation.period):
+            ax.axvline(f, color=MUTED, linewidth=0.8, linestyle=":", alpha=0.6,
+                       label=f"harmonics of the blows, {1 / excitation.period:g} Hz apart"
+                       if k == 0 else None)  # fmt: skip
+    row = np.arange(frequency.size)
+    ax.hlines(row, 0.0, frequency, color=BLUE, linewidth=2.2)
+    ax.plot(frequency, row, "o", color=BLUE, markersize=7)
+    for y, (f, ratio) in enumerate(zip(frequency, modes.damping_ratios, strict=True)):
+        ax.annotate(f"{f:.3g} Hz, {100 * ratio:.2g} %", (f, y), xytext=(8, 0), color=INK,
+                    textcoords="offset points", va="center", fontsize=8.5)  # fmt: skip
+    ax.set_yticks(row, [f"mode {k + 1}" for k in row])
+    ax.set(xlabel="natural frequency [Hz], damping ratio [%]", title="Natural frequencies")
+    ax.set_xlim(0.0, 1.25 * float(frequency.max()))
+    ax.set_ylim(frequency.size - 0.4, -0.6)
+    ax.grid(axis="y", visible=False)
+    if excitation is not None:
+        ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
+    return ax
+
+
+@styled
+def plot_mode_shapes(modes: Modes, ax: Axes | None = None) -> Axes:
+    """Deflection of every joint in every mode, the largest set to 1 (no unit).
+
+    Args:
+        modes: of the robot at a pose.
+        ax: where to draw.
+    """
+    shapes = modes.mode_shapes
+    shapes = shapes / shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
+    n = len(shapes)
+    ax = axes_or_new(ax, height=2.9)
+    width = 0.8 / n
+    names = modes.output_names if len(modes.output_names) == n else [f"{j + 1}" for j in range(n)]
+    for j in range(n):
+        ax.bar(np.arange(n) + (j - (n - 1) / 2) * width, shapes[j], 0.88 * width,
+               color=look(j)["color"], label=plain(names[j]))  # fmt: skip
+    ax.axhline(0.0, color=MUTED, linewidth=0.8)
+    ax.set_xticks(
+        np.arange(n), [f"mode {k + 1}\n{f:.3g} Hz" for k, f in enumerate(modes.natural_frequencies)]
+    )
+    ax.set(ylabel="relative deflection [\N{EN DASH}]", title="Mode shapes")
+    ax.set_ylim(-1.12, 1.12)
+    ax.grid(axis="x", visible=False)
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return ax
+
+
+# What each joint does to a sinusoidal force, by frequency.
+
+_MOST_HARMONICS = 16
+
+
+@styled
+def plot_frequency_response(
+    modes: Modes,
+    direction: ArrayLike,
+    ax: Axes | None = None,
+    *,
+    excitation: Excitation | None = None,
+    points: int = 900,
+) -> Axes:
+    """Deflection per newton of every joint (microradians per newton) over frequency (Hz).
+
+    Args:
+        modes: of the robot at a pose.
+        direction: (3,) of the force.
+        ax: where to draw.
+        excitation: blows whose harmonics to mark.
+        points: of each curve.
+    """
+    ax = axes_or_new(ax)
+    f = modes.natural_frequencies
+    # Resonances are narrow: half of the points sit on them.
+    spread = np.concatenate(
+        [fk * (1 + np.linspace(-0.2, 0.2, points // 8) ** 3 / 0.04) for fk in f]
+    )
+    frequency = np.union1d(np.geomspace(f[0] / 6.0, 2.2 * f[-1], points), spread)
+    gain = np.abs(
+        np.einsum("mdk,d->mk", modes.frequency_response(2 * np.pi * frequency),
+                  unit_vector(direction))
+    )  # fmt: skip
+    if excitation is not None:
+        inside = int(frequency[-1] * excitation.period)
+        harmonics = np.arange(1, min(inside, _MOST_HARMONICS) + 1) / excitation.period
+        for k, harmonic in enumerate(harmonics):
+            ax.axvline(harmonic, color=MUTED, linewidth=0.8, linestyle=":",
+                       label="harmonics of the blows" if k == 0 else None)  # fmt: skip
+    for j, name in enumerate(modes.output_names):
+        ax.loglog(frequency, gain[j] * 1e6, label=plain(name), **look(j))
+    top = float(gain.max()) * 1e6
+    ax.set_ylim(1e-5 * top, 2.0 * top)
+    ax.set_xlim(frequency[0], frequency[-1])
+    along = direction_label(unit_vector(direction))
+    ax.set(xlabel="frequency [Hz]", ylabel="deflection per force [µrad/N]",
+           title=f"Frequency response, force along {along}")  # fmt: skip
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return ax
+
+
+@styled
+def plot_transfer(
+    found: Transfer,
+    channel: Channel,
+    ax: Axes | None = None,
+    *,
+    highest: float | None = None,
+) -> Axes:
+    """Magnitude of response over force, measured and simulated; coherence on the right.
+
+    Args:
+        found: of one channel.
+        channel: which.
+        ax: where to draw.
+        highest: Hz, to show up to; all where None.
+    """
+    ax = axes_or_new(ax)
+    scale, unit = shown_unit(channel)
+    f = found.frequency
+    inside = (f > 0.0) & (f <= (highest or float(f[-1])))
+    ax.plot(f[inside], scale * np.abs(found.measured[inside]), label="measured", **MEASURED)
+    ax.plot(f[inside], scale * np.abs(found.simulated[inside]), label="simulated", **BEFORE)
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    right = ax.twinx()
+    right.plot(f[inside], found.coherence[inside], color=GREEN, linewidth=1.0, linestyle=":")
+    ax.plot([], [], color=GREEN, linewidth=1.0, linestyle=":", label="coherence (right)")
+    right.set_ylim(0.0, 1.05)
+    right.set_ylabel("coherence")
+    right.grid(False)
+    right.spines["right"].set_visible(True)
+    ax.set(xlabel="frequency [Hz]", ylabel=f"{plain(channel.name)}\n[{unit}/N]")
+    ax.set_xlim(float(f[inside][0]), float(f[inside][-1]))
+    plain_numbers(ax.xaxis, 1.0, 1e2)
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+    return ax

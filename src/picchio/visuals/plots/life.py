@@ -1,0 +1,166 @@
+"""Which joint and which operation cost the life: utilisation and damage."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from picchio.studies.assessment.result import Assessment
+from picchio.studies.uncertainty import UncertainLife
+from picchio.visuals.plots.style import (
+    BLUE,
+    COLOURS,
+    INK,
+    MUTED,
+    VERMILION,
+    axes_or_new,
+    note,
+    plain,
+    styled,
+)
+
+
+@styled
+def plot_utilisation(assessment: Assessment, ax: Axes | None = None) -> Axes:
+    """Largest equivalent stress over the allowable (%), by joint and operation.
+
+    A joint without a shaft has no stress, and its row says so. A reducer, where it is known, is
+    a diamond: its largest torque, gravity and blows together, over the limit that binds.
+    """
+    joints, operations = assessment.joints, assessment.operations
+    ax = axes_or_new(ax, height=_height(len(joints), len(operations)))
+    parts = [value for j in joints for value in (j.utilisation, j.reducer_utilisation)]
+    if not np.isfinite(parts).any():
+        return plot_peak_torque(assessment, ax)
+    values = np.array([100 * operation.utilisation.max(axis=0) for operation in operations])
+    _bars(ax, [j.name for j in joints], [op.name for op in operations], values, "no shaft given")
+    for row, joint in enumerate(joints):
+        if joint.reducer and np.isfinite(joint.reducer_utilisation):
+            name = None if "reducer" in ax.get_legend_handles_labels()[1] else "reducer"
+            ax.plot(100 * joint.reducer_utilisation, row, "D", color=INK, markersize=6,
+                    zorder=4, label=name)  # fmt: skip
+            values = np.append(values, 100 * joint.reducer_utilisation)
+    top = float(np.nanmax(values))
+    ax.set_xlim(0.0, 1.12 * top or 1.0)
+    if len(operations) > 1 or any(joint.reducer for joint in joints):
+        ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    if top > 40.0:
+        ax.axvline(100.0, color=VERMILION, linewidth=1.2, linestyle=(0, (5, 2)))
+    ax.set(xlabel="largest load over the allowable [%]",
+           title="Utilisation by joint and operation")  # fmt: skip
+    return ax
+
+
+@styled
+def plot_peak_torque(assessment: Assessment, ax: Axes | None = None) -> Axes:
+    """Largest torque of the vibration (N m) by joint and operation; needs no shaft."""
+    joints, operations = assessment.joints, assessment.operations
+    ax = axes_or_new(ax, height=_height(len(joints), len(operations)))
+    values = np.array([operation.peak_torque.max(axis=0) for operation in operations])
+    _bars(ax, [j.name for j in joints], [op.name for op in operations], values, "not computed")
+    ax.set(xlabel="peak torque of the vibration [N m]", title="Torque by joint and operation")
+    return ax
+
+
+@styled
+def plot_damage(assessment: Assessment, ax: Axes | None = None) -> Axes:
+    """Damage of a rivet (Miner's sum, mean over the task), stacked by operation."""
+    joints, operations = assessment.joints, assessment.operations
+    ax = axes_or_new(ax, height=_height(len(joints), 1))
+    ax.set(xlabel="damage a rivet, by operation [\N{EN DASH}]", title="Where the life goes")
+    total = np.array([joint.damage_per_rivet for joint in joints])
+    names = [joint.name for joint in joints]
+    rows = np.arange(len(joints))
+    ax.set_yticks(rows, [plain(name) for name in names])
+    ax.set_ylim(len(joints) - 0.4, -0.6)
+    ax.grid(axis="y", visible=False)
+    if not np.nansum(total) > 0.0:
+        known = any(joint.sn_curve for joint in joints)
+        note(ax, "no damage: every stress stays below the endurance limit" if known
+             else "no joint has a shaft, so no damage can be told")  # fmt: skip
+        ax.set_xticks([])
+        return ax
+    left = np.zeros(len(joints))
+    for k, operation in enumerate(operations):
+        share = np.array([joint.damage_share.get(operation.name, 0.0) for joint in joints])
+        part = np.where(np.isfinite(total), total, 0.0) * share
+        ax.barh(rows, part, 0.62, left=left, color=COLOURS[k % len(COLOURS)],
+                label=plain(operation.name), edgecolor="white", linewidth=0.6)  # fmt: skip
+        left = left + part
+    for row, (joint, end) in enumerate(zip(joints, left, strict=True)):
+        text = "no shaft given" if not joint.sn_curve else "none" if end == 0.0 else f"{end:.3g}"
+        ax.annotate(text, (end, row), xytext=(4, 0), textcoords="offset points", va="center",
+                    fontsize=8.5, color=MUTED)  # fmt: skip
+    ax.set_xlim(0.0, 1.16 * float(left.max()))
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return ax
+
+
+def _height(joints: int, operations: int) -> float:
+    return 0.95 + joints * max(0.3, 0.17 * operations + 0.1)
+
+
+def _bars(
+    ax: Axes, joints: list[str], operations: list[str], values: np.ndarray, missing: str
+) -> None:
+    """Grouped horizontal bars of values (operation, joint); NaN becomes a word."""
+    height = 0.8 / len(operations)
+    rows = np.arange(len(joints))
+    for k, (name, row) in enumerate(zip(operations, values, strict=True)):
+        y = rows + (k - (len(operations) - 1) / 2) * height
+        known = np.isfinite(row)
+        ax.barh(y[known], row[known], 0.86 * height, color=COLOURS[k % len(COLOURS)],
+                label=plain(name) if known.any() else None)  # fmt: skip
+        for at, value in zip(y[known], row[known], strict=True):
+            ax.annotate(f"{value:.3g}", (value, at), xytext=(3, 0), textcoords="offset points",
+                        va="center", fontsize=7.5, color=MUTED)  # fmt: skip
+    for row in rows[~np.isfinite(values).any(axis=0)]:
+        ax.annotate(missing, (0.0, row), xytext=(5, 0), textcoords="offset points", va="center",
+                    fontsize=8.5, color=MUTED, style="italic")  # fmt: skip
+    ax.set_yticks(rows, [plain(name) for name in joints])
+    ax.set_ylim(len(joints) - 0.45, -0.55)
+    top = float(np.nanmax(values)) if np.isfinite(values).any() else 1.0
+    ax.set_xlim(0.0, 1.12 * top or 1.0)
+    ax.grid(axis="y", visible=False)
+    if len(operations) > 1:
+        ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+# How sure a life is: what 90, 50 and 10 % of the possible worlds exceed.
+
+
+@styled
+def plot_life_spread(spread: UncertainLife, ax: Axes | None = None) -> Axes:
+    """Life of every joint and of the robot (rivets): P10 to P90 as a bar, the median as a dot.
+
+    An end at no life at all is drawn as an arrow at the right edge.
+    """
+    rows = {**spread.joints, "robot": spread.robot}
+    ax = axes_or_new(ax, height=1.1 + 0.36 * len(rows))
+    ax.set(xlabel="rivets to failure [\N{EN DASH}]", title="How sure the life is, P10 to P90")
+    ax.set_yticks(range(len(rows)), [plain(name) for name in rows])
+    ax.set_ylim(len(rows) - 0.4, -0.6)
+    ax.grid(axis="y", visible=False)
+    lives = np.array([[life.p10, life.p50, life.p90] for life in rows.values()])
+    finite = lives[np.isfinite(lives)]
+    if not finite.size:
+        note(ax, "no life has an end, however the inputs fall within their doubt")
+        ax.set_xticks([])
+        return ax
+    ax.set_xscale("log")
+    left, right = 0.4 * float(finite.min()), 4.0 * float(finite.max())
+    ax.set_xlim(left, right)
+    for y, (name, life) in enumerate(rows.items()):
+        colour = VERMILION if name == "robot" and y == len(rows) - 1 else BLUE
+        if np.isfinite(life.p10):
+            end = min(life.p90, right)
+            ax.plot([life.p10, end], [y, y], color=colour, linewidth=5, alpha=0.35,
+                    solid_capstyle="butt")  # fmt: skip
+            if not np.isfinite(life.p90):
+                ax.plot(right, y, ">", color=colour, markersize=8, clip_on=False)
+        if np.isfinite(life.p50):
+            ax.plot(life.p50, y, "o", color=colour, markersize=7)
+        if life.endless > 0.0:
+            ax.annotate(f"{100 * life.endless:.0f} % without end", (0.99, y - 0.28), ha="right",
+                        xycoords=("axes fraction", "data"), fontsize=8, color=MUTED)  # fmt: skip
+    return ax

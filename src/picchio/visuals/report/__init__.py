@@ -1,0 +1,1 @@
+"""Reports: one HTML file each that can be read, printed and mailed."""

@@ -1,0 +1,259 @@
+"""From an assessment to one self-contained HTML file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+
+import numpy as np
+from markupsafe import Markup
+
+from picchio.fatigue.shaft_stress import shear_stress
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.fatigue.sn.library import load_sn_curve
+from picchio.model.model import Model
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.studies.assessment.method_comparison import Term
+from picchio.studies.assessment.result import Assessment, format_count, verdict
+from picchio.studies.backwards import Allowable
+from picchio.studies.envelopes import direction_envelope
+from picchio.studies.tasks import Task
+from picchio.studies.uncertainty import UncertainLife
+from picchio.visuals.plots.force import plot_force_spectrum, plot_force_train
+from picchio.visuals.plots.frequency import plot_mode_shapes
+from picchio.visuals.plots.life import plot_damage, plot_life_spread, plot_utilisation
+from picchio.visuals.plots.polar import plot_polar_envelope
+from picchio.visuals.plots.response import plot_response, response_times
+from picchio.visuals.plots.sn import plot_sn_curve
+from picchio.visuals.plots.stress import plot_counted_cycles, plot_stress_history
+from picchio.visuals.plots.style import blank_figure
+from picchio.visuals.report.page import inline_svg
+from picchio.visuals.worst_rivet import WorstRivet, worst_rivet
+
+# The report's plots, each with an alt text that says what it shows.
+
+
+@dataclass(frozen=True)
+class Figure:
+    """An inline SVG, its caption, and whether it opens the report or is folded away."""
+
+    svg: Markup
+    caption: str
+    main: bool
+
+
+def report_figures(
+    assessment: Assessment,
+    robot: FlexibleRobot,
+    worst: WorstRivet,
+    curve: SNCurve | None,
+    *,
+    gravity_stiffness: bool,
+    spread: UncertainLife | None = None,
+) -> list[Figure]:
+    """All plots of an assessment report, the most telling first."""
+    made: list[Figure] = []
+
+    def add(ax: object, alt: str, caption: str, *, main: bool = False) -> None:
+        made.append(Figure(inline_svg(ax, alt, f"f{len(made)}"), caption, main))  # type: ignore[arg-type]
+
+    joint, operation = worst.joint, worst.operation
+    where = f"{operation.name}, pose {worst.pose_number}"
+    slides = joint.kind == "prismatic"
+    unit, spoken = ("mm", "millimetres") if slides else ("mrad", "milliradians")
+    joints, operations = len(assessment.joints), len(assessment.operations)
+    shafts = any(j.sn_curve or j.reducer for j in assessment.joints)
+    tall = 0.9 + 0.3 * joints * (1 + 0.5 * (operations - 1))
+    add(
+        plot_utilisation(assessment, blank_figure(height=tall)),
+        ("Largest load over the allowable" if shafts else "Largest torque")
+        + " of every joint in every operation: " + _ranking(assessment),
+        "The largest value over the poses of each operation; reducers, where known, as diamonds."
+        + ("" if shafts else " No shaft or reducer is known, so torques stand in."),
+        main=True,
+    )  # fmt: skip
+    if any(j.damage_per_rivet > 0 for j in assessment.joints):
+        add(plot_damage(assessment, blank_figure(height=1.1 + 0.34 * joints)),
+            "Damage a rivet does to every joint, by operation",
+            "Miner's sum of one rivet, the mean over the task; at a sum of 1 the joint fails.",
+            main=True)  # fmt: skip
+    if spread is not None:
+        add(plot_life_spread(spread, blank_figure(height=1.1 + 0.36 * (joints + 1))),
+            "Lives that 90, 50 and 10 percent of the possible worlds exceed, by joint",
+            "From P10 to P90, the dot is the median; what was varied stands below.",
+            main=True)  # fmt: skip
+    if worst.rest is not None:
+        peak = worst.rest.peaks(operation.direction)[worst.index].value
+        add(
+            plot_response(worst.rest, operation.direction, blank_figure(height=2.9),
+                          joints=[joint.name], steady=worst.steady, unit=unit),
+            f"Deflection of {joint.name} over a rivet of {operation.hits_per_rivet} hits: up to "
+            f"{abs(peak) * 1e3:.3g} {spoken}, then a ring-down",
+            f"{joint.name} in its worst rivet ({where}). The band is where the "
+            "steady state would lie.",
+            main=True,
+        )  # fmt: skip
+    if joint.shaft is not None and curve is not None:
+        amplitudes = {
+            j.name: np.concatenate([op.utilisation[:, k] for op in assessment.operations])
+            * curve.allowable
+            for k, j in enumerate(assessment.joints)
+            if j.sn_curve == curve.name
+        }
+        add(plot_sn_curve(curve, blank_figure(height=3.0), amplitudes=amplitudes),
+            f"S-N curve {curve.name} with the largest amplitude of every pose, a symbol a joint",
+            "Each symbol is one pose of the task at its largest equivalent amplitude; at the "
+            "right edge it could go on for ever.", main=True)  # fmt: skip
+        at, stress = worst.stress_turning_points()
+        response = worst.response
+        last = float(response.force.start[-1])
+        time = response_times(
+            response, last * 2.6 if not response.periodic else 2 * response.force.end
+        )
+        history = shear_stress(
+            worst.stiffness * response.deflection(time, operation.direction)[worst.index],
+            joint.shaft,
+        )
+        add(plot_stress_history(time, history, blank_figure(height=2.7),
+                                turning_points=(at, stress), joint=joint.name,
+                                static=float(shear_stress(worst.static_torque, joint.shaft)),
+                                allowable=curve.allowable),
+            f"Shear stress in the shaft of {joint.name} over its worst rivet",
+            f"What rainflow counts: the turning points of the stress ({where}).")  # fmt: skip
+        add(plot_counted_cycles(worst.cycles(), blank_figure(height=2.7),
+                                allowable=curve.allowable, joint=joint.name),
+            f"Cycles counted in the worst rivet of {joint.name}, by amplitude",
+            "How many cycles of this rivet reach each amplitude.")  # fmt: skip
+    add(plot_force_train(operation.excitation, blank_figure(height=2.3)),
+        f"Force of the tool over three blows: {operation.excitation.describe()}",
+        f"The blows of the operation {operation.name}.")  # fmt: skip
+    modes = worst.modes.natural_frequencies
+    add(plot_force_spectrum(operation.excitation, blank_figure(height=2.3),
+                            natural_frequencies=modes),
+        "Amplitude of the harmonics of the blows, with the robot's natural frequencies at "
+        + ", ".join(f"{f:.3g}" for f in modes) + " hertz",
+        f"The blows' harmonics and the robot's modes ({where}).")  # fmt: skip
+    add(plot_mode_shapes(worst.modes, blank_figure(height=2.7)),
+        "Which joints move in each mode of the robot",
+        f"The modes of the robot ({where}).")  # fmt: skip
+    envelope = direction_envelope(
+        Model(robot, gravity_stiffness), worst.pose, operation.excitation,
+        None if worst.rest is None else operation.hits_per_rivet,
+    )  # fmt: skip
+    for plane in ("xz", "xy"):
+        add(plot_polar_envelope(envelope, plane, blank_figure(5.6, 3.9, polar=True), count=72),  # type: ignore[arg-type]
+            f"Peak deflection of every joint by the direction of the force in the {plane} plane",
+            f"What the force's direction changes, in the {plane} plane ({where}).",
+            main=plane == "xz")  # fmt: skip
+    return made
+
+
+def _ranking(assessment: Assessment) -> str:
+    shafts = [j for j in assessment.joints if j.sn_curve or j.reducer]
+    if shafts:
+        return ", ".join(f"{j.name} {100 * j.governing_utilisation:.3g} percent" for j in shafts)
+    return ", ".join(f"{j.name} {j.peak_torque:.3g} newton metres" for j in assessment.joints)
+
+
+def assessment_report(
+    assessment: Assessment,
+    robot: FlexibleRobot,
+    task: Task,
+    *,
+    warnings: Sequence[str] = (),
+    command: str | None = None,
+    gravity_stiffness: bool = False,
+    sn_curve: str | SNCurve | None = None,
+    scene: str | None = None,
+    allowed: Sequence[Allowable] = (),
+    spread: UncertainLife | None = None,
+    terms: Sequence[Term] = (),
+) -> str:
+    """The report of an assessment: verdict, table, plots, method, origins, how to reproduce.
+
+    The page needs nothing from outside, prints on A4 or Letter, and follows the reader's light
+    or dark theme. Every name is escaped.
+
+    Args:
+        assessment: of this robot on this task.
+        robot: the robot.
+        task: the task.
+        warnings: what was warned of while loading and assessing, a sentence each.
+        command: the command line that gave this, to reproduce it.
+        gravity_stiffness: as in the assessment.
+        sn_curve: as given to `assess`.
+        scene: HTML of the 3-D scene, to be shown in the report; it adds its own size.
+        allowed: what a wanted life allows, of `picchio.studies.backwards`.
+        spread: how sure the lives are, of `picchio.studies.uncertainty`.
+        terms: the paper's method against this one, of `method_comparison`.
+
+    Returns:
+        the HTML.
+    """
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    worst = worst_rivet(assessment, robot, task, gravity_stiffness=gravity_stiffness)
+    life = assessment.joint(worst.joint.name)
+    curve = _curve(sn_curve, robot, life.sn_curve)
+    figures = report_figures(
+        assessment, robot, worst, curve, gravity_stiffness=gravity_stiffness, spread=spread
+    )
+    over_limit = any(joint.reducer_utilisation > 1.0 for joint in assessment.joints)
+    folder = files("picchio.visuals.report")
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters.update(number=number, count=format_count, percent=percent)
+    template = environment.from_string((folder / "assessment.html.j2").read_text("utf-8"))
+    return template.render(
+        style=Markup((folder / "style.css").read_text("utf-8")),
+        a=assessment,
+        robot=robot,
+        task=task,
+        worst=worst,
+        life=life,
+        curve=curve,
+        figures=figures,
+        headline=verdict(assessment),
+        bad=math.isfinite(assessment.rivets_to_failure) or over_limit,
+        reducers=any(joint.reducer for joint in assessment.joints),
+        allowed=list(allowed),
+        spread=spread,
+        spread_rows=[*spread.joints.items(), ("robot", spread.robot)] if spread else [],
+        terms=list(terms),
+        shafts=any(joint.sn_curve for joint in assessment.joints),
+        warnings=list(dict.fromkeys(warnings)),
+        estimates=[joint.name for joint in robot.flexible_joints if joint.estimated],
+        slides=any(joint.kind == "prismatic" for joint in robot.flexible_joints),
+        command=command or f"picchio assess {robot.name}",
+        scene=scene,
+    )
+
+
+def number(value: float, digits: int = 4) -> str:
+    """A number with few digits; a dash where there is none."""
+    if not math.isfinite(value):
+        return "\N{EN DASH}" if math.isnan(value) else "no end"
+    # Below this it is rounding.
+    return "0" if abs(value) < 1e-9 else f"{value:.{digits}g}"
+
+
+def percent(value: float) -> str:
+    """A share as a percentage without its sign."""
+    return number(100.0 * value, 3)
+
+
+def _curve(given: str | SNCurve | None, robot: FlexibleRobot, name: str) -> SNCurve | None:
+    """The curve that the assessment calls by this name."""
+    if not name:
+        return None
+    if isinstance(given, SNCurve):
+        return given
+    of_shafts = [joint.shaft.sn_curve for joint in robot.flexible_joints if joint.shaft]
+    for source in (given, *of_shafts):
+        if source and (curve := load_sn_curve(source, quiet=True)).name == name:
+            return curve
+    return load_sn_curve(name, quiet=True)

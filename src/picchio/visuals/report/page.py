@@ -1,0 +1,138 @@
+"""How a report's page is made: template, style sheet, and numbers as text."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from importlib.resources import files
+from typing import Any, cast
+
+import matplotlib as mpl
+from markupsafe import Markup, escape
+from matplotlib.axes import Axes
+
+from picchio.core.provenance import package_version
+from picchio.visuals.plots.style import BLUE, INK, MUTED, STYLE, VERMILION
+
+# A matplotlib figure as inline SVG that takes the page's text colour and has an alt text.
+
+_SIZE = re.compile(r'<svg [^>]*?viewBox="(?P<box>[^"]+)"[^>]*>')
+_ID = re.compile(r'\bid="([^"]+)"')
+_REFERENCE = re.compile(r"(?P<before>xlink:href=\"#|url\(#)(?P<id>[^\")]+)")
+
+
+def inline_svg(ax: Axes, alt: str, name: str) -> Markup:
+    """The figure of some Axes as an `<svg>` element.
+
+    Text and axes get the page's own colours (`currentColor`, `--muted`), so that a dark page
+    shows light text; ids are made unique on the page by `name`.
+
+    Args:
+        ax: of a figure that is drawn whole.
+        alt: what the figure shows, in words; escaped here.
+        name: unique on the page, letters and digits.
+    """
+    stream = io.StringIO()
+    with mpl.rc_context({**cast(Any, STYLE), "svg.fonttype": "path"}):
+        # Neither date nor creator: the same result gives the same file.
+        unstamped = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+        figure = ax.get_figure(root=True)
+        assert figure is not None
+        figure.savefig(stream, format="svg", facecolor="none", metadata=unstamped)
+    text = stream.getvalue()
+    text = text[text.index("<svg") :]
+    found = _SIZE.search(text)
+    assert found is not None
+    body = text[found.end() :]
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
+    body = re.sub(r"<!--.*?-->\s*", "", body, flags=re.DOTALL)
+    body = _ID.sub(rf'id="{name}-\1"', body)
+    body = _REFERENCE.sub(rf"\g<before>{name}-\g<id>", body)
+    body = body.replace("xlink:href", "href")
+    body = body.replace(INK, "currentColor").replace(MUTED, "var(--muted)")
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{found["box"]}" role="img" '
+        f'aria-label="{escape(alt)}">'
+    )
+    return Markup(head + body)
+
+
+def render(template: str, **content: Any) -> str:
+    """A page from a template of this folder; all that goes into it is escaped.
+
+    Args:
+        template: its file's name.
+        **content: what the template names; style sheet and version are given.
+    """
+    from jinja2 import BaseLoader, Environment, StrictUndefined
+
+    folder = files("picchio.visuals.report")
+
+    class Folder(BaseLoader):
+        def get_source(self, environment: Environment, template: str) -> Any:
+            return (folder / template).read_text("utf-8"), None, lambda: True
+
+    environment = Environment(
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        loader=Folder(),
+    )
+    environment.filters.update(number=number, percent=percent, spread=spread, words=words)
+    style = Markup((folder / "style.css").read_text("utf-8"))
+    return environment.get_template(template).render(
+        style=style, version=package_version(), **content
+    )
+
+
+def themed_svg(ax: Axes, alt: str, name: str) -> Markup:
+    """As `inline_svg`; blue and vermilion, too, become the page's own, which differ by theme."""
+    drawn = str(inline_svg(ax, alt, name))
+    return Markup(drawn.replace(BLUE, "var(--accent)").replace(VERMILION, "var(--bad)"))
+
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """A number with few digits; a dash where there is none."""
+    if value is None or math.isnan(value):
+        return "\N{EN DASH}"
+    if math.isinf(value):
+        return "no end"
+    text = f"{value:.{digits}g}".replace("-", "\N{MINUS SIGN}")
+    mantissa, e, power = text.partition("e")
+    if not e:
+        return text
+    sign = "-" if power.startswith("\N{MINUS SIGN}") else ""
+    exponent = f"{sign}{int(power.lstrip('+' + chr(0x2212)))}"
+    return f"{mantissa} × 10{exponent.translate(_RAISED)}"
+
+
+def percent(value: float | None, digits: int = 3) -> str:
+    """A share as a percentage without its sign."""
+    return number(None if value is None else 100.0 * value, digits)
+
+
+def spread(value: float, std: float, unit: str = "") -> str:
+    """A value with its standard deviation, both to where the latter begins."""
+    unit = "" if unit == "1" else f" {unit.replace('*', ' ')}"
+    if not (math.isfinite(value) and math.isfinite(std)) or std <= 0.0:
+        return number(value) + unit
+    size = max(abs(value), std)
+    if not 1e-4 <= size < 1e7:
+        digits = min(max(2 + math.floor(math.log10(size / std)), 2), 9)
+        return f"{number(value, digits)} ± {number(std, 2)}{unit}"
+    places = max(0, 1 - math.floor(math.log10(std)))
+    if places == 0:
+        round_to = math.floor(math.log10(std)) - 1
+        value, std = round(value, -round_to), round(std, -round_to)
+    text = f"{value:,.{places}f} ± {std:,.{places}f}{unit}"
+    return text.replace("-", "\N{MINUS SIGN}")
+
+
+def words(name: str) -> str:
+    """An effect's name as people say it."""
+    return name.replace("_", " ")

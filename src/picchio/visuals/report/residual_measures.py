@@ -1,0 +1,253 @@
+"""The numbers of a residual report, from a baseline's fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.fit.least_squares import Fit
+from picchio.prediction.percussion import POSITION_KINDS
+from picchio.prediction.residual import (
+    ChannelResidual,
+    Restoring,
+    Transfer,
+    by_window,
+    residual_torque,
+    spectrum,
+    transfer,
+)
+
+_BANDS = 110
+_HIGHEST = 6.0
+_MOST_WINDOWS = 60
+# A joint moves if its deflection is so many times its noise.
+_CLEAR = 15.0
+
+
+def channel_residuals(
+    problem: Problem, fit: Fit, predictions: Sequence[dict[str, FloatArray]]
+) -> list[ChannelResidual]:
+    """Every channel of every record."""
+    found = []
+    for record, white, predicted in zip(fit.records, fit.residuals, predictions, strict=True):
+        kinds = {c.name: c for c in record.setup.channels}
+        source = problem.campaign[record.name]
+        for row, (name, values) in enumerate(record.values.items()):
+            left, signal = values - predicted[name], values
+            if record.setup.steady or kinds[name].kind.name in POSITION_KINDS:
+                left, signal = left - left.mean(), values - values.mean()
+            found.append(
+                ChannelResidual(
+                    record.name,
+                    name,
+                    kinds[name].group,
+                    record.pose,
+                    tuple(float(c) for c in record.setup.blows.direction),
+                    float(np.abs(record.setup.blows.height).max()),
+                    source.taken,
+                    source.temperature,
+                    float(np.sqrt(np.mean(left**2))),
+                    float(np.sqrt(np.mean(signal**2))),
+                    record.noise[name].std,
+                    float(np.sqrt(np.mean(white[row] ** 2))),
+                )
+            )
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Spectra:
+    """Residual power by frequency.
+
+    Attributes:
+        edges: (k + 1,) Hz.
+        power: group -> (k,), 1 is noise.
+        modes: from and to over the poses, Hz, a natural frequency each.
+        hit_rate: Hz.
+    """
+
+    edges: FloatArray
+    power: dict[str, FloatArray]
+    modes: list[tuple[float, float]]
+    hit_rate: float
+
+    @property
+    def worst(self) -> tuple[str, float, float]:
+        """Group, Hz and power where most is left."""
+        middle = np.sqrt(self.edges[:-1] * self.edges[1:])
+        best = ("", 0.0, 0.0)
+        for group, power in self.power.items():
+            # The lowest lines hold what is left of offsets.
+            values = np.where((middle > 3.0 * self.edges[0]) & np.isfinite(power), power, 0.0)
+            k = int(np.argmax(values))
+            if values[k] > best[2]:
+                best = (group, float(middle[k]), float(values[k]))
+        return best
+
+
+def spectra(problem: Problem, fit: Fit) -> Spectra:
+    """By frequency, all records together; records of the first one's clock."""
+    step = fit.records[0].setup.samples.step
+    modes = _modes(problem)
+    longest = max(r.setup.samples.count for r in fit.records) * step
+    high = min(0.5 / step, _HIGHEST * max(m[1] for m in modes))
+    edges = np.geomspace(1.0 / longest, high, _BANDS + 1)
+    rows: dict[str, list[FloatArray]] = {}
+    for record, white in zip(fit.records, fit.residuals, strict=True):
+        if abs(record.setup.samples.step / step - 1.0) > 1e-6:
+            continue
+        for name, row in zip(record.values, white, strict=True):
+            rows.setdefault(_group(record, name), []).append(row)
+    power = {group: spectrum(every, step, edges) for group, every in rows.items()}
+    return Spectra(edges, power, modes, 1.0 / fit.records[0].setup.blows.interval)
+
+
+@dataclass(frozen=True, eq=False)
+class OverTime:
+    """Residual and signal, window by window.
+
+    Attributes:
+        edges: (k + 1,) s.
+        residual, signal: group -> (k,) RMS over the noise.
+        last_blow: s; None in steady records.
+    """
+
+    edges: FloatArray
+    residual: dict[str, FloatArray]
+    signal: dict[str, FloatArray]
+    last_blow: float | None
+
+
+def over_time(fit: Fit) -> OverTime:
+    """By time, a window a hit, records with the same blows together."""
+    first = fit.records[0].setup
+    like = [
+        (r, w)
+        for r, w in zip(fit.records, fit.residuals, strict=True)
+        if r.setup.blows.start.size == first.blows.start.size
+        and abs(r.setup.blows.interval - first.blows.interval) < 1e-9
+    ]
+    window = first.blows.interval
+    start = min(float(r.setup.samples.times[0]) for r, _ in like)
+    end = max(float(r.setup.samples.times[-1]) for r, _ in like)
+    while (end - start) / window > _MOST_WINDOWS:
+        window *= 2.0
+    before = np.ceil(max(-start, 0.0) / window)
+    edges = window * np.arange(-before, np.floor(end / window) + 1)
+    residual: dict[str, FloatArray] = {}
+    signal: dict[str, FloatArray] = {}
+    for group in dict.fromkeys(_group(r, n) for r, _ in like for n in r.values):
+        rows, levels, times = [], [], []
+        for record, white in like:
+            for row, (name, values) in zip(white, record.values.items(), strict=True):
+                if _group(record, name) == group:
+                    rows.append(row)
+                    levels.append(values / record.noise[name].std)
+                    times.append(record.setup.samples.times)
+        residual[group] = by_window(times, rows, edges)
+        signal[group] = by_window(times, levels, edges)
+    last = None if first.steady else float(first.blows.start.max())
+    return OverTime(edges, residual, signal, last)
+
+
+def restoring(
+    problem: Problem, fit: Fit, predictions: Sequence[dict[str, FloatArray]]
+) -> dict[str, tuple[str, Restoring]]:
+    """Joint -> the record that shows its missing torque best, and that torque.
+
+    A joint that hardly moves in any record, or a record that lacks a joint's deflection, is
+    left out: noise would correlate with itself.
+    """
+    robot = problem.robot
+    names = [f"deflection.{name}" for name in robot.flexible_names]
+    best: dict[str, tuple[float, int]] = {}
+    for index, (record, white) in enumerate(zip(fit.records, fit.residuals, strict=True)):
+        if not all(name in record.values for name in names) or record.setup.samples.count < 64:
+            continue
+        for joint, name in zip(robot.flexible_names, names, strict=True):
+            row = list(record.values).index(name)
+            size = float((white[row] ** 2).mean())
+            moves = float(record.values[name].std()) > _CLEAR * record.noise[name].std
+            if moves and size > best.get(joint, (0.0, 0))[0]:
+                best[joint] = (size, index)
+    found = {}
+    for joint, (_, index) in best.items():
+        every = _missing(problem, fit, fit.records[index], predictions[index], names)
+        if every is not None:
+            found[joint] = (fit.records[index].name, every[robot.flexible_names.index(joint)])
+    return {joint: found[joint] for joint in robot.flexible_names if joint in found}
+
+
+def _missing(
+    problem: Problem,
+    fit: Fit,
+    record: MeasuredRecord,
+    predicted: dict[str, FloatArray],
+    names: Sequence[str],
+) -> list[Restoring] | None:
+    setup = record.setup
+    plant = problem.model.with_effects(fit.hypothesis.effects).plant(
+        setup.geometry, setup.conditions
+    )
+    system = plant.build(setup.blows.direction)
+    if system.mass.shape[0] != len(names):
+        return None
+    measured = np.stack([record.values[name] for name in names])
+    simulated = np.stack([predicted[name] for name in names])
+    # What rests before the first blow has no deflection.
+    quiet = setup.samples.times < -1e-9
+    rest = quiet if quiet.sum() > 8 else np.ones(quiet.size, dtype=bool)
+    measured = measured - measured[:, rest].mean(axis=1, keepdims=True)
+    simulated = simulated - simulated[:, rest].mean(axis=1, keepdims=True)
+    return residual_torque(system.mass, system.damping, system.stiffness, measured, simulated,
+                           setup.samples.step)  # fmt: skip
+
+
+def transfers(
+    problem: Problem, fit: Fit, predictions: Sequence[dict[str, FloatArray]], most: int = 4
+) -> tuple[list[MeasuredRecord], dict[str, Transfer]]:
+    """Response over force of the channels that are wrong most, where a force was measured."""
+    chosen = [r for r in fit.records if "force" in r.values]
+    if not chosen:
+        return [], {}
+    worst = max(chosen, key=lambda r: float((fit.residuals[fit.records.index(r)] ** 2).mean()))
+    like = [
+        r for r in chosen
+        if r.pose == worst.pose
+        and np.allclose(r.setup.blows.direction, worst.setup.blows.direction)
+        and r.setup.samples.step == worst.setup.samples.step
+    ]  # fmt: skip
+    white = fit.residuals[fit.records.index(worst)]
+    order = np.argsort(-(white**2).mean(axis=1))
+    names = [list(worst.values)[i] for i in order]
+    found = {}
+    for name in [n for n in names if n != "force"][:most]:
+        if not all(name in r.values for r in like):
+            continue
+        simulated = [predictions[fit.records.index(r)][name] for r in like]
+        found[name] = transfer([r.values["force"] for r in like], [r.values[name] for r in like],
+                               simulated, worst.setup.samples.step)  # fmt: skip
+    return like, found
+
+
+def _group(record: MeasuredRecord, name: str) -> str:
+    return next(c.group for c in record.setup.channels if c.name == name)
+
+
+def _modes(problem: Problem) -> list[tuple[float, float]]:
+    """Natural frequencies' range over the poses, Hz; of the nominal robot."""
+    every, seen = [], set()
+    for record in problem.records:
+        if record.pose in seen:
+            continue
+        seen.add(record.pose)
+        system = problem.model.plant(record.setup.geometry).build(np.array([0.0, 0.0, 1.0]))
+        squared = np.linalg.eigvals(np.linalg.solve(system.mass, system.stiffness)).real
+        every.append(np.sort(np.sqrt(np.maximum(squared, 0.0))) / (2.0 * np.pi))
+    low, high = np.min(every, axis=0), np.max(every, axis=0)
+    return [(float(a), float(b)) for a, b in zip(low, high, strict=True)]

@@ -1,0 +1,255 @@
+"""Put a scene together: robot, envelopes, rivets, vibration; all data, no page."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from picchio.core.arrays import FloatArray
+from picchio.diagnosis.result import Diagnosis
+from picchio.excitation.trains import Excitation
+from picchio.model.model import Model
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.studies.assessment.result import Assessment
+from picchio.studies.envelopes import DirectionEnvelope, direction_envelope
+from picchio.vibration.closed_form.response import unit_vector
+from picchio.visuals.plots.style import direction_label
+from picchio.visuals.scene.causes.causes import add_causes
+from picchio.visuals.scene.causes.site import Site
+from picchio.visuals.scene.motion import vibration
+from picchio.visuals.scene.overlay import (
+    Scale,
+    envelope_meshes,
+    joint_values,
+    ring_radius,
+    rivet_values,
+)
+from picchio.visuals.scene.robot.body import Body, build_body
+from picchio.visuals.scene.robot.kinematics import frames, world
+from picchio.visuals.scene.robot.mesh import Mesh, arrow, ring, sphere, turned_to
+from picchio.visuals.scene.scene import Item, Scene
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def build_scene(
+    robot: FlexibleRobot,
+    pose: ArrayLike,
+    excitation: Excitation,
+    *,
+    hits: int | None = None,
+    direction: ArrayLike | None = None,
+    assessment: Assessment | None = None,
+    joint: str | None = None,
+    workspace: xarray.Dataset | None = None,
+    diagnosis: Diagnosis | None = None,
+    gravity_stiffness: bool = False,
+    subdivisions: int = 4,
+) -> Scene:
+    """The scene of a robot at a pose, shaken by blows.
+
+    Args:
+        robot: the robot; its meshes are read here and nowhere before.
+        pose: (nv,) rad or m.
+        excitation: the blows.
+        hits: of a burst from rest; None for the steady state.
+        direction: (3,) of the force, for the vibration; the worst one if not given.
+        assessment: of a task, for the rivets and the joints' colours.
+        joint: whose envelope is shown first; the limiting one if not given.
+        workspace: a map of `picchio.studies.maps.run`, coloured by the peak of the joint shown.
+        diagnosis: of this robot: its causes are drawn where they sit, and the layers about life
+            start hidden.
+        gravity_stiffness: add dg/dq to the springs.
+        subdivisions: fineness of the envelopes.
+
+    Raises:
+        InputError: a bad pose, direction or joint; a diagnosis of another robot.
+    """
+    checked = robot.pose(pose)
+    envelope = direction_envelope(Model(robot, gravity_stiffness), checked, excitation, hits)
+    tree = frames(robot, checked)
+    places = world(tree)
+    body = build_body(robot, tree, places)
+    where = ", ".join(f"{q:.3g}" for q in checked)
+    how = "steady state" if hits is None else f"{hits} hits from rest"
+    scene = Scene(robot.name, f"pose ({where}); {excitation.describe()}; {how}", envelope, tree)
+    scene.chosen, scene.reach = _first(envelope, assessment, joint), body.reach
+    _add_body(scene, body)
+    units = ["mm" if j.kind == "prismatic" else "mrad" for j in robot.flexible_joints]
+    _add_rings(scene, body, assessment, units)
+    _add_envelopes(scene, body, units, subdivisions)
+    blow = unit_vector(direction) if direction is not None else None
+    _add_tool(scene, body, blow)
+    if assessment is not None:
+        _add_rivets(scene, body, assessment)
+    if workspace is not None:
+        _add_workspace(scene, workspace, units)
+    if diagnosis is not None:
+        along = blow if blow is not None else _against_the_tool(robot, checked)
+        site = partial(Site, robot, checked, tree, places, body, along)
+        add_causes(scene, site, diagnosis)
+    scene.motion = vibration(robot, envelope, body.reach, blow, scene.chosen)
+    _aim(scene, body, places)
+    return scene
+
+
+def _against_the_tool(robot: FlexibleRobot, pose: FloatArray) -> FloatArray:
+    """(3,) the force on a tool that hits along its own axis."""
+    axis = np.array(robot.tool.axis)
+    return -robot.state(pose).tool_rotation @ axis / np.linalg.norm(axis)
+
+
+def _first(envelope: DirectionEnvelope, assessment: Assessment | None, joint: str | None) -> int:
+    from picchio.core.errors import InputError
+
+    names = envelope.joint_names
+    if joint is not None:
+        if joint not in names:
+            raise InputError("no such flexible joint", key="joint", value=joint, choices=names)
+        return names.index(joint)
+    if assessment is not None and assessment.limiting_joint is not None:
+        return names.index(assessment.limiting_joint)
+    return int(np.argmax(envelope.peak_deflection))
+
+
+def _add_body(scene: Scene, body: Body) -> None:
+    scene.layers.append(("robot", "robot", True))
+    scene.layers.append(("ghost", "robot at rest, as a ghost", False))
+    path = {frame.link: frame.path for frame in scene.frames}
+    own = [scene.add(shape) for shape in body.shapes]
+    for link, index, matrix in body.parts:
+        scene.items.append(Item(own[index], "robot", path[link], matrix))
+
+
+def _add_rings(scene: Scene, body: Body, assessment: Assessment | None, units: list[str]) -> None:
+    slides = np.array([unit == "mm" for unit in units])
+    values, scale = joint_values(assessment, scene.envelope, slides)
+    scene.layers.append(("joints", scale.title, True))
+    scene.scales["joints"] = scale
+    by_joint = {frame.joint: frame for frame in scene.frames if frame.joint}
+    for k, (name, value) in enumerate(zip(scene.envelope.joint_names, values, strict=True)):
+        frame = by_joint.get(name)
+        if frame is None or frame.axis is None:
+            continue
+        radius = ring_radius(frame, body)
+        # A force has no place on a scale of torques.
+        alone = slides[k] and scale.unit == "N m"
+        colour = scale.colour(np.nan if alone else float(value))
+        mesh = scene.add(ring(radius, 0.012 * body.reach, colour))
+        matrix = turned_to(frame.axis, np.zeros(3))
+        scene.items.append(Item(mesh, "joints", frame.path, matrix, joint=k))
+        told = f"{value:.3g} N" if alone else _told(float(value), scale)
+        scene.labels.append({"text": f"{name}: {told}", "layer": "joints", "node": frame.path})
+
+
+def _told(value: float, scale: Scale) -> str:
+    if not np.isfinite(value):
+        return "no shaft"
+    # Next to the largest it is nothing.
+    return "\N{ALMOST EQUAL TO} 0" if value < 1e-3 * scale.top else f"{value:.3g} {scale.unit}"
+
+
+def _add_envelopes(scene: Scene, body: Body, units: list[str], subdivisions: int) -> None:
+    envelope = scene.envelope
+    scene.layers.append(("envelope", "direction envelope at the tool", True))
+    scene.layers.append(("worst", "worst direction", True))
+    meshes, scales = envelope_meshes(envelope, units, subdivisions)
+    size = 0.26 * body.reach
+    pointer = scene.add(arrow(1.18 * size, 0.011 * body.reach, "#c2410c", head=0.075 * body.reach))
+    for k, (mesh, scale) in enumerate(zip(meshes, scales, strict=True)):
+        peak = float(envelope.peak_deflection[k])
+        factor = size / peak if peak > 0 else 1.0
+        place = np.diag([factor, factor, factor, 1.0])
+        place[:3, 3] = envelope.tool_position
+        scene.items.append(Item(scene.add(mesh), "envelope", "", place, joint=k))
+        along = envelope.worst_direction[k]
+        scene.items.append(
+            Item(pointer, "worst", "", turned_to(along, envelope.tool_position), joint=k)
+        )
+        text = f"{envelope.joint_names[k]}: {peak * 1e3:.3g} {scale.unit} "
+        text += f"along {direction_label(along)}"
+        tip = envelope.tool_position + 1.2 * size * along
+        scene.labels.append({"text": text, "layer": "worst", "at": tip.tolist(), "joint": k})
+        scene.joints.append(
+            {"name": envelope.joint_names[k], "scale": scale.to_dict(), "peak": peak, "text": text}
+        )
+
+
+def _add_tool(scene: Scene, body: Body, direction: FloatArray | None) -> None:
+    scene.layers.append(
+        ("tool", "tool point" + (" and force" if direction is not None else ""), True)
+    )
+    place = np.eye(4)
+    place[:3, 3] = scene.envelope.tool_position
+    scene.items.append(Item(scene.add(sphere(0.013 * body.reach, "#a21caf")), "tool", "", place))
+    if direction is None:
+        return
+    length = 0.17 * body.reach
+    mesh = scene.add(arrow(length, 0.008 * body.reach, "#a21caf", head=0.05 * body.reach))
+    at = scene.envelope.tool_position - direction * (length + 0.015 * body.reach)
+    scene.items.append(Item(mesh, "tool", "", turned_to(direction, at)))
+    scene.labels.append({"text": "force", "layer": "tool", "at": at.tolist()})
+
+
+def _add_rivets(scene: Scene, body: Body, assessment: Assessment) -> None:
+    values, scale = rivet_values(assessment)
+    scene.scales["rivets"] = scale
+    length = 0.055 * body.reach
+    mesh = scene.add(arrow(length, 0.0065 * body.reach, head=0.03 * body.reach))
+    for k, (operation, row) in enumerate(zip(assessment.operations, values, strict=True)):
+        layer = f"rivets-{k}"
+        scene.layers.append((layer, f"rivets: {operation.name}", True))
+        for position, value in zip(operation.tool_position, row, strict=True):
+            start = position - operation.direction * length
+            scene.items.append(
+                Item(mesh, layer, "", turned_to(operation.direction, start), scale.colour(value))
+            )
+
+
+def _add_workspace(scene: Scene, workspace: xarray.Dataset, units: list[str]) -> None:
+    from picchio.visuals.workspace import best_branch, spacing
+
+    mapped = [str(name) for name in workspace["joint"].values]
+    for k, name in enumerate(scene.envelope.joint_names):
+        if name not in mapped and k != scene.chosen:
+            continue
+        places, peak = best_branch(workspace, name)
+        scale = Scale(f"workspace: peak of {name}", units[k], 1e3 * float(peak.max()))
+        grain = sphere(0.4 * spacing(places), subdivisions=0)
+        count = len(grain.vertices)
+        cloud = Mesh(
+            (places[:, None] + grain.vertices[None]).reshape(-1, 3),
+            (np.arange(len(places))[:, None, None] * count + grain.faces[None]).reshape(-1, 3),
+            np.repeat(scale.colours(1e3 * peak), count, axis=0),
+        )
+        scene.joints[k]["map"] = scale.to_dict()
+        scene.items.append(Item(scene.add(cloud), "map", "", np.eye(4), joint=k))
+        if k == scene.chosen:
+            scene.scales["map"] = scale
+    scene.layers.append(("map", "workspace map: peak of the joint, best branch", True))
+
+
+def _aim(scene: Scene, body: Body, places: dict[str, FloatArray]) -> None:
+    points = np.array([*(p[:3, 3] for p in places.values()), scene.envelope.tool_position])
+    # The envelope that is shown at first, and the map, shall be in the picture.
+    along = 0.3 * body.reach * scene.envelope.worst_direction[scene.chosen]
+    balls = scene.envelope.tool_position + np.stack([along, -along])
+    mapped = [scene.meshes[item.mesh].vertices for item in scene.items if item.layer == "map"]
+    seen = np.concatenate([points, balls, *mapped[:1]])
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    centre = 0.5 * (low + high)
+    span = float(np.linalg.norm(high - low)) * (0.85 if mapped else 1.0) + 0.2 * body.reach
+    # From the side of the arm, a little from above: the plane it moves in is seen face on.
+    outward = scene.envelope.tool_position[:2] - points[0][:2]
+    heading = np.arctan2(outward[1], outward[0]) if np.linalg.norm(outward) > 1e-6 else 0.0
+    azimuth = heading - 1.05
+    view = np.array([np.cos(azimuth), np.sin(azimuth), 0.42])
+    cell = next((c for c in (0.05, 0.1, 0.25, 0.5) if 24 * c > 2.4 * body.reach), 1.0)
+    squares = 2 * int(np.ceil(1.2 * body.reach / cell))
+    middle = np.round(centre[:2] / cell) * cell
+    scene.floor = {"cell": cell, "squares": squares, "at": [*middle.tolist(), float(points[0][2])]}
+    scene.camera = np.array([centre + view / np.linalg.norm(view) * 1.25 * span, centre])

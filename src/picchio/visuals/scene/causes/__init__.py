@@ -1,0 +1,1 @@
+"""A diagnosis in the scene: every cause drawn where it sits."""

@@ -1,0 +1,249 @@
+"""How each kind of cause is drawn: one table from effect and target to a shape."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.model.effects.registry import effect_class
+from picchio.model.rotation import exp3
+from picchio.visuals.plots.style import BLUE
+from picchio.visuals.scene.causes.site import Drawn, Site, check_place
+from picchio.visuals.scene.causes.symbols import (
+    ball,
+    coil,
+    hose,
+    pointing,
+    sliding,
+    steel_radius,
+    turning,
+)
+from picchio.visuals.scene.overlay import ring_radius
+from picchio.visuals.scene.robot.mesh import Mesh, box, moved, ring, turned_to
+
+
+def draw(site: Site) -> list[Drawn]:
+    """A cause's drawing: its own where it has one, else that of its target's kind.
+
+    Raises:
+        InputError: an effect that is not known, or a target that this robot does not have.
+    """
+    check_place(site.robot, site.effect, site.target)
+    kind = effect_class(site.effect)
+    own = BY_EFFECT.get(site.effect)
+    if own is None and kind.where == "blows":
+        own = _blow
+    return (own or BY_KIND.get(kind.target_kind, _whole))(site)
+
+
+def _ring(site: Site) -> list[Drawn]:
+    frame, axis = site.joint(site.target)
+    at = site.position(frame.link)
+    radius = 1.12 * ring_radius(frame, site.body)
+    shape = ring(radius, 0.011 * site.reach, site.colour)
+    return [Drawn(frame.link, [moved(shape, turned_to(axis, at))], at + _above(radius))]
+
+
+def _spring(site: Site) -> list[Drawn]:
+    frame, axis = site.joint(site.target)
+    at = site.position(frame.link)
+    radius = (0.035 * site.reach) if frame.prismatic else 1.12 * ring_radius(frame, site.body)
+    length = (0.2 if frame.prismatic else 0.1) * site.reach
+    shape = coil(at, axis, radius, length, 0.006 * site.reach, site.colour)
+    return [Drawn(frame.link, [shape], at + _above(radius))]
+
+
+def _above(distance: float) -> FloatArray:
+    """(3,) up by so much: the label of something round shall not cover it."""
+    return np.array([0.0, 0.0, distance])
+
+
+def _bending(site: Site) -> list[Drawn]:
+    """Turning about the two axes across the joint's own; of a link, about those of its frame."""
+    if site.target not in site.robot.joint_names:
+        return _link(site)
+    frame, axis = site.joint(site.target)
+    at = site.position(frame.link)
+    across = turned_to(axis, at)[:3, :2].T
+    radius = 1.25 * ring_radius(frame, site.body)
+    shapes = [turning(at, side, radius, 0.006 * site.reach, site.colour) for side in across]
+    return [Drawn(frame.link, shapes, at + _above(radius))]
+
+
+def _joint_or_link(site: Site) -> list[Drawn]:
+    return (_ring if site.target in site.robot.joint_names else _link)(site)
+
+
+def _centre(site: Site) -> FloatArray:
+    """(3,) m, the target link's centre of mass, or its origin where it has no mass."""
+    place = site.places[site.target]
+    inertial = site.robot.tree.links.get(site.target)
+    return (place @ [*(inertial.xyz if inertial else (0.0, 0.0, 0.0)), 1.0])[:3]
+
+
+def _link(site: Site) -> list[Drawn]:
+    at = _centre(site)
+    return [Drawn(site.target, [ball(at, 0.045 * site.reach, site.colour, 0.75)], at)]
+
+
+def _link_mass(site: Site) -> list[Drawn]:
+    inertial = site.robot.tree.links.get(site.target)
+    more = (site.values.get("scale", 1.0) - 1.0) * (inertial.mass if inertial else 0.0)
+    at = _centre(site)
+    return [Drawn(site.target, [_mass(site, at, more)], at)]
+
+
+def _payload(site: Site) -> list[Drawn]:
+    at = site.position(site.tool_link)
+    return [Drawn(site.tool_link, [_mass(site, at, site.values.get("mass", 0.0))], at)]
+
+
+def _mass(site: Site, at: FloatArray, mass: float) -> Mesh:
+    """As large as of steel, within what can be seen; what is missing is a mere shade."""
+    radius = float(np.clip(steel_radius(mass), 0.025 * site.reach, 0.12 * site.reach))
+    return ball(at, radius, site.colour, 0.4 if mass < 0.0 else 0.85)
+
+
+def _cable(site: Site) -> list[Drawn]:
+    start = site.position(site.target)
+    foot = site.position(site.frames[0].link)
+    # Beside the arm, on the ground.
+    out = start[:2] - foot[:2]
+    out = out / np.linalg.norm(out) if np.linalg.norm(out) > 1e-6 else np.array([1.0, 0.0])
+    end = np.array([*(start[:2] + 0.3 * site.reach * np.array([out[1], -out[0]])), foot[2]])
+    return [Drawn(None, [hose(start, end, 0.008 * site.reach, site.colour)], 0.5 * (start + end))]
+
+
+def _tool(site: Site) -> list[Drawn]:
+    at = site.tool_position
+    return [Drawn(site.tool_link, [ball(at, 0.035 * site.reach, site.colour, 0.6)], at)]
+
+
+def _blow(site: Site) -> list[Drawn]:
+    start, end = _force(site, site.direction)
+    return [Drawn(site.tool_link, [pointing(start, end, 0.011 * site.reach, site.colour)], start)]
+
+
+def _force_direction(site: Site) -> list[Drawn]:
+    """The stated direction in blue, the found one in the cause's colour."""
+    axes = site.robot.state(site.pose).tool_rotation
+    turn = exp3([site.values.get(f"r{axis}", 0.0) for axis in "xyz"])
+    start, end = _force(site, axes @ turn @ axes.T @ site.direction)
+    stated = _force(site, site.direction)
+    thick = 0.011 * site.reach
+    shapes = [pointing(*stated, 0.9 * thick, BLUE), pointing(start, end, thick, site.colour)]
+    return [Drawn(site.tool_link, shapes if site.values else shapes[:1], start)]
+
+
+def _force(site: Site, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Where an arrow of the force starts and where it ends, at the tool."""
+    end = site.tool_position - 0.02 * site.reach * direction
+    return end - 0.28 * site.reach * direction, end
+
+
+def _tool_offset(site: Site) -> list[Drawn]:
+    start = site.tool_position
+    offset = np.array([site.values.get(axis, 0.0) for axis in "xyz"])
+    if not offset.any():
+        return _tool(site)
+    end = start + _offset_scale(site) * site.robot.state(site.pose).tool_rotation @ offset
+    thick = 0.006 * site.reach
+    shapes = [pointing(start, end, thick, site.colour), ball(end, 2.2 * thick, site.colour)]
+    return [Drawn(site.tool_link, shapes, end)]
+
+
+def _offset_scale(site: Site) -> float:
+    """How many times its length an offset is drawn, so that it can be seen."""
+    length = float(np.linalg.norm([site.values.get(axis, 0.0) for axis in "xyz"]))
+    least = 0.12 * site.reach
+    return float(np.ceil(least / length)) if 0.0 < length < least else 1.0
+
+
+def note(site: Site) -> str:
+    """What must be said of a drawing beside the cause's name."""
+    scale = _offset_scale(site) if site.effect == "tool_offset" else 1.0
+    if scale > 1.0:
+        return f" (drawn {scale:g} times as long)"
+    return " (blue: as stated)" if site.effect == "force_direction" else ""
+
+
+def _workpiece(site: Site) -> list[Drawn]:
+    """A plate that the tool leans on."""
+    at = site.tool_position - 0.02 * site.reach * site.direction
+    plate = moved(
+        box(np.array([0.15, 0.15, 0.01]) * site.reach, site.colour), turned_to(site.direction, at)
+    )
+    return [Drawn(None, [plate], at)]
+
+
+def _whole(site: Site) -> list[Drawn]:
+    """A thin ring at every flexible joint."""
+    found: list[Drawn] = []
+    for frame in site.frames:
+        if frame.joint in site.robot.flexible_names:
+            _, axis = site.joint(frame.joint)
+            at = site.position(frame.link)
+            radius = 1.12 * ring_radius(frame, site.body)
+            shape = ring(radius, 0.006 * site.reach, site.colour)
+            label = at + _above(radius) if not found else None
+            found.append(Drawn(frame.link, [moved(shape, turned_to(axis, at))], label))
+    return found
+
+
+def _base(site: Site) -> list[Drawn]:
+    at = site.position(site.frames[0].link)
+    axis = np.eye(3)["xyz".index(site.target[-1])]
+    thick = 0.01 * site.reach
+    if site.target.startswith("r"):
+        shape = turning(at, axis, 0.2 * site.reach, thick, site.colour)
+    else:
+        shape = sliding(at, axis, 0.5 * site.reach, thick, site.colour)
+    return [Drawn(None, [shape], at)]
+
+
+def _sensor(site: Site) -> list[Drawn]:
+    """A cube where the channels' sensor sits; on every joint where they are the joints'."""
+    kind, _, name = site.target.partition(".")
+    links = {frame.link: frame.link for frame in site.frames}
+    links |= {frame.joint: frame.link for frame in site.frames if frame.joint}
+    if name in links:
+        at = [links[name]]
+    elif kind == "force" or name:
+        at = [site.tool_link]
+    else:
+        at = [links[joint] for joint in site.robot.flexible_names]
+    found: list[Drawn] = []
+    for link in at:
+        cube = box(np.full(3, 0.05 * site.reach), site.colour)
+        label = site.position(link) if not found else None
+        found.append(Drawn(link, [moved(cube, site.places[link])], label))
+    return found
+
+
+# By the target's kind, so that an effect from elsewhere is drawn too.
+BY_KIND: Mapping[str, Callable[[Site], list[Drawn]]] = {
+    "joint": _ring,
+    "link": _link,
+    "joint or link": _joint_or_link,
+    "tool": _tool,
+    "robot": _whole,
+    "axis": _base,
+    "channel group": _sensor,
+}
+# Where a better picture is known.
+BY_EFFECT: Mapping[str, Callable[[Site], list[Drawn]]] = {
+    "joint_stiffness": _spring,
+    "hardening": _spring,
+    "servo_compliance": _spring,
+    "stiffness_drift": _spring,
+    "thermal_stiffness": _spring,
+    "transverse_compliance": _bending,
+    "link_mass": _link_mass,
+    "cable": _cable,
+    "payload": _payload,
+    "tool_offset": _tool_offset,
+    "workpiece_contact": _workpiece,
+    "force_direction": _force_direction,
+}

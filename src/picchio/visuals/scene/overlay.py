@@ -1,0 +1,154 @@
+"""What is laid over the robot: direction envelopes, worst directions, joint rings, rivets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from picchio.core.arrays import BoolArray, FloatArray, IndexArray
+from picchio.studies.assessment.result import Assessment
+from picchio.studies.envelopes import DirectionEnvelope, icosphere
+from picchio.visuals.plots.style import CMAP
+from picchio.visuals.scene.robot.body import Body
+from picchio.visuals.scene.robot.kinematics import Frame
+from picchio.visuals.scene.robot.mesh import Mesh
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What a colour means: a quantity from 0 to `top` in a unit."""
+
+    title: str
+    unit: str
+    top: float
+
+    def colours(self, values: FloatArray) -> FloatArray:
+        """(k, 3) 0 to 255 for (k,) values."""
+        from matplotlib import colormaps
+
+        share = np.clip(np.asarray(values) / self.top if self.top > 0 else values, 0.0, 1.0)
+        return np.asarray(colormaps[CMAP](share))[:, :3] * 255.0
+
+    def colour(self, value: float) -> str:
+        """One value as "#rrggbb"; grey where there is none."""
+        if not np.isfinite(value):
+            return "#9aa3ad"
+        return "#" + "".join(f"{round(c):02x}" for c in self.colours(np.array([value]))[0])
+
+    def to_dict(self) -> dict[str, object]:
+        """For the page's colour bar."""
+        steps = np.linspace(0.0, self.top, 9)
+        return {"title": self.title, "unit": self.unit, "top": self.top,
+                "colours": [self.colour(value) for value in steps]}  # fmt: skip
+
+
+def envelope_surfaces(
+    envelope: DirectionEnvelope, subdivisions: int = 4
+) -> tuple[FloatArray, IndexArray]:
+    """The double ball of every joint, each direction solved once for all joints.
+
+    Args:
+        envelope: at a pose.
+        subdivisions: of an icosahedron.
+
+    Returns:
+        vertices (n, v, 3) rad, direction times peak, and faces (f, 3).
+    """
+    directions, faces = icosphere(subdivisions)
+    key = {tuple(row): i for i, row in enumerate(np.round(directions, 9) + 0.0)}
+    mirror = np.array([key[tuple(row)] for row in np.round(-directions, 9) + 0.0])
+    # Both ends of a line have the same peak: one of each pair is solved.
+    half = np.arange(len(directions)) < mirror
+    peak = np.empty((len(envelope.joint_names), len(directions)))
+    peak[:, half] = envelope.support(directions[half])
+    peak[:, ~half] = peak[:, mirror[~half]]
+    return directions[None] * peak[:, :, None], faces
+
+
+def envelope_meshes(
+    envelope: DirectionEnvelope, units: Sequence[str], subdivisions: int = 4
+) -> tuple[list[Mesh], list[Scale]]:
+    """A translucent double ball a joint, coloured by magnitude, and what its colours mean.
+
+    Vertices are in rad (m for a prismatic joint); `units` are "mrad" or "mm".
+    """
+    vertices, faces = envelope_surfaces(envelope, subdivisions)
+    meshes, scales = [], []
+    for name, unit, surface, peak in zip(
+        envelope.joint_names, units, vertices, envelope.peak_deflection, strict=True
+    ):
+        scale = Scale(f"peak deflection of {name}", unit, float(peak) * 1e3)
+        colours = scale.colours(np.linalg.norm(surface, axis=1) * 1e3)
+        meshes.append(Mesh(surface, faces, colours, opacity=0.5, exact=True, crease=180.0))
+        scales.append(scale)
+    return meshes, scales
+
+
+def joint_values(
+    assessment: Assessment | None, envelope: DirectionEnvelope, slides: BoolArray
+) -> tuple[FloatArray, Scale]:
+    """(n,) what the joints are coloured by: damage, else utilisation, else torque.
+
+    `slides` (n,) says which joints are prismatic: theirs are forces, N, and on no scale of torques.
+    """
+    if assessment is None:
+        torque = envelope.peak("torque")
+        return torque, Scale("peak torque, worst direction", "N m", _largest(torque, ~slides))
+    joints = assessment.joints
+    damage = np.array([joint.damage_per_rivet for joint in joints])
+    if np.nansum(damage) > 0.0:
+        share = 100.0 * damage / np.nanmax(damage)
+        return share, Scale("damage of the joints, worst = 100", "%", 100.0)
+    parts = np.array([[joint.utilisation, joint.reducer_utilisation] for joint in joints])
+    utilisation = 100.0 * np.where(
+        np.isfinite(parts).any(axis=1), np.nan_to_num(parts).max(axis=1), np.nan
+    )
+    if np.isfinite(utilisation).any():
+        return utilisation, Scale("utilisation of the joints", "%", float(np.nanmax(utilisation)))
+    torque = np.array([joint.peak_torque for joint in joints])
+    return torque, Scale("peak torque of the joints", "N m", _largest(torque, ~slides))
+
+
+def _largest(values: FloatArray, among: BoolArray) -> float:
+    return float(values[among].max(initial=0.0))
+
+
+def rivet_values(assessment: Assessment) -> tuple[list[FloatArray], Scale]:
+    """Per operation (n_poses,) what a rivet costs its worst joint, and the colours for it."""
+    operations = assessment.operations
+    shafts = any(joint.sn_curve for joint in assessment.joints)
+    if shafts:
+        damage = [np.nanmax(op.damage_per_rivet, axis=1) for op in operations]
+        if max(d.max() for d in damage) > 0.0:
+            top = max(float(d.max()) for d in damage)
+            return [d / top * 100 for d in damage], Scale(
+                "damage of a rivet, worst = 100", "%", 100.0
+            )
+        use = [100 * np.nanmax(op.utilisation, axis=1) for op in operations]
+        return use, Scale("utilisation by a rivet", "%", max(float(u.max()) for u in use))
+    turning = [joint.kind != "prismatic" for joint in assessment.joints]
+    torque = [op.peak_torque[:, turning].max(axis=1, initial=0.0) for op in operations]
+    return torque, Scale(
+        "largest joint torque in a rivet", "N m", max(float(t.max()) for t in torque)
+    )
+
+
+def ring_radius(frame: Frame, body: Body) -> float:
+    """How wide a ring about a joint must be to lie around the link there, m."""
+    smallest, largest = 0.03 * body.reach, 0.11 * body.reach
+    if frame.axis is None:
+        return smallest
+    near = []
+    for link, index, matrix in body.parts:
+        if link != frame.link:
+            continue
+        points = body.shapes[index].vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        along = points @ frame.axis
+        radial = np.linalg.norm(points - along[:, None] * frame.axis, axis=1)
+        near.append(radial[(np.abs(along) < 0.05 * body.reach) & (radial < largest)])
+    found = np.concatenate(near) if near else np.zeros(0)
+    if found.size < 8:
+        return smallest
+    return float(np.clip(1.06 * np.percentile(found, 80), smallest, 0.085 * body.reach))

@@ -1,0 +1,110 @@
+"""A scene: what is placed where, on which layer, and how it moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.provenance import package_version
+from picchio.studies.envelopes import DirectionEnvelope
+from picchio.visuals.scene.overlay import Scale
+from picchio.visuals.scene.robot.kinematics import Frame
+from picchio.visuals.scene.robot.mesh import Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Item:
+    """A mesh in the scene: on which layer, under which node, where, and in which colour."""
+
+    mesh: int
+    layer: str
+    node: str
+    matrix: FloatArray
+    colour: str | None = None
+    joint: int | None = None
+
+
+@dataclass(eq=False)
+class Scene:
+    """Everything that a page, a notebook cell or a live viewer shows.
+
+    Attributes:
+        title: the robot's name.
+        subtitle: pose and blows, in words.
+        frames: the robot's links.
+        meshes: distinct geometry.
+        items: what is placed where.
+        layers: (id, words, shown at first).
+        labels: text at a place: {"text", "layer", "at" (3,) m, "node" that it is in, "joint"}.
+        joints: the flexible joints: {"name", "scale", "peak", "text", and "map" its colour bar}.
+        scales: colour bars by layer.
+        swatches: colours of layers that have one, "#rrggbb".
+        motion: the vibration, see `picchio.visuals.scene.motion`.
+        tracks: recorded motions to play as ghosts in its place: {"layer", "text", "colour",
+            "samples" (n, k) rad}, see `picchio.visuals.scene.compare`.
+        diagnosis: what the panel tells: {"verdict", "lines": [{"text", "layer"}]}, or None.
+        playing: whether the vibration is shown at once.
+        camera: position and target, (2, 3) m.
+        floor: "cell" m, "squares" along a side, "at" the middle (3,) m.
+        chosen: index of the joint whose envelope is shown at first.
+        reach: m, size of the robot.
+        envelope: what the double balls are of.
+    """
+
+    title: str
+    subtitle: str
+    envelope: DirectionEnvelope
+    frames: list[Frame] = field(default_factory=list)
+    meshes: list[Mesh] = field(default_factory=list)
+    items: list[Item] = field(default_factory=list)
+    layers: list[tuple[str, str, bool]] = field(default_factory=list)
+    labels: list[dict[str, Any]] = field(default_factory=list)
+    joints: list[dict[str, Any]] = field(default_factory=list)
+    scales: dict[str, Scale] = field(default_factory=dict)
+    swatches: dict[str, str] = field(default_factory=dict)
+    motion: dict[str, Any] = field(default_factory=dict)
+    tracks: list[dict[str, Any]] = field(default_factory=list)
+    diagnosis: dict[str, Any] | None = None
+    playing: bool = True
+    camera: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
+    floor: dict[str, Any] = field(default_factory=dict)
+    chosen: int = 0
+    reach: float = 1.0
+    version: str = field(default_factory=package_version)
+
+    def html(self) -> str:
+        """One HTML page that needs nothing but itself."""
+        from picchio.visuals.scene.page import scene_html
+
+        return scene_html(self)
+
+    def show(self, viewer: Any = None) -> Any:
+        """Draw it in a live meshcat viewer, a new one if not given, and return the viewer."""
+        from picchio.visuals.scene.live import send
+
+        if viewer is None:
+            import meshcat
+
+            viewer = meshcat.Visualizer()
+        send(self, viewer)
+        return viewer
+
+    def __repr__(self) -> str:
+        return f"Scene({self.title!r}, {self.subtitle!r}, layers={[i for i, _, _ in self.layers]})"
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        page = escape(self.html(), quote=True)
+        return (
+            f'<iframe title="{escape(self.title)}" srcdoc="{page}" '
+            'style="width:100%;height:560px;border:0"></iframe>'
+        )
+
+    def add(self, mesh: Mesh) -> int:
+        """Put geometry in; its index."""
+        self.meshes.append(mesh)
+        return len(self.meshes) - 1
