@@ -13,6 +13,7 @@ from picchio.studies.maps import places
 from picchio.studies.maps.run import workspace_map
 from picchio.studies.rivet.batch import batch_damage
 from picchio.studies.rivet.life_rules import curves_of
+from picchio.studies.tasks import Operation
 
 # Forty times the paper's blow: shafts of this steel then fail.
 BLOWS = picchio.PulseTrain(12000.0, 0.040, 0.004)
@@ -29,7 +30,7 @@ def test_damage_is_that_of_assess(tmp_path, robot, ending):
     found = workspace_map(
         robot, grid, BLOWS, tmp_path / f"map{ending}", direction=[0, 0, 1], damage=12, chunk=2
     )
-    operation = picchio.studies.Operation("", np.array([0, 0, 1.0]), BLOWS, 12, grid.rows(0, 6))
+    operation = Operation("", np.array([0, 0, 1.0]), BLOWS, 12, grid.rows(0, 6))
     told = picchio.assess(robot, picchio.Task((operation,))).operations[0]
     assert told.damage_per_rivet.max() > 0.0
     np.testing.assert_allclose(

@@ -81,7 +81,7 @@ def test_a_live_viewer_runs_until_it_is_interrupted(
         print("a greeting")
         return SimpleNamespace(window=SimpleNamespace(server_proc=Server()))
 
-    monkeypatch.setattr("picchio.visuals.scene.Scene.show", show)
+    monkeypatch.setattr("picchio.visuals.scene.scene.Scene.show", show)
     assert run(["view", "fanuc_like_3dof", "--pose=-0.3,1.1,-1.0", "--live", "--json", "-"]) == 0
     assert calls == ["wait", "kill"]
     assert json.loads(capsys.readouterr().out)["file"] is None
