@@ -337,7 +337,6 @@ def assess(
     from picchio.robot.loading.load import load_robot
     from picchio.studies.assessment.run import assess as run
     from picchio.studies.backwards import allowable
-    from picchio.studies.rivet.life_rules import curves_of
     from picchio.studies.tasks import load_task
     from picchio.studies.uncertainty import uncertain_life
     from picchio.visuals.report.assessment import assessment_report
@@ -373,23 +372,23 @@ def assess(
             progress=tick,
         )
     content = found.to_dict()
-    curves = curves_of(loaded, sn_curve)
-    named = {j.name: c for j, c in zip(loaded.flexible_joints, curves, strict=True) if c}
     terms = _terms(loaded, work, found) if compare_methods or report is not None else ()
     if terms:
         content["method_terms"] = [term.to_dict() for term in terms]
     options: dict[str, Any] = {
+        "sn_curve": sn_curve,
         "residue": residue,
         "mean_stress": mean_stress,
+        "gravity_stiffness": gravity_stiffness,
         "gravity_balanced": gravity_balanced,
     }
     allowed = spread = None
     if for_life is not None:
-        allowed = allowable(loaded, work, named, for_life, survival=survival, **options)
+        allowed = allowable(loaded, work, for_life, survival=survival, **options)
         content["for_life"] = [joint.to_dict() for joint in allowed]
     if uncertainty:
         with progress("samples") as tick:
-            spread = uncertain_life(loaded, work, named, seed=seed or 0, progress=tick, **options)
+            spread = uncertain_life(loaded, work, seed=seed or 0, progress=tick, **options)
         content["uncertainty"] = spread.to_dict()
     if report is not None:
         page = assessment_report(
@@ -422,7 +421,7 @@ def _terms(robot: FlexibleRobot, task: Task, found: Assessment) -> tuple[Term, .
     from picchio.studies.assessment.method_comparison import compare_methods
 
     known = any(joint.sn_curve for joint in found.joints)
-    damped = all(math.isfinite(check.rest_peak) for check in found.steady_state)
+    damped = all(math.isfinite(check.rest_peak + check.steady_peak) for check in found.steady_state)
     return compare_methods(robot, task, load_sn_curve(DEFAULT_SN_CURVE)) if known and damped else ()
 
 

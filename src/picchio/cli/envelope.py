@@ -48,7 +48,7 @@ def envelope(
     from picchio.model.model import Model
     from picchio.robot.dynamics.pose import warn_beyond_limits
     from picchio.robot.loading.load import load_robot
-    from picchio.studies.envelopes import direction_envelope
+    from picchio.studies.envelopes import envelope as run
 
     check_target(json, [robot, flex])
     loaded = load_robot(robot, flex=flex, tool=tool)
@@ -56,7 +56,7 @@ def envelope(
     blows = choose_blows(loaded, force, period, width)
     at = loaded.pose(numbers(pose, "--pose"))
     warn_beyond_limits(loaded, [at], "the pose")
-    found = direction_envelope(Model(loaded, gravity_stiffness), at, blows, hits)
+    found = run(loaded, at, blows, hits=hits, gravity_stiffness=gravity_stiffness)
     if json is not None:
         write_json(found.to_dict(), json)
     if json != "-":

@@ -57,13 +57,14 @@ def allowable_factor(
     return largest_factor(spent, limit)
 
 
-def largest_factor(spent: Callable[[float], float], limit: float) -> float:
-    """The largest factor whose damage is within a limit, by bisection to the last bit.
+def largest_factor(spent: Callable[[float], float], limit: float, tolerance: float = 0.0) -> float:
+    """The largest factor whose damage is within a limit, by bisection.
 
     Args:
         spent: damage at a factor, never falling; an InputError (above the static strength)
             counts as endless damage.
         limit: what may be spent.
+        tolerance: relative, of the factor; 0 goes on to the last bit.
 
     Raises:
         InputError: even a vanishing factor spends more, so what does not scale breaks the part.
@@ -84,7 +85,7 @@ def largest_factor(spent: Callable[[float], float], limit: float) -> float:
         low, high = high, high * 2.0
     while True:
         middle = 0.5 * (low + high)
-        if middle in (low, high):
+        if middle in (low, high) or high - low <= tolerance * high:
             return low
         low, high = (low, middle) if too_much(middle) else (middle, high)
 

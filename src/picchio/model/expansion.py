@@ -242,7 +242,7 @@ class WideChain:
             model.inertias[joint] = pin.Inertia(1.0, point, np.zeros((3, 3)))
         else:
             joint, placement = self._frame(inertias)
-            model.inertias[joint] = placement.act(_link_inertia(self.robot, inertias))
+            model.inertias[joint] = placement.act(link_inertia(self.robot, inertias))
         return model
 
     def has_frame(self, link: str) -> bool:
@@ -326,7 +326,12 @@ class WideChain:
         return Motion(here, np.array(gradient), rotation)
 
 
-def _link_inertia(robot: FlexibleRobot, link: str) -> Any:
+def link_inertia(robot: FlexibleRobot, link: str) -> pin.Inertia:
+    """A link's own inertia in its frame, as the URDF has it.
+
+    Raises:
+        InputError: the URDF gives the link none.
+    """
     own = robot.tree.links.get(link)
     if own is None:
         raise InputError(

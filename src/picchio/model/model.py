@@ -11,19 +11,22 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.excitation.piecewise import PiecewiseForce
+from picchio.excitation.trains import Excitation, PulseTrain
+from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, Where
 from picchio.model.effects.registry import from_dict
 from picchio.model.linear_system import LinearSystem, modal_damping_matrix
 
 if TYPE_CHECKING:
-    from picchio.model.blows import Blows
     from picchio.model.geometry import Geometry
     from picchio.model.plant import Plant
     from picchio.model.sensing import Sensors
     from picchio.robot.dynamics.statics import RobotState
     from picchio.robot.flexible_robot import FlexibleRobot
 
+_STRUCTURAL = ("structure", "over-time", "nonlinear")
 # In which order effects are applied: what a later one reads, an earlier one has changed.
 _ORDER = ("structure", "over-time", "nonlinear", "blows", "sensor", "motion")
 
@@ -60,6 +63,28 @@ class Model:
                 raise error.placed(file=next(reversed(self.robot.files), None)) from None
             object.__setattr__(self, "own", own)
             object.__setattr__(self, "effects", (*own, *self.effects))
+
+    @classmethod
+    def of(
+        cls,
+        robot: FlexibleRobot | Model,
+        *,
+        gravity_stiffness: bool | None = None,
+        gravity_balanced: bool | None = None,
+    ) -> Model:
+        """The model itself, or that of a robot; a switch that is given overrides the model's.
+
+        Args:
+            robot: a robot (with the effects it was saved with) or a model.
+            gravity_stiffness: see the class; off for a robot.
+            gravity_balanced: likewise.
+        """
+        model = robot if isinstance(robot, Model) else cls(robot)
+        if gravity_stiffness is not None:
+            model = replace(model, gravity_stiffness=gravity_stiffness)
+        if gravity_balanced is not None:
+            model = replace(model, gravity_balanced=gravity_balanced)
+        return model
 
     def with_effects(self, effects: Iterable[Effect]) -> Model:
         """The same robot, and the effects it was saved with, with these effects."""
@@ -131,6 +156,69 @@ class Model:
             effect.sense(sensors, conditions or Conditions())
         return sensors
 
+    def force(
+        self, excitation: Excitation, hits: int | None, conditions: Conditions | None = None
+    ) -> PiecewiseForce:
+        """F(t) with the effects in it: a burst and silence, or one period of the steady train.
+
+        Args:
+            excitation: the blows as programmed.
+            hits: of the burst; None for the steady train.
+            conditions: when and how warm, and in which record.
+
+        Raises:
+            InputError: an effect that has no steady state.
+        """
+        if hits is None:
+            self.refuse("steady state")
+        if not self.changes_blows:
+            return excitation.one_period() if hits is None else excitation.burst(hits)
+        blows = Blows.of(excitation, hits, np.array([0.0, 0.0, 1.0]))
+        return self.blows(blows, conditions).force()
+
+    def force_directions(
+        self, tool_rotation: FloatArray, conditions: Conditions | None = None
+    ) -> FloatArray:
+        """What becomes of the programmed force direction: (3, 3), actual = matrix @ programmed.
+
+        Args:
+            tool_rotation: (3, 3), the tool frame's axes at rest, world.
+            conditions: when and how warm, and in which record.
+        """
+        if not self.changes_blows:
+            return np.eye(3)
+        still = PulseTrain(force=1.0, period=1.0, width=0.5)
+        columns = [
+            self.blows(Blows.of(still, 1, axis).change(tool_rotation=tool_rotation), conditions)
+            for axis in np.eye(3)
+        ]
+        return np.array([blows.direction for blows in columns]).T
+
+    @property
+    def changes_blows(self) -> bool:
+        """Whether any effect changes the blows."""
+        return any(effect.where == "blows" for effect in self.effects)
+
+    @property
+    def changes_structure(self) -> bool:
+        """Whether any effect changes the equations of motion."""
+        return any(effect.where in _STRUCTURAL for effect in self.effects)
+
+    def refuse(self, question: str) -> None:
+        """Raise if an effect declares that a question has no answer.
+
+        Raises:
+            InputError: with the effect and its reason.
+        """
+        for effect in self.effects:
+            if question in effect.refused:
+                raise InputError(f"no {question}: {effect.refused[question]}", value=effect.label)
+
+    def without_load(self, conditions: Conditions | None = None) -> tuple[str, ...]:
+        """The effects that leave the loads under the tool alone, a sentence each."""
+        reasons = [(e.label, e.without_load(conditions or Conditions())) for e in self.effects]
+        return tuple(f"{label} {reason}" for label, reason in reasons if reason is not None)
+
     def linear_system(self, pose: FloatArray) -> LinearSystem:
         """The linear equations of motion at a pose.
 
@@ -142,7 +230,7 @@ class Model:
         Raises:
             InputError: wrong length, a singular mass matrix.
         """
-        if any(effect.where in ("structure", "over-time") for effect in self.effects):
+        if self.changes_structure:
             from picchio.model.geometry import Geometry
 
             geometry = Geometry.of(self.robot, pose)

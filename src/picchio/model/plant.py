@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,9 +12,10 @@ from picchio.core.errors import InputError
 from picchio.model.conditions import Conditions
 from picchio.model.elements import Element
 from picchio.model.expansion import Motion
-from picchio.model.geometry import Geometry
+from picchio.model.geometry import Geometry, Mass
 from picchio.model.linear_system import shared_damping
 from picchio.model.system import VibratingSystem
+from picchio.robot.flexible_robot import FlexibleRobot
 
 Row = dict[str, float]
 
@@ -43,17 +44,15 @@ class _Anchor:
     damping: float
 
 
-@dataclass
-class Plant:
-    """What effects change: coordinates, masses, springs, dampers, nonlinear elements.
+class Changes:
+    """What effects may change: springs, damping, masses, coordinates, nonlinear elements.
 
     Args:
-        geometry: the robot's masses and kinematics at the pose.
-        gravity_stiffness: whether gravity's change with the deflection counts.
+        robot: the robot.
+        springs: stiffness of every flexible joint by name, N m/rad.
         conditions: when and how warm.
 
     Attributes:
-        springs: stiffness of every flexible joint, N m/rad.
         damping_scale: factor on all modal damping ratios.
         modal_share: whether the stated modal damping is that of the modes with all coordinates
             and springs (1, the convention of linear effects in `docs`), or acts between link
@@ -63,29 +62,28 @@ class Plant:
         coordinates: those of the wide chain that move, then those that effects add.
     """
 
-    geometry: Geometry
-    gravity_stiffness: bool = True
-    conditions: Conditions = field(default_factory=Conditions)
-
-    def __post_init__(self) -> None:
-        robot = self.geometry.robot
-        self.springs = dict(zip(robot.flexible_names, self.geometry.stiffness, strict=True))
-        self.gravity_torque = dict(
-            zip(robot.flexible_names, self.geometry.gravity_torque, strict=True)
-        )
+    def __init__(
+        self, robot: FlexibleRobot, springs: dict[str, float], conditions: Conditions
+    ) -> None:
+        self.robot = robot
+        self.springs = springs
+        self.conditions = conditions
         self.damping_scale = 1.0
         self.modal_share = 1.0
         self.force_offset = np.zeros(3)
         self.coordinates: list[str] = list(robot.flexible_names)
         self._motors: dict[str, str] = {}
-        self._masses: list[tuple[float, str, tuple[float, ...] | None]] = [(1.0, "robot", None)]
+        self._masses: list[Mass] = [(1.0, "robot", None)]
         self._added_inertia: list[tuple[Row, float]] = []
         self._springs: list[_Spring] = []
         self._anchors: list[_Anchor] = []
         self._elements: list[tuple[Element, str]] = []
         self._contacts: list[Element] = []
 
-    # What effects may do ---------------------------------------------------------------------
+    @property
+    def gravity_torque(self) -> dict[str, float]:
+        """Torque by which each joint holds the arm against gravity, added masses included, N m."""
+        raise NotImplementedError
 
     def check_joint(self, joint: str) -> str:
         """The name, if it is a flexible joint's.
@@ -142,6 +140,57 @@ class Plant:
         if joint in self._motors:
             row[self._motors[joint]] = -1.0
         return row
+
+    @property
+    def joints_only(self) -> bool:
+        """Whether nothing but the joints' own springs, modally damped, carries the arm."""
+        return not (
+            self._springs
+            or self._anchors
+            or self._elements
+            or self._contacts
+            or len(self.coordinates) > len(self.springs)
+        )
+
+    @property
+    def added_masses(self) -> tuple[Mass, ...]:
+        """(weight, link, point) of every mass beside the robot's own."""
+        return tuple(self._masses[1:])
+
+    @property
+    def added_inertias(self) -> tuple[tuple[str, float], ...]:
+        """(joint, kg m^2) of inertias that turn with a joint's link side."""
+        return tuple((next(iter(row)), value) for row, value in self._added_inertia)
+
+
+class Plant(Changes):
+    """A robot's equations of motion at a pose.
+
+    Args:
+        geometry: the robot's masses and kinematics at the pose.
+        gravity_stiffness: whether gravity's change with the deflection counts.
+        conditions: when and how warm.
+    """
+
+    def __init__(
+        self,
+        geometry: Geometry,
+        gravity_stiffness: bool = True,
+        conditions: Conditions | None = None,
+    ) -> None:
+        names = geometry.robot.flexible_names
+        springs = dict(zip(names, geometry.stiffness, strict=True))
+        super().__init__(geometry.robot, springs, conditions or Conditions())
+        self.geometry = geometry
+        self.gravity_stiffness = gravity_stiffness
+
+    @property
+    def gravity_torque(self) -> dict[str, float]:
+        """Torque by which each joint holds the arm against gravity, added masses included, N m."""
+        held = self.geometry.gravity_torque
+        for weight, what, point in self.added_masses:
+            held = held + weight * self.geometry.inertia(what, point).gravity[: held.size]
+        return dict(zip(self.springs, held, strict=True))
 
     # What comes of it ------------------------------------------------------------------------
 

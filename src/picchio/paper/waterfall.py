@@ -18,7 +18,7 @@ from picchio.fatigue.sn.library import load_sn_curve
 from picchio.paper.claims.life import STEEL
 from picchio.paper.statics import gravity_stress
 from picchio.paper.world import World
-from picchio.studies.rivet.loads import PoseLoads, loads_at
+from picchio.studies.rivet.pose import JointLoad, Rivet
 
 CORRECTIONS = ("transient", "counting", "gravity", "curve")
 WORDS = {
@@ -61,7 +61,7 @@ class Step:
 @dataclass(frozen=True, eq=False)
 class _Loads:
     world: World
-    poses: list[PoseLoads]
+    poses: list[tuple[JointLoad, ...]]
     gravity: FloatArray
     hits: int
 
@@ -72,7 +72,7 @@ class _Loads:
 
 def _loads(world: World) -> _Loads:
     poses = [
-        loads_at(world.model, operation, pose)
+        Rivet(world.model, operation, pose).loads()
         for operation in world.operations()
         for pose in operation.poses
     ]
@@ -133,9 +133,9 @@ def _lives(loads: _Loads, chosen: tuple[str, ...], curve: SNCurve) -> FloatArray
     return np.array([life(float(d) / len(loads.poses)) for d in spent])
 
 
-def _cycles(loads: _Loads, pose: PoseLoads, joint: int, chosen: tuple[str, ...]) -> Cycles:
+def _cycles(loads: _Loads, pose: tuple[JointLoad, ...], joint: int, chosen: tuple[str, ...]) -> Cycles:
     """Stress cycles of one rivet, Pa, about their own mean."""
-    load = pose.joints[joint]
+    load = pose[joint]
     points = load.rest if "transient" in chosen else load.steady
     assert points is not None
     stress = loads.torque_factor * points

@@ -1,10 +1,9 @@
-"""The life asked backwards: what force, how many hits, what shaft a wanted life allows."""
+"""The allowable force, hits and shaft radius for a target life."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,11 +18,12 @@ from picchio.fatigue.miner import damage
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.robot.joint import Joint
+from picchio.studies.rivet.variation import ShaftStress, VariedRivet, rivets_of
 from picchio.studies.tasks import Task
-from picchio.studies.uncertainty import LifeJob, Place, place_of
 
 _MOST_HITS = 1 << 10
+# How exactly the force is found where every trial must be integrated in time.
+_NONLINEAR_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -59,146 +59,153 @@ class Allowable:
 
 
 def allowable(
-    robot: FlexibleRobot,
+    robot: FlexibleRobot | Model,
     task: Task,
-    curves: Mapping[str, SNCurve],
     rivets: float,
     *,
     survival: float | None = None,
+    sn_curve: str | SNCurve | None = None,
     residue: Residue = "half-cycles",
     mean_stress: Rule = "none",
-    gravity_balanced: bool = False,
+    gravity_stiffness: bool | None = None,
+    gravity_balanced: bool | None = None,
 ) -> tuple[Allowable, ...]:
-    """Allowable force, hits and shaft radius of every joint for a wanted life.
+    """Allowable force, hits and shaft radius of every joint for a target life.
 
     Rivets start from rest and ring down, cycles are counted by rainflow. Gravity's stress does not
     grow with the force, but with a thinner shaft. Where the curve knows its yield strength in
     shear, the largest stress must stay below it, too.
 
     Args:
-        robot: with shafts.
+        robot: with shafts; or a model of it.
         task: what it does.
-        curves: S-N curve of each joint that counts, by joint name.
-        rivets: the wanted life, in rivets of the task's mix.
+        rivets: the target life, in rivets of the task's mix.
         survival: move each curve to this probability; None leaves it.
+        sn_curve: for all joints, instead of their own.
         residue: as in `assess`.
         mean_stress: as in `assess`.
+        gravity_stiffness: as in `assess`.
         gravity_balanced: as in `assess`.
 
+    Returns:
+        what each joint with a shaft allows.
+
     Raises:
-        InputError: no joint with shaft and curve, a life that is not positive, a curve without
-            scatter where a survival is asked for, gravity alone too much.
+        InputError: no joint with a shaft, a life that is not positive, a curve without scatter
+            where a survival is asked for, gravity alone too much.
     """
     if not (math.isfinite(rivets) and rivets > 0):
         raise InputError("must be positive", key="rivets", value=rivets)
-    joints = [j for j in robot.flexible_joints if j.shaft is not None and j.name in curves]
-    if not joints:
-        raise InputError("no joint has a shaft and an S-N curve", key="curves")
-    used = [curves[j.name] if survival is None else curves[j.name].at_survival(survival)
-            for j in joints]  # fmt: skip
-    columns = [robot.flexible_names.index(joint.name) for joint in joints]
-    job = LifeJob(joints, columns, used, residue, mean_stress)
-    model = Model(robot, gravity_balanced=gravity_balanced)
-    places = [place_of(model, op, pose) for op in task.operations for pose in op.poses]
-    loads = _loads(job, places)
-    limit = task.rivets_per_pass / rivets
-    after = _AfterHits(job, places)
-    return tuple(
-        _joint(job, k, after, loads[k], limit, task, rivets, survival) for k in range(len(joints))
-    )
+    model = Model.of(robot, gravity_stiffness=gravity_stiffness, gravity_balanced=gravity_balanced)
+    stress = ShaftStress.of(model.robot, sn_curve, survival, residue, mean_stress)
+    loads = _Loads(stress, rivets_of(model, task))
+    search = _Backwards(stress, loads, task, rivets, survival)
+    return tuple(search.joint(k) for k in range(len(stress.joints)))
 
 
 Load = list[tuple[Cycles, float, float]]
-"""For each pose: the stress cycles of a rivet, the steady stress, the rivets set there."""
+"""For each rivet place: the stress cycles of a rivet, the steady stress, the rivets set there."""
 
 
-def _loads(job: LifeJob, places: Sequence[Place]) -> list[Load]:
-    found = [job.cycles(place, 1.0, 1.0, 1.0) for place in places]
-    return [
-        [(*pose[k], place.rivets) for pose, place in zip(found, places, strict=True)]
-        for k in range(len(job.joints))
-    ]
+class _Loads:
+    """The loads under a force and a number of hits, computed once for all joints."""
+
+    def __init__(self, stress: ShaftStress, places: list[tuple[VariedRivet, float]]) -> None:
+        self._stress, self._places = stress, places
+        self._known: dict[tuple[float, int | None], list[Load]] = {}
+        self.nonlinear = any(place.nonlinear for place, _ in places)
+
+    def __call__(self, joint: int, force: float = 1.0, hits: int | None = None) -> Load:
+        """Of a joint, with the force times a factor; a linear model's cycles are scaled."""
+        solved = force if self.nonlinear else 1.0
+        if (solved, hits) not in self._known:
+            found = [
+                (self._stress.cycles(place.varied(force=solved, hits=hits, compiled=False)), count)
+                for place, count in self._places
+            ]
+            self._known[solved, hits] = [
+                [(*cycles[k], count) for cycles, count in found]
+                for k in range(len(self._stress.joints))
+            ]
+        load = self._known[solved, hits][joint]
+        rest = force / solved
+        return load if rest == 1.0 else [(c.scaled(rest), steady, n) for c, steady, n in load]
 
 
-class _AfterHits:
-    """The loads after any number of blows, computed once for all joints."""
+@dataclass(frozen=True)
+class _Backwards:
+    """The search, joint by joint."""
 
-    def __init__(self, job: LifeJob, places: list[Place]) -> None:
-        self._job, self._places = job, places
-        self._known: dict[int, list[Load]] = {}
+    stress: ShaftStress
+    loads: _Loads
+    task: Task
+    rivets: float
+    survival: float | None
 
-    def __call__(self, hits: int, joint: int) -> Load:
-        if hits not in self._known:
-            changed = [dataclasses.replace(place, hits=hits) for place in self._places]
-            self._known[hits] = _loads(self._job, changed)
-        return self._known[hits][joint]
+    @property
+    def limit(self) -> float:
+        """Damage that a pass of the task may do."""
+        return self.task.rivets_per_pass / self.rivets
 
-
-def _joint(
-    job: LifeJob,
-    k: int,
-    after: _AfterHits,
-    load: Load,
-    limit: float,
-    task: Task,
-    rivets: float,
-    survival: float | None,
-) -> Allowable:
-    joint: Joint = job.joints[k]
-    curve, rule = job.curves[k], job.mean_stress
-    assert joint.shaft is not None
-    strength = curve.yield_shear or curve.ultimate_shear or math.inf
-
-    def spent(factor: float, steady_factor: float = 1.0, of: Load = load) -> float:
-        if _largest(of, factor, steady_factor) >= strength:
-            return math.inf
-        return math.fsum(
-            number * damage(cycles.scaled(factor).shifted(steady * steady_factor), curve, rule)
-            for cycles, steady, number in of
+    def joint(self, k: int) -> Allowable:
+        """What joint k allows."""
+        shaft = self.stress.joints[k].shaft
+        assert shaft is not None
+        load = self.loads(k)
+        # A stress below one pascal is rounding: the blows do not move this joint.
+        moved = any(len(cycles) and cycles.range.max() > 1.0 for cycles, _, _ in load)
+        force = slimmer = math.inf
+        if moved:
+            force = largest_factor(
+                lambda f: self._spent(k, self.loads(k, f)),
+                self.limit,
+                _NONLINEAR_TOLERANCE if self.loads.nonlinear else 0.0,
+            )
+            # A thinner shaft raises every stress of the same torques.
+            slimmer = largest_factor(lambda f: self._spent(k, load, f), self.limit)
+        now = self._spent(k, load)
+        return Allowable(
+            joint=self.stress.joints[k].name,
+            rivets=self.rivets,
+            survival=self.survival,
+            force_factor=force,
+            radius=0.0 if math.isinf(slimmer) else shaft.radius * slimmer ** (-1.0 / 3.0),
+            hits=self._hits(k) if moved else None,
+            life=math.inf if now == 0.0 else self.task.rivets_per_pass / now,
         )
 
-    # A stress below one pascal is rounding: the blows do not move this joint.
-    moved = any(len(cycles) and cycles.range.max() > 1.0 for cycles, _, _ in load)
-    force = largest_factor(spent, limit) if moved else math.inf
-    slimmer = largest_factor(lambda f: spent(f, f), limit) if moved else math.inf
-    now = spent(1.0)
-    return Allowable(
-        joint=joint.name,
-        rivets=rivets,
-        survival=survival,
-        force_factor=force,
-        radius=0.0 if math.isinf(slimmer) else joint.shaft.radius * slimmer ** (-1.0 / 3.0),
-        hits=_hits(k, after, spent, limit, task) if moved else None,
-        life=math.inf if now == 0.0 else task.rivets_per_pass / now,
-    )
+    def _spent(self, k: int, load: Load, factor: float = 1.0) -> float:
+        """Damage of joint k in a pass, every stress times `factor`; inf beyond its strength."""
+        curve, rule = self.stress.curves[k], self.stress.mean_stress
+        stresses = [(cycles.scaled(factor), steady * factor, n) for cycles, steady, n in load]
+        if _largest(stresses) >= (curve.yield_shear or curve.ultimate_shear or math.inf):
+            return math.inf
+        return math.fsum(
+            n * damage(cycles.shifted(steady), curve, rule) for cycles, steady, n in stresses
+        )
+
+    def _hits(self, k: int) -> int | None:
+        """The most blows a rivet may take; the response to each number is computed anew."""
+        if len({operation.hits_per_rivet for operation in self.task.operations}) != 1:
+            return None
+
+        def too_much(hits: int) -> bool:
+            return self._spent(k, self.loads(k, hits=hits)) > self.limit
+
+        if not too_much(_MOST_HITS):
+            return None
+        low, high = 0, _MOST_HITS
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (low, middle) if too_much(middle) else (middle, high)
+        return low
 
 
-def _largest(load: Load, factor: float, steady_factor: float) -> float:
+def _largest(load: Load) -> float:
     """The largest stress of all, gravity and blows together, Pa."""
     largest = 0.0
     for cycles, steady, _ in load:
-        held = steady * steady_factor
-        largest = max(largest, abs(held))
+        largest = max(largest, abs(steady))
         if len(cycles):
-            swing = np.abs(held + factor * cycles.mean) + factor * cycles.amplitude
-            largest = max(largest, float(swing.max()))
+            largest = max(largest, float((np.abs(steady + cycles.mean) + cycles.amplitude).max()))
     return largest
-
-
-def _hits(
-    k: int, after: _AfterHits, spent: Callable[..., float], limit: float, task: Task
-) -> int | None:
-    """The most blows a rivet may take; the response to each number is computed anew."""
-    if len({operation.hits_per_rivet for operation in task.operations}) != 1:
-        return None
-
-    def too_much(hits: int) -> bool:
-        return spent(1.0, 1.0, after(hits, k)) > limit
-
-    if not too_much(_MOST_HITS):
-        return None
-    low, high = 0, _MOST_HITS
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if too_much(middle) else (middle, high)
-    return low

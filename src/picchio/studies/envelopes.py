@@ -14,9 +14,10 @@ from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
 from picchio.excitation.trains import Excitation
 from picchio.model.model import Model
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.studies.rivet.pose import ModelAtPose
 from picchio.vibration.closed_form.many_directions import peak_deflections
-from picchio.vibration.closed_form.modes import modal_analysis
-from picchio.vibration.closed_form.response import Response, response_from_rest, steady_state
+from picchio.vibration.closed_form.response import Response
 
 FORMAT = "picchio-envelope/1"
 Quantity = Literal["deflection", "torque", "stress"]
@@ -46,6 +47,7 @@ class DirectionEnvelope:
         torque_factor: (n,) N m/rad, torque per deflection.
         stress_factor: (n,) Pa/rad, shear stress per deflection; NaN without a shaft.
         response: the closed form behind it all.
+        notes: what was left out, and why.
     """
 
     robot: str
@@ -62,6 +64,7 @@ class DirectionEnvelope:
     torque_factor: FloatArray
     stress_factor: FloatArray
     response: Response
+    notes: tuple[str, ...] = ()
     origin: Mapping[str, Any] = field(default_factory=dict)
 
     def peak(self, quantity: Quantity = "deflection") -> FloatArray:
@@ -135,11 +138,6 @@ class DirectionEnvelope:
 
     def to_dict(self) -> dict[str, Any]:
         """The content of `picchio-envelope/1`."""
-        blows = {
-            name: getattr(self.excitation, name, None) for name in ("force", "period", "width")
-        }
-        kind = {"PulseTrain": "pulse_train", "HalfSineTrain": "half_sine_train"}
-        name = kind.get(type(self.excitation).__name__, "measured")
         joints = zip(
             self.joint_names,
             self.peak_deflection,
@@ -153,7 +151,7 @@ class DirectionEnvelope:
             "robot": self.robot,
             "pose": self.pose,
             "tool_position": self.tool_position,
-            "excitation": {"kind": name, **blows, "hits": self.hits},
+            "excitation": {**self.excitation.to_dict(), "hits": self.hits},
             "natural_frequencies": self.natural_frequencies,
             "joints": [
                 {
@@ -169,59 +167,65 @@ class DirectionEnvelope:
                 "peak_displacement": self.peak_tool_displacement,
                 "worst_direction": self.worst_tool_direction,
             },
+            "notes": list(self.notes),
             "provenance": dict(self.origin),
         }
 
 
-def direction_envelope(
-    model: Model, pose: ArrayLike, excitation: Excitation, hits: int | None = None
+def envelope(
+    robot: FlexibleRobot | Model,
+    pose: ArrayLike,
+    excitation: Excitation,
+    *,
+    hits: int | None = None,
+    gravity_stiffness: bool | None = None,
 ) -> DirectionEnvelope:
     """The exact direction envelope of every joint at a pose.
 
     Args:
-        model: the robot.
+        robot: with stiffnesses; or a model of it.
         pose: (nv,) rad or m.
         excitation: the blows.
         hits: of a burst from rest with its ring-down; None for the steady state.
+        gravity_stiffness: add dg/dq to the springs; as the model has it if not given.
+
+    Returns:
+        the envelope, over the directions as programmed: a force that an effect turns is turned
+        from each of them.
 
     Raises:
-        InputError: a bad pose, a resonance without damping, no flexible joint.
+        InputError: a bad pose, a resonance without damping, no flexible joint, a nonlinear model
+            (whose worst direction has no closed form), an effect that has no steady state.
     """
-    robot = model.robot
-    if not robot.flexible_joints:
-        raise InputError("no joint has a stiffness, so nothing can vibrate", file=robot.source)
-    checked = robot.pose(pose)
-    state = robot.state(checked)
-    modes = modal_analysis(model.linear_system(checked))
-    response = (
-        steady_state(modes, excitation)
-        if hits is None
-        else response_from_rest(modes, excitation, hits)
-    )
+    model = Model.of(robot, gravity_stiffness=gravity_stiffness)
+    at = ModelAtPose(model, model.robot.pose(pose))
+    response = at.response(excitation, hits)
     worst = response.worst_directions()
     if not all(np.isfinite(w.value) for w in worst):
         raise InputError("the deflections overflow", key="force", value=excitation.peak_force)
-    tool, direction = response.worst_combination(state.jacobian)
+    tool, direction = at.tool_response(excitation, hits).worst_combination(np.eye(3))
+    joints = model.robot.flexible_joints
     stress = [
         k * joint.shaft.radius / joint.shaft.polar_moment if joint.shaft else np.nan
-        for joint, k in zip(robot.flexible_joints, state.stiffness, strict=True)
+        for joint, k in zip(joints, at.stiffness, strict=True)
     ]
     return DirectionEnvelope(
-        robot=robot.name,
-        joint_names=robot.flexible_names,
-        pose=checked,
-        tool_position=state.tool_position,
+        robot=model.robot.name,
+        joint_names=model.robot.flexible_names,
+        pose=at.pose,
+        tool_position=at.state.tool_position,
         excitation=excitation,
         hits=hits,
-        natural_frequencies=modes.natural_frequencies,
+        natural_frequencies=at.natural_frequencies,
         peak_deflection=np.array([w.value for w in worst]),
         worst_direction=np.array([w.direction for w in worst]),
         peak_tool_displacement=tool,
         worst_tool_direction=direction,
-        torque_factor=np.array(state.stiffness),
+        torque_factor=np.array(at.stiffness),
         stress_factor=np.array(stress),
         response=response,
-        origin=provenance(robot.files),
+        notes=model.without_load(),
+        origin=provenance(model.robot.files),
     )
 
 

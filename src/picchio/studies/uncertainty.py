@@ -5,16 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.excitation.piecewise import PiecewiseForce
-from picchio.excitation.trains import Excitation, HalfSineTrain, PulseTrain
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.mean_stress import Rule
@@ -23,191 +20,8 @@ from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.uncertain_lives import LifeSpread, Uncertain, design
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.robot.joint import Joint
-from picchio.studies.rivet.loads import Rivet
-from picchio.studies.tasks import Operation, Task
-from picchio.vibration.closed_form.modes import modal_analysis
-
-if TYPE_CHECKING:
-    from picchio.studies.rivet.fast_rest import FastRest
-
-
-# A rivet's stress cycles under perturbed stiffness, damping and blows; see `uncertainty`.
-
-_DYNAMIC = ("stiffness", "damping_ratio", "width")
-
-
-@dataclass(frozen=True, eq=False)
-class Place(Rivet):
-    """One pose of one operation, ready to be perturbed.
-
-    Attributes:
-        rivets: set there in a pass of the task.
-    """
-
-    rivets: float = 1.0
-
-    @cached_property
-    def fast(self) -> FastRest | None:
-        """The compiled path; None where the modes need the exact one."""
-        from picchio.studies.rivet.fast_rest import FastRest
-
-        modes = modal_analysis(self.system)
-        return FastRest(modes, self.direction) if FastRest.suits(modes) else None
-
-
-@dataclass(frozen=True)
-class LifeJob:
-    """The joints that count, and how their stress becomes damage."""
-
-    joints: list[Joint]
-    columns: list[int]
-    curves: list[SNCurve]
-    residue: Residue
-    mean_stress: Rule
-
-    def cycles(
-        self,
-        place: Place,
-        stiffness: float,
-        damping: float,
-        width: float,
-        *,
-        compiled: bool = False,
-    ) -> list[tuple[Cycles, float]]:
-        """Each joint's stress cycles at nominal force, Pa, and its steady stress.
-
-        Args:
-            place: pose and blows.
-            stiffness: factor on all stiffnesses.
-            damping: factor on all damping ratios.
-            width: factor on the width of the blows.
-            compiled: turning points to 1e-7, many times faster than those of `loads_at`.
-        """
-        blows, turns = _wider(place.excitation, width), None
-        if compiled and place.fast is not None:
-            turns = place.fast.turns(stiffness, damping, _burst(blows, place.hits))
-        if turns is None:
-            rivet = place.perturbed(stiffness, damping, blows)
-            loads = rivet.loads(need="rest", both=False)
-        else:
-            loads = place.joint_loads(turns, stiffness=stiffness * place.stiffness)
-        return [
-            (loads[column].stress_cycles(joint, self.residue), loads[column].static_stress(joint))
-            for joint, column in zip(self.joints, self.columns, strict=True)
-        ]
-
-    def _per_pass(
-        self, places: list[Place], factors: tuple[float, ...]
-    ) -> list[tuple[Cycles, FloatArray]]:
-        """Each joint's cycles of all places, counted as often as rivets are set there.
-
-        Beside them the steady stress under each cycle, Pa.
-        """
-        found = [self.cycles(place, *factors, compiled=True) for place in places]
-        joined = []
-        for k in range(len(self.joints)):
-            parts = [pose[k] for pose in found]
-            counts = [c.count * p.rivets for (c, _), p in zip(parts, places, strict=True)]
-            joined.append(
-                (
-                    Cycles.trusted(
-                        np.concatenate([cycles.range for cycles, _ in parts]),
-                        np.concatenate([cycles.mean for cycles, _ in parts]),
-                        np.concatenate(counts),
-                    ),
-                    np.concatenate([np.full(len(cycles), steady) for cycles, steady in parts]),
-                )
-            )
-        return joined
-
-    def spend(
-        self, k: int, cycles: Cycles, steady: float | FloatArray, factor: float
-    ) -> tuple[float, float]:
-        """Damage and utilisation of joint k with its stress times `factor`."""
-        load = Cycles.trusted(factor * cycles.range, factor * cycles.mean + steady, cycles.count)
-        return (
-            damage(load, self.curves[k], self.mean_stress),
-            utilisation(load, self.curves[k], self.mean_stress),
-        )
-
-    def worst(
-        self, places: list[Place], blocks: list[int], keep: int
-    ) -> tuple[list[int], FloatArray]:
-        """Indices of the most strained poses, and each joint's share of damage elsewhere.
-
-        The share is a factor, 1 or more, on the damage of the poses that are kept.
-        """
-        found = [self.cycles(place, 1.0, 1.0, 1.0, compiled=True) for place in places]
-        spent = np.array([[self.spend(k, *p, 1.0) for k, p in enumerate(pose)] for pose in found])
-        rivets = np.array([place.rivets for place in places])
-        kept: set[int] = set()
-        start = 0
-        for block in blocks:
-            order = np.argsort(-spent[start : start + block, :, 1], axis=0)
-            kept |= {start + int(i) for i in order[:keep].ravel()}
-            start += block
-        index = sorted(kept)
-        whole = rivets @ spent[:, :, 0]
-        part = rivets[index] @ spent[index, :, 0]
-        return index, np.where(part > 0, whole / np.where(part > 0, part, 1.0), 1.0)
-
-    def run(
-        self,
-        places: list[Place],
-        kept: list[int],
-        left_out: FloatArray,
-        values: Mapping[str, FloatArray],
-        progress: Callable[[int, int], None] | None,
-    ) -> tuple[FloatArray, FloatArray]:
-        """Passes of the task to failure, and utilisation, each (n_joints, m)."""
-        runs = len(next(iter(values.values())))
-        columns = {name: values.get(name, np.ones(runs)) for name in (*_DYNAMIC, "force", "model")}
-        score = np.log(values["strength"]) if "strength" in values else np.zeros(runs)
-        lives = np.empty((len(self.joints), runs))
-        used = np.empty_like(lives)
-        known: dict[tuple[float, ...], list[tuple[Cycles, FloatArray]]] = {}
-        for m in range(runs):
-            key = tuple(float(columns[name][m]) for name in _DYNAMIC)
-            if key not in known:
-                known[key] = self._per_pass([places[i] for i in kept], key)
-            load = columns["force"][m] * columns["model"][m]
-            for k, curve in enumerate(self.curves):
-                factor = float(load / _strength(curve, score[m]))
-                cycles, steady = known[key][k]
-                spent, used[k, m] = self.spend(k, cycles, steady, factor)
-                lives[k, m] = life(spent * left_out[k])
-            if progress is not None:
-                progress(m + 1, runs)
-        return lives, used
-
-
-def _strength(curve: SNCurve, score: float) -> float:
-    """A specimen's strength over the curve's: 1 where the curve has no scatter."""
-    if curve.survival is None or not curve.scatter:
-        return 1.0
-    return float(10.0 ** (curve.scatter * (score + NormalDist().inv_cdf(curve.survival))))
-
-
-def place_of(model: Model, operation: Operation, pose: FloatArray) -> Place:
-    """A pose of an operation, ready to be perturbed."""
-    return Place.at(model, operation, model.robot.state(pose), pose, rivets=operation.rivets)
-
-
-@lru_cache(maxsize=256)
-def _burst(excitation: Excitation, hits: int) -> PiecewiseForce:
-    """The blows as a force history: the same for many poses."""
-    return excitation.burst(hits)
-
-
-def _wider(excitation: Excitation, factor: float) -> Excitation:
-    if factor == 1.0:
-        return excitation
-    if isinstance(excitation, PulseTrain | HalfSineTrain):
-        width = min(excitation.width * factor, 0.999 * excitation.period)
-        return dataclasses.replace(excitation, width=width)
-    raise InputError("these blows have no width to vary", key="inputs.width")
-
+from picchio.studies.rivet.variation import ShaftStress, VariedRivet, rivets_of
+from picchio.studies.tasks import Task
 
 # Relative, as the campaign's tolerances; the width and the model's error are judgements.
 DEFAULT_INPUTS: dict[str, Uncertain] = {
@@ -261,17 +75,18 @@ class UncertainLife:
 
 
 def uncertain_life(
-    robot: FlexibleRobot,
+    robot: FlexibleRobot | Model,
     task: Task,
-    curves: Mapping[str, SNCurve],
     *,
-    inputs: Mapping[str, Uncertain] = DEFAULT_INPUTS,
+    sn_curve: str | SNCurve | None = None,
+    inputs: Mapping[str, Uncertain] | None = None,
     samples: int = 64,
     seed: int = 0,
     poses: int = 2,
     residue: Residue = "half-cycles",
     mean_stress: Rule = "none",
-    gravity_balanced: bool = False,
+    gravity_stiffness: bool | None = None,
+    gravity_balanced: bool | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> UncertainLife:
     """P10, P50 and P90 of every joint's life, and what makes them uncertain.
@@ -281,44 +96,51 @@ def uncertain_life(
     says, one rank for all joints; a curve without scatter counts as certain.
 
     Args:
-        robot: with shafts.
+        robot: with shafts; or a model of it.
         task: what it does.
-        curves: S-N curve of each joint that counts, by joint name.
+        sn_curve: for all joints, instead of their own.
         inputs: factors on the nominal values, by name: "stiffness", "damping_ratio", "force",
-            "width" (of the blows), "model" (error of the computed stress).
+            "width" (of the blows), "model" (error of the computed stress); if not given,
+            `DEFAULT_INPUTS`, without the width where blows have none.
         samples: a power of two; the dynamics run about five times as often.
         seed: the same seed gives the same result.
         poses: how many poses of each operation and joint are sampled, the most strained ones; the
             rest keep their nominal share of the damage.
         residue: as in `assess`.
         mean_stress: as in `assess`.
+        gravity_stiffness: as in `assess`.
         gravity_balanced: as in `assess`.
         progress: called with (runs done, runs in all).
 
+    Returns:
+        the lives as distributions.
+
     Raises:
-        InputError: no joint with shaft and curve, an unknown input, a width where blows have none.
+        InputError: no joint with a shaft, an unknown input, a width where blows have none.
     """
-    joints = [j for j in robot.flexible_joints if j.shaft is not None and j.name in curves]
-    if not joints:
-        raise InputError("no joint has a shaft and an S-N curve", key="curves")
+    model = Model.of(robot, gravity_stiffness=gravity_stiffness, gravity_balanced=gravity_balanced)
+    stress = ShaftStress.of(model.robot, sn_curve, None, residue, mean_stress)
+    notes = []
+    if inputs is None:
+        inputs = dict(DEFAULT_INPUTS)
+        if any(operation.excitation.width is None for operation in task.operations):
+            del inputs["width"]
+            notes.append("blows that state no width keep theirs")
     for name in inputs:
         if name not in DEFAULT_INPUTS:
             raise InputError("unknown input", key="inputs", value=name, choices=DEFAULT_INPUTS)
-    columns = [robot.flexible_names.index(joint.name) for joint in joints]
-    job = LifeJob(joints, columns, [curves[j.name] for j in joints], residue, mean_stress)
-    model = Model(robot, gravity_balanced=gravity_balanced)
-    places = [place_of(model, op, pose) for op in task.operations for pose in op.poses]
-    kept, left_out = job.worst(places, [len(op.poses) for op in task.operations], poses)
+    places = rivets_of(model, task)
+    sampler = _Sampler(stress, places, [len(op.poses) for op in task.operations], poses)
     varied = dict(inputs)
-    if any(curve.scatter for curve in job.curves):
+    if any(curve.scatter for curve in stress.curves):
         # A rank: ln of it is the specimen's standard normal score; each curve has its scatter.
         varied["strength"] = Uncertain(1.0, 1.0)
     plan = design(varied, samples=samples, seed=seed)
-    lives, used = job.run(places, kept, left_out, plan.values, progress)
+    lives, used = sampler.run(plan.values, progress)
     lives *= task.rivets_per_pass
     spreads = {
         joint.name: plan.summarise(lives[k], used[k])
-        for k, joint in enumerate(joints)
+        for k, joint in enumerate(stress.joints)
         if (used[k] > 0).all()
     }
     return UncertainLife(
@@ -327,9 +149,124 @@ def uncertain_life(
         inputs=varied,
         assumptions=(
             "inputs vary independently; a factor on the stiffness is common to all joints",
-            f"{len(kept)} of {len(places)} poses sampled, the most strained; the rest keep their "
-            "nominal share of the damage",
+            f"{len(sampler.kept)} of {len(places)} poses sampled, the most strained; the rest keep "
+            "their nominal share of the damage",
             "shares are of the variance of ln utilisation, which is finite where life is not",
+            *notes,
+            *model.without_load(),
         ),
         seed=seed,
     )
+
+
+class _Sampler:
+    """Lives of the sampled worlds.
+
+    Args:
+        stress: the joints that count.
+        places: every rivet place, and the rivets of a pass set there.
+        blocks: places of each operation.
+        keep: how many of each operation and joint are sampled, the most strained ones.
+
+    Attributes:
+        kept: indices of the places that are sampled.
+    """
+
+    def __init__(
+        self,
+        stress: ShaftStress,
+        places: list[tuple[VariedRivet, float]],
+        blocks: list[int],
+        keep: int,
+    ) -> None:
+        self._stress = stress
+        found = [stress.cycles(place.varied()) for place, _ in places]
+        spent = np.array([[self._spend(k, *p, 1.0) for k, p in enumerate(pose)] for pose in found])
+        rivets = np.array([count for _, count in places])
+        kept: set[int] = set()
+        start = 0
+        for block in blocks:
+            order = np.argsort(-spent[start : start + block, :, 1], axis=0)
+            kept |= {start + int(i) for i in order[:keep].ravel()}
+            start += block
+        self.kept = sorted(kept)
+        self._places = [places[i] for i in self.kept]
+        # Each joint's factor, 1 or more, on the damage of the places that are kept.
+        whole, part = rivets @ spent[:, :, 0], rivets[self.kept] @ spent[self.kept, :, 0]
+        self._left_out = np.where(part > 0, whole / np.where(part > 0, part, 1.0), 1.0)
+        # Only of a linear model is the load proportional to the force.
+        self._nonlinear = any(place.nonlinear for place, _ in self._places)
+
+    def _spend(
+        self, k: int, cycles: Cycles, steady: float | FloatArray, factor: float
+    ) -> tuple[float, float]:
+        """Damage and utilisation of joint k with its stress times `factor`."""
+        load = Cycles.trusted(factor * cycles.range, factor * cycles.mean + steady, cycles.count)
+        curve, rule = self._stress.curves[k], self._stress.mean_stress
+        return damage(load, curve, rule), utilisation(load, curve, rule)
+
+    def _per_pass(self, **factors: float) -> list[tuple[Cycles, FloatArray]]:
+        """Each joint's cycles of all places, counted as often as rivets are set there.
+
+        Beside them the steady stress under each cycle, Pa.
+        """
+        found = [
+            self._stress.cycles(place.varied(**factors))  # type: ignore[arg-type]
+            for place, _ in self._places
+        ]
+        joined = []
+        for k in range(len(self._stress.joints)):
+            parts = [pose[k] for pose in found]
+            counts = [c.count * n for (c, _), (_, n) in zip(parts, self._places, strict=True)]
+            joined.append(
+                (
+                    Cycles.trusted(
+                        np.concatenate([cycles.range for cycles, _ in parts]),
+                        np.concatenate([cycles.mean for cycles, _ in parts]),
+                        np.concatenate(counts),
+                    ),
+                    np.concatenate([np.full(len(cycles), steady) for cycles, steady in parts]),
+                )
+            )
+        return joined
+
+    def run(
+        self, values: Mapping[str, FloatArray], progress: Callable[[int, int], None] | None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Passes of the task to failure, and utilisation, each (n_joints, m)."""
+        runs = len(next(iter(values.values())))
+        one = np.ones(runs)
+        dynamic = {
+            "stiffness": values.get("stiffness", one),
+            "damping": values.get("damping_ratio", one),
+            "width": values.get("width", one),
+        }
+        force, load = values.get("force", one), values.get("model", one)
+        if self._nonlinear:
+            dynamic["force"] = force
+        else:
+            load = force * load
+        score = np.log(values["strength"]) if "strength" in values else np.zeros(runs)
+        lives = np.empty((len(self._stress.joints), runs))
+        used = np.empty_like(lives)
+        known: dict[tuple[float, ...], list[tuple[Cycles, FloatArray]]] = {}
+        for m in range(runs):
+            factors = {name: float(column[m]) for name, column in dynamic.items()}
+            key = tuple(factors.values())
+            if key not in known:
+                known[key] = self._per_pass(**factors)
+            for k, curve in enumerate(self._stress.curves):
+                factor = float(load[m] / _strength(curve, score[m]))
+                cycles, steady = known[key][k]
+                spent, used[k, m] = self._spend(k, cycles, steady, factor)
+                lives[k, m] = life(spent * self._left_out[k])
+            if progress is not None:
+                progress(m + 1, runs)
+        return lives, used
+
+
+def _strength(curve: SNCurve, score: float) -> float:
+    """A specimen's strength over the curve's: 1 where the curve has no scatter."""
+    if curve.survival is None or not curve.scatter:
+        return 1.0
+    return float(10.0 ** (curve.scatter * (score + NormalDist().inv_cdf(curve.survival))))

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.fatigue.counting.counter import rainflow
@@ -15,9 +13,10 @@ from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
 from picchio.studies.assessment.result import Assessment
+from picchio.studies.rivet.pose import Rivet, SampledResponse
 from picchio.studies.tasks import Operation, Task
-from picchio.vibration.closed_form.modes import Modes, modal_analysis
-from picchio.vibration.closed_form.response import Response, response_from_rest, steady_state
+from picchio.vibration.closed_form.modes import Modes
+from picchio.vibration.closed_form.response import Response
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,31 +24,49 @@ class WorstRivet:
     """A joint's worst rivet.
 
     Attributes:
+        rivet: the model at the pose, under the operation's blows.
         joint: the limiting joint, or without shafts the one that deflects most.
         index: its row among the flexible joints.
-        operation: of the task.
-        pose: (nv,) rad or m.
         pose_number: counted from 1.
-        modes: at the pose.
         rest: response to the burst; None where its ring-down has no end.
         steady: steady state; None where there is none.
-        stiffness: N m/rad, of the joint at the pose.
-        static_torque: N m, by gravity and feed force.
     """
 
+    rivet: Rivet
     joint: Joint
     index: int
-    operation: Operation
-    pose: FloatArray
     pose_number: int
-    modes: Modes
-    rest: Response | None
-    steady: Response | None
-    stiffness: float
-    static_torque: float
+    rest: Response | SampledResponse | None
+    steady: Response | SampledResponse | None
 
     @property
-    def response(self) -> Response:
+    def operation(self) -> Operation:
+        """Of the task."""
+        return self.rivet.operation
+
+    @property
+    def pose(self) -> FloatArray:
+        """(nv,) rad or m."""
+        return self.rivet.pose
+
+    @property
+    def modes(self) -> Modes:
+        """At the pose, of the linear part of the model."""
+        return self.rivet.modes
+
+    @property
+    def stiffness(self) -> float:
+        """N m/rad, of the joint at the pose."""
+        return float(self.rivet.stiffness[self.index])
+
+    @property
+    def static_torque(self) -> float:
+        """N m, by gravity and feed force."""
+        op = self.operation
+        return float(self.rivet.static_torque(op.excitation, op.direction)[self.index])
+
+    @property
+    def response(self) -> Response | SampledResponse:
         """The burst where there is one, else the steady state."""
         found = self.rest if self.rest is not None else self.steady
         assert found is not None
@@ -73,40 +90,42 @@ class WorstRivet:
 
 def worst_rivet(
     assessment: Assessment,
-    robot: FlexibleRobot,
+    robot: FlexibleRobot | Model,
     task: Task,
     *,
-    gravity_stiffness: bool = False,
+    gravity_stiffness: bool | None = None,
 ) -> WorstRivet:
     """Solve the worst rivet of an assessment again, to look at it.
 
     Args:
         assessment: of this robot on this task.
-        robot: the robot.
+        robot: the robot, or a model of it.
         task: the task.
         gravity_stiffness: as in the assessment.
+
+    Raises:
+        InputError: as `assess`.
     """
+    model = Model.of(robot, gravity_stiffness=gravity_stiffness)
     name = assessment.limiting_joint
     if name is None:
         name = max(assessment.joints, key=lambda joint: joint.peak_deflection).name
     life = assessment.joint(name)
     operation = next(op for op in task.operations if op.name == life.worst_operation)
-    pose = operation.poses[life.worst_pose]
-    index = robot.flexible_names.index(name)
-    state = robot.state(pose)
-    modes = modal_analysis(Model(robot, gravity_stiffness).linear_system(pose))
-    damped = bool((modes.poles.real < 0.0).all())
-    rest = response_from_rest(modes, operation.excitation, operation.hits_per_rivet)
-    feed = operation.excitation.preload * (state.jacobian.T @ operation.direction)
+    rivet = Rivet(model, operation, operation.poses[life.worst_pose])
+    index = model.robot.flexible_names.index(name)
+    found: list[Response | SampledResponse | None] = []
+    for hits in (operation.hits_per_rivet, None):
+        try:
+            response = rivet.response_along(operation.excitation, hits, operation.direction)
+            found.append(response if (rivet.modes.poles.real < 0.0).all() or not hits else None)
+        except InputError:  # no steady state, or no end: the assessment has told
+            found.append(None)
     return WorstRivet(
-        joint=robot.flexible_joints[index],
+        rivet=rivet,
+        joint=model.robot.flexible_joints[index],
         index=index,
-        operation=operation,
-        pose=pose,
         pose_number=life.worst_pose + 1,
-        modes=modes,
-        rest=rest if damped else None,
-        steady=steady_state(modes, operation.excitation),
-        stiffness=float(np.asarray(state.stiffness)[index]),
-        static_torque=float((feed - state.gravity_torque)[index]),
+        rest=found[0],
+        steady=found[1],
     )

@@ -65,6 +65,8 @@ class Effect(ABC):
         linear: of a class on a joint: parameters, neutral at 0, in which what `motion` adds is
             linear, all together; such an effect adds to no body torque, scales and delays nothing.
             Fits of motion records go faster by it; nothing else changes.
+        refused: of a class: question -> why it has no answer with this effect, a sentence;
+            "steady state" is such a question.
 
     Raises:
         InputError: an unknown parameter, a value out of bounds.
@@ -79,6 +81,7 @@ class Effect(ABC):
     latent: ClassVar[str | None] = None
     discrete: ClassVar[bool] = False
     linear: ClassVar[tuple[str, ...]] = ()
+    refused: ClassVar[Mapping[str, str]] = {}
 
     def __init__(self, target: str, **values: float) -> None:
         known = {p.name: p for p in self.parameters}
@@ -145,6 +148,20 @@ class Effect(ABC):
         if self.hidden:
             table["hidden"] = {record: list(numbers) for record, numbers in self.hidden.items()}
         return table
+
+    def without_load(self, conditions: Conditions) -> str | None:
+        """Why this effect leaves the joints' loads under the tool alone; None if it changes them.
+
+        Args:
+            conditions: under which the loads are asked for.
+        """
+        if self.where == "sensor":
+            return "changes what a sensor reads, not the loads"
+        if self.where == "motion":
+            return "acts while the robot moves, not while the tool hits"
+        if self.latent is not None and conditions.record not in self.hidden:
+            return "is drawn anew in every record, and no record is named here"
+        return None
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """Values of typical size, to see what the effect would do to these data.

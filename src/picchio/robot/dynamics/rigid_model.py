@@ -10,10 +10,10 @@ from __future__ import annotations
 import os
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -25,6 +25,22 @@ from picchio.robot.urdf.tree import UrdfTree
 
 Array = NDArray[np.float64]
 _STDERR_LOCK = threading.Lock()
+
+
+class Body(NamedTuple):
+    """A body to add to a link.
+
+    Attributes:
+        link: its name.
+        point: (3,) m in the link's frame, where a point mass is; None for an extended body.
+        weight: kg of the point mass, or the factor on `inertia`; may be negative.
+        inertia: in the link's frame; None for a point mass.
+    """
+
+    link: str
+    point: tuple[float, ...] | None
+    weight: float
+    inertia: pin.Inertia | None
 
 
 class RigidModel:
@@ -56,6 +72,27 @@ class RigidModel:
             if frame.type == pin.FrameType.BODY
         }
         self._local = threading.local()
+
+    def with_bodies(self, bodies: Sequence[Body]) -> RigidModel:
+        """The same robot with bodies added to its links; not picklable, unlike the original.
+
+        Raises:
+            InputError: no such link.
+        """
+        if not bodies:
+            return self
+        changed = object.__new__(RigidModel)
+        changed.__dict__.update(self.__dict__)
+        changed._model, changed._local = self._model.copy(), threading.local()
+        for body in bodies:
+            frame = self._model.frames[self.frame(body.link)]
+            own = body.inertia or pin.Inertia(1.0, np.array(body.point), np.zeros((3, 3)))
+            # The ten parameters are linear in the mass: a body may be taken off, too.
+            added = body.weight * frame.placement.act(own).toDynamicParameters()
+            joint = frame.parentJoint
+            now = changed._model.inertias[joint].toDynamicParameters()
+            changed._model.inertias[joint] = pin.Inertia.FromDynamicParameters(now + added)
+        return changed
 
     def __reduce__(self) -> tuple[Any, ...]:
         return RigidModel, (self._text, self._tree, self._gravity)

@@ -31,6 +31,8 @@ def assumptions_of(
             else ()
         ),
         "the motor side of every joint stands still while the tool hits",
+        *(f"the model has the effect {effect!r}" for effect in model.effects),
+        *model.without_load(),
         *_estimates(model.robot),
         *(rule.assumptions() if described else ("each rivet starts from rest and rings down",)),
         *(f"S-N curve {text}" for text in described),

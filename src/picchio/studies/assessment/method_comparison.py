@@ -16,6 +16,7 @@ from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.miner import life
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import PAPER_SN_CURVE, load_sn_curve
+from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import Assessment
 from picchio.studies.assessment.run import assess
@@ -51,7 +52,7 @@ class Term:
 
 
 def compare_methods(
-    robot: FlexibleRobot, task: Task, sn_curve: SNCurve, *, mean_stress: Rule = "fkm"
+    robot: FlexibleRobot | Model, task: Task, sn_curve: SNCurve, *, mean_stress: Rule = "fkm"
 ) -> tuple[Term, ...]:
     """From the paper's method to the default one, term by term.
 
@@ -59,7 +60,7 @@ def compare_methods(
     limit (Miner elementary); the limit itself, mean stress and scatter are then held against that.
 
     Args:
-        robot: with shafts.
+        robot: with shafts; or a model of it.
         task: what it does.
         sn_curve: the curve in place of the paper's, for all joints.
         mean_stress: what the mean stress term shows; the default method has "none".

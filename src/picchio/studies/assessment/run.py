@@ -32,7 +32,7 @@ from picchio.studies.assessment.checks import (
 )
 from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
 from picchio.studies.rivet.life_rules import LifeRule, PaperRule, RainflowRule, curves_of, peak
-from picchio.studies.rivet.loads import loads_at
+from picchio.studies.rivet.pose import Rivet
 from picchio.studies.tasks import Operation, Task
 
 Method = Literal["rainflow", "paper"]
@@ -40,7 +40,7 @@ METHODS: tuple[Method, ...] = ("rainflow", "paper")
 
 
 def assess(
-    robot: FlexibleRobot,
+    robot: FlexibleRobot | Model,
     task: Task,
     *,
     method: Method = "rainflow",
@@ -49,15 +49,15 @@ def assess(
     mean_stress: Rule = "none",
     miner: MinerRule | None = None,
     paper_mean_stress: bool = False,
-    gravity_stiffness: bool = False,
-    gravity_balanced: bool = False,
+    gravity_stiffness: bool | None = None,
+    gravity_balanced: bool | None = None,
     steady_check: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Assessment:
     """Life of every joint of a robot on a riveting task (paper section 3.4, eqs. 18-22).
 
     Args:
-        robot: with stiffnesses, and shafts where stresses are wanted.
+        robot: with stiffnesses, and shafts where stresses are wanted; or a model of it.
         task: operations and poses.
         method: "rainflow" (each rivet from rest, ring-down included, cycles counted) or
             "paper" (steady state, peak stress, one cycle a hit).
@@ -66,8 +66,8 @@ def assess(
         mean_stress: correction for gravity and feed force.
         miner: what cycles below the endurance limit do.
         paper_mean_stress: the paper's life at the mean of the poses' peak stresses (Table 2).
-        gravity_stiffness: add dg/dq to the springs.
-        gravity_balanced: gravity leaves no torque in the joints; see `Model`.
+        gravity_stiffness: add dg/dq to the springs; as the model has it if not given.
+        gravity_balanced: gravity leaves no torque in the joints; see `Model`; likewise.
         steady_check: tell, too, what the steady state misjudges; False leaves NaN there and
             takes about half the time.
         progress: called with (poses done, poses in all).
@@ -83,6 +83,8 @@ def assess(
         raise InputError("unknown method", key="method", value=method, choices=METHODS)
     if paper_mean_stress and method != "paper":
         raise InputError("belongs to the method paper", key="paper_mean_stress", value=True)
+    model = Model.of(robot, gravity_stiffness=gravity_stiffness, gravity_balanced=gravity_balanced)
+    robot = model.robot
     if not robot.flexible_joints:
         raise InputError(
             "no joint has a stiffness, so nothing can vibrate",
@@ -98,7 +100,6 @@ def assess(
         warn_beyond_limits(robot, operation.poses, f"operation {operation.name!r}")
     reducers = tuple(reducer_of(joint) for joint in robot.flexible_joints)
     paper_curve = load_sn_curve(PAPER_SN_CURVE, quiet=True)
-    model = Model(robot, gravity_stiffness, gravity_balanced)
     job = _Job(model, rule, curves, reducers, paper_curve, steady_check)
     total = sum(len(operation.poses) for operation in task.operations)
     results, checks, torques = [], [], []
@@ -151,22 +152,23 @@ class _Job:
     def at_pose(self, operation: Operation, pose: FloatArray) -> dict[str, FloatArray]:
         """Every joint's numbers at one pose, each (n,)."""
         robot = self.model.robot
-        loads = loads_at(self.model, operation, pose, need=self.rule.needs, both=self.both)
-        n = len(robot.flexible_joints)
+        rivet = Rivet(self.model, operation, pose)
+        loads = rivet.loads(self.rule.needs, both=self.both)
+        n = len(loads)
         columns = ("peak_deflection", "peak_shear_stress", "utilisation", "damage_per_rivet")
         out = {key: np.full(n, np.nan) for key in columns}
-        out["steady_peak_deflection"] = np.array([peak(load.steady) for load in loads.joints])
-        out["rest_peak_deflection"] = np.array([peak(load.rest) for load in loads.joints])
+        out["steady_peak_deflection"] = np.array([peak(load.steady) for load in loads])
+        out["rest_peak_deflection"] = np.array([peak(load.rest) for load in loads])
         out["check"], out["reducer_torques"] = np.full((2, n, 2), np.nan)
         own = out[f"{self.rule.needs}_peak_deflection"]
         out["peak_deflection"] = own.copy()
-        out["peak_torque"] = loads.stiffness * own
-        out["gravity_torque"] = np.abs(loads.gravity_torque)
+        out["peak_torque"] = rivet.stiffness * own
+        out["gravity_torque"] = np.abs(rivet.gravity_torque)
         out["gravity_shear_stress"] = np.full(n, np.nan)
         out["reducer_utilisation"] = np.full(n, np.nan)
         out["peak_total_stress"] = np.full(n, np.nan)
         hits = operation.hits_per_rivet
-        for j, (joint, load) in enumerate(zip(robot.flexible_joints, loads.joints, strict=True)):
+        for j, (joint, load) in enumerate(zip(robot.flexible_joints, loads, strict=True)):
             reducer = self.reducers[j]
             if reducer is not None and load.rest is not None:
                 torques = load.peak_torque_with_gravity, abs(load.stiffness * load.static)
@@ -189,8 +191,8 @@ class _Job:
                     PaperRule()(joint, load, hits, self.paper_curve).damage,
                     RainflowRule()(joint, load, hits, self.paper_curve).damage,
                 )
-        out["natural_frequencies"] = loads.natural_frequencies
-        out["tool_position"] = loads.tool_position
+        out["natural_frequencies"] = rivet.natural_frequencies
+        out["tool_position"] = rivet.state.tool_position
         return out
 
 

@@ -10,11 +10,11 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.excitation.trains import Excitation
+from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.maps.places import Listed, Places
-from picchio.studies.rivet.batch import batch_damage, stiffness_at
 from picchio.studies.rivet.life_rules import curves_of
-from picchio.vibration.batch.peaks import batch_peaks
+from picchio.studies.rivet.poses import damage_at, peaks_at
 
 # Damage of a rivet all over a map, in one direction or in the worst.
 
@@ -24,7 +24,7 @@ _AROUND = 6
 
 
 def damage_of(
-    robot: FlexibleRobot,
+    model: Model,
     poses: FloatArray,
     excitation: Excitation,
     hits: int,
@@ -38,7 +38,7 @@ def damage_of(
     damage, the beginning is kept.
 
     Args:
-        robot: with shafts.
+        model: with shafts.
         poses: (p, nv) rad or m.
         excitation: the blows.
         hits: of a rivet.
@@ -48,11 +48,11 @@ def damage_of(
     Returns:
         (p, n) Miner's sums, NaN without a shaft; (p, n, 3) unit vectors.
     """
-    curves = curves_of(robot)
+    curves = curves_of(model.robot)
     n = len(curves)
     if direction is not None:
         unit = direction / np.linalg.norm(direction, axis=1, keepdims=True)
-        found = batch_damage(robot, poses, unit, excitation, hits, curves)
+        found = damage_at(model, poses, unit, excitation, hits, curves)
         return found.damage, np.repeat(unit[:, None], n, axis=1)
     best = np.full((len(poses), n), np.nan)
     along = begin.copy()
@@ -64,8 +64,8 @@ def damage_of(
         def cost(directions: FloatArray, j: int = j, only: list = only) -> FloatArray:  # type: ignore[type-arg]
             """(p, d) damage of joint j for (p, d, 3) directions."""
             count = directions.shape[1]
-            flat = batch_damage(
-                robot, np.repeat(poses, count, axis=0), directions.reshape(-1, 3), excitation,
+            flat = damage_at(
+                model, np.repeat(poses, count, axis=0), directions.reshape(-1, 3), excitation,
                 hits, only,
             )  # fmt: skip
             return cast(FloatArray, flat.damage[:, j].reshape(len(poses), count))
@@ -104,7 +104,7 @@ class MapJob:
     """All that a chunk needs; it travels to workers as it is.
 
     Attributes:
-        robot: with stiffnesses.
+        model: the robot, with stiffnesses, and its effects.
         excitation: the blows.
         places: where.
         direction: (3,) unit vector, "worst" for each joint's own, or "normal" for the surface's.
@@ -113,7 +113,7 @@ class MapJob:
         damage: of a rivet of so many hits, counted for every joint; None leaves it out.
     """
 
-    robot: FlexibleRobot
+    model: Model
     excitation: Excitation
     places: Places
     direction: tuple[float, float, float] | str
@@ -123,23 +123,15 @@ class MapJob:
 
     def compute(self, first: int, last: int) -> Columns:
         """Rows of the places first to last - 1: one row a point and branch, none out of reach."""
-        robot = self.robot
+        robot = self.model.robot
         place = np.arange(first, last)
         rows = self.places.rows(first, last)
         if self.places.kind == "pose":
             poses = rows
         else:
             poses, place = self._poses(rows, first)
-        mass, jacobian = robot.mass_and_jacobian(poses)
-        stiffness = stiffness_at(robot, poses)
-        found = batch_peaks(
-            mass,
-            jacobian,
-            stiffness,
-            robot.damping_ratio,
-            self.excitation,
-            hits=self.hits,
-            direction=self._direction(place),
+        found, stiffness = peaks_at(
+            self.model, poses, self.excitation, hits=self.hits, direction=self._direction(place)
         )
         position = tool_places(robot, poses)
         torque = stiffness * found.peak_deflection
@@ -164,7 +156,7 @@ class MapJob:
         if self.damage is not None:
             own = self._direction(place)
             columns["damage_per_rivet"], columns["damage_direction"] = damage_of(
-                robot, poses, self.excitation, self.damage, own, found.direction
+                self.model, poses, self.excitation, self.damage, own, found.direction
             )
         return columns
 
@@ -186,14 +178,16 @@ class MapJob:
             axes = np.tile(-np.asarray(self.direction, dtype=float), (len(points), 1))
         elif self.direction == "normal":
             axes = -np.asarray(self._direction(np.arange(first, first + len(points))))
-        solved = solve_many(self.robot, points, axes=axes)
+        solved = solve_many(self.model.robot, points, axes=axes)
         if self.branch == "all":
             return solved.poses, solved.point + first
-        branch_words(self.robot, self.branch)
+        branch_words(self.model.robot, self.branch)
         chosen, place = [], []
         for k in np.unique(solved.point):
             try:
-                pose = choose_branch(self.robot, list(solved.poses[solved.point == k]), self.branch)
+                pose = choose_branch(
+                    self.model.robot, list(solved.poses[solved.point == k]), self.branch
+                )
             except InputError:
                 continue  # this point has no pose on the branch
             chosen.append(pose)

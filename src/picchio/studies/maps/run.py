@@ -1,7 +1,7 @@
 """The workspace map: peaks, directions and frequencies all over the workspace (paper Fig. 10).
 
 The work is cut into chunks. Each finished chunk is a file of its own, written whole or not at all,
-so that a map that was stopped goes on where it was and a killed worker loses only its own chunk.
+so that a map that was stopped resumes and a killed worker loses only its own chunk.
 The chunks are then joined, one at a time, to one netCDF file or Zarr store.
 """
 
@@ -20,6 +20,7 @@ from picchio.core.errors import InputError, PicchioError
 from picchio.core.files import atomic_write
 from picchio.core.provenance import provenance
 from picchio.excitation.trains import Excitation
+from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.maps.chunk import Columns, MapJob
 from picchio.studies.maps.files import join_chunks
@@ -37,7 +38,7 @@ _WORTH_WORKERS = 50_000
 
 
 def workspace_map(
-    robot: FlexibleRobot,
+    robot: FlexibleRobot | Model,
     places: Places,
     excitation: Excitation,
     out: str | Path,
@@ -55,7 +56,7 @@ def workspace_map(
     """Compute a map, or go on with one that was stopped, and open it.
 
     Args:
-        robot: with stiffnesses.
+        robot: with stiffnesses; or a model of it.
         places: points or poses; see `picchio.studies.maps.places`.
         excitation: the blows.
         out: `.nc` for netCDF, `.zarr` for Zarr. Unfinished work is kept beside it.
@@ -79,6 +80,8 @@ def workspace_map(
     Raises:
         InputError: an unknown ending, direction or branch; no flexible joint; no row at all.
     """
+    model = Model.of(robot)
+    robot = model.robot
     target = Path(out)
     if target.suffix not in ENDINGS:
         raise InputError("unknown ending", key="out", value=target.name, choices=ENDINGS)
@@ -102,6 +105,16 @@ def workspace_map(
             key="places",
             hint="take a wider spacing or a coarser grid",
         )
+    if hits is None:
+        model.refuse("steady state")
+    if model.nonlinear and (direction == "worst" or damage is not None):
+        raise InputError(
+            "a map of a nonlinear model needs one force direction and no damage: every place is "
+            "integrated in time",
+            key="direction",
+            value=direction,
+            hint="give --direction x,y,z",
+        )
     if damage is not None and damage < 1:
         raise InputError("must be at least 1", key="damage", value=damage)
     if damage is not None and all(joint.shaft is None for joint in robot.flexible_joints):
@@ -110,7 +123,7 @@ def workspace_map(
             key="damage",
             hint="give shafts in a sidecar",
         )
-    job = MapJob(robot, excitation, places, direction, branch, hits, damage)
+    job = MapJob(model, excitation, places, direction, branch, hits, damage)
     if restart:
         shutil.rmtree(_folder_of(target), ignore_errors=True)
     folder = _open_folder(target, job, chunk)
@@ -153,10 +166,11 @@ def _open_folder(target: Path, job: MapJob, chunk: int) -> Path:
     """The folder of finished chunks; one that belongs to another map is not touched."""
     folder = _folder_of(target)
     plan = {
-        "robot": [hashlib.sha256(path.read_bytes()).hexdigest() for path in job.robot.files],
-        "tool": job.robot.tool_frame,
-        "joints": [repr(joint) for joint in job.robot.flexible_joints],
-        "mounting": repr(job.robot.mounting),
+        "robot": [hashlib.sha256(path.read_bytes()).hexdigest() for path in job.model.robot.files],
+        "effects": [repr(effect) for effect in job.model.effects],
+        "tool": job.model.robot.tool_frame,
+        "joints": [repr(joint) for joint in job.model.robot.flexible_joints],
+        "mounting": repr(job.model.robot.mounting),
         "excitation": job.excitation.describe(),
         "places": job.places.describe(),
         "direction": job.direction,
@@ -239,13 +253,15 @@ def _run(
 def _attributes(job: MapJob) -> dict[str, Any]:
     return {
         "format": "picchio-map/1",
-        "robot": job.robot.name,
-        "joint": list(job.robot.flexible_names),
-        "coordinate": list(job.robot.joint_names),
+        "robot": job.model.robot.name,
+        "joint": list(job.model.robot.flexible_names),
+        "coordinate": list(job.model.robot.joint_names),
         "excitation": job.excitation.describe(),
         "direction": str(job.direction),
         "branch": job.branch,
+        "effects": [repr(effect) for effect in job.model.effects],
+        "notes": list(job.model.without_load()),
         "hits": job.hits or 0,
         "hits_of_damage": job.damage or 0,
-        "provenance": json.dumps(provenance(job.robot.files)),
+        "provenance": json.dumps(provenance(job.model.robot.files)),
     }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -10,16 +9,11 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.excitation.trains import Excitation, MeasuredForce
+from picchio.excitation.trains import Excitation
 from picchio.fatigue.reducer import Reducer
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.studies.rivet.batch import (
-    BatchDamage,
-    batch_damage,
-    gravity_torque_at,
-    stress_per_torque,
-)
+from picchio.model.model import Model
+from picchio.studies.rivet.poses import BatchDamage, damage_at, stress_per_torque
 from picchio.studies.tasks import Task
 
 
@@ -28,14 +22,14 @@ class Loads:
     """What poses cost a robot on a task.
 
     Attributes:
-        robot: with stiffnesses.
+        model: the robot, with stiffnesses, and its effects.
         task: its operations say blows and hits.
         curves: S-N curve of each of the n joints, or None.
         reducers: reducer of each joint, or None.
         by_effort: no joint has shaft or reducer: torque over the URDF's effort limit ranks them.
     """
 
-    robot: FlexibleRobot
+    model: Model
     task: Task
     curves: tuple[SNCurve | None, ...]
     reducers: tuple[Reducer | None, ...]
@@ -44,7 +38,7 @@ class Loads:
     @classmethod
     def of(
         cls,
-        robot: FlexibleRobot,
+        model: Model,
         task: Task,
         curves: tuple[SNCurve | None, ...],
         reducers: tuple[Reducer | None, ...],
@@ -55,15 +49,15 @@ class Loads:
             InputError: nothing by which joints could be ranked.
         """
         known = any(c is not None for c in curves) or any(r is not None for r in reducers)
-        efforts = [joint.effort_limit for joint in robot.flexible_joints]
+        efforts = [joint.effort_limit for joint in model.robot.flexible_joints]
         if not known and not np.isfinite(efforts).any():
             raise InputError(
                 "no joint has a shaft, a reducer or an effort limit, so no place is better than "
                 "another",
-                file=robot.source,
+                file=model.robot.source,
                 hint="give shafts or reducers in a sidecar",
             )
-        return cls(robot, task, curves, reducers, not known)
+        return cls(model, task, curves, reducers, not known)
 
     def at(
         self,
@@ -84,9 +78,9 @@ class Loads:
             compiled: False takes the slow path, exact for every damping.
         """
         op = self.task.operations[operation]
-        blows = with_period(op.excitation, period)
-        found = batch_damage(
-            self.robot, poses, directions, blows, op.hits_per_rivet, self.curves, compiled=compiled
+        blows = op.excitation if period is None else op.excitation.with_period(period)
+        found = damage_at(
+            self.model, poses, directions, blows, op.hits_per_rivet, self.curves, compiled=compiled
         )
         return np.nan_to_num(found.damage), self._utilisation(found, poses, directions, blows)
 
@@ -94,19 +88,19 @@ class Loads:
         self, found: BatchDamage, poses: FloatArray, directions: FloatArray, blows: Excitation
     ) -> FloatArray:
         allowable = np.array([np.inf if c is None else c.allowable for c in self.curves])
-        used = found.amplitude * stress_per_torque(self.robot) / allowable
+        used = found.amplitude * stress_per_torque(self.model.robot) / allowable
         if not self.by_effort and not any(self.reducers):
             return np.asarray(used)
-        held = gravity_torque_at(self.robot, poses)
+        held = found.many.gravity_torque()
         if blows.preload:
-            jacobian = self.robot.mass_and_jacobian(poses)[1]
+            jacobian = found.many.mass_and_jacobian()[1]
             held = held - blows.preload * np.einsum("pdn,pd->pn", jacobian, directions)
         peak = np.maximum(
             np.abs(found.stiffness * found.highest - held),
             np.abs(found.stiffness * found.lowest - held),
         )
         for j, (joint, reducer) in enumerate(
-            zip(self.robot.flexible_joints, self.reducers, strict=True)
+            zip(self.model.robot.flexible_joints, self.reducers, strict=True)
         ):
             if self.by_effort:
                 used[:, j] = peak[:, j] / joint.effort_limit
@@ -124,16 +118,3 @@ def reducer_utilisation(reducer: Reducer, peak: FloatArray, held: FloatArray) ->
     bound = min((limit for limit in limits if limit is not None), default=math.inf)
     rated = reducer.rated_torque
     return np.maximum(peak / bound, 0.0 * held if rated is None else held / rated)
-
-
-def with_period(excitation: Excitation, period: float | None) -> Excitation:
-    """The same blows at another rate.
-
-    Raises:
-        InputError: blows longer than the period.
-    """
-    if period is None or period == excitation.period:
-        return excitation
-    if isinstance(excitation, MeasuredForce) and period < excitation.time[-1]:
-        raise InputError("is shorter than the measured blow", key="period-range", value=period)
-    return dataclasses.replace(excitation, period=period)  # type: ignore[type-var]

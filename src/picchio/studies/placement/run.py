@@ -19,10 +19,11 @@ from picchio.core.errors import InputError, PicchioWarning
 from picchio.core.provenance import provenance
 from picchio.fatigue.miner import life
 from picchio.fatigue.sn.curve import SNCurve
+from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.ik.chain import tool_chain
 from picchio.studies.assessment.checks import reducer_of
-from picchio.studies.placement.loads import Loads, with_period
+from picchio.studies.placement.loads import Loads
 from picchio.studies.placement.result import JointUse, Off, Placement, Standing
 from picchio.studies.placement.search import ROUNDS, SHIFTS, Search, Spot, descend
 from picchio.studies.placement.self_collision import SelfCollision
@@ -36,7 +37,7 @@ _PERIODS = 7
 
 
 def place(
-    robot: FlexibleRobot,
+    robot: FlexibleRobot | Model,
     task: Task,
     *,
     move: Sequence[float] | None = None,
@@ -54,7 +55,7 @@ def place(
     Lives are those of `assess` by its default method, gravity stiffness off.
 
     Args:
-        robot: with stiffnesses, and shafts or reducers (or else effort limits).
+        robot: with stiffnesses, and shafts or reducers (or else effort limits); or a model of it.
         task: the work; the tool's places are read off its poses.
         move: how far the work may go each way: x, y, z in m, heading in rad; half the arm's
             reach and a half turn if not given. Zeros leave it where it is: poses alone.
@@ -77,6 +78,16 @@ def place(
         InputError: no flexible joint, nothing to rank joints by, a bad range, no place at all
             where every rivet can be set.
     """
+    model = Model.of(robot)
+    robot = model.robot
+    if model.nonlinear:
+        effects = ", ".join(e.label for e in model.effects if e.where == "nonlinear")
+        raise InputError(
+            "placement compares many thousands of poses, and a nonlinear model must be integrated "
+            "in time at each",
+            value=effects,
+            hint="place the work by a model without it, then assess the place with it",
+        )
     if not robot.flexible_joints:
         raise InputError("no joint has a stiffness, so nothing can vibrate", file=robot.source)
     if placements < 1:
@@ -86,7 +97,7 @@ def place(
     if not (math.isfinite(margin) and margin >= 0.0):
         raise InputError("must not be negative", key="margin", value=margin)
     curves = curves_of(robot, sn_curve)
-    loads = Loads.of(robot, task, curves, tuple(reducer_of(j) for j in robot.flexible_joints))
+    loads = Loads.of(model, task, curves, tuple(reducer_of(j) for j in robot.flexible_joints))
     work = Work.of(robot, task)
     half = _half(robot, move)
     periods = _periods(task, period_range)
@@ -156,7 +167,10 @@ def _periods(task: Task, wanted: tuple[float, float] | None) -> tuple[float, flo
             "must be two positive periods in s, the shorter first", key="period-range", value=wanted
         )
     for operation in task.operations:
-        with_period(operation.excitation, low)  # refuses blows longer than that
+        try:
+            operation.excitation.with_period(low)  # refuses blows longer than that
+        except InputError as error:
+            raise InputError(error.problem, key="period-range", value=low) from None
     return low, high
 
 
@@ -173,7 +187,7 @@ def _costs(
     """Damage and utilisation (k, n) of every rivet place."""
     work = search.work
     along = work.direction @ work.turn(move[3]).T
-    damage = np.empty((len(poses), len(search.loads.robot.flexible_joints)))
+    damage = np.empty((len(poses), len(search.loads.model.robot.flexible_joints)))
     used = np.empty_like(damage)
     for operation in np.unique(work.operation):
         own = work.operation == operation
@@ -256,9 +270,9 @@ def _standing(search: Search, spot: Spot) -> Standing:
     total = (damage * search.work.share[:, None]).sum(axis=0)
     joints = tuple(
         JointUse(joint.name, life(float(total[j])), float(used[:, j].max()))
-        for j, joint in enumerate(search.loads.robot.flexible_joints)
+        for j, joint in enumerate(search.loads.model.robot.flexible_joints)
     )
-    mounting = search.loads.robot.mounting
+    mounting = search.loads.model.robot.mounting
     base, heading = search.work.base_move(spot.move, np.asarray(mounting.xyz, dtype=float))
     return Standing(spot, joints, base, heading)
 
@@ -286,6 +300,7 @@ def _assumptions(loads: Loads, meshes: SelfCollision | str) -> tuple[str, ...]:
         "vertical; the force and the tool's axis turn with it",
         "the tool turns freely about its axis",
         "the robot may change its branch between any two rivets",
+        *loads.model.without_load(),
         "nothing is known of obstacles around robot and work, nor whether the tool fits",
     ]
     if loads.by_effort:

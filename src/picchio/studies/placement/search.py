@@ -50,7 +50,7 @@ def cost_tables(
     work: Work, loads: Loads, candidates: Candidates, period: float | None
 ) -> tuple[FloatArray, FloatArray]:
     """Damage and utilisation (k, b, c, n); infinite where there is no pose."""
-    n = len(loads.robot.flexible_joints)
+    n = len(loads.model.robot.flexible_joints)
     shape = (len(work.group), *candidates.poses[0].shape[:2], n)
     damage, used = np.full(shape, np.inf), np.full(shape, np.inf)
     for operation in np.unique(work.operation):
@@ -169,7 +169,7 @@ class Search:
     reach: Reach = field(init=False)
 
     def __post_init__(self) -> None:
-        self.reach = Reach(self.loads.robot, self.work)
+        self.reach = Reach(self.loads.model.robot, self.work)
 
     def explore(
         self,

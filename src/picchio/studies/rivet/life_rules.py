@@ -16,7 +16,7 @@ from picchio.fatigue.sn.curve import MinerRule, SNCurve
 from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, load_sn_curve
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
-from picchio.studies.rivet.loads import JointLoad
+from picchio.studies.rivet.pose import JointLoad
 
 
 class JointDamage(NamedTuple):

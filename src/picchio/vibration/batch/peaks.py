@@ -36,7 +36,7 @@ def batch_peaks(
     jacobian: FloatArray,
     stiffness: FloatArray,
     damping_ratio: ArrayLike,
-    excitation: Excitation,
+    excitation: Excitation | PiecewiseForce,
     *,
     hits: int | None = None,
     direction: ArrayLike | None = None,
@@ -51,8 +51,8 @@ def batch_peaks(
         jacobian: (p, 3, n) m.
         stiffness: (n,) or (p, n) N m/rad.
         damping_ratio: scalar or (n,), one for each joint.
-        excitation: the blows.
-        hits: of a burst from rest; None for the steady state.
+        excitation: the blows, or their force: one period of the steady state, or a burst.
+        hits: of a burst from rest; None for the steady state. Only where blows are given.
         direction: (3,) or (p, 3); None for the worst of all directions.
         compiled: False takes the NumPy path throughout: the oracle.
 
@@ -66,7 +66,11 @@ def batch_peaks(
     springs = np.ascontiguousarray(np.broadcast_to(stiffness, (poses, n)), dtype=float)
     ratios = np.ascontiguousarray(np.broadcast_to(damping_ratio, (n,)), dtype=float)
     along = _directions(direction, poses)
-    force = excitation.one_period() if hits is None else excitation.burst(hits)
+    if isinstance(excitation, PiecewiseForce):
+        force = excitation
+    else:
+        force = excitation.one_period() if hits is None else excitation.burst(hits)
+    periodic = bool(np.isfinite(force.end))
     found = BatchPeaks(
         np.full((poses, n), np.nan), np.full((poses, n), np.nan), np.full((poses, n, 3), np.nan)
     )
@@ -74,7 +78,7 @@ def batch_peaks(
         from picchio.vibration.batch.peak_kernel import peaks
 
         peaks(
-            hits is None, force.start, force.duration, force.constant, force.slope,
+            periodic, force.start, force.duration, force.constant, force.slope,
             force.amplitude, force.angular_frequency, np.ascontiguousarray(mass_matrix),
             np.ascontiguousarray(jacobian), springs, ratios, along,
             found.natural_frequencies, found.peak_deflection, found.direction,
@@ -84,7 +88,7 @@ def batch_peaks(
         left = np.ones(poses, dtype=bool)
     for s in np.flatnonzero(left):
         row = along[s] if len(along) else None
-        _exactly(mass_matrix[s], jacobian[s], springs[s], ratios, force, hits, row, found, int(s))
+        _exactly(mass_matrix[s], jacobian[s], springs[s], ratios, force, row, found, int(s))
     return found
 
 
@@ -105,7 +109,6 @@ def _exactly(
     springs: FloatArray,
     ratios: FloatArray,
     force: PiecewiseForce,
-    hits: int | None,
     along: FloatArray | None,
     found: BatchPeaks,
     s: int,
@@ -116,7 +119,8 @@ def _exactly(
     names = tuple(str(j) for j in range(n))
     system = LinearSystem(mass, damping, np.diag(springs), jacobian.T, np.eye(n), names)
     modes = modal_analysis(system)
-    response = steady_state(modes, force) if hits is None else response_from_rest(modes, force)
+    periodic = np.isfinite(force.end)
+    response = steady_state(modes, force) if periodic else response_from_rest(modes, force)
     found.natural_frequencies[s] = modes.natural_frequencies
     if along is None:
         for j, worst in enumerate(response.worst_directions()):

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from picchio.core.arrays import FloatArray
 from picchio.excitation.piecewise import PiecewiseForce
 from picchio.excitation.trains import Excitation
+from picchio.model.model import Model
 from picchio.visuals.plots.style import BLUE, MUTED, VERMILION, axes_or_new, styled
 
 _PER_PIECE = 24
@@ -36,19 +37,29 @@ def sample_force(force: PiecewiseForce, until: float) -> tuple[FloatArray, Float
 
 
 @styled
-def plot_force_train(excitation: Excitation, ax: Axes | None = None, *, hits: int = 3) -> Axes:
+def plot_force_train(
+    excitation: Excitation,
+    ax: Axes | None = None,
+    *,
+    hits: int = 3,
+    model: Model | None = None,
+) -> Axes:
     """The first blows over time, ms and N; the feed force is the dashed line.
 
     Args:
-        excitation: the blows.
+        excitation: the blows as programmed.
         ax: where to draw; a new figure if not given.
         hits: how many blows are shown.
+        model: draws the blows with its effects in them.
     """
     ax = axes_or_new(ax, height=2.6)
-    time, force = sample_force(excitation.one_period().repeat(hits), hits * excitation.period)
+    history = excitation.burst(hits) if model is None else model.force(excitation, hits)
+    time, force = sample_force(history, hits * excitation.period)
     ax.plot(time * 1e3, force, color=BLUE, label="blows")
     ax.fill_between(time * 1e3, force, color=BLUE, alpha=0.14, linewidth=0)
     mean = excitation.one_period().mean()
+    if model is not None and model.changes_blows:
+        mean = float(np.trapezoid(force, time)) / (hits * excitation.period)
     ax.axhline(mean, color=VERMILION, linewidth=1.1, linestyle=(0, (5, 2)),
                label=f"mean {mean:.3g} N")  # fmt: skip
     if excitation.preload:
@@ -68,6 +79,7 @@ def plot_force_spectrum(
     *,
     natural_frequencies: FloatArray | None = None,
     up_to: float | None = None,
+    model: Model | None = None,
 ) -> Axes:
     """Amplitude of every harmonic of the blows, N over Hz, and where the robot's modes lie.
 
@@ -76,13 +88,18 @@ def plot_force_spectrum(
         ax: where to draw.
         natural_frequencies: (n,) Hz, drawn as marks at the top.
         up_to: Hz; some twenty harmonics, or all modes, if not given.
+        model: takes the blows with its effects in them.
+
+    Raises:
+        InputError: an effect of the model that has no steady state.
     """
     ax = axes_or_new(ax, height=2.6)
-    first = 1.0 / excitation.period
+    period = excitation.one_period() if model is None else model.force(excitation, None)
+    first = 1.0 / float(period.end)
     modes = np.zeros(0) if natural_frequencies is None else np.asarray(natural_frequencies)
     top = up_to or max(22.0 * first, 1.08 * float(modes.max(initial=0.0)))
     count = max(1, int(top / first))
-    coefficients = excitation.one_period().fourier_coefficients(count)
+    coefficients = period.fourier_coefficients(count)
     amplitude = np.abs(coefficients) * np.where(np.arange(count + 1) > 0, 2.0, 1.0)
     frequency = np.arange(count + 1) * first
     ax.vlines(frequency, 0.0, amplitude, color=BLUE, linewidth=1.4)

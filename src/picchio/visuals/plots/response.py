@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.studies.rivet.pose import SampledResponse
 from picchio.vibration.closed_form.response import Response, unit_vector
 from picchio.visuals.plots.style import MUTED, axes_or_new, direction_label, look, plain, styled
 
@@ -18,7 +19,9 @@ _SAMPLES_PER_CYCLE = 24
 _WORTH_A_LABEL = 0.12
 
 
-def response_times(response: Response, until: float, start: float = 0.0) -> FloatArray:
+def response_times(
+    response: Response | SampledResponse, until: float, start: float = 0.0
+) -> FloatArray:
     """Times (k,) s fine enough to draw a response, the force's jumps among them."""
     fastest = float(np.abs(response.modes.poles).max()) / (2.0 * np.pi)
     count = int(np.clip((until - start) * fastest * _SAMPLES_PER_CYCLE, 400, 20000))
@@ -29,13 +32,13 @@ def response_times(response: Response, until: float, start: float = 0.0) -> Floa
 
 @styled
 def plot_response(
-    response: Response,
+    response: Response | SampledResponse,
     direction: ArrayLike,
     ax: Axes | None = None,
     *,
     joints: Sequence[str] | None = None,
     until: float | None = None,
-    steady: Response | None = None,
+    steady: Response | SampledResponse | None = None,
     peaks: bool = True,
     unit: str = "mrad",
 ) -> Axes:
@@ -96,7 +99,7 @@ def plot_response(
     return ax
 
 
-def _first_part(response: Response, last_blow: float) -> float:
+def _first_part(response: Response | SampledResponse, last_blow: float) -> float:
     """Until the slowest mode has rung down to a twentieth."""
     slowest = -float(response.modes.poles.real.max())
     if slowest <= 0.0:
@@ -104,6 +107,6 @@ def _first_part(response: Response, last_blow: float) -> float:
     return min(last_blow + 3.0 / slowest, 3.0 * last_blow + 0.2 / slowest)
 
 
-def _band(steady: Response, direction: ArrayLike, j: int) -> tuple[float, float]:
+def _band(steady: Response | SampledResponse, direction: ArrayLike, j: int) -> tuple[float, float]:
     _, values = steady.turning_points(direction)[j]
     return float(values.min()), float(values.max())

@@ -18,7 +18,7 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.method_comparison import Term
 from picchio.studies.assessment.result import Assessment, format_count, verdict
 from picchio.studies.backwards import Allowable
-from picchio.studies.envelopes import direction_envelope
+from picchio.studies.envelopes import envelope
 from picchio.studies.tasks import Task
 from picchio.studies.uncertainty import UncertainLife
 from picchio.visuals.plots.force import plot_force_spectrum, plot_force_train
@@ -46,11 +46,9 @@ class Figure:
 
 def report_figures(
     assessment: Assessment,
-    robot: FlexibleRobot,
     worst: WorstRivet,
     curve: SNCurve | None,
     *,
-    gravity_stiffness: bool,
     spread: UncertainLife | None = None,
 ) -> list[Figure]:
     """All plots of an assessment report, the most telling first."""
@@ -126,24 +124,27 @@ def report_figures(
                                 allowable=curve.allowable, joint=joint.name),
             f"Cycles counted in the worst rivet of {joint.name}, by amplitude",
             "How many cycles of this rivet reach each amplitude.")  # fmt: skip
-    add(plot_force_train(operation.excitation, blank_figure(height=2.3)),
+    model = worst.rivet.model
+    told = "" if not model.changes_blows else ", with the model's effects in them"
+    add(plot_force_train(operation.excitation, blank_figure(height=2.3), model=model),
         f"Force of the tool over three blows: {operation.excitation.describe()}",
-        f"The blows of the operation {operation.name}.")  # fmt: skip
+        f"The blows of the operation {operation.name}{told}.")  # fmt: skip
     modes = worst.modes.natural_frequencies
     add(plot_force_spectrum(operation.excitation, blank_figure(height=2.3),
-                            natural_frequencies=modes),
+                            natural_frequencies=modes,
+                            model=None if worst.steady is None else model),
         "Amplitude of the harmonics of the blows, with the robot's natural frequencies at "
         + ", ".join(f"{f:.3g}" for f in modes) + " hertz",
         f"The blows' harmonics and the robot's modes ({where}).")  # fmt: skip
     add(plot_mode_shapes(worst.modes, blank_figure(height=2.7)),
         "Which joints move in each mode of the robot",
         f"The modes of the robot ({where}).")  # fmt: skip
-    envelope = direction_envelope(
-        Model(robot, gravity_stiffness), worst.pose, operation.excitation,
-        None if worst.rest is None else operation.hits_per_rivet,
-    )  # fmt: skip
+    if worst.rivet.nonlinear:  # no closed form for every direction
+        return made
+    balls = envelope(model, worst.pose, operation.excitation,
+                     hits=None if worst.rest is None else operation.hits_per_rivet)  # fmt: skip
     for plane in ("xz", "xy"):
-        add(plot_polar_envelope(envelope, plane, blank_figure(5.6, 3.9, polar=True), count=72),  # type: ignore[arg-type]
+        add(plot_polar_envelope(balls, plane, blank_figure(5.6, 3.9, polar=True), count=72),  # type: ignore[arg-type]
             f"Peak deflection of every joint by the direction of the force in the {plane} plane",
             f"What the force's direction changes, in the {plane} plane ({where}).",
             main=plane == "xz")  # fmt: skip
@@ -159,12 +160,12 @@ def _ranking(assessment: Assessment) -> str:
 
 def assessment_report(
     assessment: Assessment,
-    robot: FlexibleRobot,
+    robot: FlexibleRobot | Model,
     task: Task,
     *,
     warnings: Sequence[str] = (),
     command: str | None = None,
-    gravity_stiffness: bool = False,
+    gravity_stiffness: bool | None = None,
     sn_curve: str | SNCurve | None = None,
     scene: str | None = None,
     allowed: Sequence[Allowable] = (),
@@ -178,7 +179,7 @@ def assessment_report(
 
     Args:
         assessment: of this robot on this task.
-        robot: the robot.
+        robot: the robot, or a model of it.
         task: the task.
         warnings: what was warned of while loading and assessing, a sentence each.
         command: the command line that gave this, to reproduce it.
@@ -196,11 +197,10 @@ def assessment_report(
     from markupsafe import Markup
 
     worst = worst_rivet(assessment, robot, task, gravity_stiffness=gravity_stiffness)
+    robot = worst.rivet.model.robot
     life = assessment.joint(worst.joint.name)
     curve = _curve(sn_curve, robot, life.sn_curve)
-    figures = report_figures(
-        assessment, robot, worst, curve, gravity_stiffness=gravity_stiffness, spread=spread
-    )
+    figures = report_figures(assessment, worst, curve, spread=spread)
     over_limit = any(joint.reducer_utilisation > 1.0 for joint in assessment.joints)
     folder = files("picchio.visuals.report")
     environment = Environment(

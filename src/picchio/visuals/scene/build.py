@@ -14,7 +14,8 @@ from picchio.excitation.trains import Excitation
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import Assessment
-from picchio.studies.envelopes import DirectionEnvelope, direction_envelope
+from picchio.studies.envelopes import DirectionEnvelope
+from picchio.studies.envelopes import envelope as envelope_of
 from picchio.vibration.closed_form.response import unit_vector
 from picchio.visuals.plots.style import direction_label
 from picchio.visuals.scene.causes.causes import add_causes
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 
 
 def build_scene(
-    robot: FlexibleRobot,
+    robot: FlexibleRobot | Model,
     pose: ArrayLike,
     excitation: Excitation,
     *,
@@ -47,13 +48,13 @@ def build_scene(
     joint: str | None = None,
     workspace: xarray.Dataset | None = None,
     diagnosis: Diagnosis | None = None,
-    gravity_stiffness: bool = False,
+    gravity_stiffness: bool | None = None,
     subdivisions: int = 4,
 ) -> Scene:
     """The scene of a robot at a pose, shaken by blows.
 
     Args:
-        robot: the robot; its meshes are read here and nowhere before.
+        robot: the robot, or a model of it; its meshes are read here and nowhere before.
         pose: (nv,) rad or m.
         excitation: the blows.
         hits: of a burst from rest; None for the steady state.
@@ -67,10 +68,13 @@ def build_scene(
         subdivisions: fineness of the envelopes.
 
     Raises:
-        InputError: a bad pose, direction or joint; a diagnosis of another robot.
+        InputError: a bad pose, direction or joint; a diagnosis of another robot; a nonlinear
+            model, which has no envelope in closed form.
     """
+    model = Model.of(robot, gravity_stiffness=gravity_stiffness)
+    robot = model.robot
     checked = robot.pose(pose)
-    envelope = direction_envelope(Model(robot, gravity_stiffness), checked, excitation, hits)
+    envelope = envelope_of(model, checked, excitation, hits=hits)
     tree = frames(robot, checked)
     places = world(tree)
     body = build_body(robot, tree, places)

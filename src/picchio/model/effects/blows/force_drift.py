@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
@@ -18,6 +21,10 @@ class ForceDrift(Effect):
         parameter("per_hit", lower=-0.5, upper=0.5, meaning="relative change from blow to blow"),
     )
     meaning = "the blows fade or build up within a burst (air supply, heating)"
+
+    refused: ClassVar[Mapping[str, str]] = {
+        "steady state": "blows that grow or fade within a burst have no steady state"
+    }
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Scale each by its place in the burst."""

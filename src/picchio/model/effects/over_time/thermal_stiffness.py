@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Plant
@@ -24,6 +25,12 @@ class ThermalStiffness(Effect):
         if kelvin is not None:
             factor = max(1.0 + self.values["per_kelvin"] * kelvin, 0.01)
             plant.springs[plant.check_joint(self.target)] *= factor
+
+    def without_load(self, conditions: Conditions) -> str | None:
+        """Nothing changes where no temperature is given."""
+        if conditions.temperature is None:
+            return "depends on the temperature, and none is given here"
+        return super().without_load(conditions)
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """A tenth over the campaign's range."""

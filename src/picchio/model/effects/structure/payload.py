@@ -18,8 +18,8 @@ class Payload(Effect):
     meaning = "the tool is heavier (or lighter) than stated"
 
     def structure(self, plant: Plant) -> None:
-        """Add the mass; its weight only changes gravity's stiffness, since the pose is given."""
-        plant.add_mass(self.values["mass"], plant.geometry.robot.tool_frame, (0.0, 0.0, 0.0))
+        """Add the mass; the pose is given, so its weight loads the springs but bends nothing."""
+        plant.add_mass(self.values["mass"], plant.robot.tool_frame, (0.0, 0.0, 0.0))
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """Two hundredths of what moves; a quarter of that, for a light wrist's fast modes."""

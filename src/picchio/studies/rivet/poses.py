@@ -1,4 +1,7 @@
-"""Damage and extremes of one rivet at many poses, in compiled code."""
+"""What blows do to the joints at many poses: the one way from a model to many responses.
+
+Compiled code where it can take the model (see `ManyPoses`), else pose by pose as `ModelAtPose`.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +14,14 @@ from numpy.typing import ArrayLike
 from picchio.core.arrays import FloatArray
 from picchio.excitation.trains import Excitation
 from picchio.fatigue.sn.curve import SNCurve
+from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model
-from picchio.robot.dynamics.statics import balancing
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.rivet.life_rules import RainflowRule
-from picchio.studies.rivet.loads import loads_at
+from picchio.studies.rivet.pose import ModelAtPose, Rivet
 from picchio.studies.tasks import Operation
+from picchio.vibration.batch.peaks import BatchPeaks, batch_peaks
+from picchio.vibration.closed_form.response import unit_vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +34,7 @@ class BatchDamage:
         highest: (p, n) rad, largest deflection.
         stiffness: (p, n) N m/rad, of the joints there.
         damage: (p, n) Miner's sum; NaN for a joint without a curve.
+        many: the model at the poses.
     """
 
     natural_frequencies: FloatArray
@@ -36,6 +42,7 @@ class BatchDamage:
     highest: FloatArray
     stiffness: FloatArray
     damage: FloatArray
+    many: ManyPoses
 
     @property
     def amplitude(self) -> FloatArray:
@@ -43,8 +50,8 @@ class BatchDamage:
         return 0.5 * self.stiffness * (self.highest - self.lowest)
 
 
-def batch_damage(
-    robot: FlexibleRobot,
+def damage_at(
+    model: Model,
     poses: FloatArray,
     direction: ArrayLike,
     excitation: Excitation,
@@ -56,7 +63,7 @@ def batch_damage(
     """What one rivet does at many poses: the default method of `assess` without its report.
 
     Args:
-        robot: with stiffnesses; gravity stiffness is off.
+        model: the robot and its effects.
         poses: (p, nv) rad or m, taken unchecked.
         direction: (3,) or (p, 3) unit vectors of the force, world.
         excitation: the blows.
@@ -67,74 +74,97 @@ def batch_damage(
     Raises:
         InputError: no hits, or a mode without damping.
     """
-    force = excitation.burst(hits)
+    force = model.force(excitation, hits)
     along = np.ascontiguousarray(np.broadcast_to(direction, (len(poses), 3)), dtype=float)
-    n = len(robot.flexible_joints)
-    springs = stiffness_at(robot, poses)
+    many = ManyPoses(model, poses)
+    shape = many.stiffness.shape
     found = BatchDamage(
-        np.full((len(poses), n), np.nan), np.full((len(poses), n), np.nan),
-        np.full((len(poses), n), np.nan), springs, np.zeros((len(poses), n)),
+        np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan), many.stiffness,
+        np.zeros(shape), many,
     )  # fmt: skip
     left = np.ones(len(poses), dtype=bool)
-    if compiled:
+    if compiled and many.compiled:
         from picchio.studies.rivet.damage_kernel import damages
 
-        mass, jacobian = robot.mass_and_jacobian(poses)
+        mass, jacobian = many.mass_and_jacobian()
         damages(
             force.start, force.duration, force.constant, force.slope, force.amplitude,
-            force.angular_frequency, np.ascontiguousarray(mass), np.ascontiguousarray(jacobian),
-            springs, robot.damping_ratio, along, stress_per_torque(robot), *curve_tables(curves),
-            found.natural_frequencies, found.lowest, found.highest, found.damage,
+            force.angular_frequency, mass, jacobian, many.stiffness, many.damping_ratio, along,
+            stress_per_torque(model.robot), *curve_tables(curves), found.natural_frequencies,
+            found.lowest, found.highest, found.damage,
         )  # fmt: skip
         left = np.isnan(found.lowest[:, 0]) & ~np.isnan(found.natural_frequencies[:, 0])
     for s in np.flatnonzero(left):
         operation = Operation("", along[s], excitation, hits, poses[s : s + 1])
-        _exactly(robot, operation, curves, found, int(s))
+        _exactly(Rivet(model, operation, poses[s]), curves, found, int(s))
     found.damage[:, [curve is None for curve in curves]] = np.nan
     return found
 
 
-def _exactly(
-    robot: FlexibleRobot,
-    operation: Operation,
-    curves: Sequence[SNCurve | None],
-    found: BatchDamage,
-    s: int,
-) -> None:
-    """One pose by the path that takes every damping."""
-    loads = loads_at(Model(robot), operation, operation.poses[0], need="rest")
-    found.natural_frequencies[s] = loads.natural_frequencies
-    for j, (joint, load) in enumerate(zip(robot.flexible_joints, loads.joints, strict=True)):
+def _exactly(rivet: Rivet, curves: Sequence[SNCurve | None], found: BatchDamage, s: int) -> None:
+    """One pose by the path that takes every model."""
+    found.natural_frequencies[s] = rivet.natural_frequencies
+    found.stiffness[s] = rivet.stiffness
+    joints = rivet.model.robot.flexible_joints
+    hits = rivet.operation.hits_per_rivet
+    for j, (joint, load) in enumerate(zip(joints, rivet.loads("rest", both=False), strict=True)):
         assert load.rest is not None
         found.lowest[s, j], found.highest[s, j] = load.rest.min(), load.rest.max()
         curve = curves[j]
         if curve is not None:
-            rule = RainflowRule()
-            found.damage[s, j] = rule(joint, load, operation.hits_per_rivet, curve).damage
+            found.damage[s, j] = RainflowRule()(joint, load, hits, curve).damage
 
 
-def gravity_torque_at(robot: FlexibleRobot, poses: FloatArray) -> FloatArray:
-    """Torque (p, n) that the springs carry at rest at poses (p, nv), unchecked, N m (N)."""
-    index = robot.flexible_index
-    held = np.array([robot.rigid.gravity_torque(pose) for pose in poses])
-    held = held.reshape(len(poses), len(robot.joint_names))[:, index]
-    if any(joint.balancer is not None for joint in robot.flexible_joints):
-        rows = poses[:, index]
-        added = [balancing(robot.flexible_joints, robot.tree, row)[0] for row in rows]
-        held = held + np.array(added).reshape(held.shape)
-    return np.asarray(held)
+def peaks_at(
+    model: Model,
+    poses: FloatArray,
+    excitation: Excitation,
+    *,
+    hits: int | None = None,
+    direction: ArrayLike | None = None,
+) -> tuple[BatchPeaks, FloatArray]:
+    """Largest deflection of every joint at many poses, exact in time and in direction.
 
+    Args:
+        model: the robot and its effects.
+        poses: (p, nv) rad or m, taken unchecked.
+        excitation: the blows.
+        hits: of a burst from rest; None for the steady state.
+        direction: (3,) or (p, 3) of the programmed force; None for the worst of all directions.
 
-def stiffness_at(robot: FlexibleRobot, poses: FloatArray) -> FloatArray:
-    """Stiffness (p, n) of the joints at poses (p, nv), N m/rad; curves at gravity's torque."""
-    springs = np.tile(robot.stiffness, (len(poses), 1))
-    curves = [joint.stiffness_curve for joint in robot.flexible_joints]
-    if any(curve is not None for curve in curves):
-        held = gravity_torque_at(robot, poses)
-        for j, curve in enumerate(curves):
-            if curve is not None:
-                springs[:, j] = curve.tangent(held[:, j])
-    return springs
+    Returns:
+        the peaks; (p, n) N m/rad, the joints' stiffness.
+
+    Raises:
+        InputError: the worst direction of a nonlinear model, a resonance without damping, an
+            effect that has no steady state.
+    """
+    many = ManyPoses(model, poses)
+    if many.compiled:
+        mass, jacobian = many.mass_and_jacobian()
+        found = batch_peaks(
+            mass, jacobian, many.stiffness, many.damping_ratio, model.force(excitation, hits),
+            direction=direction,
+        )  # fmt: skip
+        return found, many.stiffness
+    n = many.stiffness.shape[1]
+    found = BatchPeaks(
+        np.empty((len(poses), n)), np.empty((len(poses), n)), np.empty((len(poses), n, 3))
+    )
+    along = None if direction is None else np.broadcast_to(direction, (len(poses), 3))
+    for s, pose in enumerate(poses):
+        at = ModelAtPose(model, pose)
+        found.natural_frequencies[s] = at.natural_frequencies
+        many.stiffness[s] = at.stiffness
+        if along is None:
+            for j, worst in enumerate(at.response(excitation, hits).worst_directions()):
+                found.peak_deflection[s, j], found.direction[s, j] = worst.value, worst.direction
+        else:
+            unit = unit_vector(along[s])
+            turns = at.turning_points(excitation, hits, unit)
+            found.direction[s] = unit
+            found.peak_deflection[s] = [np.abs(values).max() for values in turns]
+    return found, many.stiffness
 
 
 def stress_per_torque(robot: FlexibleRobot) -> FloatArray:

@@ -1,0 +1,113 @@
+"""A model at many poses at once: the matrices that compiled code takes."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.model.conditions import Conditions
+from picchio.model.expansion import link_inertia
+from picchio.model.model import Model
+from picchio.model.plant import Changes, Plant
+from picchio.robot.dynamics.rigid_model import Body, RigidModel
+from picchio.robot.dynamics.statics import balancing
+
+
+class ManyPoses:
+    """Mass matrix, Jacobian, springs and damping of a model at p poses of n flexible joints.
+
+    Args:
+        model: the robot and its effects.
+        poses: (p, nv) rad or m, taken unchecked.
+
+    Attributes:
+        compiled: whether compiled code can take it: linear, modally damped, carried by nothing
+            but the joints' own springs. Otherwise only `gravity_torque` holds, and each pose is
+            a `ModelAtPose` of its own.
+        stiffness: (p, n) N m/rad; with a stiffness curve, the slope at gravity's torque.
+        damping_ratio: (n,).
+
+    Raises:
+        InputError: an effect whose target the robot does not have.
+    """
+
+    def __init__(self, model: Model, poses: FloatArray) -> None:
+        robot = self._robot = model.robot
+        self._model, self._poses = model, poses
+        self._rigid = robot.rigid
+        self._joint_inertia = np.zeros(len(robot.flexible_joints))
+        self.damping_ratio = robot.damping_ratio
+        self.stiffness = np.tile(robot.stiffness, (len(poses), 1))
+        curves = [joint.stiffness_curve for joint in robot.flexible_joints]
+        if any(curve is not None for curve in curves):
+            held = self._held(robot.rigid)
+            for j, curve in enumerate(curves):
+                if curve is not None:
+                    self.stiffness[:, j] = curve.tangent(held[:, j])
+        self.compiled = not model.gravity_stiffness
+        if model.changes_structure:
+            self._change()
+
+    def _change(self) -> None:
+        """Take the effects in: what they do to the springs may depend on the pose."""
+        first: Changes | None = None
+        for k, row in enumerate(self.stiffness):
+            changes = Changes(
+                self._robot, dict(zip(self._robot.flexible_names, row, strict=True)), Conditions()
+            )
+            if self._model.nonlinear:
+                self.compiled = False
+                return
+            for effect in self._model.ordered:
+                effect.structure(cast(Plant, changes))
+            self.stiffness[k] = list(changes.springs.values())
+            first = changes if first is None else first
+        if first is None:
+            return
+        self.compiled = self.compiled and first.joints_only and not first.force_offset.any()
+        self.damping_ratio = first.damping_scale * self._robot.damping_ratio
+        self._rigid = self._robot.rigid.with_bodies(
+            [
+                Body(link, point, weight, None if point else link_inertia(self._robot, link))
+                for weight, link, point in first.added_masses
+            ]
+        )
+        names = self._robot.flexible_names
+        for joint, inertia in first.added_inertias:
+            if joint in names:
+                self._joint_inertia[names.index(joint)] += inertia
+
+    def mass_and_jacobian(self) -> tuple[FloatArray, FloatArray]:
+        """M (p, n, n) kg m^2 and J (p, 3, n) m, force along the programmed direction, world."""
+        robot, index = self._robot, self._robot.flexible_index
+        point = self._rigid.frame(robot.tool_point)
+        mass, jacobian = self._rigid.mass_and_jacobian(self._poses, point, index)
+        if self._joint_inertia.any():
+            mass = mass + np.diag(self._joint_inertia)
+        if self._model.changes_blows:
+            tool = self._rigid.frame(robot.tool_frame)
+            turns = [
+                self._model.force_directions(self._rigid.placement(pose, tool)[1])
+                for pose in self._poses
+            ]
+            # J^T F with F = turn @ programmed.
+            jacobian = np.einsum("pde,pdn->pen", np.array(turns).reshape(-1, 3, 3), jacobian)
+        return np.ascontiguousarray(mass), np.ascontiguousarray(jacobian)
+
+    def gravity_torque(self) -> FloatArray:
+        """(p, n) N m (N), that the springs carry at rest, added masses included."""
+        if self._model.gravity_balanced:
+            return np.zeros_like(self.stiffness)
+        return self._held(self._rigid)
+
+    def _held(self, rigid: RigidModel) -> FloatArray:
+        robot, index = self._robot, self._robot.flexible_index
+        held = np.array([rigid.gravity_torque(pose) for pose in self._poses])
+        held = held.reshape(len(self._poses), len(robot.joint_names))[:, index]
+        if any(joint.balancer is not None for joint in robot.flexible_joints):
+            rows = self._poses[:, index]
+            added = [balancing(robot.flexible_joints, robot.tree, row)[0] for row in rows]
+            held = held + np.array(added).reshape(held.shape)
+        return np.asarray(held)
