@@ -13,8 +13,10 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.excitation.excitation import Excitation
+from picchio.excitation.half_sine_train import HalfSineTrain
 from picchio.excitation.piecewise import PiecewiseForce
-from picchio.excitation.trains import Excitation, HalfSineTrain, PulseTrain
+from picchio.excitation.pulse_train import PulseTrain
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.mean_stress import Rule

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.excitation.trains import Excitation, MeasuredForce
+from picchio.excitation.excitation import Excitation
 from picchio.fatigue.reducer import Reducer
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -134,6 +133,7 @@ def with_period(excitation: Excitation, period: float | None) -> Excitation:
     """
     if period is None or period == excitation.period:
         return excitation
-    if isinstance(excitation, MeasuredForce) and period < excitation.time[-1]:
-        raise InputError("is shorter than the measured blow", key="period-range", value=period)
-    return dataclasses.replace(excitation, period=period)  # type: ignore[type-var]
+    try:
+        return excitation.with_period(period)
+    except InputError as error:
+        raise error.placed(key="period-range") from None

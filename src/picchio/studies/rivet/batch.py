@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
-from picchio.excitation.trains import Excitation
+from picchio.excitation.excitation import Excitation
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.model import Model
 from picchio.robot.dynamics.statics import balancing
