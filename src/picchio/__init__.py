@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from picchio.campaign.campaign import Campaign, load_campaign, write_campaign
     from picchio.campaign.record import Record
     from picchio.core.errors import InputError, PicchioError, PicchioWarning
-    from picchio.excitation.trains import HalfSineTrain, MeasuredForce, PulseTrain
+    from picchio.excitation.half_sine_train import HalfSineTrain
+    from picchio.excitation.measured import MeasuredForce
+    from picchio.excitation.pulse_train import PulseTrain
     from picchio.fatigue.counting.counter import rainflow
     from picchio.fatigue.sn.curve import SNCurve
     from picchio.fatigue.sn.library import load_sn_curve
@@ -38,14 +40,14 @@ _HOME = {
     "Assessment": "studies.assessment.result",
     "Campaign": "campaign.campaign",
     "FlexibleRobot": "robot.flexible_robot",
-    "HalfSineTrain": "excitation.trains",
+    "HalfSineTrain": "excitation.half_sine_train",
     "InputError": "core.errors",
     "LinearSystem": "model.linear_system",
-    "MeasuredForce": "excitation.trains",
+    "MeasuredForce": "excitation.measured",
     "Model": "model.model",
     "PicchioError": "core.errors",
     "PicchioWarning": "core.errors",
-    "PulseTrain": "excitation.trains",
+    "PulseTrain": "excitation.pulse_train",
     "Record": "campaign.record",
     "SNCurve": "fatigue.sn.curve",
     "Task": "studies.tasks",

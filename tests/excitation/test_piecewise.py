@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from picchio.core.errors import InputError
-from picchio.excitation.trains import HalfSineTrain, MeasuredForce, PulseTrain
+from picchio.excitation.half_sine_train import HalfSineTrain
+from picchio.excitation.measured import MeasuredForce
+from picchio.excitation.pulse_train import PulseTrain
 
 MEASURED = MeasuredForce(
     np.array([0.0, 0.001, 0.003, 0.004, 0.02]), np.array([0.0, 310.0, 80.0, -20.0, 0.0]), 0.04

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from picchio.excitation.trains import PulseTrain
+from picchio.excitation.pulse_train import PulseTrain
 from picchio.paper.fourier import amplitude_and_phase, printed_force, printed_series
 from picchio.paper.statics import gravity_stress, holding_torque
 

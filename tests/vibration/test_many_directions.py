@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import picchio
-from picchio.excitation.trains import HalfSineTrain, PulseTrain
+from picchio.excitation.half_sine_train import HalfSineTrain
+from picchio.excitation.pulse_train import PulseTrain
 from picchio.vibration.closed_form.many_directions import peak_deflections
 
 

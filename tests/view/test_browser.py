@@ -15,7 +15,7 @@ from PIL import Image
 
 import picchio
 from picchio.diagnosis.result import Cause, Diagnosis, Value
-from picchio.excitation.trains import PulseTrain
+from picchio.excitation.pulse_train import PulseTrain
 from picchio.visuals.report.assessment import assessment_report
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.compare import compare_scene

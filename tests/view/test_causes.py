@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 import picchio
 from picchio.cli.main import run
 from picchio.diagnosis.result import Cause, Diagnosis, Value
-from picchio.excitation.trains import PulseTrain
+from picchio.excitation.pulse_train import PulseTrain
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.registry import catalogue
 from picchio.visuals.diagnosis_file import read_diagnosis

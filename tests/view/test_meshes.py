@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import picchio
 from picchio.core.errors import PicchioWarning
-from picchio.excitation.trains import PulseTrain
+from picchio.excitation.pulse_train import PulseTrain
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.robot.body import MOST_FACES, build_body, decimate
 from picchio.visuals.scene.robot.kinematics import frames, world

@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 from lxml import html as lxml_html
 
 import picchio
-from picchio.excitation.trains import HalfSineTrain, PulseTrain
+from picchio.excitation.half_sine_train import HalfSineTrain
+from picchio.excitation.pulse_train import PulseTrain
 from picchio.studies.envelopes import direction_envelope, icosphere
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.compare import compare_scene

@@ -18,7 +18,7 @@ from picchio.campaign.tables import FORMAT, CampaignExcitation, CampaignTable, R
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.toml import validate
-from picchio.excitation.trains import Excitation
+from picchio.excitation.excitation import Excitation
 
 BLOCK = 16384
 

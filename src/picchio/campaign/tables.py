@@ -90,12 +90,6 @@ class CampaignExcitation(ExcitationTable):
     file: InsideFile | None = None
     hits: Hits | None = None
 
-    def overridden_by(self, other: ExcitationTable | None) -> CampaignExcitation:
-        """This table with every key that `other` gives taken from it."""
-        given = self.model_dump(exclude_none=True)
-        given |= other.model_dump(exclude_none=True) if other is not None else {}
-        return CampaignExcitation(**given)
-
     @property
     def blows(self) -> ExcitationTable:
         """The table without `hits`."""

@@ -45,7 +45,6 @@ def envelope(
     """The worst force direction of every joint at a pose, exact: no direction is sampled."""
     from picchio.cli.inputs import choose_blows, numbers
     from picchio.cli.output import check_target, write_json
-    from picchio.model.model import Model
     from picchio.robot.dynamics.pose import warn_beyond_limits
     from picchio.robot.loading.load import load_robot
     from picchio.studies.envelopes import envelope as run

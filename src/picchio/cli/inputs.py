@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
-    from picchio.excitation.trains import Excitation
+    from picchio.excitation.excitation import Excitation
     from picchio.robot.flexible_robot import FlexibleRobot
 
 
@@ -62,7 +62,7 @@ def choose_blows(
     """
     from picchio.cli.output import check_numbers
     from picchio.core.toml import parse_toml
-    from picchio.excitation.table import ExcitationTable
+    from picchio.excitation.table import ExcitationTable, excitation_class
     from picchio.studies.tasks import FORMAT, TaskTable
 
     check_numbers(force=force, period=period, width=width)
@@ -76,7 +76,7 @@ def choose_blows(
             if not value > 0:
                 raise InputError("must be positive", key=f"--{key}", value=value)
             table = table.overridden_by(ExcitationTable(**{key: value}))
-        elif getattr(table, key) is None and table.kind != "measured":
+        elif getattr(table, key) is None and key in excitation_class(table.kind).needed:
             raise InputError(
                 f"{robot.name} has no example task that gives it", key=f"--{key}", hint="give it"
             )

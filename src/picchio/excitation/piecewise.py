@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -101,12 +103,37 @@ class PiecewiseForce:
 
     def scaled(self, factor: float) -> PiecewiseForce:
         """So many times as large."""
+        return replace(self, **{name: factor * getattr(self, name) for name in _FORCES})
+
+    def over(self, height: float) -> PiecewiseForce:
+        """Divided by a height: a force of that height becomes one of exactly 1."""
+        return replace(self, **{name: getattr(self, name) / height for name in _FORCES})
+
+    def stretched(self, factor: float) -> PiecewiseForce:
+        """So many times as long, as high as before."""
+        if factor == 1.0:
+            return self
         return replace(
             self,
-            constant=factor * self.constant,
-            slope=factor * self.slope,
-            amplitude=factor * self.amplitude,
+            start=factor * self.start,
+            end=factor * self.end,
+            slope=self.slope / factor,
+            angular_frequency=self.angular_frequency / factor,
         )
+
+    @cached_property
+    def key(self) -> bytes:
+        """What tells this history from another."""
+        arrays = b"".join(getattr(self, name).tobytes() for name in _PER_PIECE)
+        return arrays + float(self.end).hex().encode()
+
+    def padded(self, end: float) -> PiecewiseForce:
+        """Followed by silence until `end`, s."""
+        if end <= self.end:
+            return self
+        pieces = {name: np.append(getattr(self, name), 0.0) for name in _PER_PIECE}
+        pieces["start"][-1] = self.end
+        return PiecewiseForce(end=end, **pieces)
 
     def in_piece(self, index: ArrayLike, u: ArrayLike) -> FloatArray:
         """The force (N) of piece `index` at `u` seconds after that piece's start."""
@@ -178,13 +205,59 @@ class PiecewiseForce:
         offset = np.repeat(np.arange(count) * self.end, self.start.size)
         pieces = {name: np.tile(getattr(self, name), count) for name in _PER_PIECE}
         pieces["start"] = pieces["start"] + offset
-        end = count * self.end
-        if then_silence:
-            pieces = {n: np.append(v, end if n == "start" else 0.0) for n, v in pieces.items()}
-            end = np.inf
-        return PiecewiseForce(end=end, **pieces)
+        found = PiecewiseForce(end=count * self.end, **pieces)
+        return found.padded(np.inf) if then_silence else found
 
 
+def superposed(
+    start: FloatArray, parts: Sequence[tuple[FloatArray, PiecewiseForce]], end: float = np.inf
+) -> PiecewiseForce:
+    """Blows that may overlap, added up from t = 0 to `end`.
+
+    Args:
+        start: (b,) s, of each blow; it may lie before 0.
+        parts: what every blow consists of: (b,) factors, and the force from the blow's start on.
+        end: s.
+
+    Returns:
+        pieces between all edges, which are rounded to 1e-12 s.
+
+    Raises:
+        InputError: two sines of different frequencies at one time, which no piece can hold.
+    """
+    edges = np.concatenate(
+        [[0.0], *((start[:, None] + np.append(f.start, f.end)).ravel() for _, f in parts)]
+    )
+    edges = np.unique(np.round(edges[(edges >= 0.0) & (edges < end)], 12))
+    since = edges[:, None] - start
+    # Just after an edge it is clear which piece holds, whatever the rounding did.
+    late = since + _AFTER
+    constant, slope, omega = (np.zeros(edges.size) for _ in range(3))
+    amplitude = np.zeros(edges.size, dtype=np.complex128)
+    for factor, force in parts:
+        on = np.where((late >= 0.0) & (late < force.end), factor, 0.0)
+        piece = np.searchsorted(force.start, late, side="right") - 1
+        u = since - force.start[piece]
+        if force.constant.any():
+            constant += (on * force.constant[piece]).sum(axis=1)
+        if force.slope.any():
+            constant += (on * force.slope[piece] * u).sum(axis=1)
+            slope += (on * force.slope[piece]).sum(axis=1)
+        if force.amplitude.any():
+            own = force.angular_frequency[piece]
+            wave = on * force.amplitude[piece] * np.exp(1j * own * u)
+            amplitude += wave.sum(axis=1)
+            fast = np.where(wave != 0.0, own, omega[:, None]).max(axis=1)
+            others = np.where(wave != 0.0, own, fast[:, None]).min(axis=1)
+            others = np.where(omega > 0.0, np.minimum(others, omega), others)
+            if np.any(fast - others > 1e-9 * fast):
+                raise InputError("blows that overlap hold sines of different frequencies")
+            omega = fast
+    return PiecewiseForce(edges, end, constant, slope, amplitude, omega)
+
+
+_AFTER = 1e-9  # s
+_FORCES = ("constant", "slope", "amplitude")
 _PER_PIECE = ("start", "constant", "slope", "amplitude", "angular_frequency")
 
 

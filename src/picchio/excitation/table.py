@@ -1,26 +1,56 @@
-"""The `[excitation]` table of task and campaign files."""
+"""The `[excitation]` table of task and campaign files, and the kinds that it may name."""
 
 from __future__ import annotations
 
+import math
+from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Self
+
+from pydantic import ConfigDict, ValidationError, field_validator, model_validator
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from picchio.core.errors import InputError
+from picchio.core.registry import classes_in, is_concrete, with_entry_points
 from picchio.core.toml import Finite, Positive, StrictModel
-from picchio.excitation.trains import Excitation, HalfSineTrain, MeasuredForce, PulseTrain
+from picchio.excitation.excitation import Excitation
 
-Kind = Literal["pulse_train", "half_sine_train", "measured"]
-_TRAINS: dict[str, type[PulseTrain] | type[HalfSineTrain]] = {
-    "pulse_train": PulseTrain,
-    "half_sine_train": HalfSineTrain,
-}
+GROUP = "picchio.excitations"
+DEFAULT = "pulse_train"
+
+
+@cache
+def catalogue() -> dict[str, type[Excitation]]:
+    """Every excitation's class by its kind.
+
+    Raises:
+        InputError: two of one kind, or an entry point that is no excitation.
+    """
+    own = classes_in("picchio.excitation", Excitation)  # type: ignore[type-abstract]
+    return with_entry_points(
+        GROUP, "excitation", own, lambda x: is_concrete(x, Excitation), lambda x: x.kind
+    )
+
+
+def excitation_class(kind: str | None) -> type[Excitation]:
+    """The excitation of a kind; of None, that of a table that names none.
+
+    Raises:
+        InputError: there is none.
+    """
+    try:
+        return catalogue()[kind or DEFAULT]
+    except KeyError:
+        raise InputError("no such excitation", value=kind, choices=catalogue()) from None
 
 
 class ExcitationTable(StrictModel):
     """One blow train as a file states it; any key may be missing where another table fills it.
 
+    Keys beside these are those that a kind declares; see `Excitation.needed`.
+
     Attributes:
-        kind: "pulse_train", "half_sine_train" or "measured".
+        kind: such as "pulse_train".
         force: N, height or peak.
         period: s.
         width: s.
@@ -28,22 +58,45 @@ class ExcitationTable(StrictModel):
         file: CSV with `time [s]` and `force [N]`, relative to the file that names it.
     """
 
-    kind: Kind | None = None
+    model_config = ConfigDict(extra="allow")
+
+    kind: str | None = None
     force: Positive | None = None
     period: Positive | None = None
     width: Positive | None = None
     preload: Finite | None = None
     file: str | None = None
 
-    def overridden_by(self, other: ExcitationTable | None) -> ExcitationTable:
-        """This table with every key that `other` gives taken from it."""
-        if other is None:
-            return self
-        given: dict[str, Any] = {**self._given(), **other._given()}
-        return ExcitationTable(**given)
+    @field_validator("kind")
+    @classmethod
+    def _known_kind(cls, kind: str | None) -> str | None:
+        if kind is not None and kind not in catalogue():
+            raise ValueError(f"must be one of {', '.join(map(repr, catalogue()))}")
+        return kind
 
-    def _given(self) -> dict[str, Any]:
-        return {k: v for k, v in self.model_dump().items() if v is not None}
+    @model_validator(mode="after")
+    def _known_keys(self) -> Self:
+        for key, value in (self.model_extra or {}).items():
+            problem: str | PydanticCustomError | None = None
+            if not any(key in c.needed + c.optional for c in catalogue().values()):
+                problem = "extra_forbidden"
+            elif isinstance(value, bool) or not isinstance(value, int | float | str):
+                problem = PydanticCustomError("excitation", "must be a number or a text")
+            elif isinstance(value, float) and not math.isfinite(value):
+                problem = PydanticCustomError("excitation", "must be a finite number")
+            if problem:
+                raise ValidationError.from_exception_data(
+                    type(self).__name__, [InitErrorDetails(type=problem, loc=(key,), input=value)]
+                )
+        return self
+
+    def overridden_by(self, other: ExcitationTable | None) -> Self:
+        """This table with every key that `other` gives taken from it."""
+        return self if other is None else type(self)(**{**self.given(), **other.given()})
+
+    def given(self) -> dict[str, Any]:
+        """The keys that are given."""
+        return self.model_dump(exclude_none=True)
 
     def build(self, *, file: str | Path | None = None, key: str = "excitation") -> Excitation:
         """The excitation itself.
@@ -56,30 +109,23 @@ class ExcitationTable(StrictModel):
             InputError: a key that the kind needs is missing, or one that it has no use for
                 is given, or a value is out of range.
         """
-        kind = self.kind or "pulse_train"
-        needed = ["file"] if kind == "measured" else ["force", "period", "width"]
-        optional = ["period", "preload"] if kind == "measured" else ["preload"]
-        given = self._given()
+        made = excitation_class(self.kind)
+        given = self.given()
         given.pop("kind", None)
-        for name in needed:
+        for name in made.needed:
             if name not in given:
-                raise InputError(f"a {kind} needs this key", file=file, key=f"{key}.{name}")
+                raise InputError(f"a {made.kind} needs this key", file=file, key=f"{key}.{name}")
         for name, value in given.items():
-            if name not in needed + optional:
+            if name not in made.needed + made.optional:
                 raise InputError(
-                    f"a {kind} has no use for this key",
+                    f"a {made.kind} has no use for this key",
                     file=file,
                     key=f"{key}.{name}",
                     value=value,
-                    choices=needed + optional,
+                    choices=[*made.needed, *made.optional],
                 )
         try:
-            if kind == "measured":
-                base = Path(file).parent if file is not None else Path()
-                return MeasuredForce.from_csv(
-                    base / given["file"], period=self.period, preload=self.preload or 0.0
-                )
-            return _TRAINS[kind](**given)
+            return made.from_table(given, Path(file).parent if file is not None else Path())
         except InputError as error:
             if error.file is not None:
                 raise

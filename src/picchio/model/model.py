@@ -11,8 +11,9 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
-from picchio.excitation.trains import Excitation, PulseTrain
+from picchio.excitation.pulse_train import PulseTrain
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, Where

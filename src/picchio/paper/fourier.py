@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from picchio.core.arrays import ComplexArray, FloatArray
-from picchio.excitation.trains import PulseTrain
+from picchio.excitation.pulse_train import PulseTrain
 from picchio.paper.world import World
 from picchio.vibration.closed_form.modes import modal_analysis
 from picchio.vibration.closed_form.response import Response, steady_state

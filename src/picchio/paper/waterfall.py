@@ -133,7 +133,9 @@ def _lives(loads: _Loads, chosen: tuple[str, ...], curve: SNCurve) -> FloatArray
     return np.array([life(float(d) / len(loads.poses)) for d in spent])
 
 
-def _cycles(loads: _Loads, pose: tuple[JointLoad, ...], joint: int, chosen: tuple[str, ...]) -> Cycles:
+def _cycles(
+    loads: _Loads, pose: tuple[JointLoad, ...], joint: int, chosen: tuple[str, ...]
+) -> Cycles:
     """Stress cycles of one rivet, Pa, about their own mean."""
     load = pose[joint]
     points = load.rest if "transient" in chosen else load.steady

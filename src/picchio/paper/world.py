@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.excitation.trains import PulseTrain
+from picchio.excitation.pulse_train import PulseTrain
 from picchio.model.model import Model
 from picchio.paper.arm import arm, poses_at, rivet_points
 from picchio.paper.assumptions import INPUTS, Assumptions, Input

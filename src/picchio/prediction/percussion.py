@@ -344,12 +344,12 @@ def _blows(record: Record) -> Blows:
     assert direction is not None
     excitation = record.blows()
     if excitation is None:
-        from picchio.excitation.trains import MeasuredForce
+        from picchio.excitation.measured import MeasuredForce
 
         data = record.read(["force"])
         after = data["time"] >= -1e-12
         excitation = MeasuredForce(data["time"][after], data["force"][after])
-        return Blows.of(excitation, 1, direction)
+        return Blows.of(excitation, 1, direction).change(recorded=True)
     return Blows.of(excitation, record.hits, direction)
 
 

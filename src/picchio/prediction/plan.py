@@ -15,6 +15,7 @@ from picchio.campaign.channels import AXES, Channel, parse_channel
 from picchio.campaign.tables import CampaignExcitation, Direction, Hits, Pose, Tolerance
 from picchio.core.errors import InputError
 from picchio.core.toml import Finite, NotNegative, Positive, StrictModel, parse_toml
+from picchio.excitation.table import catalogue, excitation_class
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import from_dict
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -211,10 +212,10 @@ class Plan(StrictModel):
         Raises:
             InputError: a measured excitation, a wrong number of times, too many samples.
         """
-        if self.excitation.kind == "measured":
+        if not excitation_class(self.excitation.kind).programmed:
+            programmed = [kind for kind, made in catalogue().items() if made.programmed]
             raise InputError("a plan's blows are not measured yet", key="excitation.kind",
-                             value="measured",
-                             choices=["pulse_train", "half_sine_train"])  # fmt: skip
+                             value=self.excitation.kind, choices=programmed)  # fmt: skip
         if self.hits is not None and self.excitation.hits is not None:
             raise InputError("is given twice, here and in [excitation]", key="hits",
                              value=self.hits)  # fmt: skip

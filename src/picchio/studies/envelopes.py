@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
-from picchio.excitation.trains import Excitation
+from picchio.excitation.excitation import Excitation
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.rivet.pose import ModelAtPose

@@ -13,8 +13,8 @@ from pydantic import Field
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.toml import Finite, Positive, StrictModel, parse_toml, validate
-from picchio.excitation.table import ExcitationTable, Kind
-from picchio.excitation.trains import Excitation
+from picchio.excitation.excitation import Excitation
+from picchio.excitation.table import ExcitationTable
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.vibration.closed_form.response import unit_vector
 
@@ -27,7 +27,7 @@ _LEAST_JOINTS_TO_AIM = 5
 Hits = Annotated[int, Field(gt=0, le=10_000, strict=True)]
 
 
-class OperationTable(StrictModel):
+class OperationTable(ExcitationTable):
     """One `[[operation]]`; keys of the excitation given here override the task's."""
 
     name: str
@@ -38,20 +38,11 @@ class OperationTable(StrictModel):
     rivets: Positive = 1.0
     hits_per_rivet: Hits | None = None
     excitation: ExcitationTable | None = None
-    kind: Kind | None = None
-    force: Positive | None = None
-    period: Positive | None = None
-    width: Positive | None = None
-    preload: Finite | None = None
-    file: str | None = None
 
     def own_excitation(self) -> ExcitationTable:
         """The excitation's keys given here, in a table of their own or flat."""
-        flat = {
-            name: value
-            for name in ExcitationTable.model_fields
-            if (value := getattr(self, name)) is not None
-        }
+        own = OperationTable.__annotations__
+        flat = {name: value for name, value in self.given().items() if name not in own}
         return (self.excitation or ExcitationTable()).overridden_by(ExcitationTable(**flat))
 
 

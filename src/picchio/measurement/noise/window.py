@@ -11,7 +11,7 @@ from picchio.campaign.channels import TIME
 from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.excitation.trains import Excitation
+from picchio.excitation.excitation import Excitation
 
 # Numbers kept of one record, all channels together: 16 MiB.
 LIMIT = 1 << 21

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.excitation.trains import PulseTrain
+from picchio.excitation.pulse_train import PulseTrain
 from picchio.paper.arm import arm, poses_at, rivet_points
 from picchio.paper.assumptions import Assumptions
 from picchio.paper.fourier import printed_series

@@ -9,7 +9,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.excitation.trains import Excitation
+from picchio.excitation.excitation import Excitation
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.maps.places import Listed, Places

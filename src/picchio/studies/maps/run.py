@@ -19,7 +19,7 @@ import numpy as np
 from picchio.core.errors import InputError, PicchioError
 from picchio.core.files import atomic_write
 from picchio.core.provenance import provenance
-from picchio.excitation.trains import Excitation
+from picchio.excitation.excitation import Excitation
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.maps.chunk import Columns, MapJob

@@ -9,7 +9,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.excitation.trains import Excitation
+from picchio.excitation.excitation import Excitation
 from picchio.fatigue.reducer import Reducer
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.model import Model

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
-from picchio.excitation.trains import Excitation
+from picchio.excitation.excitation import Excitation
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model

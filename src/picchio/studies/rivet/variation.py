@@ -18,8 +18,8 @@ import numpy as np
 
 from picchio.core.arrays import ComplexArray, FloatArray
 from picchio.core.errors import InputError
+from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
-from picchio.excitation.trains import Excitation
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.mean_stress import Rule

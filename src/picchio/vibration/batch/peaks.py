@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
-from picchio.excitation.trains import Excitation
 from picchio.model.linear_system import LinearSystem, modal_damping_matrix
 from picchio.vibration.closed_form.modes import modal_analysis
 from picchio.vibration.closed_form.response import response_from_rest, steady_state, unit_vector

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
+from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
-from picchio.excitation.trains import Excitation
 from picchio.vibration.closed_form.modes import Modes
 
 

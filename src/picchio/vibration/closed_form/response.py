@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import ComplexArray, FloatArray, IndexArray
 from picchio.core.errors import InputError
+from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
-from picchio.excitation.trains import Excitation
 from picchio.vibration.closed_form.extrema import Grid, golden_maximum, refine_roots
 from picchio.vibration.closed_form.modes import Modes
 

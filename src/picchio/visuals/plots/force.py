@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from picchio.core.arrays import FloatArray
+from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
-from picchio.excitation.trains import Excitation
 from picchio.model.model import Model
 from picchio.visuals.plots.style import BLUE, MUTED, VERMILION, axes_or_new, styled
 

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from picchio.campaign.channels import Channel
-from picchio.excitation.trains import Excitation
+from picchio.excitation.excitation import Excitation
 from picchio.prediction.residual import Transfer
 from picchio.vibration.closed_form.modes import Modes
 from picchio.vibration.closed_form.response import unit_vector

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.result import Diagnosis
-from picchio.excitation.trains import Excitation
+from picchio.excitation.excitation import Excitation
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import Assessment

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.excitation.trains import Excitation
+from picchio.excitation.excitation import Excitation
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.visuals.plots.style import BLUE, VERMILION
 from picchio.visuals.scene.build import build_scene

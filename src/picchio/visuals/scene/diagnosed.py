@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from picchio.excitation.trains import MeasuredForce
+from picchio.excitation.measured import MeasuredForce
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.scene import Scene
 

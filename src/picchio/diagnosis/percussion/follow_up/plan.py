@@ -9,6 +9,7 @@ from typing import Any
 from picchio.campaign.record import Record
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.excitation.table import excitation_class
 from picchio.prediction.percussion import PercussionSetup
 from picchio.prediction.plan import Plan, SensorTable, plan_toml
 
@@ -47,7 +48,7 @@ def asked_plan(
     """
     records = percussion_records(problem)
     table = next(record for record in records if record.file == like).excitation
-    if table.kind == "measured":
+    if not excitation_class(table.kind).programmed:
         return None
     samples = setup.samples
     quiet = max(-samples.start, 0.0)

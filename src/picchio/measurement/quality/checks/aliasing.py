@@ -47,7 +47,7 @@ class AliasingCheck(Check):
             extra = max(0.0, float(top.sum()) - beside)
             share = float(np.sqrt(extra / max(float(power.sum()), 1e-300)))
             self._shares.setdefault(name, []).append((share, scan.file, window.rate))
-        width = float(getattr(blows, "width", 0.0) or 0.0)
+        width = (blows.width if blows is not None else None) or 0.0
         if jumps and width and width * window.rate < _SAMPLES_A_BLOW - 1e-6:
             self._thin.append((width * window.rate, scan.file))
         yield from ()

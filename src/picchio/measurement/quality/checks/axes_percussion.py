@@ -51,11 +51,9 @@ class PercussionAxesCheck(Check):
             start = _Start(robot, robot.pose(record.pose), record.direction)
         except (InputError, np.linalg.LinAlgError):
             return
-        width = float(getattr(window.blows, "width", 0.0) or 0.1 * window.blows.period)
-        # A half-sine's mean is what counts in so short a time.
-        force = window.blows.peak_force * (
-            2.0 / np.pi if record.excitation.kind == "half_sine_train" else 1.0
-        )
+        width = window.blows.width or 0.1 * window.blows.period
+        # A blow's mean is what counts in so short a time.
+        force = window.blows.peak_force * window.blows.fullness
         for group in {record.channel(n).group for n in window.arrays if record.channel(n).axis}:
             names = [f"{group}.{axis}" for axis in AXES]
             kind, _, frame = group.partition(".")

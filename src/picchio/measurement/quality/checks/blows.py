@@ -44,7 +44,7 @@ class BlowsCheck(Check):
     def _force(self, scan: RecordScan) -> Iterator[Finding]:
         window, blows = scan.window, scan.window.blows
         assert blows is not None
-        force = window.arrays["force"] - float(getattr(blows, "preload", 0.0) or 0.0)
+        force = window.arrays["force"] - blows.preload
         programmed = blows.peak_force
         if not force.any() or programmed <= 0.0:
             return
@@ -55,7 +55,7 @@ class BlowsCheck(Check):
                              value=float(force.min()), unit="N", **name)  # fmt: skip
             force = -force
         peak = float(np.median(force[force > 0.6 * force.max()]))
-        if window.record.excitation.kind in ("half_sine_train", "measured"):
+        if not blows.flat:
             peak = float(force.max())
         ratio = peak / programmed
         if not 1.0 / 3.0 < ratio < 3.0:
@@ -78,7 +78,7 @@ class BlowsCheck(Check):
         rising = np.flatnonzero(above[1:] & ~above[:-1]) + 1
         # Noise at the threshold is not another blow.
         times = window.time[rising]
-        width = float(getattr(blows, "width", 0.0) or 0.1 * blows.period)
+        width = blows.width or 0.1 * blows.period
         times = times[np.insert(np.diff(times) > max(0.25 * blows.period, 0.5 * width), 0, True)]
         if not times.size:
             return
@@ -120,7 +120,7 @@ class BlowsCheck(Check):
         name = min(onsets, key=lambda key: onsets[key])
         first = onsets[name]
         blows = window.blows
-        late = 2.0 * float(getattr(blows, "width", 0.0) or 0.0) + 5e-3
+        late = 2.0 * ((blows.width if blows is not None else None) or 0.0) + 5e-3
         if first < -2.0 * window.step:
             yield self.found("warning", f"moves {-1e3 * first:.3g} ms before the first blow",
                              "t = 0 must be the first blow's first edge: shift the time",

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.excitation.table import excitation_class
 from picchio.measurement.quality.check import Check, Context, Finding
 from picchio.measurement.quality.scan import ChannelScan, RecordScan
 
@@ -35,8 +36,8 @@ class ClippingCheck(Check):
             motion = scan.record.kind == "motion"
             if motion and channel.kind.name not in _MOTION:
                 continue  # a machine may stand still where its range ends
-            if name == "force" and scan.record.excitation.kind in (None, "pulse_train"):
-                continue  # a rectangle's top is flat
+            if name == "force" and excitation_class(scan.record.excitation.kind).flat:
+                continue
             values = scan.window.arrays[name]
             flat = _exact(values, seen, self.context)
             if flat:

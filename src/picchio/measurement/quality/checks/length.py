@@ -35,7 +35,7 @@ class LengthCheck(Check):
                                  "told from noise", "record three periods or more; more are better",
                                  record=scan.file, value=periods, unit="periods")  # fmt: skip
             return
-        width = float(getattr(blows, "width", 0.0) or 0.0)
+        width = blows.width or 0.0
         if clock.start > max(0.5 * width, 1.01 * clock.step):
             yield self.found("warning", f"begins at t = {clock.start:.4g} s, after the first blow",
                              "t = 0 must be the first blow's first edge, with quiet time before",

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from picchio.core.errors import InputError
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
+
+NO_SHAPE = "blows of a force that was measured have no other shape to turn into"
 
 
 class PulseShape(Effect):
@@ -24,8 +27,14 @@ class PulseShape(Effect):
     meaning = "the blows have another shape than programmed"
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
-        """Blend the shapes."""
+        """Blend the shapes.
+
+        Raises:
+            InputError: blows whose kind knows no other shape.
+        """
         blend = self.values["blend"]
+        if blend and blows.other is None:
+            raise InputError(NO_SHAPE, key=self.name)
         return blows.change(blend=blows.blend + blend * (1.0 - 2.0 * blows.blend))
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:

@@ -9,7 +9,10 @@ from picchio.model.effects.scales import Scales
 
 
 class PulseWidth(Effect):
-    """Every blow lasts `scale` times as long as programmed."""
+    """Every blow lasts `scale` times as long as programmed, and is as high.
+
+    A measured force is stretched about the start of each blow.
+    """
 
     name = "pulse_width"
     where = "blows"
@@ -28,7 +31,7 @@ class PulseWidth(Effect):
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Scale the width."""
-        return blows.change(width=self.values["scale"] * blows.width)
+        return blows.change(stretch=self.values["scale"] * blows.stretch)
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """A quarter longer, a quarter shorter."""

@@ -1,0 +1,157 @@
+"""A force history that was measured."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.core.files import read_text
+from picchio.excitation.excitation import Excitation
+from picchio.excitation.piecewise import PiecewiseForce
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredForce(Excitation):
+    """A measured force history, straight lines between its samples, repeated every period.
+
+    Attributes:
+        time: (m,) s, ascending; counted from the first sample.
+        samples: (m,) N.
+        period: s, from one repetition to the next; the length of the record when not given.
+            Between the record's end and the period's end the force is zero.
+        preload: N, steady feed force.
+        source: the file, for messages.
+    """
+
+    kind = "measured"
+    meaning = "a measured force history, repeated every period"
+    needed = ("file",)
+    optional = ("period", "preload")
+    programmed = False
+    force = None
+    width = None
+
+    time: FloatArray
+    samples: FloatArray
+    period: float = 0.0
+    preload: float = 0.0
+    source: str | None = None
+
+    def __post_init__(self) -> None:
+        time = np.array(self.time, dtype=float)
+        samples = np.array(self.samples, dtype=float)
+        where = {"file": self.source}
+        if time.ndim != 1 or time.shape != samples.shape or time.size < 2:
+            raise InputError("needs two or more samples, one force for each time", **where)
+        if not (np.isfinite(time).all() and np.isfinite(samples).all()):
+            bad = int(np.flatnonzero(~(np.isfinite(time) & np.isfinite(samples)))[0])
+            raise InputError(f"sample {bad + 1} is not a finite number", **where)
+        if not (np.diff(time) > 0).all():
+            bad = int(np.flatnonzero(np.diff(time) <= 0)[0])
+            raise InputError(f"the time of sample {bad + 2} does not ascend", **where)
+        time = time - time[0]
+        period = float(self.period) or float(time[-1])
+        # The last sample closes the record, so a record as long as the period is allowed.
+        if not np.isfinite(period) or period < time[-1] * (1.0 - 1e-9):
+            raise InputError(
+                f"must not be shorter than the record ({time[-1]:g} s)",
+                key="period",
+                value=self.period,
+                **where,
+            )
+        for name, value in (("time", time), ("samples", samples)):
+            value.flags.writeable = False
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "period", max(period, float(time[-1])))
+
+    @classmethod
+    def from_table(cls, values: dict[str, Any], folder: Path) -> Self:
+        """As `Excitation.from_table`; the CSV is `file`."""
+        return cls.from_csv(
+            folder / values["file"],
+            period=values.get("period"),
+            preload=values.get("preload", 0.0),
+        )
+
+    @classmethod
+    def from_csv(
+        cls, path: str | Path, *, period: float | None = None, preload: float = 0.0
+    ) -> Self:
+        """Read `time [s]` and `force [N]` columns.
+
+        Args:
+            path: a CSV file whose header names the two columns, in any order.
+            period: s, as in the class.
+            preload: N.
+
+        Raises:
+            InputError: missing file, header or number, with its line.
+        """
+        rows = list(csv.reader(io.StringIO(read_text(path))))
+        header = [cell.strip() for cell in rows[0]] if rows else []
+        wanted = ("time [s]", "force [N]")
+        for name in wanted:
+            if header.count(name) != 1:
+                raise InputError(
+                    f"the header must name one column {name!r}", file=path, value=header
+                )
+        columns = [header.index(name) for name in wanted]
+        values = []
+        for line, row in enumerate(rows[1:], start=2):
+            if not row:
+                continue
+            try:
+                values.append([float(row[c]) for c in columns])
+            except (ValueError, IndexError):
+                raise InputError(
+                    f"line {line} does not hold two numbers", file=path, value=",".join(row)
+                ) from None
+        table = np.array(values).reshape(-1, 2)
+        return cls(table[:, 0], table[:, 1], period or 0.0, preload, str(path))
+
+    @property
+    def peak_force(self) -> float:
+        """The largest absolute force of the record, N."""
+        return float(np.abs(self.samples).max())
+
+    def blow(self) -> PiecewiseForce:
+        """The record."""
+        slope = np.diff(self.samples) / np.diff(self.time)
+        zero = np.zeros(slope.size)
+        return PiecewiseForce(
+            self.time[:-1], float(self.time[-1]), self.samples[:-1], slope, zero, zero
+        )
+
+    def scaled(self, force: float = 1.0, width: float = 1.0) -> Self:
+        """The same history, so many times as high.
+
+        Raises:
+            InputError: a width is to be varied, which a measured history does not state.
+        """
+        if width != 1.0:
+            raise InputError("a measured force states no width to vary", key="width")
+        return self if force == 1.0 else replace(self, samples=force * self.samples)
+
+    def with_period(self, period: float) -> Self:
+        """The same history at another rate.
+
+        Raises:
+            InputError: the history is longer than the period.
+        """
+        if period < self.time[-1]:
+            raise InputError("is shorter than the measured blow", key="period", value=period)
+        return replace(self, period=period)
+
+    def describe(self) -> str:
+        """One line for people."""
+        name = Path(self.source).name if self.source else "a record"
+        return (
+            f"measured blows ({name}, peak {self.peak_force:g} N), every {self.period * 1e3:g} ms"
+        )
