@@ -29,7 +29,7 @@ import trial  # noqa: E402
 
 import picchio  # noqa: E402
 from picchio.core.files import atomic_write  # noqa: E402
-from picchio.diagnosis.percussion.run import diagnose_percussion  # noqa: E402
+from picchio.diagnosis.percussion.diagnosis import diagnose_percussion  # noqa: E402
 
 ARM, OTHERS = "fanuc_like_3dof", ("ur10", "kinova_gen3")
 # An early draw of each, spread over what effects are: structure, contact, blows, sensors.

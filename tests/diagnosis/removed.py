@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from picchio.diagnosis.percussion.search.screen import LATENT
+from picchio.diagnosis.percussion.fit.drawn import LATENT
 from worlds import campaign as worlds
 from worlds import robots
 

@@ -6,7 +6,7 @@ import pytest
 import trial
 
 import picchio
-from picchio.diagnosis.percussion.run import diagnose_percussion
+from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 
 FEW = {"robot": "fanuc_like_3dof", "kind": "few", "snr": 40}
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import picchio
-from picchio.diagnosis.life import Unsure, life_before_and_after, with_effects
+from picchio.diagnosis.life import Uncertain, life_before_and_after, with_effects
 from picchio.model.effects.registry import effect_class
 from picchio.studies.assessment.run import assess
 
@@ -39,7 +39,7 @@ def _effects(vector):
 def test_intervals_of_a_life_are_those_of_draws(arm, task):
     centre = np.log([0.8, 1.1, 0.9])
     spread = np.array([[0.03, 0.0, 0.0], [0.02, 0.02, 0.0], [0.0, 0.0, 0.1]])
-    unsure = Unsure(_effects, centre, spread @ spread.T)
+    unsure = Uncertain(_effects, centre, spread @ spread.T)
     # The paper's curve has no endurance limit: every life has an end.
     options = {"sn_curve": "nie-2016"}
     found = life_before_and_after(arm, task, _effects(centre), after=unsure, **options)
@@ -77,7 +77,7 @@ def test_an_interval_may_reach_from_a_life_with_an_end_to_one_without(arm, task)
 
     used = life_before_and_after(arm, task, ())["baseline"]["utilisation"]
     centre = np.array([-np.log(used)])  # blows that bring the worst joint to its limit
-    unsure = Unsure(stronger, centre, np.array([[0.2**2]]))
+    unsure = Uncertain(stronger, centre, np.array([[0.2**2]]))
     found = life_before_and_after(arm, task, stronger(centre), after=unsure)["extended"]
     low, high = found["rivets_interval"]
     assert np.isfinite(low) and np.isinf(high)
@@ -88,7 +88,7 @@ def test_an_interval_may_reach_from_a_life_with_an_end_to_one_without(arm, task)
 
 def test_what_is_known_exactly_has_no_interval_and_other_sets_have_their_own_life(arm, task):
     blows = effect_class("force_amplitude")("tool")
-    known = Unsure(lambda vector: (blows,), np.zeros(1), np.zeros((1, 1)))
+    known = Uncertain(lambda vector: (blows,), np.zeros(1), np.zeros((1, 1)))
     other = blows.with_values(scale=1.5)
     found = life_before_and_after(arm, task, (blows,), before=known, after=known, others=[(other,)])
     for side in ("baseline", "extended"):
@@ -110,7 +110,7 @@ def test_poses_that_only_stronger_blows_damage_count_in_the_interval(share, arm)
     task = dataclasses.replace(whole, operations=(operation,))
     used = life_before_and_after(arm, task, ())["baseline"]["utilisation"]
     centre, sigma = np.array([np.log(share / used)]), 0.15
-    unsure = Unsure(_stronger, centre, np.array([[sigma**2]]))
+    unsure = Uncertain(_stronger, centre, np.array([[sigma**2]]))
     found = life_before_and_after(arm, task, _stronger(centre), after=unsure)["extended"]
     worst = centre + 1.6448536 * sigma
     there = life_before_and_after(arm, task, _stronger(worst))["extended"]
@@ -121,7 +121,7 @@ def test_a_value_at_its_bound_still_has_an_interval(arm, task):
     def bounded(vector):
         return _stronger(np.minimum(vector, 0.0))
 
-    unsure = Unsure(
+    unsure = Uncertain(
         bounded, np.zeros(1), np.array([[0.1**2]]), np.array([-1.0]), np.array([0.0])
     )  # fmt: skip
     found = life_before_and_after(arm, task, bounded(np.zeros(1)), after=unsure)["extended"]
@@ -136,7 +136,7 @@ def test_where_a_model_ends_the_interval_does_too_and_nothing_is_lost(arm, task)
     def weak(vector):  # below nothing the joint would drive itself
         return (damper("joint_3").with_values(damping=float(vector[0])),)
 
-    unsure = Unsure(weak, np.array([-30.0]), np.array([[60.0**2]]))
+    unsure = Uncertain(weak, np.array([-30.0]), np.array([[60.0**2]]))
     found = life_before_and_after(
         arm, task, weak(unsure.centre), after=unsure, others=[weak([-500.0])]
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import picchio.datasets
-from picchio.diagnosis.motion.run import diagnose_motion
+from picchio.diagnosis.motion.diagnosis import diagnose_motion
 from picchio.robot.loading.load import load_robot
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -5,13 +5,13 @@ import pytest
 
 from picchio.campaign.campaign import Campaign
 from picchio.campaign.record import Record
-from picchio.diagnosis.motion.data.baseline import stated_friction
 from picchio.diagnosis.motion.data.split import split
 from picchio.diagnosis.motion.data.system import System
+from picchio.diagnosis.motion.diagnosis import diagnose_motion
+from picchio.diagnosis.motion.fit.baseline import stated_friction
+from picchio.diagnosis.motion.fit.orders import find_orders, power_at, power_spectrum
 from picchio.diagnosis.motion.fit.state import State
 from picchio.diagnosis.motion.fit.stretches import confidence
-from picchio.diagnosis.motion.run import diagnose_motion
-from picchio.diagnosis.motion.search.orders import find_orders, power_at, power_spectrum
 from picchio.model.effects.registry import effect_class
 from picchio.prediction.motion.log import MotionLog
 from picchio.robot.loading.load import load_robot

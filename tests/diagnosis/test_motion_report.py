@@ -10,14 +10,14 @@ from dataclasses import replace
 import pytest
 from motion_records import ARM, campaign
 
-from picchio.diagnosis.motion.conclude.carried import (
-    NO_SHAFT,
+from picchio.diagnosis.life import NO_SHAFT
+from picchio.diagnosis.motion.conclude.during_blows import (
     NO_TASK,
     STANDS,
-    carried,
+    effects_during_blows,
     motion_life,
 )
-from picchio.diagnosis.motion.run import diagnose_motion
+from picchio.diagnosis.motion.diagnosis import diagnose_motion
 from picchio.diagnosis.result import differences, in_words
 from picchio.robot.loading.load import load_robot
 from picchio.studies.assessment.run import assess
@@ -47,14 +47,14 @@ def diagnosis(robot, heavy):
 def page_of(diagnosis, robot, **more):
     task = load_task(robot.task_path, robot)
     return motion_diagnosis_report(diagnosis, life=motion_life(robot, task, diagnosis),
-                                   carried=carried(diagnosis), **more)  # fmt: skip
+                                   carried=effects_during_blows(diagnosis), **more)  # fmt: skip
 
 
 def test_only_what_acts_while_the_tool_hits_is_carried_over(diagnosis):
     assert {(c.effect, c.target) for c in diagnosis.causes} == {
         ("payload", "tool"), ("coulomb_friction", "joint_2")
     }  # fmt: skip
-    sorted_ = carried(diagnosis)
+    sorted_ = effects_during_blows(diagnosis)
     assert [e.name for e in sorted_.effects] == ["payload"]
     assert [(e.name, why) for e, why in sorted_.left] == [("coulomb_friction", STANDS)]
 

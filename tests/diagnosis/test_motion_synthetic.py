@@ -7,7 +7,7 @@ from motion_records import ARM, RATE, campaign, wave
 from picchio.campaign.campaign import Campaign
 from picchio.campaign.record import Record
 from picchio.core.errors import InputError
-from picchio.diagnosis.motion.run import diagnose_motion
+from picchio.diagnosis.motion.diagnosis import diagnose_motion
 from picchio.robot.loading.load import load_robot
 
 

@@ -7,7 +7,7 @@ import pytest
 import trial
 
 import picchio
-from picchio.diagnosis.percussion.run import diagnose_percussion
+from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 from picchio.prediction.plan import read_plan
 from picchio.prediction.simulation import simulate
 

@@ -15,11 +15,11 @@ import trial
 import picchio
 from picchio.campaign.tables import Tolerance
 from picchio.cli.main import run as command
-from picchio.diagnosis.percussion.criteria.whiteness import weigh
+from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 from picchio.diagnosis.percussion.fit.least_squares import fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.run import diagnose_percussion
 from picchio.diagnosis.result import Gain
 from picchio.model.effects.registry import effect_class
 from picchio.robot.loading.load import load_robot
@@ -50,7 +50,7 @@ def test_a_null_of_another_simulator_leaves_noise(arm):
     campaign, truth = trial.make({**FEW, "kind": "null", "draw": 901})
     problem = Problem(arm, campaign)
     found = fit_growing(problem, Hypothesis.baseline(arm, campaign.tolerance))
-    evidence = weigh(problem, found.residuals)
+    evidence = whiteness_test(problem, found.residuals)
     assert evidence.is_noise, (evidence.worst_band, evidence.worst_pose)
     assert evidence.chi_square == pytest.approx(1.0, abs=0.05)
     for effect in found.hypothesis.effects:

@@ -10,27 +10,27 @@ import pytest
 import trial
 
 import picchio
-from picchio.diagnosis.percussion.conclude.holdout import held_out
-from picchio.diagnosis.percussion.criteria.whiteness import weigh
+from picchio.diagnosis.percussion.criteria.bic import SAME, bic
+from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.data.split import held_out
+from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
-from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing, unstuck
+from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.run import diagnose_percussion
 from picchio.diagnosis.percussion.search import exchange as exchange_module
 from picchio.diagnosis.percussion.search import select
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.search.exchange import exchange, prune
+from picchio.diagnosis.percussion.search.restart import restarted
 from picchio.diagnosis.percussion.search.screen import Suspect, acts_either_way, smallest
 from picchio.diagnosis.percussion.search.trials import (
-    SAME,
     Trial,
     _short_list,
     fit_short,
-    held_out_choice,
+    holdout_choice,
     over_the_same_samples,
-    score,
-    spread_out,
+    records_of_every_pose,
 )
 from picchio.model.effects.registry import effect_class
 from worlds import campaign as worlds
@@ -78,7 +78,7 @@ def two_causes(arm):
     def trial_of(name, **values):
         known = baseline.hypothesis.plus(effect_class(name)("joint_1", **values))
         found = fit_growing(problem, known)
-        return Trial(f"{name}:joint_1", found, score(found), 0.0)
+        return Trial(f"{name}:joint_1", found, bic(found), 0.0)
 
     wrong = trial_of("hysteresis", torque=20.0, deflection=2e-4)
     right = trial_of("joint_stiffness", scale=1.3)
@@ -89,7 +89,7 @@ def two_causes(arm):
 
 def test_a_rival_replaces_what_was_chosen_too_early(two_causes):
     problem, wrong, right, best = two_causes
-    later = Trial("force_amplitude:tool", best, score(best), 0.0)
+    later = Trial("force_amplitude:tool", best, bic(best), 0.0)
     better = exchange(problem, best, [[wrong, right], [later]], problem.records, 8.0)
     assert better.hypothesis.labels == {"joint_stiffness:joint_1", "force_amplitude:tool"}
     assert better.chi_square / better.samples < 1.1 < best.chi_square / best.samples
@@ -99,7 +99,7 @@ def test_what_is_right_is_not_replaced(two_causes):
     problem, wrong, right, _ = two_causes
     both = right.fit.hypothesis.plus(effect_class("force_amplitude")("tool", scale=0.8))
     best = fit(problem, both, iterations=6)
-    later = Trial("force_amplitude:tool", best, score(best), 0.0)
+    later = Trial("force_amplitude:tool", best, bic(best), 0.0)
     assert exchange(problem, best, [[right, wrong], [later]], problem.records, 8.0) is best
 
 
@@ -138,7 +138,7 @@ def test_rivals_are_compared_over_the_same_samples(seed, arm):
     def trial_of(name, target, **values):
         cause = effect_class(name)(target, **values)
         found = fit_growing(problem, baseline.hypothesis.plus(cause))
-        return Trial(cause.label, found, score(found), 0.0)
+        return Trial(cause.label, found, bic(found), 0.0)
 
     trials = [
         trial_of("clock_drift", SENSORS[0], rate=-0.0043),
@@ -177,7 +177,7 @@ def test_what_replaces_a_cause_must_hold_on_poses_held_out(holds, two_causes, ar
     better = exchange(
         problem, best, [[wrong, right], [Trial("", best, 0.0, 0.0)]], problem.records, 8.0
     )
-    rounds = iter([[wrong], [Trial("force_amplitude:tool", best, score(best), 0.0)], [], []])
+    rounds = iter([[wrong], [Trial("force_amplitude:tool", best, bic(best), 0.0)], [], []])
     monkeypatch.setattr(select, "try_candidates", lambda *_, **__: next(rounds))
     monkeypatch.setattr(select, "prune", lambda problem, found, *_, **__: found)
     monkeypatch.setattr(select, "unstuck", lambda problem, best, *_: best)
@@ -196,7 +196,7 @@ def test_what_has_nothing_to_do_beside_a_rival_is_taken_out(two_causes, arm, mon
     idle = effect_class("joint_damping")("joint_3", damping=1e-3)
     force = effect_class("force_amplitude")("tool", scale=0.8)
     three = fit(problem, right.fit.hypothesis.plus(force).plus(idle), iterations=4)
-    rounds = iter([[wrong], [Trial("force_amplitude:tool", best, score(best), 0.0)], []])
+    rounds = iter([[wrong], [Trial("force_amplitude:tool", best, bic(best), 0.0)], []])
     monkeypatch.setattr(select, "try_candidates", lambda *_, **__: next(rounds))
     monkeypatch.setattr(select, "unstuck", lambda problem, best, *_: best)
     monkeypatch.setattr(select, "exchange", lambda *_: three)
@@ -213,7 +213,7 @@ def test_swapped_axes_are_fitted_with_their_own_slopes(arm):
     problem = Problem(arm, campaign)
     train, _ = held_out(problem)[0]
     baseline = fit_growing(problem, Hypothesis.baseline(arm, campaign.tolerance), train)
-    some = spread_out(train)
+    some = records_of_every_pose(train)
     known = fit(problem, baseline.hypothesis, some, 0.3, iterations=4, with_jacobian=True)
     kind = effect_class("sensor_axes")
     swapped = [kind(SENSORS[0], code=float(code)) for code in range(48)]
@@ -273,7 +273,7 @@ def test_of_faint_trials_that_would_become_one_the_smallest_is_tried():
 )
 def test_of_what_does_as_well_the_records_held_out_choose(gains, chosen):
     tied = [(str(i), gain) for i, gain in enumerate(gains)]
-    assert held_out_choice(tied) == (None if chosen is None else str(chosen))
+    assert holdout_choice(tied) == (None if chosen is None else str(chosen))
 
 
 def test_warmth_is_not_chosen_where_a_record_held_out_says_it_was_the_day(arm):
@@ -321,11 +321,11 @@ def test_a_contact_that_a_fit_holds_shut_for_ever_is_opened_again(arm):
         "tool", stiffness=9e4, damping=300.0, preload=1000.0
     )  # fmt: skip
     held = fit(problem, baseline.hypothesis.plus(shut), iterations=8)
-    assert not weigh(problem, held.residuals).is_noise
+    assert not whiteness_test(problem, held.residuals).is_noise
     effects = held.hypothesis.effects
     scales = measure_scales(problem, effects, problem.predictions(effects))
-    opened = unstuck(problem, held, scales, problem.records)
-    assert weigh(problem, opened.residuals).is_noise
+    opened = restarted(problem, held, scales, problem.records)
+    assert whiteness_test(problem, opened.residuals).is_noise
     (found,) = opened.hypothesis.causes
     assert found.values["preload"] == pytest.approx(34.0, rel=0.02)
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from picchio.diagnosis.percussion.follow_up.next_measurement import _Shot, _why
+from picchio.diagnosis.percussion.follow_up.next_measurement import _Proposal, _why
 from picchio.diagnosis.percussion.follow_up.separation import Separation, _left, _root, new_noise
 
 
@@ -44,7 +44,9 @@ def test_the_root_is_one(drawn):
 
 
 def shot(if_best, if_rival):
-    return _Shot(None, "", "deflection", False, Separation(np.array(if_best), np.array(if_rival)))
+    return _Proposal(
+        None, "", "deflection", False, Separation(np.array(if_best), np.array(if_rival))
+    )
 
 
 def test_what_is_told_either_way_comes_before_what_is_told_one_way():

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from picchio.diagnosis.percussion.conclude.verdict import verdict_of, why_none
+from picchio.diagnosis.percussion.conclude.verdict import verdict_of, why_not_claimed
 from picchio.diagnosis.result import Cause
 
 NOISE, MORE = SimpleNamespace(is_noise=True), SimpleNamespace(is_noise=False)
@@ -40,9 +40,9 @@ def test_verdict(confidences, before, after, others, explained, common, verdict)
 
 
 def test_which_of_several_causes_is_doubted_is_said():
-    why = why_none(causes(0.999, 0.95, 0.999), ())
+    why = why_not_claimed(causes(0.999, 0.95, 0.999), ())
     assert "3 causes together" in why
     assert "effect 1 (joint_1, confidence 0.95) is not beyond doubt" in why
     assert "effect 0" not in why
-    assert why_none(causes(0.999, 0.999), ()) == "" == why_none(causes(0.5), ())
-    assert "all sensors" in why_none(causes(0.5, 0.5), COMMON)
+    assert why_not_claimed(causes(0.999, 0.999), ()) == "" == why_not_claimed(causes(0.5), ())
+    assert "all sensors" in why_not_claimed(causes(0.5, 0.5), COMMON)

@@ -14,7 +14,7 @@ import picchio
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import fit
-from picchio.diagnosis.percussion.fit.shared_records import shared_out
+from picchio.diagnosis.percussion.fit.parallel_records import parallel_records
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.fit.workers import Workers
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
@@ -49,7 +49,7 @@ def test_workers_change_nothing(campaign):
     for workers in (1, 2):
         problem = Problem(picchio.load_robot(ARM), campaign, workers=workers)
         start = Hypothesis.baseline(problem.robot, campaign.tolerance)
-        with shared_out(problem):
+        with parallel_records(problem):
             base = fit(problem, start, iterations=3)
             scales = measure_scales(
                 problem, base.hypothesis.effects, problem.predictions(base.hypothesis.effects)
@@ -93,7 +93,7 @@ def _same(problem, effects, end=None):
 @linux
 def test_shared_records_are_predicted_alike(problem, start):
     drift = _late(start, 3e-4)
-    with shared_out(problem):
+    with parallel_records(problem):
         assert _same(problem, start.effects)
         assert _same(problem, drift, 0.5)
         free = problem.residuals(drift)
@@ -112,7 +112,7 @@ def test_shared_records_are_predicted_alike(problem, start):
 @linux
 def test_an_error_leaves_no_answer_behind(problem, start):
     nowhere = (*start.effects, effect_class("joint_stiffness")("nowhere", scale=0.9))
-    with shared_out(problem):
+    with parallel_records(problem):
         for _ in range(2):
             with pytest.raises(InputError, match="nowhere"):
                 problem.residuals(nowhere)
@@ -122,7 +122,7 @@ def test_an_error_leaves_no_answer_behind(problem, start):
 @linux
 def test_it_goes_on_alone_when_a_helper_is_killed(problem, start):
     alone = problem.own_residuals(start.effects, problem.records, None)
-    with shared_out(problem):
+    with parallel_records(problem):
         assert _same(problem, start.effects)
         helper = problem.helpers._processes[0]
         os.kill(helper.pid, signal.SIGKILL)
@@ -141,7 +141,7 @@ import picchio, trial
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.fit.workers import warm_up
+from picchio.diagnosis.percussion.search.warm_up import warm_up
 
 def loaded():
     found = [o for o in gc.get_objects() if isinstance(o, numba.core.registry.CPUDispatcher)]
@@ -191,7 +191,7 @@ ANSWER = """
 import sys
 sys.path[:0] = {folders!r}
 import picchio, trial
-from picchio.diagnosis.percussion.run import diagnose_percussion
+from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 
 if __name__ == "__main__":
     campaign, _ = trial.make({case!r})

@@ -21,7 +21,7 @@ import removed  # noqa: E402
 from ablations import METHODS  # noqa: E402
 
 import picchio  # noqa: E402
-from picchio.diagnosis.percussion.run import diagnose_percussion  # noqa: E402
+from picchio.diagnosis.percussion.diagnosis import diagnose_percussion  # noqa: E402
 from picchio.model.effects.registry import catalogue  # noqa: E402
 from worlds import campaign as worlds  # noqa: E402
 from worlds import cases  # noqa: E402

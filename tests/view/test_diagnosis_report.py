@@ -15,15 +15,17 @@ from lxml import html as lxml_html
 from picchio.campaign.campaign import Campaign
 from picchio.cli.diagnose import show_diagnosis
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.conclude.holdout import held_out, measure_gain
-from picchio.diagnosis.percussion.criteria.whiteness import weigh
+from picchio.diagnosis.percussion.conclude.holdout import holdout_gain
+from picchio.diagnosis.percussion.criteria.bic import bic
+from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.data.split import held_out
+from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.run import PercussionDiagnosis
 from picchio.diagnosis.percussion.search.candidates import measure_scales
 from picchio.diagnosis.percussion.search.select import Search
-from picchio.diagnosis.percussion.search.trials import Trial, score
+from picchio.diagnosis.percussion.search.trials import Trial
 from picchio.diagnosis.result import Cause, Diagnosis, Value
 from picchio.model.effects.registry import effect_class
 from picchio.robot.loading.load import load_robot
@@ -66,11 +68,11 @@ def case(repository):
     whole = fit(problem, best.hypothesis, with_jacobian=True, iterations=2)
     nominal = fit(problem, baseline.hypothesis, iterations=2)
     rows = [
-        {"step": 1, "effect": "payload", "target": "tool", "bic": score(best),
+        {"step": 1, "effect": "payload", "target": "tool", "bic": bic(best),
          "screened_gain": 1.0, "chi_square_per_sample": best.chi_square / best.samples},
         {"step": 1, "effect": "cable", "target": "link_3", "bic": float("inf"),
          "screened_gain": 1.0, "chi_square_per_sample": 40.0},
-        {"step": 2, "effect": "backlash", "target": "joint_2", "bic": score(best) + 3.0,
+        {"step": 2, "effect": "backlash", "target": "joint_2", "bic": bic(best) + 3.0,
          "screened_gain": 1.0, "chi_square_per_sample": 1.0},
     ]  # fmt: skip
     mass = next(e for e in whole.hypothesis.effects if e.name == "payload").values["mass"]
@@ -78,13 +80,13 @@ def case(repository):
         "named",
         (Cause("payload", "tool", 0.99, {"mass": Value(mass, 0.004, "kg")}),),
         nuisances={"stiffness.joint_1": Value(2.4e5, 31.0, "N*m/rad")},
-        gain=measure_gain(problem, baseline.hypothesis, best.hypothesis, train, kept),
+        gain=holdout_gain(problem, baseline.hypothesis, best.hypothesis, train, kept),
         scores=tuple(rows),
     )
     found = PercussionDiagnosis(
         diagnosis, problem, nominal, whole,
-        Search(baseline, best, [[Trial("payload:tool", best, score(best), 1.0)]]),
-        weigh(problem, nominal.residuals), weigh(problem, whole.residuals),
+        Search(baseline, best, [[Trial("payload:tool", best, bic(best), 1.0)]]),
+        whiteness_test(problem, nominal.residuals), whiteness_test(problem, whole.residuals),
         measure_scales(problem, nominal.hypothesis.effects,
                        problem.predictions(nominal.hypothesis.effects)),
     )  # fmt: skip

@@ -18,8 +18,8 @@ from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
     from picchio.campaign.campaign import Campaign
-    from picchio.diagnosis.motion.conclude.carried import Carried, MotionLife
-    from picchio.diagnosis.percussion.run import PercussionDiagnosis
+    from picchio.diagnosis.motion.conclude.during_blows import BlowEffects, MotionLife
+    from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
     from picchio.diagnosis.result import Diagnosis
     from picchio.model.effects.effect import Effect
     from picchio.robot.flexible_robot import FlexibleRobot
@@ -153,7 +153,7 @@ class MotionAnswer:
     """
 
     diagnosis: Diagnosis
-    carried: Carried
+    carried: BlowEffects
     life: MotionLife
 
     @property
@@ -206,8 +206,12 @@ def diagnose_motion_records(
         InputError: as `diagnose_motion`; a bad task that was asked for.
     """
     from picchio.cli.output import progress
-    from picchio.diagnosis.motion.conclude.carried import MotionLife, carried, motion_life
-    from picchio.diagnosis.motion.run import diagnose_motion
+    from picchio.diagnosis.motion.conclude.during_blows import (
+        MotionLife,
+        effects_during_blows,
+        motion_life,
+    )
+    from picchio.diagnosis.motion.diagnosis import diagnose_motion
     from picchio.studies.tasks import load_task
 
     with progress("diagnosis") as report:
@@ -220,7 +224,7 @@ def diagnose_motion_records(
         if task is not None:
             raise
         life = MotionLife(None, f"the life could not be computed: {error}")
-    return MotionAnswer(found, carried(found), life)
+    return MotionAnswer(found, effects_during_blows(found), life)
 
 
 EPILOG = "Example: picchio diagnose fanuc_like_3dof --data measurements/ --report why.html"
@@ -360,7 +364,7 @@ def _percussion(
     gravity_stiffness: bool,
     say: Callable[[str], None],
 ) -> PercussionDiagnosis:
-    from picchio.diagnosis.percussion.run import diagnose_percussion
+    from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 
     return diagnose_percussion(
         robot, campaign, without=without, gravity_stiffness=gravity_stiffness, progress=say

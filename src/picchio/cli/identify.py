@@ -69,11 +69,11 @@ def _diagnose(robot: FlexibleRobot, campaign: Campaign) -> Diagnosis:
     from picchio.cli.output import progress
 
     if any(record.kind == "motion" for record in campaign):
-        from picchio.diagnosis.motion.run import diagnose_motion
+        from picchio.diagnosis.motion.diagnosis import diagnose_motion
 
         with progress("diagnosis") as report:
             return diagnose_motion(robot, campaign, progress=report)
-    from picchio.diagnosis.percussion.run import diagnose_percussion
+    from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 
     return diagnose_percussion(robot, campaign).diagnosis
 

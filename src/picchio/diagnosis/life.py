@@ -32,7 +32,7 @@ _KNOWN = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class Unsure:
+class Uncertain:
     """Effects whose values are known up to a spread.
 
     Attributes:
@@ -62,8 +62,8 @@ def life_before_and_after(
     task: Task,
     effects: Sequence[Effect],
     *,
-    before: Unsure | None = None,
-    after: Unsure | None = None,
+    before: Uncertain | None = None,
+    after: Uncertain | None = None,
     others: Sequence[Sequence[Effect]] = (),
     **options: Any,
 ) -> dict[str, Any]:
@@ -120,7 +120,7 @@ def _life(
     robot: FlexibleRobot,
     task: Task,
     options: dict[str, Any],
-    unsure: Unsure | None = None,
+    unsure: Uncertain | None = None,
     bare: FlexibleRobot | None = None,
 ) -> dict[str, Any]:
     found = assess(robot, task, **options)
@@ -155,7 +155,7 @@ def life_intervals(
     robot: FlexibleRobot,
     task: Task,
     found: Assessment,
-    unsure: Unsure,
+    unsure: Uncertain,
     options: dict[str, Any] | None = None,
     level: float = LEVEL,
 ) -> dict[str, dict[str, tuple[float, float]]]:
@@ -229,7 +229,7 @@ def life_intervals(
 
 
 def _slopes(
-    unsure: Unsure,
+    unsure: Uncertain,
     spread: FloatArray,
     at: Callable[[FloatArray], tuple[FloatArray, FloatArray] | None],
     reference: FloatArray,

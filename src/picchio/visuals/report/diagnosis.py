@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from picchio.core.provenance import provenance
+from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 from picchio.diagnosis.percussion.fit.unknowns import NUISANCE_KEYS
 from picchio.diagnosis.percussion.follow_up.plan import when
-from picchio.diagnosis.percussion.run import PercussionDiagnosis
 from picchio.diagnosis.result import Cause, Diagnosis
 from picchio.model.effects.registry import catalogue
 from picchio.studies.assessment.result import format_count

@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 
 from picchio.campaign.channels import Channel
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.percussion.criteria.bic import bic
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 from picchio.diagnosis.percussion.fit.least_squares import Fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.run import PercussionDiagnosis
-from picchio.diagnosis.percussion.search.trials import score
 from picchio.visuals.plots.diagnosis import (
     plot_bands,
     plot_left_over,
@@ -172,7 +172,7 @@ class DiagnosisFigures:
         """The candidates, a picture a step of the search."""
         rows = list(self.found.diagnosis.scores)
         start = self.found.search.baseline
-        without = (score(start), start.chi_square / max(start.samples, 1))
+        without = (bic(start), start.chi_square / max(start.samples, 1))
         stand = tuple(tuple(x.split(":", 1)) for x in self.found.extended.hypothesis.labels)
         made = []
         for step in sorted({row["step"] for row in rows}):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from picchio.core.provenance import provenance
-from picchio.diagnosis.motion.conclude.carried import Carried, MotionLife
+from picchio.diagnosis.motion.conclude.during_blows import BlowEffects, MotionLife
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.result import Cause, Diagnosis, Value, differences, in_words
 from picchio.model.effects.registry import catalogue
@@ -30,7 +30,7 @@ def motion_diagnosis_report(
     diagnosis: Diagnosis,
     *,
     life: MotionLife,
-    carried: Carried,
+    carried: BlowEffects,
     model_toml: str = "",
     command: str | None = None,
     folder: str | None = None,
@@ -262,7 +262,7 @@ def _blows(life: MotionLife) -> list[tuple[str, str, str, str]]:
     ]  # fmt: skip
 
 
-def _once(carried: Carried) -> list[tuple]:  # type: ignore[type-arg]
+def _once(carried: BlowEffects) -> list[tuple]:  # type: ignore[type-arg]
     return list({(e.name, e.target): (e, why) for e, why in carried.left}.values())
 
 

@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.motion.data.system import System
+from picchio.diagnosis.motion.fit.orders import order_spectrum
 from picchio.diagnosis.motion.fit.state import State
-from picchio.diagnosis.motion.search.orders import order_spectrum
 from picchio.diagnosis.result import Diagnosis
 from picchio.model.motion import TORQUE, WINDUP
 from picchio.visuals.plots.diagnosis import (
@@ -343,7 +343,7 @@ class MotionFigures:
         )
         return [self._picture(ax, f"Residual of {joint} by order, with {orders} found", caption)]
 
-    def unseen(self) -> list[Picture]:
+    def unconstrained_range(self) -> list[Picture]:
         """Before and after in a record that neither model was fitted to."""
         gain = self.diagnosis.gain
         if gain is None or not self.changed or gain.held_out_records == gain.train_records:

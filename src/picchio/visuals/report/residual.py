@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from picchio.campaign.campaign import Campaign
 from picchio.core.provenance import provenance
-from picchio.diagnosis.percussion.criteria.whiteness import Evidence, weigh
+from picchio.diagnosis.percussion.criteria.whiteness import Evidence, whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
@@ -59,7 +59,7 @@ def residual_report(
         return motion_report(robot, campaign, command=command, warnings=told)
     problem = Problem(robot, campaign, gravity_stiffness=gravity_stiffness)
     fit = fit_growing(problem, Hypothesis.baseline(robot, campaign.tolerance))
-    evidence = weigh(problem, fit.residuals)
+    evidence = whiteness_test(problem, fit.residuals)
     predictions = problem.predictions(fit.hypothesis.effects)
     parts = channel_residuals(problem, fit, predictions)
     found = spectra(problem, fit)

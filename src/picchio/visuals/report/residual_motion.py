@@ -12,9 +12,9 @@ from picchio.campaign.channels import parse_channel
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
-from picchio.diagnosis.motion.data.baseline import baseline
 from picchio.diagnosis.motion.data.noise import noise_levels
 from picchio.diagnosis.motion.data.system import System
+from picchio.diagnosis.motion.fit.baseline import baseline
 from picchio.diagnosis.motion.fit.least_squares import Fit, fit
 from picchio.model.motion import TORQUE, WINDUP
 from picchio.prediction.motion.filters import choose_cutoff

@@ -11,7 +11,7 @@ from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.scene import Scene
 
 if TYPE_CHECKING:
-    from picchio.diagnosis.percussion.run import PercussionDiagnosis
+    from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 
 
 def diagnosis_scene(found: PercussionDiagnosis, **options: Any) -> Scene:

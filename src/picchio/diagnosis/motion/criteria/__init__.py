@@ -1,1 +1,1 @@
-"""When something may be said: equivalence, and every record held out."""
+"""When a cause may be claimed: score on stretches left out, necessity, every record held out."""

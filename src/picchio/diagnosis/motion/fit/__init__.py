@@ -1,1 +1,1 @@
-"""Weighted least squares of motion records."""
+"""Fitting a state to motion records: weighted least squares, ripple orders."""

@@ -1,1 +1,1 @@
-"""The search for causes: candidates, scores, ripple orders, selection."""
+"""The search for causes: candidates, selection, alternatives."""

@@ -10,8 +10,8 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit, clean, jacobian
+from picchio.diagnosis.motion.fit.orders import find_orders
 from picchio.diagnosis.motion.fit.state import INVERSE, Coordinate, effect_coordinates
-from picchio.diagnosis.motion.search.orders import find_orders
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import catalogue
 from picchio.model.motion import TORQUE, WINDUP

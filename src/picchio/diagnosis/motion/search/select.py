@@ -8,21 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from picchio.core.arrays import FloatArray
+from picchio.diagnosis.motion.criteria.necessity import TORQUE_RIPPLE, necessity, passes
+from picchio.diagnosis.motion.criteria.score import Score, Scorer
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit, fit, row_weights
 from picchio.diagnosis.motion.fit.state import State
 from picchio.diagnosis.motion.search.candidates import Candidate, candidates, usual
-from picchio.diagnosis.motion.search.score import Score, Scorer
 from picchio.diagnosis.motion.search.timing import time_by_ripple
 from picchio.model.effects.effect import Effect
 
-RIPPLE = "torque_ripple"
 _ELASTIC = ("joint_stiffness", "backlash")
 _AGAIN = 3
-_LEAST_BIC = 3.0
-_LEAST_CONFIDENCE = 0.90
-_LEAST_SHARE = 0.005
 _TIE = 1.0
 _ALIKE = 0.9
 _ROUNDS = 12
@@ -65,8 +61,8 @@ def select(
         progress: told (stage, stages).
     """
     pick = lambda names: {n: k for n, k in kinds.items() if n in names}  # noqa: E731
-    ripple, elastic = pick({RIPPLE}), pick(_ELASTIC)
-    slow = pick(set(kinds) - {RIPPLE, *_ELASTIC})
+    ripple, elastic = pick({TORQUE_RIPPLE}), pick(_ELASTIC)
+    slow = pick(set(kinds) - {TORQUE_RIPPLE, *_ELASTIC})
     stages = [(ripple, 2), (slow, _ROUNDS), (elastic, 3), (ripple, _ROUNDS)]
     current = fit(system, start)
     steps: list[Step] = []
@@ -98,9 +94,9 @@ def _forward(system: System, current: Fit, pool: Mapping[str, type[Effect]],
             grown = state.with_effect(candidate.started(score.values))
             state = _take_over(system, current, grown, candidate)
         current = fit(system, state)
-        if RIPPLE in pool:
+        if TORQUE_RIPPLE in pool:
             current = lock(system, current)
-        if RIPPLE in pool and "encoder_delay" in kinds:
+        if TORQUE_RIPPLE in pool and "encoder_delay" in kinds:
             current = time_by_ripple(system, current, kinds["encoder_delay"])
     return current
 
@@ -137,24 +133,15 @@ def score_all(system: System, base: Fit, kinds: Mapping[str, type[Effect]]) -> l
     return sorted(found, key=lambda pair: -pair[0].rank)
 
 
-def passes(score: Score, ripple: bool = False) -> bool:
-    """Whether a candidate may be claimed: penalised, held out, and on every stretch."""
-    enough = ripple or score.share >= _LEAST_SHARE
-    return (
-        score.admissible and score.bic > _LEAST_BIC and score.gain > 0.0
-        and score.confidence >= _LEAST_CONFIDENCE and enough
-    )  # fmt: skip
-
-
 def choose(scored: list[Scored]) -> list[Scored]:
     """The best of each set of equations; of equals the more usual."""
-    good = [pair for pair in scored if passes(pair[0], pair[1].effect.name == RIPPLE)]
+    good = [pair for pair in scored if passes(pair[0], pair[1].effect.name == TORQUE_RIPPLE)]
     taken: set[tuple[str, str]] = set()
     chosen: list[Scored] = []
     blocked = False
     for score, candidate in good:
         groups = set(score.groups)
-        if candidate.effect.name == RIPPLE:
+        if candidate.effect.name == TORQUE_RIPPLE:
             if all(_apart(candidate.effect, other.effect) for _, other in chosen):
                 chosen.append((score, candidate))
             continue
@@ -164,7 +151,7 @@ def choose(scored: list[Scored]) -> list[Scored]:
         blocked = blocked or len(groups) > 1
         equal = [
             pair for pair in good
-            if pair[1].effect.name != RIPPLE and set(pair[0].groups) == groups
+            if pair[1].effect.name != TORQUE_RIPPLE and set(pair[0].groups) == groups
             and pair[0].rank >= score.rank - _TIE
         ]  # fmt: skip
         chosen.append(min(equal, key=lambda pair: (usual(pair[1].effect.name), -pair[0].rank)))
@@ -203,47 +190,12 @@ def eliminate(system: System, current: Fit) -> Fit:
         tried = []
         for index, effect in enumerate(current.state.effects):
             score = necessity(scorer, index)
-            if score is None or not passes(score, effect.name == RIPPLE):
+            if score is None or not passes(score, effect.name == TORQUE_RIPPLE):
                 tried.append((-np.inf if score is None else score.gain, index))
         if not tried:
             return current
         current = fit(system, current.state.without(min(tried)[1]))
     return current
-
-
-def necessity(scorer: Scorer, index: int) -> Score | None:
-    """What an effect of the scorer's fit gains over the fit without it."""
-    current = scorer.base
-    own, part = own_part(current, index)
-    if not own:
-        return None
-    coordinates = [current.coordinates[i] for i in own]
-    columns = current.columns[:, own]
-    values = np.array([c.value for c in coordinates])
-    noise = scorer.noise_of(current.state.effects[index])
-    return scorer.score(columns, coordinates, values - part, without=own, back=columns @ part,
-                        noise=noise)  # fmt: skip
-
-
-def own_part(current: Fit, index: int) -> tuple[list[int], FloatArray]:
-    """An effect's coordinates, and how far each is from where it does nothing.
-
-    At the optimum the residual is what the full model leaves: with the effect's own part (its
-    columns times these) added back, a fit without it has to leave it.
-    """
-    number = len(current.state.nuisances) + index
-    own = [i for i, c in enumerate(current.coordinates) if c.index == number]
-    return own, np.array([_from_neutral(current, i) for i in own])
-
-
-def _from_neutral(current: Fit, i: int) -> float:
-    """How far a linear parameter is from where it does nothing; others count as they are."""
-    c = current.coordinates[i]
-    effect = current.state.every[c.index]
-    parameter = next(p for p in effect.parameters if p.name == c.name)
-    if parameter.name == "order" or parameter.logarithmic:
-        return 0.0 if (effect.name, c.name) != ("joint_stiffness", "scale") else c.value
-    return c.value - parameter.neutral
 
 
 def _step(current: Fit, scored: list[Scored], chosen: list[Scored]) -> Step:

@@ -10,23 +10,24 @@ import numpy as np
 
 from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
-from picchio.diagnosis.life import Unsure
+from picchio.diagnosis.life import Uncertain
+from picchio.diagnosis.percussion.criteria.bic import bic
 from picchio.diagnosis.percussion.criteria.confidence import confidence
-from picchio.diagnosis.percussion.criteria.identifiability import unseen
-from picchio.diagnosis.percussion.criteria.pose_consistency import between_poses
+from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_range
+from picchio.diagnosis.percussion.criteria.pose_consistency import jackknife_covariance
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.diagnosis.percussion.fit.drawn import width_spread
 from picchio.diagnosis.percussion.fit.least_squares import Fit
 from picchio.diagnosis.percussion.fit.unknowns import NUISANCE_KEYS, Hypothesis
 from picchio.diagnosis.percussion.search.select import EXACT, Search
-from picchio.diagnosis.percussion.search.trials import Trial, score
+from picchio.diagnosis.percussion.search.trials import Trial
 from picchio.diagnosis.result import Cause, Value
 from picchio.model.effects.effect import CHANNEL_UNIT, Effect
 from picchio.robot.flexible_robot import FlexibleRobot
 
 
-def told_causes(
+def fitted_causes(
     problem: Problem,
     whole: Fit,
     found: Search,
@@ -49,7 +50,7 @@ def told_causes(
     """
     unsettled = {trial.fit.hypothesis.labels for trial in refuted}
     rivals = [r for r in rivals if r.fit.hypothesis.labels not in unsettled]
-    variance = told_covariance(whole).diagonal()
+    variance = reported_covariance(whole).diagonal()
     unknowns, vector = whole.hypothesis.unknowns(), whole.hypothesis.vector()
     result = []
     for effect in whole.hypothesis.causes:
@@ -60,7 +61,7 @@ def told_causes(
             for k, unknown in enumerate(unknowns):
                 if unknown.effect == index and unknown.name == p.name:
                     std = abs(unknown.slope(vector[k])) * math.sqrt(max(variance[k], 0.0))
-                    std = max(std, _unseen(problem, whole, k))
+                    std = max(std, _unconstrained(problem, whole, k))
             if effect.name == "pulse_jitter":
                 std = _width_spread(whole, effect)
             values[p.name] = Value(effect.values[p.name], std, _unit(whole, effect, p.name))
@@ -75,12 +76,12 @@ def told_causes(
     return tuple(result)
 
 
-def _unseen(problem: Problem, whole: Fit, number: int) -> float:
-    """As `unseen`, in the parameter's unit; 0 for what is known beforehand."""
+def _unconstrained(problem: Problem, whole: Fit, number: int) -> float:
+    """As `unconstrained_range`, in the parameter's unit; 0 for what is known beforehand."""
     unknown, here = whole.hypothesis.unknowns()[number], float(whole.hypothesis.vector()[number])
     if unknown.prior is not None:
         return 0.0
-    moved = here + unseen(problem, whole, number)
+    moved = here + unconstrained_range(problem, whole, number)
     return abs(unknown.value(moved) - unknown.value(here))
 
 
@@ -103,14 +104,14 @@ def _width_spread(whole: Fit, effect: Effect) -> float:
     return 0.0
 
 
-def told_covariance(whole: Fit) -> FloatArray:
+def reported_covariance(whole: Fit) -> FloatArray:
     """(unknowns, unknowns) of the transformed unknowns, as it is told.
 
     That of the fit, larger where more than noise is left: by how much more, and by how far the
     poses then disagree. And that of the model's exactness.
     """
     inflate = max(1.0, whole.chi_square / max(whole.samples, 1))
-    covariance = whole.covariance() * inflate + (1.0 - 1.0 / inflate) * between_poses(whole)
+    covariance = whole.covariance() * inflate + (1.0 - 1.0 / inflate) * jackknife_covariance(whole)
     hypothesis, vector = whole.hypothesis, whole.hypothesis.vector()
     for k, unknown in enumerate(hypothesis.unknowns()):
         effect = hypothesis.effects[unknown.effect]
@@ -122,22 +123,22 @@ def told_covariance(whole: Fit) -> FloatArray:
     return covariance
 
 
-def told_spread(whole: Fit) -> Unsure:
+def fitted_spread(whole: Fit) -> Uncertain:
     """How well all values of a fit are known, for the life."""
     hypothesis = whole.hypothesis
-    return _unsure(hypothesis, told_covariance(whole))
+    return _uncertain(hypothesis, reported_covariance(whole))
 
 
-def stated_spread(robot: FlexibleRobot, tolerance: Tolerance) -> Unsure:
+def nominal_spread(robot: FlexibleRobot, tolerance: Tolerance) -> Uncertain:
     """How well the nominal values are known before anything was measured."""
     hypothesis = Hypothesis.baseline(robot, tolerance)
     spread = np.array([u.prior[1] if u.prior else 0.0 for u in hypothesis.unknowns()])
-    return _unsure(hypothesis, np.diag(spread**2))
+    return _uncertain(hypothesis, np.diag(spread**2))
 
 
-def _unsure(hypothesis: Hypothesis, covariance: FloatArray) -> Unsure:
+def _uncertain(hypothesis: Hypothesis, covariance: FloatArray) -> Uncertain:
     unknowns = hypothesis.unknowns()
-    return Unsure(
+    return Uncertain(
         lambda vector: hypothesis.at(vector).effects,
         hypothesis.vector(),
         covariance,
@@ -170,7 +171,7 @@ def _confidence(
         if effect.label not in r.fit.hypothesis.labels and r.finished(best.records)
     ]
     if others:
-        told.append(confidence(best, min(others, key=score)))
+        told.append(confidence(best, min(others, key=bic)))
     if not told and len(best.hypothesis.causes) == 1 and found.baseline is not best:
         return confidence(best, found.baseline)
     if not told:
@@ -178,7 +179,7 @@ def _confidence(
     return min(told)
 
 
-def told_nuisances(found: Fit) -> dict[str, Value]:
+def fitted_nuisances(found: Fit) -> dict[str, Value]:
     """Fitted nuisances, in their own units."""
     if found.jacobians is None:
         return {}

@@ -56,7 +56,7 @@ def _doubted(causes: Sequence[Cause]) -> list[Cause]:
     return [cause for cause in causes if cause.confidence < BEYOND_DOUBT]
 
 
-def why_none(causes: Sequence[Cause], common: Sequence[str]) -> str:
+def why_not_claimed(causes: Sequence[Cause], common: Sequence[str]) -> str:
     """Why no cause is claimed though they leave noise."""
     if common:
         return _why_common(common)

@@ -13,7 +13,7 @@ from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 _FAR_ABOVE = 0.9
 
 
-def dominant(problem: Problem, found: Fit, records: Sequence[MeasuredRecord]) -> Fit:
+def dominant_causes(problem: Problem, found: Fit, records: Sequence[MeasuredRecord]) -> Fit:
     """The fit without the causes that explain too little of what is wrong without them.
 
     Where the catalogue lacks something, its last causes imitate what it lacks: each takes a part
@@ -32,13 +32,13 @@ def dominant(problem: Problem, found: Fit, records: Sequence[MeasuredRecord]) ->
             for label in sorted(best.hypothesis.labels)
         ]
         without = min(fits, key=lambda other: other.cost)
-        if share(best, without) >= _FAR_ABOVE:
+        if explained_share(best, without) >= _FAR_ABOVE:
             break
         best = without
     return best
 
 
-def share(best: Fit, without: Fit) -> float:
+def explained_share(best: Fit, without: Fit) -> float:
     """How much of what is wrong without a cause is explained with it: 1 where noise is left."""
     rise = max(without.cost - best.cost, 0.0)
     left = max(best.chi_square - best.samples, 0.0)

@@ -11,18 +11,20 @@ from collections.abc import Sequence, Set
 
 import numpy as np
 
-from picchio.diagnosis.percussion.criteria.identifiability import unseen
+from picchio.diagnosis.percussion.criteria.bic import SAME, bic
+from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_range
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
-from picchio.diagnosis.percussion.search.trials import SAME, score
 
 _PARALLEL = 1.0 - 1e-9
 # What is known of a cause's number beforehand, in typical sizes or e-folds: hardly anything.
 _VAGUE = 3.0
 
 
-def behind(problem: Problem, best: Fit, other: Fit, records: Sequence[MeasuredRecord]) -> float:
+def bic_difference(
+    problem: Problem, best: Fit, other: Fit, records: Sequence[MeasuredRecord]
+) -> float:
     """By how much a fit is behind another in BIC, numbers counted as far as they are told.
 
     Args:
@@ -31,14 +33,14 @@ def behind(problem: Problem, best: Fit, other: Fit, records: Sequence[MeasuredRe
         other: its rival.
         records: that both are fitted to.
     """
-    by_bic, by_cost = score(other) - score(best), other.cost - best.cost
+    by_bic, by_cost = bic(other) - bic(best), other.cost - best.cost
     if by_bic < SAME or by_cost >= SAME:
         return by_bic
     if _in_series(best.hypothesis.labels ^ other.hypothesis.labels, records):
         # The base's spring has a damper of its own, the joint's shares the robot's damping: that
         # is told in more numbers, but fits nothing that the joint does not.
         return by_cost
-    told = [_told_numbers(problem, each, records) for each in (best, other)]
+    told = [_effective_parameters(problem, each, records) for each in (best, other)]
     return by_cost + (told[1] - told[0]) * math.log(max(best.samples, 2))
 
 
@@ -58,7 +60,7 @@ def _moves_alike(record: MeasuredRecord, joint: str, axis: str) -> bool:
     return bool(abs(a @ b) >= _PARALLEL * np.linalg.norm(a) * np.linalg.norm(b))
 
 
-def _told_numbers(problem: Problem, found: Fit, records: Sequence[MeasuredRecord]) -> float:
+def _effective_parameters(problem: Problem, found: Fit, records: Sequence[MeasuredRecord]) -> float:
     """How many of the causes' numbers the records determine, beside the nuisances.
 
     The trace of what data add to next to nothing (D. J. C. MacKay, Neural Computation 4 (1992)
@@ -68,7 +70,7 @@ def _told_numbers(problem: Problem, found: Fit, records: Sequence[MeasuredRecord
         found = fit(problem, found.hypothesis, records, None, iterations=0, with_jacobian=True)
     free = np.array([u.prior is None for u in found.hypothesis.unknowns()])
     at_work = ~free
-    at_work[free] = [not unseen(problem, found, int(k)) for k in np.flatnonzero(free)]
+    at_work[free] = [not unconstrained_range(problem, found, int(k)) for k in np.flatnonzero(free)]
     free = free[at_work]
     matrix = found.normal_matrix()[np.ix_(at_work, at_work)] + np.diag(free / _VAGUE**2)
     left = np.linalg.pinv(matrix, hermitian=True)[np.ix_(free, free)]

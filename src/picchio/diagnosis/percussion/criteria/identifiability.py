@@ -13,7 +13,7 @@ _FAR = 0.5
 _HALVINGS = 4
 
 
-def unseen(problem: Problem, found: Fit, number: int) -> float:
+def unconstrained_range(problem: Problem, found: Fit, number: int) -> float:
     """How far an unknown may be moved, away from its nearer bound, before chi-square changes by 1.
 
     A rotor of next to no inertia, a damper of next to nothing: their slopes are rounding, and would

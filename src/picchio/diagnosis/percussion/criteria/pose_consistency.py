@@ -13,7 +13,7 @@ _POSES = 3
 _TOLD = 1e-9
 
 
-def unsteadiness(found: Fit) -> float:
+def pose_inconsistency(found: Fit) -> float:
     """By how many standard deviations the unknowns differ from pose to pose, all together.
 
     What is wrong may look like another stiffness in each pose, and leave noise there; then the
@@ -45,7 +45,7 @@ def unsteadiness(found: Fit) -> float:
     return float(np.clip(norm.isf(chi2.sf(fall - together, degrees)), -38.0, 38.0))
 
 
-def between_poses(found: Fit) -> FloatArray:
+def jackknife_covariance(found: Fit) -> FloatArray:
     """(unknowns, unknowns) covariance by how the fit moves where one pose is left out.
 
     To first order (the jackknife: Quenouille, doi:10.1093/biomet/43.3-4.353). Where more than noise

@@ -53,13 +53,13 @@ class Evidence:
         bands: by group and frequency.
         poses: by group and pose.
         chi_square: per sample, all together.
-        unsteady: by how many standard deviations the unknowns differ from pose to pose.
+        pose_inconsistency: by how many standard deviations the unknowns differ from pose to pose.
     """
 
     bands: tuple[Level, ...]
     poses: tuple[Level, ...]
     chi_square: float
-    unsteady: float = 0.0
+    pose_inconsistency: float = 0.0
 
     @property
     def is_noise(self) -> bool:
@@ -67,7 +67,7 @@ class Evidence:
         return (
             self.worst_band < BAND_LIMIT
             and self.worst_pose < POSE_LIMIT
-            and self.unsteady < BAND_LIMIT
+            and self.pose_inconsistency < BAND_LIMIT
         )
 
     @property
@@ -81,7 +81,7 @@ class Evidence:
         return max((level.z for level in self.poses), default=0.0)
 
 
-def weigh(
+def whiteness_test(
     problem: Problem,
     residuals: Sequence[FloatArray],
     records: Sequence[MeasuredRecord] | None = None,

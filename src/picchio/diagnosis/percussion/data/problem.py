@@ -243,17 +243,17 @@ def residual(record: MeasuredRecord, model: Model, end: float | None = None) -> 
     out, room, known = np.empty((len(record.values), count)), np.empty(count), np.zeros(0, bool)
     for i, channel in enumerate(record.channels):
         name = channel.name
-        foretold = predicted[name]
+        simulated = predicted[name]
         offset = 0.0
         if setup.steady or channel.kind.name in POSITION_KINDS:
-            offset = float((record.values[name][:count] - foretold).sum()) / count
+            offset = float((record.values[name][:count] - simulated).sum()) / count
         unknown = known
         if masked is not None and channel.kind.name in _JUMPING:
             # Before the filter, which would spread what is not known, and after it; there as
             # large as noise, lest a fit gain by moving edges towards samples it misses.
             unknown = masked[channel.group]
         whitened(
-            record.values[name], foretold, offset, unknown, record.filler(name),
+            record.values[name], simulated, offset, unknown, record.filler(name),
             *record.noise[name].model.filters, room, out[i],
         )  # fmt: skip
     return out

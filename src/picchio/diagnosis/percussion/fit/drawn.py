@@ -10,7 +10,7 @@ import numpy as np
 
 from picchio.core.arrays import BoolArray, FloatArray
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.data.problem import Problem, take_out_line
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.diagnosis.percussion.fit.least_squares import (
     HOPELESS,
@@ -22,8 +22,14 @@ from picchio.diagnosis.percussion.fit.least_squares import (
 )
 from picchio.diagnosis.percussion.fit.slopes import jacobian
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.search.screen import current_hidden, hidden_columns, with_hidden
 from picchio.model.effects.effect import Effect
+from picchio.model.effects.registry import effect_class
+
+# Effects that draw numbers anew in every record: jitter, missed hits, the phase of the hum.
+
+LATENT = ("pulse_jitter", "missed_hits", "mains_hum")
+_SHIFT = 2e-4  # s
+_WEAKER = 0.2
 
 # What numbers that are drawn anew in every record cost: they come from one distribution.
 
@@ -67,6 +73,91 @@ def width_spread(width: float, fall: float, count: int) -> float:
     if fall <= count or count < 1:
         return width
     return width * fall / (fall - count) / math.sqrt(2.0 * count)
+
+
+def hidden_columns(problem: Problem, known: Fit, kind: type[Effect]) -> list[FloatArray]:
+    """The residual's change with every blow's shift or weakening, per record."""
+    hypothesis = known.hypothesis
+    current = current_hidden(hypothesis, kind.name)
+    most = max(int(r.setup.blows.hit.max()) + 1 for r in known.records)
+    step = _SHIFT if kind.name == "pulse_jitter" else _WEAKER
+    found: list[list[FloatArray]] = [[] for _ in known.records]
+    for hit in range(1, most):
+        hidden = {}
+        for record in known.records:
+            count = int(record.setup.blows.hit.max()) + 1
+            numbers = np.array(current.get(record.name, np.zeros(count)), dtype=float)
+            if hit < count:
+                numbers[hit] += step
+            hidden[record.name] = tuple(numbers)
+        there = problem.residuals(
+            with_hidden(hypothesis, kind, hidden).effects, known.records, known.end
+        )
+        for i, (record, new, old) in enumerate(
+            zip(known.records, there, known.residuals, strict=True)
+        ):
+            if hit <= record.setup.blows.hit.max():
+                found[i].append(((new - old) / step).ravel())
+    return [
+        np.stack(columns, axis=1) if columns else np.zeros((r.size, 0))
+        for columns, r in zip(found, known.residuals, strict=True)
+    ]
+
+
+def current_hidden(hypothesis: Hypothesis, name: str) -> dict[str, tuple[float, ...]]:
+    """Record -> an effect's hidden numbers, as far as they are known."""
+    for effect in hypothesis.effects:
+        if effect.name == name:
+            return dict(effect.hidden)
+    return {}
+
+
+def with_hidden(
+    hypothesis: Hypothesis, kind: type[Effect], hidden: dict[str, tuple[float, ...]]
+) -> Hypothesis:
+    """With an effect's hidden numbers (record -> numbers), and the effect if it was not there."""
+    effects = tuple(e.with_hidden(hidden) if e.name == kind.name else e for e in hypothesis.effects)
+    if kind.name not in {e.name for e in hypothesis.effects}:
+        effects = (*effects, kind("tool").with_hidden(hidden))
+    return replace(hypothesis, effects=effects)
+
+
+def hidden_cost(hypothesis: Hypothesis, n_records: int, samples: int) -> float:
+    """What the causes' hidden numbers cost, in units of chi-square."""
+    known = {label: drawn_cost(fall, count, samples) for label, fall, count in hypothesis.drawn}
+    total = 0.0
+    for effect in hypothesis.causes:
+        count = 0.0
+        if effect.name == "mains_hum":
+            count = 2 * n_records
+        elif effect.name == "pulse_jitter":
+            count = sum(max(len(v) - 1, 0) for v in effect.hidden.values())
+        elif effect.name == "missed_hits":  # yes or no: a bit each, not a number
+            bits = sum(max(len(v) - 1, 0) for v in effect.hidden.values())
+            total += bits * math.log(2.0) * math.log(max(samples, 2))
+        total += min(known.get(effect.label, math.inf), count * math.log(max(samples, 2)))
+    return total
+
+
+def hum_lines(problem: Problem, found: Fit) -> Hypothesis:
+    """The hum's amplitude and phases of every record written into its effect."""
+    hypothesis = found.hypothesis
+    effects = list(hypothesis.effects)
+    for i, effect in enumerate(effects):
+        if effect.name != "mains_hum":
+            continue
+        others = [e for k, e in enumerate(effects) if k != i]
+        predictions = problem.predictions(others)
+        hidden = {}
+        for record, predicted in zip(problem.records, predictions, strict=True):
+            rows = {n: v - predicted[n] for n, v in record.values.items()}
+            frequency = effect.values["frequency"]
+            hidden[record.name] = take_out_line(rows, record.setup, effect.target, frequency)
+        amplitude = float(np.sqrt(np.mean([a * a + b * b for a, b in hidden.values()])))
+        kind = effect_class("mains_hum")
+        effects[i] = kind(effect.target, amplitude=amplitude, frequency=effect.values["frequency"])
+        effects[i] = effects[i].with_hidden(hidden)
+    return replace(hypothesis, effects=tuple(effects))
 
 
 # Where each blow fell, found blow by blow: a start for what all blows' times together must fit.
@@ -249,10 +340,10 @@ def fit_latent(
         here = together or _in_turns(problem, here, kind, columns)
         if (turn or together) and before - here.cost < _CONVERGED * here.cost:
             break
-    return _told_times(here, kind, columns) if jitter else _told_share(here, kind)
+    return _with_width(here, kind, columns) if jitter else _with_fraction(here, kind)
 
 
-def _told_times(here: Fit, kind: type[Effect], columns: Sequence[FloatArray]) -> Fit:
+def _with_width(here: Fit, kind: type[Effect], columns: Sequence[FloatArray]) -> Fit:
     """With the width of the blows' times, without what noise adds to it, and what they cost."""
     known = _numbers(here, kind)
     moved, fall, count = 0.0, 0.0, 0
@@ -265,7 +356,7 @@ def _told_times(here: Fit, kind: type[Effect], columns: Sequence[FloatArray]) ->
     return _priced(_with_own(here, kind, std=std), f"{kind.name}:tool", fall, count)
 
 
-def _told_share(here: Fit, kind: type[Effect]) -> Fit:
+def _with_fraction(here: Fit, kind: type[Effect]) -> Fit:
     """With the share of the blows that are missing."""
     hidden = current_hidden(here.hypothesis, kind.name)
     numbers = np.concatenate([np.array(v)[1:] for v in hidden.values()])

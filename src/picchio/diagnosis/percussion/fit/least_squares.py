@@ -1,23 +1,18 @@
-"""Parameters that a fit has pushed to where they do nothing are put back, and fitted again."""
+"""Nonlinear least squares: Levenberg-Marquardt on whitened residuals, over growing windows."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.criteria.whiteness import weigh
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.diagnosis.percussion.fit.slopes import borrowed, fine_steps, jacobian, updated
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.model.effects.effect import Effect
-from picchio.model.effects.scales import Scales
-
-# Forward nonlinear least squares: Levenberg-Marquardt on whitened residuals.
 
 # Windows that grow, s: a long one at once lets the fit skip cycles.
 WINDOWS = (0.06, 0.16, 0.4, None)
@@ -25,7 +20,7 @@ _CONVERGED = 1e-5
 _INSIDE = 1e-9
 # Times a rival's cost: what is still above that after two rounds is given up.
 HOPELESS = 1.5
-# A step that gains less than this share of what was foretold asks for a new Jacobian.
+# A step that gains less than this share of what was expected asks for a new Jacobian.
 _TRUSTED = 0.25
 
 
@@ -157,7 +152,7 @@ def fit(
                 break
             damping *= 6.0
         if not improved:
-            if fresh and (refined or not kinked(here)):
+            if fresh and (refined or not is_nonsmooth(here)):
                 break
             # Carried too far; or differences were too coarse for a motion that a kink makes rough.
             refined = fresh
@@ -169,7 +164,7 @@ def fit(
         refined = False
         gained = cost - value
         moved = trial.vector() - vector
-        foretold = -float(2.0 * gradient @ moved + moved @ normal @ moved)
+        expected = -float(2.0 * gradient @ moved + moved @ normal @ moved)
         slopes = updated(slopes, residuals, there, moved, scale)
         here, residuals, cost = trial, there, value
         damping = max(damping / 8.0, 1e-9)
@@ -178,14 +173,14 @@ def fit(
             fresh = False
             break
         fresh = False
-        if small or gained < _TRUSTED * foretold:
+        if small or gained < _TRUSTED * expected:
             slopes = None
     if with_jacobian and not (fresh and slopes is not None):
         slopes = jacobian(problem, here, chosen, end, residuals, steps)
     return Fit(here, residuals, slopes if with_jacobian else None, cost, chosen, end)
 
 
-def kinked(hypothesis: Hypothesis) -> bool:
+def is_nonsmooth(hypothesis: Hypothesis) -> bool:
     """Whether a small change of an unknown may change the motion a lot."""
     return any(effect.where == "nonlinear" for effect in hypothesis.effects)
 
@@ -253,74 +248,3 @@ def fit_growing(
         )
     assert found is not None
     return found
-
-
-# So many times smaller or larger than its typical size, a logarithmic parameter has no slope left
-# that could lead a fit back.
-_FAR = 1e3
-# A parameter that, changed by this factor, changes chi-square by no more than one, does nothing.
-_MOVED = 1.3
-# Where there is a kink, a small error early is a large one late: not all at once, s.
-_GROWING = (0.16, 0.3, 0.6, None)
-
-
-def unstuck(problem: Problem, best: Fit, scales: Scales, records: Sequence[MeasuredRecord]) -> Fit:
-    """The fit, or a better one from where what does nothing stands at one of its usual sizes again.
-
-    What is far off is put back always; where more than noise is left, so is what does nothing where
-    it is, such as the preload of a contact that never opens: it may have to be much smaller.
-
-    Args:
-        problem: data and noise.
-        best: the fit.
-        scales: sizes in this campaign.
-        records: that are fitted.
-    """
-    found = best
-    noisy = not weigh(problem, best.residuals, best.records).is_noise
-    for effect in best.hypothesis.causes:
-        for name, sizes in _usual(effect, scales).items():
-            far = [not 1.0 / _FAR < effect.values[name] / size < _FAR for size in sizes]
-            off = all(far) and any(p.logarithmic for p in effect.parameters if p.name == name)
-            if not (off or (noisy and _does_nothing(problem, best, effect, name))):
-                continue
-            for size in sizes:
-                effects = tuple(
-                    e.with_values(**{name: size}) if e.label == effect.label else e
-                    for e in found.hypothesis.effects
-                )
-                start = replace(found.hypothesis, effects=effects)
-                windows = _GROWING if kinked(start) else (None,)
-                again = fit_growing(problem, start, records, windows=windows, iterations=8)
-                found = again if again.cost < found.cost else found
-    return found
-
-
-def _usual(effect: Effect, scales: Scales) -> dict[str, list[float]]:
-    """The sizes above 0 at which an effect's parameters are tried, each once."""
-    sizes: dict[str, list[float]] = {}
-    if effect.latent is not None or effect.discrete:
-        return sizes
-    for trial in effect.trials(scales):
-        for name, value in trial.items():
-            if value > 0.0 and value not in sizes.get(name, []):
-                sizes.setdefault(name, []).append(value)
-    return sizes
-
-
-def _does_nothing(problem: Problem, best: Fit, effect: Effect, name: str) -> bool:
-    """Whether the motion is the same with a parameter a little larger or smaller."""
-    told = False
-    for factor in (_MOVED, 1.0 / _MOVED):
-        try:
-            moved = effect.with_values(**{name: factor * effect.values[name]})
-            effects = tuple(moved if e is effect else e for e in best.hypothesis.effects)
-            there = problem.residuals(effects, best.records, best.end)
-        except InputError:  # beyond its bounds
-            continue
-        pairs = zip(there, best.residuals, strict=True)
-        change = sum(float(((a - b) ** 2).sum()) for a, b in pairs)
-        if change > 1.0:
-            return False
-        told = True
-    return told

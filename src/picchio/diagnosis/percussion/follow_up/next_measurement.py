@@ -10,6 +10,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.criteria.bic import SAME
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
@@ -20,9 +21,9 @@ from picchio.diagnosis.percussion.follow_up.plan import (
     when,
 )
 from picchio.diagnosis.percussion.follow_up.possible_records import possible_records, varied
-from picchio.diagnosis.percussion.follow_up.refit import foretold
+from picchio.diagnosis.percussion.follow_up.refit import expected_rise
 from picchio.diagnosis.percussion.follow_up.separation import Separation, new_noise, separation
-from picchio.diagnosis.percussion.search.trials import SAME, Trial
+from picchio.diagnosis.percussion.search.trials import Trial
 from picchio.prediction.percussion import PercussionSetup
 
 _RIVALS = 4
@@ -33,7 +34,7 @@ _TRIED_AGAIN = 2
 
 
 @dataclass(frozen=True, eq=False)
-class _Shot:
+class _Proposal:
     """One record that might be taken, and by how much chi-square would tell each rival."""
 
     setup: PercussionSetup
@@ -139,7 +140,7 @@ def _how_told(least: float, most: float) -> str:
     return "one way" if most >= _ENOUGH else "no"
 
 
-def _why(shot: _Shot, best: str, names: Sequence[str], where: str) -> str:
+def _why(shot: _Proposal, best: str, names: Sequence[str], where: str) -> str:
     """What the record tells, what only if it comes out that way, and what it does not."""
     surely = [n for n, value in zip(names, shot.surely, strict=True) if value >= _ENOUGH]
     alike = [n for n, value in zip(names, shot.perhaps, strict=True) if value < _ENOUGH]
@@ -172,22 +173,22 @@ def _fitted(problem: Problem, found: Fit) -> Fit:
 
 def _best(
     problem: Problem,
-    shots: Sequence[_Shot],
+    shots: Sequence[_Proposal],
     best: Fit,
     rivals: Sequence[Fit],
     fresh: Mapping[str, float],
-) -> _Shot:
+) -> _Proposal:
     """The best record: of each sensor that which slopes say is best, held against refits."""
-    firsts: dict[str, _Shot] = {}
+    firsts: dict[str, _Proposal] = {}
     for shot in sorted(shots, key=lambda s: s.worth, reverse=True):
         firsts.setdefault(shot.sensor, shot)
-    checked: list[_Shot] = []
+    checked: list[_Proposal] = []
     for shot in firsts.values():
         ways = np.array([shot.told.if_best, shot.told.if_rival])
         for k, rival in enumerate(rivals):
             if shot.perhaps[k] >= _ENOUGH:
                 ways[:, k] = [
-                    foretold(problem, shot.setup, shot.sensor, fresh, true, other)
+                    expected_rise(problem, shot.setup, shot.sensor, fresh, true, other)
                     for true, other in ((best, rival), (rival, best))
                 ]
         checked.append(replace(shot, told=Separation(ways[0], ways[1])))
@@ -207,7 +208,7 @@ def _shots(
     best: Fit,
     rivals: Sequence[Fit],
     fresh: Mapping[str, float],
-) -> list[_Shot]:
+) -> list[_Proposal]:
     shots = [shot for setup in setups for shot in _taken(problem, setup, best, rivals, fresh)]
     again = dict.fromkeys(s.setup for s in sorted(shots, key=lambda s: s.worth, reverse=True))
     for setup in list(again)[:_TRIED_AGAIN]:
@@ -223,14 +224,14 @@ def _taken(
     rivals: Sequence[Fit],
     fresh: Mapping[str, float],
     what: str = "",
-) -> list[_Shot]:
+) -> list[_Proposal]:
     """The record with every sensor; none where one of the models is none there."""
     try:
         told = separation(problem, setup, best, rivals, fresh)
     except InputError:
         return []
     return [
-        _Shot(setup, what, name, sensor_group(problem, name) in problem.groups, value)
+        _Proposal(setup, what, name, sensor_group(problem, name) in problem.groups, value)
         for name, value in told.items()
     ]
 
@@ -243,7 +244,7 @@ class _How:
     values: dict[str, float]
 
 
-def _conditions(problem: Problem, shot: _Shot) -> _How:
+def _conditions(problem: Problem, shot: _Proposal) -> _How:
     here = shot.setup.conditions
     if shot.varied == "force":
         force = float(np.abs(shot.setup.blows.height).max())

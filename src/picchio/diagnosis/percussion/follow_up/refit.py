@@ -17,7 +17,7 @@ from picchio.prediction.percussion import PercussionSetup
 _TURNS = 8
 
 
-def foretold(
+def expected_rise(
     problem: Problem,
     setup: PercussionSetup,
     sensor: str,

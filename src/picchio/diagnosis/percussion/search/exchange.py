@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence, Set
 from dataclasses import replace
 
-from picchio.diagnosis.percussion.criteria.whiteness import weigh
+from picchio.diagnosis.percussion.criteria.bic import bic
+from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
-from picchio.diagnosis.percussion.fit.drawn import fit_latent
+from picchio.diagnosis.percussion.fit.drawn import LATENT, fit_latent, with_hidden
 from picchio.diagnosis.percussion.fit.least_squares import HOPELESS, Fit, fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.search.screen import LATENT, with_hidden
 from picchio.diagnosis.percussion.search.trials import (
     SCREEN_WINDOW,
     SHORT_LIST,
     Trial,
-    score,
-    spread_out,
+    records_of_every_pose,
     try_candidates,
 )
 from picchio.model.effects.effect import Effect
@@ -47,8 +46,8 @@ def prune(
             fit(problem, best.hypothesis.minus(cause.label), records, None, iterations=5)
             for cause in best.hypothesis.causes
         ]
-        idlest = min(fits, key=score)
-        if score(idlest) >= score(best) + least:
+        idlest = min(fits, key=bic)
+        if bic(idlest) >= bic(best) + least:
             break
         best = idlest
     return best
@@ -99,7 +98,7 @@ def exchange(
             if begun is None:
                 continue
             other = fit(problem, begun, records, None, iterations=6, rival=best.cost)
-            if score(other) < score(best) - least:
+            if bic(other) < bic(best) - least:
                 best = other
     return best
 
@@ -108,7 +107,7 @@ def _come_near(
     problem: Problem, hypothesis: Hypothesis, best: Fit, records: Sequence[MeasuredRecord]
 ) -> Hypothesis | None:
     """A hypothesis fitted to the first part of some records; None where that is hopeless."""
-    some = spread_out(records)
+    some = records_of_every_pose(records)
     own = fit(problem, best.hypothesis, some, SCREEN_WINDOW, iterations=2)
     begun = fit(problem, hypothesis, some, SCREEN_WINDOW, iterations=4, rival=own.cost)
     return begun.hypothesis if begun.cost < HOPELESS * own.cost else None
@@ -166,10 +165,10 @@ def replaced(
         if cause.label in settled or cause.label not in best.hypothesis.labels:  # taken out since
             continue
         trials = rivals_of(cause.label, problem, best, candidates, scales, records, tried)
-        if trials and trials[0].score < score(best) - least:
+        if trials and trials[0].score < bic(best) - least:
             newest = trials[0].label
             best = prune(problem, trials[0].fit, records, least)
             best = with_latent(problem, best, newest)
-            if weigh(problem, best.residuals, best.records).is_noise:
+            if whiteness_test(problem, best.residuals, best.records).is_noise:
                 break
     return best

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from picchio.diagnosis.percussion.conclude.holdout import Split
-from picchio.diagnosis.percussion.criteria.pose_consistency import unsteadiness
-from picchio.diagnosis.percussion.criteria.whiteness import Evidence, weigh
+from picchio.diagnosis.percussion.criteria.bic import bic
+from picchio.diagnosis.percussion.criteria.pose_consistency import pose_inconsistency
+from picchio.diagnosis.percussion.criteria.whiteness import Evidence, whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.split import Split
+from picchio.diagnosis.percussion.fit.drawn import LATENT
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import measure_scales
-from picchio.diagnosis.percussion.search.screen import LATENT
 from picchio.diagnosis.percussion.search.select import Search, refit, search
-from picchio.diagnosis.percussion.search.trials import score
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
 
@@ -41,7 +41,7 @@ class Look:
     @property
     def gained(self) -> float:
         """Fall of BIC by what was found."""
-        return score(self.baseline) - score(self.found.best)
+        return bic(self.baseline) - bic(self.found.best)
 
     def nominal(self, problem: Problem) -> tuple[Fit, Evidence]:
         """The nuisances alone, fitted to all records, and what that leaves."""
@@ -49,7 +49,7 @@ class Look:
             nominal = fit(problem, self.baseline.hypothesis, problem.records, None, iterations=3)
         else:
             nominal = refit(problem, self.found.best.hypothesis, problem.records)
-        return nominal, weighed(problem, nominal)
+        return nominal, fit_evidence(problem, nominal)
 
 
 def look(
@@ -85,9 +85,11 @@ def look(
     return Look(train, kept, baseline, scales, found)
 
 
-def weighed(problem: Problem, whole: Fit) -> Evidence:
+def fit_evidence(problem: Problem, whole: Fit) -> Evidence:
     """What a fit to all records leaves, and whether its unknowns hold at every pose."""
-    return replace(weigh(problem, whole.residuals), unsteady=unsteadiness(whole))
+    return replace(
+        whiteness_test(problem, whole.residuals), pose_inconsistency=pose_inconsistency(whole)
+    )
 
 
 def _chi_square(

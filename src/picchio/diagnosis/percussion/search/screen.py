@@ -16,11 +16,15 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.fit.drawn import blow_by_blow, drawn_cost
+from picchio.diagnosis.percussion.fit.drawn import (
+    LATENT,
+    blow_by_blow,
+    drawn_cost,
+    hidden_columns,
+    with_hidden,
+)
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, prior_weights
-from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.model.effects.effect import Effect
-from picchio.model.effects.registry import effect_class
 from picchio.model.effects.scales import Scales
 
 # Trials of an effect made smaller or larger.
@@ -83,11 +87,6 @@ def bounded(trial: Effect, values: dict[str, float]) -> Effect:
     return type(trial)(trial.target, **inside)
 
 
-# Effects that draw numbers anew in every record: jitter, missed hits, the phase of the hum.
-
-LATENT = ("pulse_jitter", "missed_hits", "mains_hum")
-_SHIFT = 2e-4  # s
-_WEAKER = 0.2
 _MAINS = (50.0, 60.0)
 # Late blows that the screening tries.
 _LOOKED_AT = 1.8
@@ -149,93 +148,6 @@ def _late_share(problem: Problem, known: Fit, kind: type[Effect]) -> float:
     except InputError:  # led to where there is no model
         return 0.0
     return max(1.0 - late.chi_square / max(first.chi_square, 1e-300), 0.0)
-
-
-def hidden_columns(problem: Problem, known: Fit, kind: type[Effect]) -> list[FloatArray]:
-    """The residual's change with every blow's shift or weakening, per record."""
-    hypothesis = known.hypothesis
-    current = current_hidden(hypothesis, kind.name)
-    most = max(int(r.setup.blows.hit.max()) + 1 for r in known.records)
-    step = _SHIFT if kind.name == "pulse_jitter" else _WEAKER
-    found: list[list[FloatArray]] = [[] for _ in known.records]
-    for hit in range(1, most):
-        hidden = {}
-        for record in known.records:
-            count = int(record.setup.blows.hit.max()) + 1
-            numbers = np.array(current.get(record.name, np.zeros(count)), dtype=float)
-            if hit < count:
-                numbers[hit] += step
-            hidden[record.name] = tuple(numbers)
-        there = problem.residuals(
-            with_hidden(hypothesis, kind, hidden).effects, known.records, known.end
-        )
-        for i, (record, new, old) in enumerate(
-            zip(known.records, there, known.residuals, strict=True)
-        ):
-            if hit <= record.setup.blows.hit.max():
-                found[i].append(((new - old) / step).ravel())
-    return [
-        np.stack(columns, axis=1) if columns else np.zeros((r.size, 0))
-        for columns, r in zip(found, known.residuals, strict=True)
-    ]
-
-
-def current_hidden(hypothesis: Hypothesis, name: str) -> dict[str, tuple[float, ...]]:
-    """Record -> an effect's hidden numbers, as far as they are known."""
-    for effect in hypothesis.effects:
-        if effect.name == name:
-            return dict(effect.hidden)
-    return {}
-
-
-def with_hidden(
-    hypothesis: Hypothesis, kind: type[Effect], hidden: dict[str, tuple[float, ...]]
-) -> Hypothesis:
-    """With an effect's hidden numbers (record -> numbers), and the effect if it was not there."""
-    effects = tuple(e.with_hidden(hidden) if e.name == kind.name else e for e in hypothesis.effects)
-    if kind.name not in {e.name for e in hypothesis.effects}:
-        effects = (*effects, kind("tool").with_hidden(hidden))
-    return replace(hypothesis, effects=effects)
-
-
-def hidden_cost(hypothesis: Hypothesis, n_records: int, samples: int) -> float:
-    """What the causes' hidden numbers cost, in units of chi-square."""
-    known = {label: drawn_cost(fall, count, samples) for label, fall, count in hypothesis.drawn}
-    total = 0.0
-    for effect in hypothesis.causes:
-        count = 0.0
-        if effect.name == "mains_hum":
-            count = 2 * n_records
-        elif effect.name == "pulse_jitter":
-            count = sum(max(len(v) - 1, 0) for v in effect.hidden.values())
-        elif effect.name == "missed_hits":  # yes or no: a bit each, not a number
-            bits = sum(max(len(v) - 1, 0) for v in effect.hidden.values())
-            total += bits * math.log(2.0) * math.log(max(samples, 2))
-        total += min(known.get(effect.label, math.inf), count * math.log(max(samples, 2)))
-    return total
-
-
-def hum_lines(problem: Problem, found: Fit) -> Hypothesis:
-    """The hum's amplitude and phases of every record written into its effect."""
-    from picchio.diagnosis.percussion.data.problem import take_out_line
-
-    hypothesis = found.hypothesis
-    effects = list(hypothesis.effects)
-    for i, effect in enumerate(effects):
-        if effect.name != "mains_hum":
-            continue
-        others = [e for k, e in enumerate(effects) if k != i]
-        predictions = problem.predictions(others)
-        hidden = {}
-        for record, predicted in zip(problem.records, predictions, strict=True):
-            rows = {n: v - predicted[n] for n, v in record.values.items()}
-            frequency = effect.values["frequency"]
-            hidden[record.name] = take_out_line(rows, record.setup, effect.target, frequency)
-        amplitude = float(np.sqrt(np.mean([a * a + b * b for a, b in hidden.values()])))
-        kind = effect_class("mains_hum")
-        effects[i] = kind(effect.target, amplitude=amplitude, frequency=effect.values["frequency"])
-        effects[i] = effects[i].with_hidden(hidden)
-    return replace(hypothesis, effects=tuple(effects))
 
 
 _FAINT = 20.0

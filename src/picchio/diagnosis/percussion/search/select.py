@@ -7,13 +7,14 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from picchio.diagnosis.percussion.criteria.bic import SAME, bic
 from picchio.diagnosis.percussion.criteria.confidence import confidence
-from picchio.diagnosis.percussion.criteria.equivalence import behind
-from picchio.diagnosis.percussion.criteria.whiteness import Evidence, weigh
+from picchio.diagnosis.percussion.criteria.equivalence import bic_difference
+from picchio.diagnosis.percussion.criteria.whiteness import Evidence, whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem, signal_power
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
-from picchio.diagnosis.percussion.fit.drawn import fit_latent
-from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, unstuck
+from picchio.diagnosis.percussion.fit.drawn import LATENT, fit_latent
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.exchange import (
     Tried,
@@ -23,14 +24,12 @@ from picchio.diagnosis.percussion.search.exchange import (
     rivals_of,
     with_latent,
 )
-from picchio.diagnosis.percussion.search.screen import LATENT
+from picchio.diagnosis.percussion.search.restart import restarted
 from picchio.diagnosis.percussion.search.trials import (
     MOST_RIVALS,
-    SAME,
     Trial,
-    held_out_choice,
+    holdout_choice,
     over_the_same_samples,
-    score,
     try_candidates,
 )
 from picchio.diagnosis.result import BEYOND_DOUBT
@@ -111,7 +110,7 @@ def search(
     def grow(stack: ExitStack) -> None:
         for _ in range(MOST_CAUSES):
             here = found.best
-            found.evidence = weigh(problem, here.residuals, here.records)
+            found.evidence = whiteness_test(problem, here.residuals, here.records)
             say(f"looking for cause {len(here.hypothesis.labels) + 1}")
             quiet = found.evidence.is_noise
             if quiet and not found.pinned:
@@ -127,7 +126,7 @@ def search(
                 trials = over_the_same_samples(problem, trials, records)
             found.steps.append(trials)
             tied = [t for t in trials if t.score - trials[0].score < SAME]
-            best = held_out_choice([(t, held_out_gain(here, t.fit)) for t in tied])
+            best = holdout_choice([(t, held_out_gain(here, t.fit)) for t in tied])
             if best is None and not quiet:
                 # What looked best is none; the right one may not have been among those fitted.
                 wider = try_candidates(
@@ -137,7 +136,7 @@ def search(
                 trials[:] = wider or trials
                 held = (t for t in trials if t.finished(records) and confirmed(here, t.fit))
                 best = next(held, None)
-            gain = score(here) - best.score if best is not None else 0.0
+            gain = bic(here) - best.score if best is not None else 0.0
             if best is None or gain < least:
                 break
             trials.sort(key=lambda t: t is not best)
@@ -152,14 +151,17 @@ def search(
                 if found.best.cost < here.cost and not quiet:
                     continue
                 break
-            found.best = unstuck(problem, found.best, scales, records)
+            found.best = restarted(problem, found.best, scales, records)
             # Times of blows may have been missed: then they are looked for once more.
             if known:
-                noise = weigh(problem, found.best.residuals, found.best.records).is_noise
+                noise = whiteness_test(problem, found.best.residuals, found.best.records).is_noise
                 again = with_latent(problem, found.best, best.label if noise else "")
                 if again.cost < found.best.cost:
                     found.best = prune(problem, again, records, least, alone=False)
-            if known and not weigh(problem, found.best.residuals, found.best.records).is_noise:
+            if (
+                known
+                and not whiteness_test(problem, found.best.residuals, found.best.records).is_noise
+            ):
                 other = exchange(problem, found.best, found.steps, records, least)
                 if other is not found.best:  # beside the right one, others may have nothing to do
                     other = prune(problem, other, records, least, alone=False)
@@ -174,7 +176,7 @@ def search(
             several = len(best.hypothesis.labels) > 1
             if not several or best.cost > _HALFWAY * baseline.cost:
                 break
-            if weigh(problem, best.residuals, best.records).is_noise:
+            if whiteness_test(problem, best.residuals, best.records).is_noise:
                 break
             say("looking whether the causes chosen first were the right ones")
             settled = {label for label in best.hypothesis.labels if _tried_before(found, label)}
@@ -186,7 +188,7 @@ def search(
                 break
             if len(found.best.hypothesis.labels) < MOST_CAUSES:
                 grow(stack)
-    found.evidence = weigh(problem, found.best.residuals, found.best.records)
+    found.evidence = whiteness_test(problem, found.best.residuals, found.best.records)
     return found
 
 
@@ -199,7 +201,7 @@ def _calm(problem: Problem, best: Fit, newest: str, records: Sequence[MeasuredRe
     if newest not in best.hypothesis.labels or len(best.hypothesis.labels) < 2:
         return best
     without = fit(problem, best.hypothesis.minus(newest), records, None, iterations=5)
-    return without if weigh(problem, without.residuals, records).is_noise else best
+    return without if whiteness_test(problem, without.residuals, records).is_noise else best
 
 
 def alternatives(
@@ -226,7 +228,7 @@ def alternatives(
         for trial in finished:
             if trial.fit.hypothesis.labels == best.hypothesis.labels:
                 continue
-            if behind(problem, best, trial.fit, records) < SAME:
+            if bic_difference(problem, best, trial.fit, records) < SAME:
                 same.append(trial)
     return same, tried
 

@@ -8,14 +8,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.criteria.whiteness import weigh
+from picchio.diagnosis.percussion.criteria.bic import SAME, bic
+from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
-from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing, kinked
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing, is_nonsmooth
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.fit.workers import Workers
-from picchio.diagnosis.percussion.search.screen import Screen, Suspect, hidden_cost
+from picchio.diagnosis.percussion.search.screen import Screen, Suspect
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import effect_class
 from picchio.model.effects.scales import Scales
@@ -63,7 +64,7 @@ def fit_long(
         turns = 0 if effect.name == "pulse_jitter" else 3
         long = fit(problem, short, records, None, iterations=turns)
         return fit_latent(problem, long, type(effect), effect.target, rival)
-    if kinked(short):  # a small error early is a large one late: not all at once
+    if is_nonsmooth(short):  # a small error early is a large one late: not all at once
         short = fit_growing(problem, short, records, windows=_ON_THE_WAY, iterations=3).hypothesis
     return fit(problem, short, records, None, iterations=6, rival=rival)
 
@@ -87,8 +88,6 @@ _TWIN = 1e-4
 MOST_RIVALS = 5
 # Chi-square per sample up to which the first part of a part of the records shows nothing.
 _LITTLE = 1.2
-# Sets whose BIC is within this cannot be told apart.
-SAME = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,25 +102,6 @@ class Trial:
     def finished(self, records: Sequence[MeasuredRecord]) -> bool:
         """Whether it was fitted to all of these records, to their ends."""
         return len(self.fit.records) == len(records) and self.fit.end is None
-
-
-def score(found: Fit) -> float:
-    """BIC: chi-square and priors, plus ln(samples) for every number the causes hold.
-
-    What numbers cost that are drawn anew in every record says `drawn_numbers`.
-    """
-    causes = found.hypothesis.causes
-    numbers = sum(_numbers(effect) for effect in causes)
-    hidden = hidden_cost(found.hypothesis, len(found.records), found.samples)
-    return found.cost + numbers * math.log(max(found.samples, 2)) + hidden
-
-
-def _numbers(effect: Effect) -> int:
-    if effect.latent is not None:
-        return 1
-    if effect.discrete:
-        return 1
-    return len(effect.parameters)
 
 
 def try_candidates(
@@ -148,7 +128,7 @@ def try_candidates(
     With a `cause`, which is a label among the candidates, its rivals are looked for: it is screened
     to know what may be expected of them; `best` is the fit to all records that has it.
     """
-    some = list(records) if whole else spread_out(records)
+    some = list(records) if whole else records_of_every_pose(records)
     window = None if whole else SCREEN_WINDOW
     start = fit(problem, known, some, window, iterations=4, with_jacobian=True)
     if not whole and start.chi_square < _LITTLE * start.samples:
@@ -199,7 +179,7 @@ def try_candidates(
         if best is None or not short:
             return _long_trials(pool, short, list(records), long_fits)
         own = fit(problem, best.hypothesis, some, window, iterations=2)
-        mark = min(score(own), short[0][2])
+        mark = min(bic(own), short[0][2])
         return _long_trials(pool, short, list(records), long_fits, mark, best.cost)
 
 
@@ -249,7 +229,7 @@ def _best_of_each(
         known = found.get(suspect.label)
         if known is None or light.cost < known[1].cost:
             own = replace(light, records=tuple(records))
-            found[suspect.label] = (suspect, own, score(own))
+            found[suspect.label] = (suspect, own, bic(own))
     return sorted(found.values(), key=lambda item: item[2])
 
 
@@ -286,7 +266,7 @@ def _long_trials(
         for (suspect, _), light in zip(some, pool.map("long", tasks), strict=True):
             long = replace(light, records=tuple(records))
             rival = min(rival, long.cost)
-            trials.append(Trial(suspect.label, long, score(long), suspect.gain))
+            trials.append(Trial(suspect.label, long, bic(long), suspect.gain))
     return sorted(trials, key=lambda t: t.score)
 
 
@@ -309,7 +289,7 @@ def _twins(one: Suspect, other: Suspect) -> bool:
     return one.numbers == other.numbers and abs(one.gain - other.gain) < _TWIN * one.gain
 
 
-def spread_out(records: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
+def records_of_every_pose(records: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
     """One or two records of every pose, their directions taken in turn."""
     by_pose: dict[int, list[MeasuredRecord]] = {}
     for record in records:
@@ -328,7 +308,7 @@ def spread_out(records: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
 _ROUGH = 100.0
 
 
-def held_out_choice(tied: Sequence[tuple[Trial, float | None]]) -> Trial | None:
+def holdout_choice(tied: Sequence[tuple[Trial, float | None]]) -> Trial | None:
     """Of trials that do as well, the first that the records held out confirm, or clearly prefer.
 
     Args:
@@ -362,12 +342,12 @@ def over_the_same_samples(
     ]
     if best not in close or len(close) < 2:
         return list(trials)
-    if not weigh(problem, best.fit.residuals, best.fit.records).is_noise:
+    if not whiteness_test(problem, best.fit.residuals, best.fit.records).is_noise:
         return list(trials)
     with problem.pinned(best.fit.hypothesis.effects):
         again = []
         for t in close:
             there = fit(problem, t.fit.hypothesis, records, None, iterations=6)
-            again.append(replace(t, fit=there, score=score(there)))
+            again.append(replace(t, fit=there, score=bic(there)))
     others = [t for t in trials if t not in close]
     return sorted([*again, *others], key=lambda t: t.score)

@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
-
+from picchio.diagnosis.motion.criteria.necessity import (
+    TORQUE_RIPPLE,
+    contribution,
+    indistinguishable,
+    necessity,
+    passes,
+)
+from picchio.diagnosis.motion.criteria.score import Scorer
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit
-from picchio.diagnosis.motion.fit.stretches import confidence
 from picchio.diagnosis.motion.search.candidates import candidates
-from picchio.diagnosis.motion.search.score import Score, Scorer
-from picchio.diagnosis.motion.search.select import RIPPLE, necessity, own_part, passes
 from picchio.model.effects.effect import Effect
 
-_TIE = 2.0
-_SURE = 0.95
 
-
-def rivals(
+def alternatives(
     system: System, current: Fit, kinds: Mapping[str, type[Effect]]
 ) -> dict[int, list[tuple[str, str]]]:
     """Number of an effect of the fit -> those that the training records can't tell from it.
@@ -27,14 +27,14 @@ def rivals(
     A rival takes the effect's place beside all others. It can't be told apart where it is
     nearly as likely, or where its losses are not of one sign over the stretches held out.
     """
-    slow = {name: kind for name, kind in kinds.items() if name != RIPPLE}
+    slow = {name: kind for name, kind in kinds.items() if name != TORQUE_RIPPLE}
     scorer = Scorer(system, current)
     found: dict[int, list[tuple[str, str]]] = {}
     for index, effect in enumerate(current.state.effects):
-        if effect.name == RIPPLE:
+        if effect.name == TORQUE_RIPPLE:
             continue
         score = necessity(scorer, index)
-        own, part = own_part(current, index)
+        own, part = contribution(current, index)
         if score is None:
             continue
         back = current.columns[:, own] @ part
@@ -49,18 +49,8 @@ def rivals(
             if other is None or not passes(other) or not set(other.groups) & set(score.groups):
                 continue
             same = candidate.label == (effect.name, effect.target)
-            if not same and _alike(score, other):
+            if not same and indistinguishable(score, other):
                 known = found.setdefault(index, [])
                 if candidate.label not in known:
                     known.append(candidate.label)
     return found
-
-
-def _alike(score: Score, other: Score) -> bool:
-    if other.rank >= score.rank - _TIE:
-        return True
-    shared = sorted(set(score.differences) | set(other.differences))
-    lead = np.array([
-        score.differences.get(b, 0.0) - other.differences.get(b, 0.0) for b in shared
-    ])  # fmt: skip
-    return confidence(lead) < _SURE and float(lead.sum()) < 3.0 * _TIE

@@ -22,7 +22,7 @@ _WORTH_SENDING = 10_000
 
 
 @contextmanager
-def shared_out(problem: Problem) -> Iterator[None]:
+def parallel_records(problem: Problem) -> Iterator[None]:
     """Within the block, other processes predict their part of the records.
 
     They are forked, so they have the problem as it is now; which effects, which records and up to

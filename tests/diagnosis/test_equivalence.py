@@ -11,12 +11,12 @@ import pytest
 import trial
 
 import picchio
-from picchio.diagnosis.percussion.criteria.equivalence import _told_numbers
-from picchio.diagnosis.percussion.criteria.identifiability import unseen
+from picchio.diagnosis.percussion.criteria.equivalence import _effective_parameters
+from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_range
 from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 from picchio.diagnosis.percussion.fit.least_squares import fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.run import diagnose_percussion
 from picchio.model.effects.registry import effect_class
 from worlds import campaign as worlds
 
@@ -122,7 +122,7 @@ def fitted(slopes, priors):
 )
 def test_numbers_count_as_far_as_the_records_tell_them(columns, priors, numbers):
     problem, records, found = fitted(np.array(columns), priors)
-    assert _told_numbers(problem, found, records) == pytest.approx(numbers, abs=5e-3)
+    assert _effective_parameters(problem, found, records) == pytest.approx(numbers, abs=5e-3)
 
 
 def test_a_rotor_of_next_to_no_inertia_is_no_number(arm, soft_joint):
@@ -133,8 +133,8 @@ def test_a_rotor_of_next_to_no_inertia_is_no_number(arm, soft_joint):
     hypothesis = Hypothesis.baseline(arm, soft_joint[0].tolerance).plus(servo)
     found = fit(problem, hypothesis, problem.records, None, iterations=0, with_jacobian=True)
     numbers = {u.name: k for k, u in enumerate(hypothesis.unknowns()) if u.prior is None}
-    assert unseen(problem, found, numbers["stiffness"]) == 0.0
-    far = unseen(problem, found, numbers["rotor_inertia"])
+    assert unconstrained_range(problem, found, numbers["stiffness"]) == 0.0
+    far = unconstrained_range(problem, found, numbers["rotor_inertia"])
     assert 1e-4 < values["rotor_inertia"] * math.exp(far) < 10.0  # kg m^2; the arm's are 10 to 100
 
     def changes(distance):

@@ -10,6 +10,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.motion.data.system import Group, Segment, System
 from picchio.diagnosis.motion.fit.least_squares import Fit, correlation_length
+from picchio.diagnosis.motion.fit.orders import Spectrum, order_spectrum
 from picchio.diagnosis.motion.fit.state import Coordinate
 from picchio.diagnosis.motion.fit.stretches import (
     Stretch,
@@ -19,7 +20,6 @@ from picchio.diagnosis.motion.fit.stretches import (
     stretches_of,
     without_added,
 )
-from picchio.diagnosis.motion.search.orders import Spectrum, order_spectrum
 from picchio.model.effects.effect import Effect
 
 _TINY = 1e-300

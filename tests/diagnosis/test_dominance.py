@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 import picchio
-from picchio.diagnosis.percussion import run as diagnose
-from picchio.diagnosis.percussion.criteria.dominance import dominant, share
-from picchio.diagnosis.percussion.criteria.whiteness import weigh
+from picchio.diagnosis.percussion import diagnosis as diagnose
+from picchio.diagnosis.percussion.criteria.dominance import dominant_causes, explained_share
+from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
@@ -48,9 +48,9 @@ def test_what_imitates_the_unknown_rest_is_not_claimed():
     alone = fit(problem, found.hypothesis.minus("hysteresis:joint_2"))
     # it helps a lot, and leaves much
     assert found.cost < alone.cost - 100.0
-    assert not weigh(problem, found.residuals).is_noise
-    assert 0.1 < share(found, alone) < 0.9
-    stands = dominant(problem, found, problem.records)
+    assert not whiteness_test(problem, found.residuals).is_noise
+    assert 0.1 < explained_share(found, alone) < 0.9
+    stands = dominant_causes(problem, found, problem.records)
     assert stands.hypothesis.labels == {"joint_stiffness:joint_1"}
     (softer,) = stands.hypothesis.causes
     true = 0.7 * truth["nuisances"]["stiffness"]["joint_1"]
@@ -59,14 +59,14 @@ def test_what_imitates_the_unknown_rest_is_not_claimed():
 
 def test_causes_that_are_there_stay():
     problem, found, _ = fitted((SOFTER, TILTED, UNKNOWN), SOFTER, TILTED)
-    assert not weigh(problem, found.residuals).is_noise
-    assert dominant(problem, found, problem.records) is found
+    assert not whiteness_test(problem, found.residuals).is_noise
+    assert dominant_causes(problem, found, problem.records) is found
 
 
 def test_where_noise_is_left_every_cause_explains_all():
     problem, found, _ = fitted((SOFTER, TILTED), SOFTER, TILTED)
-    assert weigh(problem, found.residuals).is_noise
-    assert dominant(problem, found, problem.records) is found
+    assert whiteness_test(problem, found.residuals).is_noise
+    assert dominant_causes(problem, found, problem.records) is found
 
 
 def test_a_diagnosis_leaves_the_imitation_out(monkeypatch):

@@ -9,19 +9,20 @@ from picchio.campaign.campaign import Campaign
 from picchio.core.errors import InputError
 from picchio.diagnosis.motion.conclude.holdout import judge, judged_groups, table
 from picchio.diagnosis.motion.conclude.values import cause, nuisances
-from picchio.diagnosis.motion.criteria.equivalence import rivals
-from picchio.diagnosis.motion.criteria.every_record import validate
-from picchio.diagnosis.motion.data.baseline import baseline
+from picchio.diagnosis.motion.criteria.holdout import validate
+from picchio.diagnosis.motion.criteria.necessity import TORQUE_RIPPLE, necessity
+from picchio.diagnosis.motion.criteria.score import Scorer
 from picchio.diagnosis.motion.data.noise import noise_levels
 from picchio.diagnosis.motion.data.split import split
 from picchio.diagnosis.motion.data.system import Group, System
+from picchio.diagnosis.motion.fit.baseline import baseline
 from picchio.diagnosis.motion.fit.instruments import instrument_shifts
 from picchio.diagnosis.motion.fit.least_squares import Fit, fit
 from picchio.diagnosis.motion.fit.state import State
 from picchio.diagnosis.motion.follow_up.advice import next_measurement
+from picchio.diagnosis.motion.search.alternatives import alternatives
 from picchio.diagnosis.motion.search.candidates import motion_effects
-from picchio.diagnosis.motion.search.score import Scorer
-from picchio.diagnosis.motion.search.select import RIPPLE, Step, eliminate, necessity, select
+from picchio.diagnosis.motion.search.select import Step, eliminate, select
 from picchio.diagnosis.result import MOSTLY, Cause, Diagnosis, Gain, Verdict
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import catalogue as all_effects
@@ -114,10 +115,10 @@ def _conclude(system: System, judge_on: System, before: Fit, found: Fit,
     for index in range(len(found.state.effects)):
         score = necessity(scorer, index)
         sure.append(min(_SURE, score.confidence) if score is not None else 0.5)
-    alike = rivals(system, found, kinds)
+    rivals = alternatives(system, found, kinds)
     order = sorted(
         range(len(found.state.effects)),
-        key=lambda i: (found.state.effects[i].name == RIPPLE, i),
+        key=lambda i: (found.state.effects[i].name == TORQUE_RIPPLE, i),
     )  # fmt: skip
     causes = tuple(cause(system, found, i, sure[i]) for i in order)
     verdict = _verdict(system, before, found, noise, gain)
@@ -126,17 +127,17 @@ def _conclude(system: System, judge_on: System, before: Fit, found: Fit,
     if verdict == "unexplained":
         leads = tuple(dict.fromkeys([*_labels(found.state), *leads]))
         causes = ()
-    alternatives = _alternatives(found.state, alike) if causes else ()
-    if verdict == "named" and alternatives:
+    sets = _alternatives(found.state, rivals) if causes else ()
+    if verdict == "named" and sets:
         verdict = "ambiguous"
     return Diagnosis(
         verdict=verdict,
         causes=causes,
-        alternatives=alternatives,
+        alternatives=sets,
         leads=leads if verdict in ("partial", "unexplained") else (),
         nuisances=nuisances(system, found),
         gain=gain,
-        next_measurement=next_measurement(system, found, noise, alike)
+        next_measurement=next_measurement(system, found, noise, rivals)
         if verdict not in ("nothing-wrong", "named") else None,
         scores=tuple(row for step in steps for row in step.scores),
         details=_details(system, judge_on, before, found, outer, steps, causes, dropped, kinds),

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from picchio.diagnosis.percussion.criteria.pose_consistency import between_poses, unsteadiness
+from picchio.diagnosis.percussion.criteria.pose_consistency import (
+    jackknife_covariance,
+    pose_inconsistency,
+)
 
 POSES, RECORDS, SAMPLES, UNKNOWNS = 6, 3, 80, 4
 
@@ -40,7 +43,7 @@ def fitted(rng, moves=0.0, poses=POSES):
 @pytest.mark.parametrize("poses", [1, 3, 6])
 def test_noise_alone_is_normal(poses):
     rng = np.random.default_rng(5)
-    told = [unsteadiness(fitted(rng, poses=poses)) for _ in range(200)]
+    told = [pose_inconsistency(fitted(rng, poses=poses)) for _ in range(200)]
     assert kstest(told, "norm").pvalue > 0.01
 
 
@@ -49,11 +52,11 @@ def test_an_unknown_that_differs_from_pose_to_pose_shows():
     # five standard deviations of what a pose tells; the residual's power hardly rises
     found = fitted(rng, moves=5.0 / np.sqrt(RECORDS * 2 * SAMPLES))
     assert np.mean([np.mean(r**2) for r in found.residuals]) < 1.3
-    assert unsteadiness(found) > 6.0
+    assert pose_inconsistency(found) > 6.0
 
 
 def test_without_slopes_nothing_is_said():
-    assert unsteadiness(SimpleNamespace(jacobians=None)) == 0.0
+    assert pose_inconsistency(SimpleNamespace(jacobians=None)) == 0.0
 
 
 def test_the_spread_between_poses_is_that_of_fits_without_one():
@@ -65,7 +68,7 @@ def test_the_spread_between_poses_is_that_of_fits_without_one():
         data = np.concatenate([found.data[k] for k in some])
         without.append(np.linalg.lstsq(design, data, rcond=None)[0])
     covariance = (POSES - 1) / POSES * np.cov(np.array(without).T, ddof=0) * POSES
-    np.testing.assert_allclose(between_poses(found), covariance, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(jackknife_covariance(found), covariance, rtol=1e-9, atol=1e-15)
 
 
 def test_where_noise_is_left_the_poses_agree_as_the_fit_says():
@@ -74,7 +77,7 @@ def test_where_noise_is_left_the_poses_agree_as_the_fit_says():
     for _ in range(100):
         found = fitted(rng)
         fits = np.linalg.inv(found.normal_matrix())
-        ratios.append(between_poses(found).diagonal() / fits.diagonal())
+        ratios.append(jackknife_covariance(found).diagonal() / fits.diagonal())
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.15)
 
 
@@ -82,7 +85,7 @@ def test_one_pose_has_no_spread():
     found = fitted(np.random.default_rng(9), poses=1)
     found.records, found.jacobians = found.records[:1], found.jacobians[:1]
     found.residuals = found.residuals[:1]
-    assert not between_poses(found).any()
+    assert not jackknife_covariance(found).any()
 
 
 def test_what_one_record_alone_tells_does_not_spread():
@@ -94,6 +97,6 @@ def test_what_one_record_alone_tells_does_not_spread():
     normal[0, 1:] += 1e-13
     normal[1:, 0] += 1e-13
     found.normal_matrix = lambda: normal
-    spread = between_poses(found)
+    spread = jackknife_covariance(found)
     assert spread[0, 0] < np.linalg.inv(normal)[0, 0]
     assert (spread.diagonal()[1:] < 4.0 * np.linalg.inv(normal).diagonal()[1:]).all()

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.motion.criteria.necessity import TORQUE_RIPPLE, contribution
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit, clean, fit, row_weights, stable_solve
 from picchio.diagnosis.motion.fit.state import Coordinate, State
-from picchio.diagnosis.motion.search.select import RIPPLE, own_part
 from picchio.model.effects.effect import Effect
 
 _LITTLE = 0.05
@@ -30,17 +30,17 @@ def validate(
     if len(held_out.logs) < 2:
         return current, dropped
     while current.state.effects:
-        seen, equations = look(held_out, current), normal_equations(train, current)
+        seen, equations = held_out_equations(held_out, current), normal_equations(train, current)
         gains = [gain_by_record(held_out, current, i, seen, equations)
                  for i in range(len(current.state.effects))]  # fmt: skip
         failing = [
             i for i, found in enumerate(gains)
-            if found and _fails(found, current.state.effects[i].name == RIPPLE)
+            if found and _fails(found, current.state.effects[i].name == TORQUE_RIPPLE)
         ]  # fmt: skip
         if not failing:
             break
         # Ripples hardly touch each other and go together; others one by one, the worst first.
-        gone = [i for i in failing if current.state.effects[i].name == RIPPLE]
+        gone = [i for i in failing if current.state.effects[i].name == TORQUE_RIPPLE]
         others = [i for i in failing if i not in gone]
         if others:
             gone.append(min(others, key=lambda i: min(gains[i].values())))
@@ -77,10 +77,10 @@ def gain_by_record(
         held_out: the equations of the records held out.
         current: the fit to the training records.
         index: which effect.
-        seen: of `look`.
+        seen: of `held_out_equations`.
         equations: of `normal_equations`.
     """
-    own, part = own_part(current, index)
+    own, part = contribution(current, index)
     if not own:
         return {}
     rest = [i for i in range(len(current.coordinates)) if i not in own]
@@ -103,7 +103,7 @@ def gain_by_record(
     return {file: (a - b) / max(a, 1e-300) for file, (a, b) in found.items()}
 
 
-def look(system: System, current: Fit) -> tuple[FloatArray, FloatArray]:
+def held_out_equations(system: System, current: Fit) -> tuple[FloatArray, FloatArray]:
     """Derivatives (rows, k) by the fit's coordinates, and the residual, on records held out."""
     predicted = system.predict(current.state.every, current.state.scales)
     columns = [_column(system, current.state, c, predicted) for c in current.coordinates]

@@ -12,36 +12,38 @@ from picchio.campaign.campaign import Campaign
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.life import life_before_and_after
 from picchio.diagnosis.percussion.conclude.causes import (
-    stated_spread,
-    told_causes,
-    told_covariance,
-    told_nuisances,
-    told_spread,
+    fitted_causes,
+    fitted_nuisances,
+    fitted_spread,
+    nominal_spread,
+    reported_covariance,
     with_hum,
 )
-from picchio.diagnosis.percussion.conclude.holdout import held_out, measure_gain
+from picchio.diagnosis.percussion.conclude.holdout import holdout_gain
 from picchio.diagnosis.percussion.conclude.verdict import (
     may_be_partial,
     pair_of,
     verdict_of,
-    why_none,
+    why_not_claimed,
 )
+from picchio.diagnosis.percussion.criteria.bic import SAME, bic
 from picchio.diagnosis.percussion.criteria.common_fault import common_faults
-from picchio.diagnosis.percussion.criteria.dominance import dominant
-from picchio.diagnosis.percussion.criteria.equivalence import behind
+from picchio.diagnosis.percussion.criteria.dominance import dominant_causes
+from picchio.diagnosis.percussion.criteria.equivalence import bic_difference
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.split import held_out
+from picchio.diagnosis.percussion.fit.drawn import hum_lines
 from picchio.diagnosis.percussion.fit.least_squares import Fit
-from picchio.diagnosis.percussion.fit.shared_records import shared_out
+from picchio.diagnosis.percussion.fit.parallel_records import parallel_records
 from picchio.diagnosis.percussion.fit.unknowns import TOLERATED, Hypothesis
-from picchio.diagnosis.percussion.fit.workers import warm_up
 from picchio.diagnosis.percussion.follow_up.next_measurement import next_measurement
 from picchio.diagnosis.percussion.search.candidates import all_candidates
-from picchio.diagnosis.percussion.search.rounds import look, weighed
-from picchio.diagnosis.percussion.search.screen import hum_lines
+from picchio.diagnosis.percussion.search.rounds import fit_evidence, look
 from picchio.diagnosis.percussion.search.select import LEAST_GAIN, Search, alternatives, refit
-from picchio.diagnosis.percussion.search.trials import SAME, Trial, score
+from picchio.diagnosis.percussion.search.trials import Trial
+from picchio.diagnosis.percussion.search.warm_up import warm_up
 from picchio.diagnosis.result import Diagnosis
 from picchio.measurement.noise.level import Noise
 from picchio.model.effects.effect import Effect
@@ -86,8 +88,8 @@ class PercussionDiagnosis:
             robot,
             task,
             self.extended.hypothesis.effects,
-            before=stated_spread(robot, self.problem.campaign.tolerance),
-            after=told_spread(self.extended),
+            before=nominal_spread(robot, self.problem.campaign.tolerance),
+            after=fitted_spread(self.extended),
             others=[other.effects for other in self.others],
         )
 
@@ -121,7 +123,7 @@ def diagnose_percussion(
     problem = Problem(robot, campaign, noise, gravity_stiffness=gravity_stiffness, workers=workers)
     candidates = all_candidates(problem, without)
     warm_up(problem, candidates)
-    with shared_out(problem):
+    with parallel_records(problem):
         return _diagnosed(problem, candidates, say)
 
 
@@ -145,22 +147,22 @@ def _diagnosed(
     whole = nominal
     if found.best.hypothesis.labels:
         whole = refit(problem, found.best.hypothesis, problem.records)
-    after = weighed(problem, whole)
+    after = fit_evidence(problem, whole)
     if len(found.best.hypothesis.labels) > 1 and not after.is_noise:
         say("looking which of the causes stand far above what is left")
-        stands = dominant(problem, found.best, train)
+        stands = dominant_causes(problem, found.best, train)
         if stands is not found.best:
             found.best = stands
             whole = refit(problem, stands.hypothesis, problem.records)
-            after = weighed(problem, whole)
-    gain = measure_gain(problem, baseline.hypothesis, found.best.hypothesis, train, kept)
+            after = fit_evidence(problem, whole)
+    gain = holdout_gain(problem, baseline.hypothesis, found.best.hypothesis, train, kept)
     same: list[Trial] = []
     rivals = [
         t
         for t in (found.steps[0] if found.steps else [])
         if t.finished(train) and t.fit.hypothesis.labels != whole.hypothesis.labels
     ]
-    causes = told_causes(problem, whole, found, rivals, train)
+    causes = fitted_causes(problem, whole, found, rivals, train)
     # More rivals can only lessen the confidence: what isn't sure by now won't be claimed.
     if causes and (after.is_noise or may_be_partial(causes, gain.explained)):
         say("looking for other causes that would do as well")
@@ -169,8 +171,8 @@ def _diagnosed(
             same, rivals = alternatives(problem, found, candidates, scales, train)
         with problem.pinned(whole.hypothesis.effects):
             same, refuted = _on_all_records(problem, whole, same)
-        causes = told_causes(problem, whole, found, rivals, train, refuted)
-    common = common_faults(whole.hypothesis, told_covariance(whole), problem.groups)
+        causes = fitted_causes(problem, whole, found, rivals, train, refuted)
+    common = common_faults(whole.hypothesis, reported_covariance(whole), problem.groups)
     verdict = verdict_of(causes, before, after, bool(same), gain.explained, common)
     if any(e.name == "mains_hum" for e in whole.hypothesis.effects):
         causes = with_hum(causes, hum_lines(problem, whole))
@@ -178,7 +180,7 @@ def _diagnosed(
     for t in same:
         pairs = tuple(sorted(pair_of(label) for label in t.fit.hypothesis.labels))
         others.setdefault(pairs, t.fit.hypothesis)
-    note = why_none(causes, common) if after.is_noise and verdict == "unexplained" else ""
+    note = why_not_claimed(causes, common) if after.is_noise and verdict == "unexplained" else ""
     leads: tuple[tuple[str, str], ...] = ()
     if note:
         leads = tuple((c.effect, c.target) for c in causes)
@@ -194,7 +196,7 @@ def _diagnosed(
         causes=causes if claimed else (),
         alternatives=tuple(others) if claimed else (),
         leads=leads,
-        nuisances=told_nuisances(whole if claimed or verdict == "nothing-wrong" else nominal),
+        nuisances=fitted_nuisances(whole if claimed or verdict == "nothing-wrong" else nominal),
         gain=gain,
         next_measurement=ask,
         scores=tuple(_scores(found)),
@@ -214,8 +216,8 @@ def _on_all_records(
     refuted: list[Trial] = []
     for trial in same:
         there = refit(problem, trial.fit.hypothesis, problem.records)
-        alike = behind(problem, whole, there, problem.records) < SAME
-        (kept if alike else refuted).append(replace(trial, fit=there, score=score(there)))
+        alike = bic_difference(problem, whole, there, problem.records) < SAME
+        (kept if alike else refuted).append(replace(trial, fit=there, score=bic(there)))
     return kept, refuted
 
 
@@ -223,7 +225,7 @@ def _leads(found: Search) -> list[tuple[str, str]]:
     """What helped, though nothing may be claimed."""
     if not found.steps:
         return []
-    reference = score(found.baseline)
+    reference = bic(found.baseline)
     helpful = [t for t in found.steps[0] if reference - t.score > LEAST_GAIN]
     return [pair_of(t.label) for t in helpful[:3]]
 

@@ -99,7 +99,7 @@ def order_spectrum(
 ) -> Spectrum | None:
     """A joint's residual over the order, record by record; None where there is too little.
 
-    Args: as `picchio.diagnosis.motion.search.orders.find_orders`.
+    Args: as `picchio.diagnosis.motion.fit.orders.find_orders`.
     """
     pieces = _pieces(system, residual, joint, state)
     travel = max((float(np.ptp(angle)) for angle, _ in pieces), default=0.0)

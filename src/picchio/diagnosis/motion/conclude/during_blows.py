@@ -24,7 +24,7 @@ NONE_ACTS = "nothing that was found acts while the tool hits: the life is the no
 
 
 @dataclass(frozen=True)
-class Carried:
+class BlowEffects:
     """The causes of a motion diagnosis, sorted by whether a blow meets them.
 
     Attributes:
@@ -52,7 +52,7 @@ class MotionLife:
     blows: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
-def carried(diagnosis: Diagnosis) -> Carried:
+def effects_during_blows(diagnosis: Diagnosis) -> BlowEffects:
     """Which causes act on a robot whose motors stand still while its tool hits.
 
     Masses and what yields beyond the gear do. Friction, ripple and rotors are in the drive, and a
@@ -60,7 +60,7 @@ def carried(diagnosis: Diagnosis) -> Carried:
     side, since friction damps. Which is which is seen from what an effect does to a motion.
     """
     if not diagnosis.causes:
-        return Carried((), ())
+        return BlowEffects((), ())
     system: System = diagnosis.details["systems"]["train"]
     state: State = diagnosis.details["extended"]
     kept, left = [], []
@@ -70,7 +70,7 @@ def carried(diagnosis: Diagnosis) -> Carried:
             kept.append(effect)
         else:
             left.append((effect, READS if reads else CARRIES if beyond else STANDS))
-    return Carried(tuple(kept), tuple(left))
+    return BlowEffects(tuple(kept), tuple(left))
 
 
 def _acts(system: System, effect: Effect) -> tuple[bool, bool]:
@@ -106,7 +106,7 @@ def motion_life(robot: FlexibleRobot, task: Task | None, diagnosis: Diagnosis) -
     if not robot.flexible_joints:
         return MotionLife(None, "no joint has a stiffness, so blows can't be followed: give one "
                           "with --flex")  # fmt: skip
-    effects = carried(diagnosis).effects
+    effects = effects_during_blows(diagnosis).effects
     found = life_before_and_after(robot, task, effects)
     blows = {
         side: {name: joint["peak_deflection"] for name, joint in found[side]["joints"].items()}
