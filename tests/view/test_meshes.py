@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 import picchio
 from picchio.core.errors import PicchioWarning
 from picchio.excitation.trains import PulseTrain
+from picchio.visuals.kinematics import frames, world
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.robot.body import MOST_FACES, build_body, decimate
-from picchio.visuals.scene.robot.kinematics import frames, world
 from picchio.visuals.scene.robot.mesh import sphere
 from picchio.visuals.scene.robot.visuals import load_mesh, resolve_mesh
 
