@@ -110,8 +110,8 @@ def test_the_page_stands_alone_and_its_links_lead_somewhere(whole):
 
 @pytest.mark.slow
 def test_every_function_that_is_named_exists(whole):
-    from picchio.paper.equations import resolve
+    from pkgutil import resolve_name
 
     for equation in whole[2]["equations"]:
         if equation["function"]:
-            assert callable(resolve(equation["function"]))
+            assert callable(resolve_name(equation["function"]))

@@ -8,10 +8,12 @@ from SALib.analyze import sobol as salib
 from SALib.sample import sobol as salib_sample
 
 from picchio.core.errors import InputError
-from picchio.fatigue.sn.curve import SNCurve
-from picchio.fatigue.uncertain_lives import Samples, Uncertain, propagate, strength_factor
+from picchio.fatigue.uncertain_lives import LifeSpread, Samples, Uncertain, design
 
-CURVE = SNCurve(name="c", strength=200e6, cycles=1e6, slopes=(8.0,), survival=0.975, scatter=0.04)
+
+def propagate(inputs, model, samples: int = 1024, seed: int = 0) -> LifeSpread:
+    plan = design(inputs, samples=samples, seed=seed)
+    return plan.summarise(*model(plan.values))
 
 
 def power_law(values: Samples) -> tuple[np.ndarray, np.ndarray]:
@@ -84,12 +86,6 @@ def test_lives_without_end_keep_their_ranking() -> None:
     assert spread.shares["a"] == pytest.approx(1.0, abs=0.02)
 
 
-def test_strength_factor_is_the_curves_own_scatter() -> None:
-    for survival in (0.5, 0.9, 0.975, 0.999):
-        factor = float(strength_factor(0.975, 0.04, 1.0 - survival))
-        assert CURVE.at_survival(survival).strength == pytest.approx(200e6 * factor, rel=1e-9)
-
-
 def test_bad_inputs_are_named() -> None:
     for call, key in (
         (lambda: propagate({}, power_law), "inputs"),
@@ -98,7 +94,6 @@ def test_bad_inputs_are_named() -> None:
         (lambda: propagate(INPUTS, lambda v: (v["a"], -v["a"])), "measure"),
         (lambda: Uncertain(1.0, -0.1), "spread"),
         (lambda: Uncertain(1.0, 0.1, "gauss"), "shape"),  # type: ignore[arg-type]
-        (lambda: strength_factor(0.9, 0.04, 1.0), "probability"),
     ):
         with pytest.raises(InputError, match=key):
             call()

@@ -12,7 +12,6 @@ from picchio.core.errors import InputError
 from picchio.fatigue.shaft_stress import (
     check_shaft,
     polar_moment,
-    radius_for_stress,
     shear_stress,
     shear_stress_from_deflection,
 )
@@ -62,12 +61,6 @@ def test_disagreement_is_the_stresses_ratio() -> None:
     bar, stiffness = Bar(), 1e5
     ratio = shear_stress_from_deflection(1e-3, bar) / shear_stress(stiffness * 1e-3, bar)
     assert check_shaft(stiffness, bar) == pytest.approx(float(ratio) - 1.0, rel=1e-12)
-
-
-def test_radius_for_stress_inverts_shear_stress() -> None:
-    radius = radius_for_stress(-420.0, 55e6)
-    assert float(shear_stress(420.0, Bar(radius=radius))) == pytest.approx(55e6, rel=1e-12)
-    assert radius_for_stress(0.0, 55e6) == 0.0
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, "x", None, 1j])

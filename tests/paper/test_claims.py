@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from picchio.paper.assumptions import Assumptions
-from picchio.paper.claims.registry import CLAIMS
+from picchio.paper.claims.trial import CLAIMS
 from picchio.paper.printed import printed
 from picchio.paper.verdict import Verdict
 

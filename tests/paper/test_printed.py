@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from picchio.paper.assumptions import INPUTS, Assumptions, parse_assumptions
-from picchio.paper.claims.registry import CLAIMS, claim
+from picchio.paper.claims.registry import claim
+from picchio.paper.claims.trial import CLAIMS
 from picchio.paper.printed import printed
 
 

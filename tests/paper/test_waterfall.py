@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from picchio.fatigue.sn.library import load_sn_curve
-from picchio.paper.claims.life import STEEL
-from picchio.paper.waterfall import CORRECTIONS, paper_lives, waterfall
+from picchio.paper.waterfall import CORRECTIONS, STEEL, paper_lives, waterfall
 from picchio.studies.assessment.run import assess
 from picchio.studies.tasks import Task
 

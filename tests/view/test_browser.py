@@ -125,7 +125,7 @@ def test_links_are_where_pinocchio_has_them(open_page, arm_scene, arm) -> None:
           });
         }"""
     )
-    from picchio.visuals.scene.robot.kinematics import frames
+    from picchio.visuals.kinematics import frames
 
     for frame, place in zip(frames(arm.robot, arm.worst.pose), places, strict=True):
         expected, _ = arm.robot.frame_placement(arm.worst.pose, frame.link)

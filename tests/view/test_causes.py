@@ -18,8 +18,8 @@ from picchio.excitation.pulse_train import PulseTrain
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.registry import catalogue
 from picchio.visuals.diagnosis_file import read_diagnosis
+from picchio.visuals.kinematics import world
 from picchio.visuals.scene.build import build_scene
-from picchio.visuals.scene.robot.kinematics import world
 
 BLOWS = PulseTrain(300.0, 0.040, 0.004)
 POSE = [-0.3, 0.6, -0.5]

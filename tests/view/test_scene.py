@@ -20,12 +20,12 @@ import picchio
 from picchio.excitation.half_sine_train import HalfSineTrain
 from picchio.excitation.pulse_train import PulseTrain
 from picchio.studies.envelopes import direction_envelope, icosphere
+from picchio.visuals.kinematics import frames, world
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.compare import compare_scene
 from picchio.visuals.scene.live import controls
 from picchio.visuals.scene.overlay import envelope_surfaces
 from picchio.visuals.scene.page import script_json
-from picchio.visuals.scene.robot.kinematics import frames, world
 from picchio.visuals.scene.robot.mesh import arrow, turned_to
 
 BLOWS = PulseTrain(300.0, 0.040, 0.004)

@@ -1,11 +1,11 @@
-"""Reducers: catalogue life while turning, and the torque limits that bind at standstill.
+"""Reducers: their ratings, the torque limits that bind at standstill, and the catalogue files.
 
-Catalogue life is the life of rolling contacts that turn: the wave generator's bearing of a
-strain-wave gear (exponent 3), the crank's roller bearings of a cycloidal one (exponent 10/3). A
-joint that stands still under blows rolls over nothing: its contacts fret at one spot (false
-brinelling), which no catalogue covers. So for percussive work the binding check is the peak torque,
-gravity and vibration together, against the limit for repeated peaks: a blow is duty, not an
-accident, and the limit for momentary peaks is for emergencies alone.
+A catalogue life is that of rolling contacts that turn: the wave generator's bearing of a
+strain-wave gear, the crank's roller bearings of a cycloidal one. A joint that stands still under
+blows turns nothing: its contacts fret in one spot (false brinelling), which no catalogue covers. So
+for percussive work the check that decides is the peak torque, gravity and vibration together,
+against the limit for repeated peaks. A blow is part of the duty, not an accident: the limit for
+momentary peaks is for emergencies only.
 """
 
 from __future__ import annotations
@@ -17,10 +17,7 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Literal
-
-import numpy as np
-import numpy.typing as npt
+from typing import Any, Literal, get_args
 
 from picchio.core.arrays import as_floats
 from picchio.core.errors import InputError
@@ -28,11 +25,8 @@ from picchio.core.toml import Positive, StrictModel, parse_toml
 
 Kind = Literal["strain-wave", "cycloidal"]
 
-LIFE_EXPONENT: dict[Kind, float] = {"strain-wave": 3.0, "cycloidal": 10.0 / 3.0}
-MOMENTARY_EVENTS = 1e4
-"""Flexspline deformations that a strain-wave gear stands at momentary peaks (Harmonic Drive)."""
-
-
+REDUCER_FORMAT = "picchio-reducers/1"
+_RPM = 2.0 * math.pi / 60.0
 _EXCEEDED = {
     "repeated peak torque": "the blows' peak torque exceeds the limit for repeated peaks",
     "momentary peak torque": "the peak torque exceeds even the limit for emergencies",
@@ -76,82 +70,12 @@ class Reducer:
     source: str = ""
 
     def __post_init__(self) -> None:
-        if self.kind not in LIFE_EXPONENT:
-            raise InputError("unknown kind", key="kind", value=self.kind, choices=LIFE_EXPONENT)
+        if self.kind not in get_args(Kind):
+            raise InputError("unknown kind", key="kind", value=self.kind, choices=get_args(Kind))
         for key, value in asdict(self).items():
             number = value if isinstance(value, int | float) else 1.0
             if not (math.isfinite(number) and number > 0):
                 raise InputError("must be positive", key=f"{self.name}.{key}", value=value)
-
-    @property
-    def life_exponent(self) -> float:
-        """Of torque in the life: 3 (ball bearing) or 10/3 (roller bearing)."""
-        return LIFE_EXPONENT[self.kind]
-
-    def mean_torque(
-        self, torque: npt.ArrayLike, speed: npt.ArrayLike, duration: npt.ArrayLike
-    ) -> float:
-        """The steady torque that wears as much as a cycle of torques.
-
-        (sum |n| t |T|^p / sum |n| t)^(1/p), p the life exponent; Harmonic Drive Engineering Data,
-        equation 18.2 (p = 3); Nabtesco RV catalogue (p = 10/3).
-
-        Args:
-            torque: (c,) N m of each part of the cycle.
-            speed: (c,) of the output, any unit.
-            duration: (c,) s.
-
-        Returns:
-            N m; at standstill throughout, the largest torque, since nothing averages it.
-        """
-        load = np.abs(as_floats(torque, "torque"))
-        turns = np.abs(as_floats(speed, "speed")) * as_floats(duration, "duration")
-        load, turns = np.broadcast_arrays(load, turns)
-        if load.size == 0 or (turns < 0).any():
-            raise InputError("needs parts of the cycle with durations", key="duration")
-        if turns.sum() == 0:
-            return float(load.max())
-        p = self.life_exponent
-        return float((np.sum(turns * load**p) / turns.sum()) ** (1.0 / p))
-
-    def life(self, mean_torque: float, mean_speed: float) -> float:
-        """Catalogue life L10 while turning: L (n_rated / n) (T_rated / T)^p.
-
-        Args:
-            mean_torque: N m, from `mean_torque`.
-            mean_speed: rad/s, over the whole cycle with its pauses, of the shaft that
-                `rated_speed` is for.
-
-        Returns:
-            s; inf at standstill or without torque, which promises nothing (see the module).
-        """
-        torque = abs(float(as_floats(mean_torque, "mean_torque")))
-        speed = abs(float(as_floats(mean_speed, "mean_speed")))
-        if torque == 0 or speed == 0:
-            return math.inf
-        ratio = self.rated_torque / torque
-        return self.rated_life * (self.rated_speed / speed) * ratio**self.life_exponent
-
-    def momentary_events(self, output_speed: float, duration: float) -> float | None:
-        """How many momentary peaks are allowed: 1e4 / (2 n t), n the input's turns a second.
-
-        Harmonic Drive Engineering Data, equation 18.8. For emergencies; not in the normal cycle.
-
-        Args:
-            output_speed: rad/s while the peak lasts.
-            duration: s of one peak.
-
-        Returns:
-            the number of events; None at standstill, where the budget counts turns that do not
-            happen, and for reducers whose catalogue has no such budget.
-        """
-        turns = abs(float(as_floats(output_speed, "output_speed"))) / (2.0 * math.pi)
-        if self.kind != "strain-wave" or self.ratio is None or turns == 0:
-            return None
-        length = float(as_floats(duration, "duration"))
-        if length <= 0:
-            raise InputError("must be positive", key="duration", value=duration)
-        return MOMENTARY_EVENTS / (2.0 * turns * self.ratio * length)
 
     def check_blows(self, peak_torque: float, holding_torque: float = 0.0) -> ReducerCheck:
         """Check a joint that stands still under blows.
@@ -186,8 +110,8 @@ class Reducer:
 
     def _warnings(self, shares: dict[str, float]) -> tuple[str, ...]:
         lines = [
-            f"{self.name}: catalogue life presumes turning; a joint that stands still under blows "
-            "risks false brinelling, which no catalogue covers"
+            f"{self.name}: the catalogue life presumes turning; a joint that stands still under "
+            "blows risks false brinelling, which no catalogue covers"
         ]
         for limit, text in _EXCEEDED.items():
             if shares.get(limit, 0.0) > 1.0:
@@ -197,7 +121,7 @@ class Reducer:
 
 @dataclass(frozen=True)
 class ReducerCheck:
-    """How far blows at standstill use a reducer's limits.
+    """Torques of a joint that stands still under blows, against its reducer's limits.
 
     Attributes:
         reducer: its name.
@@ -227,12 +151,6 @@ class ReducerCheck:
         return {**asdict(self), "warnings": list(self.warnings), "passed": self.passed}
 
 
-# The reducers that can be named: catalogue files that ship with picchio, and the user's own.
-
-REDUCER_FORMAT = "picchio-reducers/1"
-_RPM = 2.0 * math.pi / 60.0
-
-
 class ReducerEntry(StrictModel):
     """One reducer of a catalogue file; torques in N m."""
 
@@ -257,11 +175,6 @@ class ReducerFile(StrictModel):
     reducer: tuple[ReducerEntry, ...]
 
 
-def reducer_names() -> tuple[str, ...]:
-    """The names of the reducers that ship with picchio."""
-    return tuple(_shipped())
-
-
 def load_reducer(name: str, *, catalogues: Iterable[str | Path] = ()) -> Reducer:
     """A reducer by its catalogue name.
 
@@ -269,7 +182,7 @@ def load_reducer(name: str, *, catalogues: Iterable[str | Path] = ()) -> Reducer
 
     Args:
         name: as in the catalogue.
-        catalogues: further files (`picchio-reducers/1`); they win over those that ship.
+        catalogues: further files (`picchio-reducers/1`); they take precedence over those shipped.
 
     Raises:
         InputError: an unknown name, or a catalogue file that is missing or wrong.
@@ -290,14 +203,14 @@ def read_reducers(path: str | Path) -> dict[str, Reducer]:
     """The reducers of a catalogue file, by name.
 
     Raises:
-        InputError: missing, not TOML, an unknown format, misspelt keys, wrong values, or a name
-            that stands there twice.
+        InputError: missing, not TOML, an unknown format, misspelt keys, wrong values, or a
+            duplicate name.
     """
     content = parse_toml(path, ReducerFile, format=REDUCER_FORMAT)
     found: dict[str, Reducer] = {}
     for entry in content.reducer:
         if entry.name in found:
-            raise InputError("stands here twice", file=path, key="reducer.name", value=entry.name)
+            raise InputError("duplicate name", file=path, key="reducer.name", value=entry.name)
         values = entry.model_dump(exclude={"source"})
         found[entry.name] = Reducer(
             **values,

@@ -99,23 +99,6 @@ def check_shaft(stiffness: float, shaft: ShaftLike) -> float:
     return own / _positive(stiffness, "stiffness") - 1.0
 
 
-def radius_for_stress(torque: float, stress: float) -> float:
-    """The radius of the solid shaft in which `torque` gives `stress`: (2 T / (pi tau))^(1/3).
-
-    Args:
-        torque: N m, its magnitude counts.
-        stress: Pa.
-
-    Returns:
-        m; 0 for no torque.
-
-    Raises:
-        InputError: a torque that is not finite, or a stress that is not positive.
-    """
-    magnitude = abs(float(as_floats(torque, "torque")))
-    return float((2.0 * magnitude / (math.pi * _positive(stress, "stress"))) ** (1.0 / 3.0))
-
-
 def _positive(value: float, key: str) -> float:
     number = float(as_floats(value, key))
     if number <= 0.0:

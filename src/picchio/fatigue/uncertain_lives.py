@@ -1,15 +1,13 @@
-"""Uncertain lives: sample the inputs, summarise the life, and share its variance out.
+"""Uncertain lives: sample the inputs, then summarise the lives and attribute their variance.
 
-The functions here take samples and lives, not robots: the study that runs a robot's model on the
-samples (`picchio.studies.uncertainty`) and any other model can use them.
+Nothing here knows a robot: `picchio.studies.uncertainty` runs the model on the samples.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from statistics import NormalDist
 from typing import Any, Literal
 
 import numpy as np
@@ -173,28 +171,6 @@ def design(inputs: Mapping[str, Uncertain], *, samples: int = 1024, seed: int = 
     return Design({name: inputs[name].at(runs[:, i]) for i, name in enumerate(inputs)}, samples)
 
 
-def propagate(
-    inputs: Mapping[str, Uncertain],
-    model: Callable[[Samples], tuple[npt.ArrayLike, npt.ArrayLike]],
-    *,
-    samples: int = 1024,
-    seed: int = 0,
-) -> LifeSpread:
-    """P10, P50 and P90 of an uncertain life, and each input's share of the variance.
-
-    Args:
-        inputs: as in `design`.
-        model: takes {name: (m,)} and gives lives and measures, each (m,).
-        samples: as in `design`; the model runs (inputs + 2) * samples times.
-        seed: as in `design`.
-
-    Raises:
-        InputError: as `design` and `Design.summarise`.
-    """
-    plan = design(inputs, samples=samples, seed=seed)
-    return plan.summarise(*model(plan.values))
-
-
 def _sobol(
     at_a: FloatArray, at_b: FloatArray, mixed: FloatArray
 ) -> tuple[list[float], list[float]]:
@@ -206,21 +182,3 @@ def _sobol(
     first = [float(np.mean((at_b - centre) * (m - at_a)) / variance) for m in mixed]
     total = [float(0.5 * np.mean((at_a - m) ** 2) / variance) for m in mixed]
     return first, total
-
-
-def strength_factor(survival: float, scatter: float, probability: npt.ArrayLike) -> FloatArray:
-    """Factor on a curve's strength for a specimen of given rank.
-
-    Multiplies a curve stated for `survival` so that a share `probability` of specimens is weaker.
-
-    Args:
-        survival: of the curve as it stands.
-        scatter: standard deviation of log10 strength.
-        probability: (...) rank of the specimen among all, in (0, 1).
-    """
-    from scipy.special import ndtri
-
-    rank = as_floats(probability, "probability")
-    if ((rank <= 0) | (rank >= 1)).any() or not 0 < survival < 1:
-        raise InputError("must lie between 0 and 1", key="probability", value=probability)
-    return np.asarray(10.0 ** (scatter * (ndtri(rank) + NormalDist().inv_cdf(survival))))

@@ -1,4 +1,4 @@
-"""The paper's arm, made from what the paper prints, and its poses in closed form."""
+"""The paper's arm as printed, its poses in closed form, and the rivets it sets."""
 
 from __future__ import annotations
 
@@ -116,11 +116,12 @@ def places_of(poses: ArrayLike) -> FloatArray:
     return np.stack([out * np.cos(q1), out * np.sin(q1), up], axis=-1)
 
 
-# The rivet pattern of Fig. 12, as assumed: a panel that faces forward, riveted row by row.
-
-
 def rivet_points(given: Assumptions) -> FloatArray:
-    """Rivets (k, 3) in m in the order of the path: there and back, from the bottom row up."""
+    """The rivet pattern of Fig. 12, as assumed: a panel that faces the robot.
+
+    Returns:
+        (k, 3) m, in the order of the path: row by row from the bottom, to and fro.
+    """
     across = (np.arange(given.columns) - (given.columns - 1) / 2.0) * given.pitch
     up = (np.arange(given.rows) - (given.rows - 1) / 2.0) * given.pitch
     points = [

@@ -11,6 +11,7 @@ from picchio.paper.arm import poses_at
 from picchio.paper.assumptions import INPUTS
 from picchio.paper.study import Study
 from picchio.paper.world import World
+from picchio.vibration.batch.peaks import batch_peaks
 
 _TRIED = 4000
 _NAMES = ("period", "duty", "damping_ratio", "path_x")
@@ -96,8 +97,6 @@ def _search(study: Study) -> Dominance:
 
 
 def _worst(world: World, frame: World, mass: FloatArray, jacobian: FloatArray) -> FloatArray:
-    from picchio.vibration.batch.peaks import batch_peaks
-
     return batch_peaks(
         mass, jacobian, frame.robot.stiffness, world.given.damping_ratio, world.blows
     ).peak_deflection

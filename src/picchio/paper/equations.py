@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from picchio.paper.fourier import amplitude_and_phase, printed_series, worst_responses
+from picchio.excitation.piecewise import PiecewiseForce
+from picchio.excitation.pulse_train import PulseTrain
+from picchio.fatigue.miner import damage, peak_damage
+from picchio.fatigue.shaft_stress import shear_stress, shear_stress_from_deflection
+from picchio.model.linear_system import LinearSystem, modal_damping_matrix, undamped_modes
+from picchio.model.model import Model
+from picchio.paper.arm import places_of
+from picchio.paper.fourier import (
+    amplitude_and_phase,
+    printed_series,
+    worst_of,
+    worst_responses,
+)
 from picchio.paper.printed import Printed
 from picchio.paper.study import Study
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.studies.assessment.run import assess
+from picchio.vibration.closed_form.fourier import truncated_fourier_response
+from picchio.vibration.closed_form.modes import modal_analysis
+from picchio.vibration.closed_form.response import Response, response_from_rest
 
 
 @dataclass(frozen=True)
@@ -38,38 +54,19 @@ class Equation:
 
 
 Check = Callable[[Study], float]
-
-
-def resolve(path: str) -> Any:
-    """The object that a dotted path names.
-
-    Raises:
-        AttributeError: there is none.
-    """
-    top, *rest = path.split(".")
-    found: Any = importlib.import_module(top)
-    walked = top
-    for name in rest:
-        walked += f".{name}"
-        # A function hides the module of the same name, as it does for who imports it.
-        if not hasattr(found, name):
-            try:
-                importlib.import_module(walked)
-            except ModuleNotFoundError:
-                raise AttributeError(path) from None
-        found = getattr(found, name)
-    return found
+Row = tuple[Callable[..., Any], str, Check]
 
 
 def equations(study: Study) -> tuple[Equation, ...]:
     """All of them, checked in the base world."""
     found = []
     for number, remark in study.printed.equations.items():
-        function, check, gap = DONE_BY.get(number, ("", "not in the text", None))
-        found.append(
-            Equation(number, remark.page, remark.says, function, check,
-                     None if gap is None else gap(study))
-        )  # fmt: skip
+        if number not in DONE_BY:
+            found.append(Equation(number, remark.page, remark.says, "", "not in the text", None))
+            continue
+        function, check, gap = DONE_BY[number]
+        path = f"{function.__module__}.{function.__qualname__}"
+        found.append(Equation(number, remark.page, remark.says, path, check, gap(study)))
     return tuple(found)
 
 
@@ -127,8 +124,6 @@ def _energy(study: Study) -> float:
 
 def _jacobian(study: Study) -> float:
     """Eq. 3: J against differences of the tool's place."""
-    from picchio.paper.arm import places_of
-
     pose, step = np.array([0.3, 0.5, -0.8]), 1e-6
     found = study.base.robot.state(pose).jacobian
     by_steps = [
@@ -140,8 +135,6 @@ def _jacobian(study: Study) -> float:
 def _motion(study: Study) -> float:
     """Eqs. 2, 4, 5, 9, 11: the exact response put into M x'' + C x' + K x = J' n F."""
     rest, _, n, _ = worst_responses(study.base, 12)
-    from picchio.paper.fourier import worst_of
-
     pose = study.base.rivet_poses[worst_of(study.base)[1]]
     system = study.base.model.linear_system(pose)
     blows = study.base.blows
@@ -166,8 +159,6 @@ def _split(study: Study) -> float:
 
 def _modes(study: Study) -> float:
     """Eqs. 7, 8, 10: K S = M S D with S'MS = 1."""
-    from picchio.model.linear_system import undamped_modes
-
     system = study.base.model.linear_system(study.base.rivet_poses[0])
     omega, shapes = undamped_modes(system.mass_matrix, system.stiffness_matrix)
     left = system.stiffness_matrix @ shapes
@@ -186,8 +177,6 @@ def _series(study: Study) -> float:
 
 def _stress(study: Study) -> float:
     """Eqs. 14-17: G r x / l against k x r / Jp."""
-    from picchio.fatigue.shaft_stress import shear_stress, shear_stress_from_deflection
-
     gaps = []
     for joint in study.base.robot.flexible_joints:
         assert joint.shaft is not None
@@ -196,35 +185,35 @@ def _stress(study: Study) -> float:
     return max(gaps)
 
 
-_V, _M = "picchio.vibration", "picchio.model.linear_system"
 _EOM = "residual of the exact response in the equation of motion"
 _MODES = "residual of K S = M S D"
 _SHAFT = "G r Δq / l against k Δq r / Jp"
 _MINER = "eqs. 20 and 21 put back into eq. 18"
+_STRESS: Row = (shear_stress_from_deflection, _SHAFT, _stress)
+_RIVETS: Row = (assess, _MINER, lambda study: miner_gap(study.printed))
 
-DONE_BY: dict[str, tuple[str, str, Check | None]] = {
-    "1": ("picchio.robot.FlexibleRobot.state", "kinetic energy link by link against M", _energy),
-    "2": ("picchio.model.Model.linear_system", _EOM, _motion),
-    "3": ("picchio.robot.FlexibleRobot.frame_jacobian", "J against differences", _jacobian),
-    "4": ("picchio.excitation.PulseTrain", _EOM, _motion),
-    "5": ("picchio.model.LinearSystem", _EOM, _motion),
-    "6": (f"{_V}.response_from_rest", "from rest, after 400 blows, against the steady state",
-          _split),
-    "7": (f"{_V}.Response.deflection", _EOM, _motion),
-    "8": (f"{_M}.undamped_modes", _MODES, _modes),
-    "9": (f"{_V}.modal_analysis", _EOM, _motion),
-    "10": (f"{_M}.undamped_modes", _MODES, _modes),
-    "11": (f"{_M}.modal_damping_matrix", _EOM, _motion),
-    "12": ("picchio.excitation.PiecewiseForce.fourier_coefficients",
-           "eq. 12 against the exact pulse", _series),
-    "13": (f"{_V}.truncated_fourier_response", "eq. 13 with atan2 against the exact steady state",
+DONE_BY: dict[str, Row] = {
+    "1": (FlexibleRobot.state, "kinetic energy link by link against M", _energy),
+    "2": (Model.linear_system, _EOM, _motion),
+    "3": (FlexibleRobot.frame_jacobian, "J against differences", _jacobian),
+    "4": (PulseTrain, _EOM, _motion),
+    "5": (LinearSystem, _EOM, _motion),
+    "6": (response_from_rest, "from rest, after 400 blows, against the steady state", _split),
+    "7": (Response.deflection, _EOM, _motion),
+    "8": (undamped_modes, _MODES, _modes),
+    "9": (modal_analysis, _EOM, _motion),
+    "10": (undamped_modes, _MODES, _modes),
+    "11": (modal_damping_matrix, _EOM, _motion),
+    "12": (PiecewiseForce.fourier_coefficients, "eq. 12 against the exact pulse", _series),
+    "13": (truncated_fourier_response, "eq. 13 with atan2 against the exact steady state",
            lambda study: amplitude_and_phase(study.base).right_error),
-    "14": ("picchio.fatigue.shear_stress_from_deflection", _SHAFT, _stress),
-    "15": ("picchio.fatigue.shear_stress_from_deflection", _SHAFT, _stress),
-    "16": ("picchio.fatigue.shear_stress_from_deflection", _SHAFT, _stress),
-    "17": ("picchio.fatigue.shear_stress_from_deflection", _SHAFT, _stress),
-    "18": ("picchio.fatigue.miner", _MINER, lambda study: miner_gap(study.printed)),
-    "19": ("picchio.fatigue.peak_damage", _MINER, lambda study: miner_gap(study.printed)),
-    "20": ("picchio.studies.assessment.run", _MINER, lambda study: miner_gap(study.printed)),
-    "21": ("picchio.studies.assessment.run", _MINER, lambda study: miner_gap(study.printed)),
+    "14": _STRESS,
+    "15": _STRESS,
+    "16": _STRESS,
+    "17": _STRESS,
+    "18": (damage, _MINER, lambda study: miner_gap(study.printed)),
+    "19": (peak_damage, _MINER, lambda study: miner_gap(study.printed)),
+    "20": _RIVETS,
+    "21": _RIVETS,
 }  # fmt: skip
+"""By number: the function that does it, what was computed two ways, and how far they differ."""

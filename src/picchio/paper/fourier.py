@@ -1,4 +1,4 @@
-"""Eqs. 12 and 13 as they are written, to hold against the exact solution."""
+"""Eqs. 12 and 13 as printed, to compare with the exact solution."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from picchio.core.arrays import ComplexArray, FloatArray
 from picchio.excitation.pulse_train import PulseTrain
 from picchio.paper.world import World
 from picchio.vibration.closed_form.modes import modal_analysis
-from picchio.vibration.closed_form.response import Response, steady_state
+from picchio.vibration.closed_form.response import Response, response_from_rest, steady_state
 
-# Eq. 12: the Fourier series of the pulse train, as it is written.
+_HARMONICS = 4000
 
 
 def printed_series(blows: PulseTrain, harmonics: int) -> ComplexArray:
@@ -22,9 +22,6 @@ def printed_series(blows: PulseTrain, harmonics: int) -> ComplexArray:
     a = blows.force / (j * np.pi) * np.sin(2.0 * np.pi * j * share)
     b = blows.force / (j * np.pi) - blows.force / (j * np.pi) * np.cos(2.0 * np.pi * j * share)
     return np.concatenate([[blows.force * share], a - 1j * b])
-
-
-_HARMONICS = 4000
 
 
 def printed_force(blows: PulseTrain, harmonics: int, time: FloatArray) -> FloatArray:
@@ -130,8 +127,6 @@ def worst_responses(world: World, hits: int) -> tuple[Response, Response, FloatA
 
     Fig. 8, and what becomes of the steady state.
     """
-    from picchio.vibration.closed_form.response import response_from_rest
-
     direction, rivet, joint = worst_of(world)
     modes = modal_analysis(world.model.linear_system(world.rivet_poses[rivet]))
     return (

@@ -26,7 +26,7 @@ def reproduction_report(found: Reproduction, *, command: str = "picchio reproduc
     It needs nothing from outside, prints, and follows the reader's light or dark theme.
 
     Args:
-        found: of `picchio.paper.reproduce`.
+        found: of `picchio.paper.run.reproduce`.
         command: the command line that gave this.
 
     Returns:

@@ -9,11 +9,11 @@ from typing import Any
 
 from picchio.core.provenance import provenance
 from picchio.paper.assumptions import INPUTS, Assumptions
-from picchio.paper.claims.registry import Tried, try_claims
+from picchio.paper.claims.trial import Tried, try_claims
 from picchio.paper.conflicts import Conflict, conflicts
 from picchio.paper.equations import Equation, equations
-from picchio.paper.figures import all_figures
 from picchio.paper.figures.base import PaperFigure
+from picchio.paper.figures.catalogue import all_figures
 from picchio.paper.influence import Influence, influences
 from picchio.paper.printed import paper_file
 from picchio.paper.study import WORLDS, Study

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.paper.arm import poses_at
 from picchio.paper.world import World
 
 
@@ -48,7 +49,5 @@ def gravity_stress(world: World) -> FloatArray:
 
 def path_bend(world: World, x: FloatArray) -> FloatArray:
     """(4, len(x)) rad: how far joint 3 must bend to reach Fig. 9's heights at each x."""
-    from picchio.paper.arm import poses_at
-
     points = [[(at, 0.0, z) for at in x] for z in world.printed.task.path_heights]
     return np.asarray(np.abs(poses_at(points)[..., 2]))

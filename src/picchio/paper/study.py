@@ -11,6 +11,7 @@ from picchio.paper.printed import Printed, printed
 from picchio.paper.reach import ReachMap, reach_map
 from picchio.paper.table2.by_curve import CurveOfTable, curve_of_table
 from picchio.paper.table2.compare import Comparison, compare_hypotheses
+from picchio.paper.table2.place import FREE, decode
 from picchio.paper.world import World, random_worlds
 
 WORLDS = 160
@@ -59,6 +60,13 @@ class Study:
     def curve_of_table(self) -> CurveOfTable:
         """Table 2's lives against its stresses, without an arm."""
         return curve_of_table(self.printed)
+
+    @cached_property
+    def fitted(self) -> World:
+        """The world that comes nearest to Table 2's eight mean stresses."""
+        fit = self.comparison.alike[0]
+        values = decode(fit.vector[: len(FREE)])
+        return World(fit.place.base.but(**values, stress_per_twist=fit.stress_per_twist))
 
     @cached_property
     def comparison(self) -> Comparison:

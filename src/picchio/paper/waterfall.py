@@ -15,11 +15,13 @@ from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.miner import damage, life
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import load_sn_curve
-from picchio.paper.claims.life import STEEL
+from picchio.paper.fourier import worst_responses
 from picchio.paper.statics import gravity_stress
 from picchio.paper.world import World
 from picchio.studies.rivet.pose import JointLoad, Rivet
 
+STEEL = "42CrMo4-QT-shaft"
+"""An ordinary shaft steel to compare the paper's curve with."""
 CORRECTIONS = ("transient", "counting", "gravity", "curve")
 WORDS = {
     "transient": "from rest, not steady",
@@ -108,8 +110,6 @@ def paper_lives(world: World) -> FloatArray:
 
 def peak_over_amplitude(world: World) -> float:
     """Peak of the steady state over half its range, at the world's largest stress."""
-    from picchio.paper.fourier import worst_responses
-
     _, steady, n, joint = worst_responses(world, world.printed.task.hits_per_rivet)
     value = steady.turning_points(n)[joint][1]
     return float(np.abs(value).max() / (0.5 * np.ptp(value)))

@@ -115,15 +115,6 @@ class RainflowCounter:
             count,
         )
 
-    def drain(self) -> Cycles:
-        """Hand over the closed cycles and forget them, so that a long history needs no memory."""
-        whole, self._closed = self._closed, []
-        if not whole:
-            return Cycles.none()
-        ranges = np.concatenate([part[0] for part in whole])
-        means = np.concatenate([part[1] for part in whole])
-        return Cycles.trusted(ranges, means, np.ones(len(ranges)))
-
     @property
     def residue(self) -> FloatArray:
         """(r,) the turning points of the residue, as if the history ended here."""

@@ -71,27 +71,6 @@ class Cycles:
         """The cycles of the history times `factor`; a negative one turns the means over."""
         return Cycles(self.range * abs(float(factor)), self.mean * float(factor), self.count)
 
-    def binned(self, width: float) -> Cycles:
-        """Fewer cycles: ranges and means rounded away from zero to multiples of `width`.
-
-        On the safe side: no range or mean becomes smaller. Nothing here bins unless asked to.
-
-        Args:
-            width: of the classes, positive, in the history's unit.
-
-        Raises:
-            InputError: a width that is not positive and finite.
-        """
-        step = float(as_floats(width, "width"))
-        if step <= 0:
-            raise InputError("must be positive", key="width", value=width)
-        # A value on a class's edge stays there, whatever its last bit.
-        size = np.ceil(self.range / step - 1e-12)
-        mean = np.sign(self.mean) * np.ceil(np.abs(self.mean) / step - 1e-12)
-        classes, where = np.unique(np.stack((size, mean)), axis=1, return_inverse=True)
-        count = np.bincount(where.ravel(), weights=self.count, minlength=classes.shape[1])
-        return Cycles(classes[0] * step, classes[1] * step, count)
-
     def to_dict(self) -> dict[str, Any]:
         """Plain lists, for JSON."""
         return {name: getattr(self, name).tolist() for name in ("range", "mean", "count")}

@@ -1,8 +1,8 @@
-"""S-N curves in shear: one object that gives the same life on every path.
+"""S-N curves in shear.
 
 A curve is straight lines in log amplitude over log cycles (Basquin), steepest first, with an
 endurance limit beyond the last knee or without one. The life of a scalar, of an array, and the
-inverse all read the same knots, so nothing can disagree.
+inverse all read the same knots, so they cannot disagree.
 """
 
 from __future__ import annotations
@@ -19,60 +19,14 @@ import numpy.typing as npt
 from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError
 
-# What an S-N curve must hold.
-
-_POSITIVE = (
-    "strength", "cycles", "slopes", "knees", "ultimate_shear", "yield_shear", "tensile_strength",
-)  # fmt: skip
-
-
-def check_curve(curve: SNCurve) -> None:
-    """Refuse values that are no curve.
-
-    Raises:
-        InputError: names the attribute.
-    """
-    if curve.kind != "shear":
-        raise InputError("must be a shear curve", key="kind", value=curve.kind)
-    if curve.miner not in MINER_RULES:
-        raise InputError("unknown rule", key="miner", value=curve.miner, choices=MINER_RULES)
-    for name in _POSITIVE:
-        value = getattr(curve, name)
-        if value is not None and (as_floats(value, name) <= 0).any():
-            raise InputError("must be positive", key=name, value=value)
-    if curve.scatter is not None and float(as_floats(curve.scatter, "scatter")) < 0:
-        raise InputError("must not be negative", key="scatter", value=curve.scatter)
-    if curve.survival is not None:
-        check_probability(curve.survival)
-    if not curve.slopes or len(curve.slopes) - len(curve.knees) not in (0, 1):
-        raise InputError(
-            "needs as many knees as slopes (endurance limit) or one fewer",
-            key="knees",
-            value=curve.knees,
-        )
-    if any(b <= a for a, b in zip(curve.knees, curve.knees[1:], strict=False)):
-        raise InputError("must ascend", key="knees", value=curve.knees)
-    if len(curve.knees) == len(curve.slopes) and curve.cycles > curve.knees[-1]:
-        raise InputError("lies beyond the last knee", key="cycles", value=curve.cycles)
-
-
-def check_probability(value: float) -> float:
-    """A probability of survival.
-
-    Raises:
-        InputError: not between 0 and 1.
-    """
-    number = float(as_floats(value, "survival"))
-    if not 0.0 < number < 1.0:
-        raise InputError("must lie between 0 and 1", key="survival", value=value)
-    return number
-
-
 MinerRule = Literal["original", "elementary", "haibach"]
 MINER_RULES: tuple[MinerRule, ...] = get_args(MinerRule)
 
 ALLOWABLE_CYCLES = 1e7
 """Where the allowable is read from a curve that has no endurance limit."""
+_POSITIVE = (
+    "strength", "cycles", "slopes", "knees", "ultimate_shear", "yield_shear", "tensile_strength",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +54,7 @@ class SNCurve:
         kind: always "shear".
 
     Raises:
-        InputError: when made with values that are no curve.
+        InputError: values that do not make a curve.
     """
 
     name: str
@@ -163,7 +117,7 @@ class SNCurve:
         """Strength at a life: the inverse of `cycles_to_failure`.
 
         Args:
-            cycles: (...) positive; inf asks for what is survived for ever.
+            cycles: (...) positive; inf for the amplitude that is survived for ever.
 
         Returns:
             (...) Pa; the endurance limit beyond its knee (Miner original).
@@ -208,8 +162,8 @@ class SNCurve:
             scatter: standard deviation of log10 strength, if not the curve's own.
 
         Raises:
-            InputError: a probability that is none, or a curve whose own survival or scatter is
-                not known.
+            InputError: a probability outside (0, 1), or a curve whose own survival or scatter
+                is not known.
         """
         spread = self.scatter if scatter is None else scatter
         if self.survival is None:
@@ -220,25 +174,6 @@ class SNCurve:
         shift = NormalDist().inv_cdf(self.survival) - NormalDist().inv_cdf(wanted)
         moved = self.scaled(10.0 ** (spread * shift), f"survival {self.survival:g} to {wanted:g}")
         return dataclasses.replace(moved, survival=wanted, scatter=spread)
-
-    def failure_probability(self, amplitude: npt.ArrayLike, cycles: npt.ArrayLike) -> FloatArray:
-        """Probability that a part has failed after `cycles` at a constant `amplitude`.
-
-        Args:
-            amplitude: (...) Pa.
-            cycles: (...) broadcast against amplitude.
-
-        Raises:
-            InputError: as `at_survival`; or a scatter of zero.
-        """
-        if self.survival is None or not self.scatter:
-            raise InputError("the curve has no survival probability or no scatter", key=self.name)
-        stress = as_floats(amplitude, "amplitude")
-        with np.errstate(divide="ignore"):
-            margin = np.log10(stress / self.amplitude(cycles)) / self.scatter
-        score = margin - NormalDist().inv_cdf(self.survival)
-        erf = np.vectorize(math.erf, otypes=[float])
-        return np.asarray(0.5 * (1.0 + erf(score / math.sqrt(2.0))))
 
     def _repr_html_(self) -> str:
         from picchio.core.html import sheet
@@ -303,6 +238,48 @@ class SNCurve:
             stress *= (knees[i] / at) ** (-1.0 / slopes[i + 1])
             knots[i], at = stress, knees[i]
         return knots
+
+
+def check_curve(curve: SNCurve) -> None:
+    """Refuse values that do not make a curve.
+
+    Raises:
+        InputError: names the attribute.
+    """
+    if curve.kind != "shear":
+        raise InputError("must be a shear curve", key="kind", value=curve.kind)
+    if curve.miner not in MINER_RULES:
+        raise InputError("unknown rule", key="miner", value=curve.miner, choices=MINER_RULES)
+    for name in _POSITIVE:
+        value = getattr(curve, name)
+        if value is not None and (as_floats(value, name) <= 0).any():
+            raise InputError("must be positive", key=name, value=value)
+    if curve.scatter is not None and float(as_floats(curve.scatter, "scatter")) < 0:
+        raise InputError("must not be negative", key="scatter", value=curve.scatter)
+    if curve.survival is not None:
+        check_probability(curve.survival)
+    if not curve.slopes or len(curve.slopes) - len(curve.knees) not in (0, 1):
+        raise InputError(
+            "needs as many knees as slopes (endurance limit) or one fewer",
+            key="knees",
+            value=curve.knees,
+        )
+    if any(b <= a for a, b in zip(curve.knees, curve.knees[1:], strict=False)):
+        raise InputError("must ascend", key="knees", value=curve.knees)
+    if len(curve.knees) == len(curve.slopes) and curve.cycles > curve.knees[-1]:
+        raise InputError("lies beyond the last knee", key="cycles", value=curve.cycles)
+
+
+def check_probability(value: float) -> float:
+    """A probability of survival.
+
+    Raises:
+        InputError: not between 0 and 1.
+    """
+    number = float(as_floats(value, "survival"))
+    if not 0.0 < number < 1.0:
+        raise InputError("must lie between 0 and 1", key="survival", value=value)
+    return number
 
 
 def _power(base: FloatArray, exponent: FloatArray) -> FloatArray:

@@ -1,10 +1,11 @@
-"""Fit an S-N curve to test data with run-outs, each parameter with a confidence interval."""
+"""Fit an S-N curve to test data with run-outs; every parameter with a confidence interval."""
 
 from __future__ import annotations
 
 import dataclasses
 import warnings
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,6 @@ from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.likelihood import Likelihood, maximise
 from picchio.fatigue.sn.profile import Profile
 
-# A fitted S-N curve: its parameters with their intervals, and how sure the line is.
-
 METHOD = (
     "maximum likelihood; Basquin's line with an endurance limit; log-normal strength and "
     "life; profile likelihood intervals with Student's t threshold, scatter by the Cox-Reid "
@@ -27,7 +26,7 @@ METHOD = (
 
 @dataclass(frozen=True)
 class Estimate:
-    """A fitted value and its confidence interval; an end that the data do not bound is 0 or inf."""
+    """A fitted value and its confidence interval; 0 or inf where the data set no bound."""
 
     value: float
     low: float
@@ -159,9 +158,6 @@ class SNFit:
         }
 
 
-__all__ = ["METHOD", "Estimate", "SNFit", "fit_sn"]
-
-
 def fit_sn(
     amplitude: npt.ArrayLike,
     cycles: npt.ArrayLike,
@@ -205,16 +201,16 @@ def fit_sn(
     tests = _check(amplitude, cycles, failed, level, survival)
     run_outs = int((~tests.failed).sum())
     with_knee = run_outs > 0 if knee is None else knee
-    notes = [f"{tests.failed.sum()} failures, {run_outs} run-outs taken as tests stopped alive"]
+    notes = [f"{tests.failed.sum()} failures, {run_outs} run-outs taken as censored tests"]
     if with_knee:
-        notes.append("about half of the scatter is strength unless the tests know better")
+        notes.append("about half of the scatter is strength unless the tests show otherwise")
     else:
         notes.append("no knee: a straight line")
     if with_knee and run_outs == 0:
-        raise InputError("needs run-outs", key="knee", value=knee)
+        raise InputError("a knee needs run-outs", key="knee", value=knee)
     if knee is None and not with_knee:
         warnings.warn(
-            "the tests have no run-out, so the fit has no knee and no endurance limit",
+            "no test is a run-out, so the fit has no knee and no endurance limit",
             PicchioWarning,
             stacklevel=2,
         )
@@ -223,14 +219,14 @@ def fit_sn(
     theta = _best(tests, free)
     median = Profile(tests, theta, free, level)
     at_quantile = theta.copy()
-    z = _normal_quantile(survival)
+    z = NormalDist().inv_cdf(survival)
     at_quantile[0] -= z * np.exp(theta[3])
     design = Profile(dataclasses.replace(tests, z=z), at_quantile, free, level)
 
     share = float(1.0 / (1.0 + np.exp(-median.theta[4])))
     if with_knee and not 0.2 < share < 0.8:
-        kind = "strength" if share > 0.5 else "life by itself"
-        notes.append(f"the scatter is nearly all of {kind}: the intervals are too narrow then")
+        kind = "strength" if share > 0.5 else "life at a given strength"
+        notes.append(f"the scatter is nearly all in {kind}: the intervals are too narrow")
 
     def estimate(profile: Profile, index: int) -> Estimate:
         low, high = profile.interval(index)
@@ -281,7 +277,7 @@ def _check(amplitude: Any, cycles: Any, failed: Any, level: float, survival: flo
     if broke.sum() < 6:
         raise InputError("needs at least 6 failures", key="tests", value=int(broke.sum()))
     if len(np.unique(stress[broke])) < 2:
-        raise InputError("needs failures at two stresses at least", key="tests")
+        raise InputError("needs failures at two stresses or more", key="tests")
     return Likelihood(np.log(stress), np.log(life), broke)
 
 
@@ -302,11 +298,7 @@ def _best(tests: Likelihood, free: list[int]) -> FloatArray:
             if np.isfinite(value) and (best is None or value > best[0]):
                 best = (value, theta)
     if best is None or best[1][3] < np.log(1e-6):
-        raise InputError("the tests lie on a line: no scatter can be estimated", key="tests")
+        raise InputError(
+            "the tests lie exactly on a line: no scatter can be estimated", key="tests"
+        )
     return best[1]
-
-
-def _normal_quantile(probability: float) -> float:
-    from statistics import NormalDist
-
-    return NormalDist().inv_cdf(probability)

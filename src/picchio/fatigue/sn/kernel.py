@@ -1,4 +1,4 @@
-"""The compiled search for the maximum of the S-N likelihood. Importing this module loads numba."""
+"""The likelihood of S-N tests and the search for its maximum, compiled. Imports numba."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 
-# The compiled likelihood of S-N tests. Importing this module loads numba.
-
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(20)
 _FEW_NODES, _FEW_WEIGHTS = np.polynomial.legendre.leggauss(12)
+_STEP = 1e-5
 _HALF_LOG_2PI = 0.5 * math.log(2.0 * math.pi)
 
 
@@ -89,7 +88,7 @@ def log_likelihood(
     limited: bool,
     gradient: FloatArray,
 ) -> float:
-    """See `_sn_likelihood`; the gradient (5,) is added up in place, from zero.
+    """See `picchio.fatigue.sn.likelihood`; the gradient (5,) is added up in place, from zero.
 
     `limited`: whether there is an endurance limit; else the line goes on for ever.
     """
@@ -145,9 +144,6 @@ def log_likelihood(
         gradient[3] -= by_x * (x + z_p) + by_w * (w + z_p)
         gradient[4] += by_rho * rho_by_eta
     return total
-
-
-_STEP = 1e-5
 
 
 @numba.njit(cache=True)

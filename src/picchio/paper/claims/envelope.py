@@ -6,8 +6,9 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.paper.claims.registry import claim
+from picchio.paper.dominance import search_dominance
 from picchio.paper.study import Study
-from picchio.paper.verdict import PATH, Finding, across
+from picchio.paper.verdict import PATH, Finding, Verdict, across
 from picchio.paper.world import World
 
 _PINCHED = 0.2
@@ -138,9 +139,6 @@ def dominant_low(study: Study) -> Finding:
 @claim("dominant_all", "dominance")
 def dominant_all(study: Study) -> Finding:
     """All four at once; searched for, since it is rare."""
-    from picchio.paper.dominance import search_dominance
-    from picchio.paper.verdict import Verdict
-
     found = search_dominance(study)
     return Finding(
         Verdict.CONDITIONAL if found.hits else Verdict.FAILS,

@@ -8,18 +8,15 @@ import numpy as np
 
 from picchio.fatigue.sn.library import load_sn_curve
 from picchio.paper.claims.registry import claim
+from picchio.paper.equations import miner_gap, printed_total
 from picchio.paper.study import Study
 from picchio.paper.verdict import Finding, decided, unknown
-
-STEEL = "42CrMo4-QT-shaft"
-"""An ordinary shaft steel, to hold against the paper's curve."""
+from picchio.paper.waterfall import STEEL, paper_lives
 
 
 @claim("lives_differ", "table-2")
 def lives_differ(study: Study) -> Finding:
     """Lives by joint, printed and ours."""
-    from picchio.paper.waterfall import paper_lives
-
     printed = study.printed.cycles[np.isfinite(study.printed.cycles)]
     ours = paper_lives(study.base)
     ratio = float(ours.max() / ours.min())
@@ -35,8 +32,6 @@ def lives_differ(study: Study) -> Finding:
 @claim("miner_algebra", "equations")
 def miner_algebra(study: Study) -> Finding:
     """Eqs. 19a-21b against eq. 18, with numbers."""
-    from picchio.paper.equations import miner_gap
-
     gap = miner_gap(study.printed)
     return decided(
         gap < 1e-12,
@@ -115,8 +110,6 @@ def three_joints(study: Study) -> Finding:
 @claim("total")
 def total(study: Study) -> Finding:
     """The sum is not in the text; what Table 2 would give."""
-    from picchio.paper.equations import printed_total
-
     value, joint = printed_total(study.printed)
     many = study.printed.task.hits_per_rivet * value
     return unknown(

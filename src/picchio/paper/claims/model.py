@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from picchio.model.linear_system import undamped_modes
 from picchio.paper.claims.registry import claim
 from picchio.paper.fourier import amplitude_and_phase, printed_series
 from picchio.paper.study import Study
@@ -58,8 +59,6 @@ def transient(study: Study) -> Finding:
 @claim("decoupled")
 def decoupled(study: Study) -> Finding:
     """S^T M S and S^T K S are diagonal."""
-    from picchio.model.linear_system import undamped_modes
-
     worst = 0.0
     for pose in study.base.rivet_poses:
         system = study.base.model.linear_system(pose)

@@ -6,7 +6,7 @@ import numpy as np
 
 from picchio.paper.claims.registry import claim
 from picchio.paper.study import Study
-from picchio.paper.verdict import REACH, Finding, across
+from picchio.paper.verdict import REACH, Finding, Verdict, across
 from picchio.paper.world import World
 
 _AT_THE_END = 0.95
@@ -139,8 +139,6 @@ def nearest_joint_3(study: Study) -> Finding:
 
 def _limited(found: Finding, words: str) -> Finding:
     """A finding that is true under a condition at best."""
-    from picchio.paper.verdict import Verdict
-
     if found.verdict is Verdict.FAILS:
         return found
     return Finding(Verdict.CONDITIONAL, found.test, found.decides, found.number, words)

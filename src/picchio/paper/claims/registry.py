@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from picchio.paper.printed import Sentence
 from picchio.paper.verdict import Finding
 
 if TYPE_CHECKING:
@@ -30,25 +29,6 @@ class Claim:
     test: Test
 
 
-@dataclass(frozen=True)
-class Tried:
-    """A claim after it was tried."""
-
-    claim: Claim
-    sentence: Sentence
-    finding: Finding
-
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "name": self.claim.name,
-            "page": self.sentence.page,
-            "quote": self.sentence.quote,
-            "figure": self.claim.figure or None,
-            **self.finding.to_dict(),
-        }
-
-
 CLAIMS: dict[str, Claim] = {}
 
 
@@ -62,14 +42,3 @@ def claim(name: str, figure: str = "") -> Callable[[Test], Test]:
         return test
 
     return register
-
-
-def try_claims(study: Study) -> tuple[Tried, ...]:
-    """Every claim, in the order in which the paper makes them."""
-    import picchio.paper.claims  # noqa: F401 - registers them
-
-    return tuple(
-        Tried(CLAIMS[name], sentence, CLAIMS[name].test(study))
-        for name, sentence in study.printed.claims.items()
-        if name in CLAIMS
-    )

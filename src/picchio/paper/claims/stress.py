@@ -7,7 +7,10 @@ import numpy as np
 from picchio.paper.claims.registry import claim
 from picchio.paper.study import Study
 from picchio.paper.verdict import PANEL, Finding, across, decided
+from picchio.paper.waterfall import peak_over_amplitude
 from picchio.paper.world import World
+from picchio.vibration.closed_form.modes import modal_analysis
+from picchio.vibration.closed_form.response import steady_state
 
 _CLEARLY = 1.10
 """A difference of 10 % is one."""
@@ -69,8 +72,6 @@ def direction(study: Study) -> Finding:
 @claim("fluctuates", "fig-8")
 def fluctuates(study: Study) -> Finding:
     """The stress goes up and down."""
-    from picchio.vibration.closed_form.modes import modal_analysis
-    from picchio.vibration.closed_form.response import steady_state
 
     def moves(world: World) -> tuple[bool, float]:
         modes = modal_analysis(world.model.linear_system(world.rivet_poses[0]))
@@ -124,8 +125,6 @@ def most_stressed(study: Study) -> Finding:
 @claim("peak_stress", "corrections")
 def peak_stress(study: Study) -> Finding:
     """Whether the peak stands in for the amplitude without harm."""
-    from picchio.paper.waterfall import peak_over_amplitude
-
     ratio = peak_over_amplitude(study.base)
     factor = ratio**study.printed.sn_curve.exponent
     return decided(

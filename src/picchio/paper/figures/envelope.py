@@ -9,6 +9,7 @@ from picchio.core.arrays import FloatArray
 from picchio.paper.claims.envelope import lean, waist
 from picchio.paper.dominance import search_dominance
 from picchio.paper.figures.base import PaperFigure, panels, rounded
+from picchio.paper.statics import path_bend
 from picchio.paper.study import Study
 from picchio.paper.world import World
 from picchio.visuals.plots.style import BLUE, COLOURS, GREY, INK, MUTED, VERMILION, look
@@ -139,8 +140,6 @@ def _scatter(ax: Axes, values: FloatArray, agree: FloatArray) -> None:
 
 def reach_of_path(study: Study) -> PaperFigure:
     """Joint 3's stated range against the vertical path."""
-    from picchio.paper.statics import path_bend
-
     world = study.base
     limit = float(world.printed.arm.limits[2])
     x = np.linspace(0.2, 1.6, 400)

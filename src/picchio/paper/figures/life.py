@@ -8,11 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from picchio.fatigue.sn.library import load_sn_curve
-from picchio.paper.claims.life import STEEL
 from picchio.paper.figures.base import PaperFigure, panels, rounded
 from picchio.paper.statics import gravity_stress, holding_torque
 from picchio.paper.study import Study
-from picchio.paper.waterfall import Step
+from picchio.paper.waterfall import STEEL, Step
 from picchio.visuals.plots.style import BLUE, GREEN, GREY, INK, MUTED, ORANGE, VERMILION, look
 
 

@@ -7,9 +7,8 @@ from matplotlib.axes import Axes
 
 from picchio.paper.arm import rivet_points
 from picchio.paper.figures.base import PaperFigure, panels, rounded
+from picchio.paper.influence import influences
 from picchio.paper.study import Study
-from picchio.paper.table2.place import FREE, decode
-from picchio.paper.world import World
 from picchio.visuals.plots.style import BLUE, INK, MUTED, look
 
 
@@ -38,17 +37,9 @@ def figure_12(study: Study) -> PaperFigure:
     )  # fmt: skip
 
 
-def fitted_world(study: Study) -> World:
-    """The world that comes nearest to Table 2's eight mean stresses."""
-    fit = study.comparison.alike[0]
-    return World(
-        fit.place.base.but(**decode(fit.vector[: len(FREE)]), stress_per_twist=fit.stress_per_twist)
-    )
-
-
 def figures_13_to_15(study: Study) -> PaperFigure:
     """Peak stresses over the rivets, in the base world and in the fitted one."""
-    worlds = {"base": study.base, "fitted": fitted_world(study)}
+    worlds = {"base": study.base, "fitted": study.fitted}
     rows = study.printed.table2
     means = {name: world.rivet_stress.mean(axis=1) for name, world in worlds.items()}
 
@@ -85,8 +76,6 @@ def figures_13_to_15(study: Study) -> PaperFigure:
 
 def influence(study: Study) -> PaperFigure:
     """One input at a time from its least to its largest: what becomes of the life."""
-    from picchio.paper.influence import influences
-
     rows = influences(study)
     base = rows[0].base_life
 

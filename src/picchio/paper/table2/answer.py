@@ -10,7 +10,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.paper.table2.by_curve import CurveFit, CurveOfTable
-from picchio.paper.table2.compare import Compared, Comparison
+from picchio.paper.table2.compare import Comparison
 from picchio.paper.table2.fit import described
 
 if TYPE_CHECKING:
@@ -66,11 +66,6 @@ class Answer:
         return float(np.abs(np.delete(self.curve.residuals, self.curve.aside)).max())
 
     @property
-    def printed_curve_best(self) -> Compared:
-        """The best hypothesis that keeps the printed curve."""
-        return next(h for h in self.comparison.hypotheses if not h.fit.rule.free_exponent)
-
-    @property
     def slip(self) -> tuple[str, str, float]:
         """The change of one digit that comes nearest to the curve: to, from, ln N that is left."""
         k = self.curve.aside
@@ -121,8 +116,6 @@ def _one_digit_off(text: str) -> list[str]:
 
 def answer(study: Study) -> Answer:
     """All that can be said of Table 2."""
-    from picchio.paper.figures.rivets import fitted_world
-
     table, comparison = study.curve_of_table, study.comparison
     curve = table.fit(_OTHER, aside=True)
     printed = study.printed.sn_curve
@@ -140,7 +133,7 @@ def answer(study: Study) -> Answer:
                      "stress_per_twist")
     }  # fmt: skip
     return Answer(
-        table, comparison, base, fitted_world(study).rivet_stress.mean(axis=1),
+        table, comparison, base, study.fitted.rivet_stress.mean(axis=1),
         printed.cycles(base), curve, lead, (cycles, printed.a * cycles**printed.b),
         printed.b / b, ranges,
     )  # fmt: skip

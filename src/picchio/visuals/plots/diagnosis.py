@@ -17,6 +17,7 @@ from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.criteria.whiteness import Level
 from picchio.model.effects.registry import catalogue
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.visuals.kinematics import Frame, frames, world
 from picchio.visuals.plots.style import (
     BLUE,
     GREY,
@@ -28,7 +29,6 @@ from picchio.visuals.plots.style import (
     plain,
     styled,
 )
-from picchio.visuals.scene.robot.kinematics import Frame, frames, world
 
 # The arm as a stick figure, with the place of a cause ringed.
 

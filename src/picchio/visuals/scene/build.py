@@ -17,6 +17,7 @@ from picchio.studies.assessment.result import Assessment
 from picchio.studies.envelopes import DirectionEnvelope
 from picchio.studies.envelopes import envelope as envelope_of
 from picchio.vibration.closed_form.response import unit_vector
+from picchio.visuals.kinematics import frames, world
 from picchio.visuals.plots.style import direction_label
 from picchio.visuals.scene.causes.causes import add_causes
 from picchio.visuals.scene.causes.site import Site
@@ -29,7 +30,6 @@ from picchio.visuals.scene.overlay import (
     rivet_values,
 )
 from picchio.visuals.scene.robot.body import Body, build_body
-from picchio.visuals.scene.robot.kinematics import frames, world
 from picchio.visuals.scene.robot.mesh import Mesh, arrow, ring, sphere, turned_to
 from picchio.visuals.scene.scene import Item, Scene
 

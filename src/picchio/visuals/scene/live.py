@@ -9,14 +9,16 @@ from __future__ import annotations
 import base64
 import json
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.visuals.scene.robot.kinematics import joint_motion
+from picchio.visuals.kinematics import joint_motion
 from picchio.visuals.scene.robot.mesh import Mesh, rgb
-from picchio.visuals.scene.scene import Item, Scene
+
+if TYPE_CHECKING:
+    from picchio.visuals.scene.scene import Item, Scene
 
 _SINGLE = ("envelope", "worst", "map")
 """Layers of which one joint is shown at a time."""

@@ -10,9 +10,9 @@ import numpy as np
 from picchio.core.arrays import BoolArray, FloatArray, IndexArray
 from picchio.studies.assessment.result import Assessment
 from picchio.studies.envelopes import DirectionEnvelope, icosphere
+from picchio.visuals.kinematics import Frame
 from picchio.visuals.plots.style import CMAP
 from picchio.visuals.scene.robot.body import Body
-from picchio.visuals.scene.robot.kinematics import Frame
 from picchio.visuals.scene.robot.mesh import Mesh
 
 

@@ -10,16 +10,16 @@ from html import escape
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from picchio.visuals.scene.robot.kinematics import Frame
+from picchio.visuals.kinematics import Frame
 from picchio.visuals.scene.robot.mesh import Mesh
-from picchio.visuals.scene.scene import Scene
 
-# Arrays as one compressed block of text that the page unpacks.
+if TYPE_CHECKING:
+    from picchio.visuals.scene.scene import Scene
 
 
 class Packer:

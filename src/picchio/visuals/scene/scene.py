@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,10 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.provenance import package_version
 from picchio.studies.envelopes import DirectionEnvelope
+from picchio.visuals.kinematics import Frame
+from picchio.visuals.scene.live import send
 from picchio.visuals.scene.overlay import Scale
-from picchio.visuals.scene.robot.kinematics import Frame
+from picchio.visuals.scene.page import scene_html
 from picchio.visuals.scene.robot.mesh import Mesh
 
 
@@ -77,14 +80,10 @@ class Scene:
 
     def html(self) -> str:
         """One HTML page that needs nothing but itself."""
-        from picchio.visuals.scene.page import scene_html
-
         return scene_html(self)
 
     def show(self, viewer: Any = None) -> Any:
         """Draw it in a live meshcat viewer, a new one if not given, and return the viewer."""
-        from picchio.visuals.scene.live import send
-
         if viewer is None:
             import meshcat
 
@@ -96,8 +95,6 @@ class Scene:
         return f"Scene({self.title!r}, {self.subtitle!r}, layers={[i for i, _, _ in self.layers]})"
 
     def _repr_html_(self) -> str:
-        from html import escape
-
         page = escape(self.html(), quote=True)
         return (
             f'<iframe title="{escape(self.title)}" srcdoc="{page}" '

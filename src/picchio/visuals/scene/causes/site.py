@@ -10,8 +10,8 @@ from picchio.core.errors import InputError
 from picchio.model.effects.registry import effect_class
 from picchio.model.expansion import BASE_AXES
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.visuals.kinematics import Frame
 from picchio.visuals.scene.robot.body import Body
-from picchio.visuals.scene.robot.kinematics import Frame
 from picchio.visuals.scene.robot.mesh import Mesh
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, PicchioWarning
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.visuals.scene.robot.kinematics import Frame
+from picchio.visuals.kinematics import Frame
 from picchio.visuals.scene.robot.mesh import Mesh, merged, rgb, rod, sphere, turned_to
 from picchio.visuals.scene.robot.visuals import Visual, load_mesh, read_visuals
 

@@ -15,6 +15,7 @@ from picchio.core.errors import InputError, PicchioWarning
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.find import resolve_package
 from picchio.robot.urdf.xml import children, parse_urdf, read_urdf_bytes
+from picchio.visuals.kinematics import placement
 from picchio.visuals.scene.robot.mesh import Mesh, box, cylinder, merged, sphere
 
 _MOST_BYTES = 64 << 20
@@ -156,8 +157,6 @@ def resolve_mesh(address: str, folder: Path) -> Path:
 
 
 def _origin(element: etree._Element) -> FloatArray:
-    from picchio.visuals.scene.robot.kinematics import placement
-
     found = children(element, "origin")
     if not found:
         return np.eye(4)
