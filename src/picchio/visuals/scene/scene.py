@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.html import Page
 from picchio.core.provenance import package_version
 from picchio.studies.envelopes import DirectionEnvelope
 from picchio.visuals.scene.overlay import Scale
@@ -28,7 +29,7 @@ class Item:
 
 
 @dataclass(eq=False)
-class Scene:
+class Scene(Page):
     """Everything that a page, a notebook cell or a live viewer shows.
 
     Attributes:
@@ -94,15 +95,6 @@ class Scene:
 
     def __repr__(self) -> str:
         return f"Scene({self.title!r}, {self.subtitle!r}, layers={[i for i, _, _ in self.layers]})"
-
-    def _repr_html_(self) -> str:
-        from html import escape
-
-        page = escape(self.html(), quote=True)
-        return (
-            f'<iframe title="{escape(self.title)}" srcdoc="{page}" '
-            'style="width:100%;height:560px;border:0"></iframe>'
-        )
 
     def add(self, mesh: Mesh) -> int:
         """Put geometry in; its index."""
