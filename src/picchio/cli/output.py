@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -31,6 +32,11 @@ def say_warning(message: str) -> None:
 def said_warnings() -> list[str]:
     """The warnings printed so far."""
     return list(_said)
+
+
+def command_line() -> str:
+    """What was typed, for a report."""
+    return shlex.join(["picchio", *sys.argv[1:]])
 
 
 def console() -> Console:

@@ -41,11 +41,11 @@ class Result:
     Attributes:
         PAGE: the function that draws it for `picchio.report`, as "module:function" with the
             module below `picchio`. It is called with the result, `command`, `warnings` and the
-            options given to `report`, and returns HTML. Without one, the page shows what a
-            notebook shows.
+            options given to `report`, and returns HTML. The default page shows what a notebook
+            shows.
     """
 
-    PAGE: ClassVar[str] = ""
+    PAGE: ClassVar[str] = "visuals.report.page:plain_page"
 
     def _content(self) -> Mapping[str, Any]:
         """The keys of its JSON format; arrays, NaN and infinite numbers may stand in it."""

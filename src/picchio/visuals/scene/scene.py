@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.html import Page
 from picchio.core.provenance import package_version
+from picchio.core.results import Result
 from picchio.studies.envelopes import DirectionEnvelope
 from picchio.visuals.scene.overlay import Scale
 from picchio.visuals.scene.robot.kinematics import Frame
@@ -28,8 +30,8 @@ class Item:
     joint: int | None = None
 
 
-@dataclass(eq=False)
-class Scene(Page):
+@dataclass(eq=False, repr=False)
+class Scene(Page, Result):
     """Everything that a page, a notebook cell or a live viewer shows.
 
     Attributes:
@@ -53,6 +55,7 @@ class Scene(Page):
         chosen: index of the joint whose envelope is shown at first.
         reach: m, size of the robot.
         envelope: what the double balls are of.
+        file: where it was saved last, or None.
     """
 
     title: str
@@ -75,6 +78,7 @@ class Scene(Page):
     chosen: int = 0
     reach: float = 1.0
     version: str = field(default_factory=package_version)
+    file: Path | None = None
 
     def html(self) -> str:
         """One HTML page that needs nothing but itself."""
@@ -93,8 +97,27 @@ class Scene(Page):
         send(self, viewer)
         return viewer
 
-    def __repr__(self) -> str:
-        return f"Scene({self.title!r}, {self.subtitle!r}, layers={[i for i, _, _ in self.layers]})"
+    def save(self, path: str | Path) -> Path:
+        """Write the page to a file, whole or not at all, and return the path.
+
+        Raises:
+            InputError: it cannot be written there.
+        """
+        self.file = super().save(path)
+        return self.file
+
+    def _headline(self) -> str:
+        return f"{self.title}, {self.subtitle}"
+
+    def _content(self) -> dict[str, Any]:
+        return {
+            "format": "picchio-scene/1",
+            "file": self.file,
+            "bytes": 0 if self.file is None else self.file.stat().st_size,
+            "layers": [{"id": name, "text": text} for name, text, _ in self.layers],
+            "envelope": self.envelope.to_dict(),
+            "provenance": self.envelope.origin,
+        }
 
     def add(self, mesh: Mesh) -> int:
         """Put geometry in; its index."""
