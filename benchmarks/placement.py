@@ -23,8 +23,8 @@ from typing import Any
 import numba
 
 import picchio
-from picchio.cli.output import finite
 from picchio.core.files import atomic_write
+from picchio.core.results import plain
 from picchio.studies.placement.run import place
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -113,7 +113,7 @@ def main() -> None:
     if options.json:
         content = {"format": "picchio-placement-benchmark/1", "cases": rows}
         with atomic_write(options.json) as stream:
-            stream.write(json.dumps(finite(content), indent=2) + "\n")
+            stream.write(json.dumps(plain(content), indent=2) + "\n")
 
 
 if __name__ == "__main__":

@@ -15,96 +15,93 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from picchio import datasets
-    from picchio.campaign.campaign import Campaign, load_campaign, write_campaign
-    from picchio.campaign.record import Record
-    from picchio.core.errors import InputError, PicchioError, PicchioWarning
-    from picchio.excitation.half_sine_train import HalfSineTrain
-    from picchio.excitation.measured import MeasuredForce
-    from picchio.excitation.pulse_train import PulseTrain
-    from picchio.fatigue.counting.counter import rainflow
-    from picchio.fatigue.sn.curve import SNCurve
-    from picchio.fatigue.sn.library import load_sn_curve
-    from picchio.model.linear_system import LinearSystem
-    from picchio.model.model import Model
-    from picchio.robot.flexible_robot import FlexibleRobot
-    from picchio.robot.loading.load import load_robot
-    from picchio.studies.assessment.result import Assessment
-    from picchio.studies.assessment.run import assess
-    from picchio.studies.tasks import Task, load_task, task_from_dict
-    from picchio.vibration.closed_form.fourier import truncated_fourier_response
-    from picchio.vibration.closed_form.modes import modal_analysis
-    from picchio.vibration.closed_form.response import response_from_rest, steady_state
+    from picchio import datasets as datasets
+    from picchio.campaign.campaign import Campaign as Campaign
+    from picchio.campaign.campaign import load_campaign as load_campaign
+    from picchio.campaign.campaign import write_campaign as write_campaign
+    from picchio.campaign.importing.importer import import_record as import_record
+    from picchio.campaign.record import Record as Record
+    from picchio.core.errors import InputError as InputError
+    from picchio.core.errors import PicchioError as PicchioError
+    from picchio.core.errors import PicchioWarning as PicchioWarning
+    from picchio.excitation.half_sine_train import HalfSineTrain as HalfSineTrain
+    from picchio.excitation.measured import MeasuredForce as MeasuredForce
+    from picchio.excitation.pulse_train import PulseTrain as PulseTrain
+    from picchio.fatigue.counting.counter import rainflow as rainflow
+    from picchio.fatigue.sn.curve import SNCurve as SNCurve
+    from picchio.fatigue.sn.fit import fit_sn as fit_sn
+    from picchio.fatigue.sn.library import load_sn_curve as load_sn_curve
+    from picchio.measurement.quality.report import check as check
+    from picchio.model.model import Model as Model
+    from picchio.paper.run import reproduce as reproduce
+    from picchio.prediction.simulation import simulate as simulate
+    from picchio.robot.flexible_robot import FlexibleRobot as FlexibleRobot
+    from picchio.robot.loading.annotated import annotate as annotate
+    from picchio.robot.loading.catalogue import robots as robots
+    from picchio.robot.loading.load import load_robot as load_robot
+    from picchio.studies.assessment.run import assess as assess
+    from picchio.studies.tasks import Task as Task
+    from picchio.studies.tasks import load_task as load_task
+    from picchio.studies.tasks import task_from_dict as task_from_dict
+    from picchio.vibration.closed_form.modes import modal_analysis as modal_analysis
+    from picchio.vibration.closed_form.response import response_from_rest as response_from_rest
+    from picchio.vibration.closed_form.response import steady_state as steady_state
+    from picchio.visuals.report.page import report as report
+    from picchio.visuals.view import view as view
 
+# Every public name and its module, which is loaded when the name is first used; "" for a package.
 _HOME = {
-    "Assessment": "studies.assessment.result",
+    # What the commands do: a function each.
+    "annotate": "robot.loading.annotated",
+    "assess": "studies.assessment.run",
+    "check": "measurement.quality.report",
+    "fit_sn": "fatigue.sn.fit",
+    "import_record": "campaign.importing.importer",
+    "report": "visuals.report.page",
+    "reproduce": "paper.run",
+    "robots": "robot.loading.catalogue",
+    "simulate": "prediction.simulation",
+    "view": "visuals.view",
+    # What they work on, from files and from Python.
     "Campaign": "campaign.campaign",
     "FlexibleRobot": "robot.flexible_robot",
     "HalfSineTrain": "excitation.half_sine_train",
-    "InputError": "core.errors",
-    "LinearSystem": "model.linear_system",
     "MeasuredForce": "excitation.measured",
     "Model": "model.model",
-    "PicchioError": "core.errors",
-    "PicchioWarning": "core.errors",
     "PulseTrain": "excitation.pulse_train",
     "Record": "campaign.record",
     "SNCurve": "fatigue.sn.curve",
     "Task": "studies.tasks",
-    "assess": "studies.assessment.run",
     "load_campaign": "campaign.campaign",
     "load_robot": "robot.loading.load",
     "load_sn_curve": "fatigue.sn.library",
     "load_task": "studies.tasks",
+    "task_from_dict": "studies.tasks",
+    "write_campaign": "campaign.campaign",
+    "datasets": "",
+    # The steps of the method, for a closer look.
     "modal_analysis": "vibration.closed_form.modes",
     "rainflow": "fatigue.counting.counter",
     "response_from_rest": "vibration.closed_form.response",
     "steady_state": "vibration.closed_form.response",
-    "task_from_dict": "studies.tasks",
-    "truncated_fourier_response": "vibration.closed_form.fourier",
-    "write_campaign": "campaign.campaign",
+    # What goes wrong.
+    "InputError": "core.errors",
+    "PicchioError": "core.errors",
+    "PicchioWarning": "core.errors",
 }
 
-__all__ = [
-    "Assessment",
-    "Campaign",
-    "FlexibleRobot",
-    "HalfSineTrain",
-    "InputError",
-    "LinearSystem",
-    "MeasuredForce",
-    "Model",
-    "PicchioError",
-    "PicchioWarning",
-    "PulseTrain",
-    "Record",
-    "SNCurve",
-    "Task",
-    "assess",
-    "datasets",
-    "load_campaign",
-    "load_robot",
-    "load_sn_curve",
-    "load_task",
-    "modal_analysis",
-    "rainflow",
-    "response_from_rest",
-    "steady_state",
-    "task_from_dict",
-    "truncated_fourier_response",
-    "write_campaign",
-]
+__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         return import_module("picchio.core.provenance").package_version()
-    if name == "datasets":
-        return import_module("picchio.datasets")
-    if name in _HOME:
-        return getattr(import_module(f"picchio.{_HOME[name]}"), name)
-    raise AttributeError(f"module 'picchio' has no attribute {name!r}")
+    if name not in _HOME:
+        raise AttributeError(f"module 'picchio' has no attribute {name!r}")
+    if not _HOME[name]:
+        return import_module(f"picchio.{name}")
+    return getattr(import_module(f"picchio.{_HOME[name]}"), name)
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__, "__version__"])
+    return __all__

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from picchio.campaign.importing import read_matlab
-from picchio.campaign.importing.importer import import_record, read_raw
+from picchio.campaign.importing.importer import read_mapped, read_raw
 from picchio.campaign.importing.mapping import read_mapping
 from picchio.campaign.importing.template import mapping_template
 from picchio.core.errors import InputError
@@ -35,7 +35,7 @@ scale = 2.0
 from = "rec.motor(1)"
 to = "force"
 """
-    record = import_record(path, mapped(tmp_path, text + RECORD)).records[0]
+    record = read_mapped(path, mapped(tmp_path, text + RECORD)).records[0]
     expected = np.deg2rad((2 * values[1] + 1) * 1e-3)
     np.testing.assert_allclose(record["deflection.joint_1"], expected, rtol=1e-14)
     assert (record["force"] == values[0] * 2).all()
@@ -68,7 +68,7 @@ remove = "quiet"
 def test_csv_with_german_decimals(tmp_path):
     path = tmp_path / "messung.csv"
     path.write_text(CSV)
-    read = import_record(path, mapped(tmp_path, CSV_LAYOUT + RECORD)).records[0].read()
+    read = read_mapped(path, mapped(tmp_path, CSV_LAYOUT + RECORD)).records[0].read()
     steps = np.arange(20)
     np.testing.assert_allclose(read["time"], steps * 1e-4 - 5e-4, atol=1e-18)
     np.testing.assert_allclose(read["force"], steps * 500.0)
@@ -81,7 +81,7 @@ def test_a_rate_makes_the_clock_and_numbers_name_columns(tmp_path):
     path.write_text("1,10\n2,20\n3,30\n")
     text = "[source]\nheader = false\n[time]\nrate = 4.0\nzero = 0.25\n"
     text += '[[channel]]\nfrom = "2"\nto = "force"\n'
-    record = import_record(path, mapped(tmp_path, text + RECORD)).records[0]
+    record = read_mapped(path, mapped(tmp_path, text + RECORD)).records[0]
     assert record.file == "bare.csv"
     assert record.time.tolist() == [-0.25, 0.0, 0.25]
     assert record["force"].tolist() == [10.0, 20.0, 30.0]
@@ -94,7 +94,7 @@ def test_a_contract_csv_goes_through_unchanged(campaign, tmp_path):
     for name in names:
         header = campaign["r01.csv"].channel(name).header
         text += f'[[channel]]\nfrom = "{header}"\nto = "{name}"\n'
-    imported = import_record(source, mapped(tmp_path, text + RECORD)).save(tmp_path / "c")
+    imported = read_mapped(source, mapped(tmp_path, text + RECORD)).save(tmp_path / "c")
     assert (imported.folder / "r01.csv").read_bytes() == source.read_bytes()
 
 
@@ -129,7 +129,7 @@ def test_a_bad_mapping_is_refused_in_one_line(tmp_path, name):
     path = tmp_path / "messung.csv"
     path.write_text(CSV)
     with pytest.raises(InputError) as caught:
-        import_record(path, mapped(tmp_path, text if "[record]" in text else text + RECORD))
+        read_mapped(path, mapped(tmp_path, text if "[record]" in text else text + RECORD))
     assert "\n" not in str(caught.value)
     for word in words:
         assert word in str(caught.value), str(caught.value)
@@ -142,7 +142,7 @@ def test_files_that_are_none_of_their_kind(tmp_path, ending, content):
     path.write_bytes(content)
     text = '[time]\nrate = 1.0\n[[channel]]\nfrom = "a"\nto = "force"\n'
     with pytest.raises(InputError) as caught:
-        import_record(path, mapped(tmp_path, text + RECORD))
+        read_mapped(path, mapped(tmp_path, text + RECORD))
     assert f"bad{ending}" in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -184,5 +184,5 @@ def test_a_template_lists_every_series_and_reads_back(tmp_path, signals):
     assert filled != text
     target = tmp_path / "m.toml"
     target.write_text(filled.replace('kind = "percussion"', 'kind = "motion"'))
-    record = import_record(path, read_mapping(target)).records[0]
+    record = read_mapped(path, read_mapping(target)).records[0]
     assert (record["force"] == signals[1][0]).all()

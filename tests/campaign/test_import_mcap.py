@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from picchio.campaign.importing.importer import import_record, read_raw
+from picchio.campaign.importing.importer import read_mapped, read_raw
 from picchio.campaign.importing.mapping import read_mapping
 from picchio.campaign.importing.template import mapping_template
 from picchio.core.errors import InputError
@@ -133,7 +133,7 @@ def test_even_stamps_come_in_bit_for_bit(tmp_path, signals):
     assert "/joint_states:effort.b" not in raw.channels  # NaN: no such reading
     assert "/joint_states:velocity.a" not in raw.channels
     assert not any(name.startswith("/chat") for name in raw.channels)
-    record = import_record(path, mapped(tmp_path)).records[0]
+    record = read_mapped(path, mapped(tmp_path)).records[0]
     read = record.read()
     np.testing.assert_allclose(read["time"], np.arange(200) / 500.0, rtol=1e-15)
     assert (read["position.b"] == signals[1]).all()
@@ -150,11 +150,11 @@ def test_uneven_stamps_are_refused_and_resampled_on_request(tmp_path, signals):
     tone = np.sin(2 * np.pi * 5.0 * stamps * 1e-9)
     path = write_log(tmp_path / "run.mcap", stamps, np.tile(tone, (5, 1)), imu_stamps=imu)
     with pytest.raises(InputError, match=r"stamps of their own.*resample.*rate.*\d Hz"):
-        import_record(path, mapped(tmp_path))
+        read_mapped(path, mapped(tmp_path))
     with pytest.raises(InputError, match=r"time\.rate"):
-        import_record(path, mapped(tmp_path, 'resample = "linear"'))
+        read_mapped(path, mapped(tmp_path, 'resample = "linear"'))
     time = 'resample = "linear"\nrate = 250.0'
-    read = import_record(path, mapped(tmp_path, time)).records[0].read()
+    read = read_mapped(path, mapped(tmp_path, time)).records[0].read()
     assert np.diff(read["time"]) == pytest.approx(0.004, rel=1e-9)
     # The first stamp of all is the file's zero; linear interpolation errs by (w dt)^2 / 8.
     origin = min(stamps.astype(int).min(), imu.astype(int).min()) * 1e-9
@@ -170,7 +170,7 @@ def test_a_dropout_is_not_drawn_over(tmp_path, signals):
     with pytest.raises(
         InputError, match=r"/joint_states:position\.b.*missing for 0\.042 s.*0\.098"
     ):
-        import_record(path, mapped(tmp_path, 'resample = "linear"\nrate = 500.0'))
+        read_mapped(path, mapped(tmp_path, 'resample = "linear"\nrate = 500.0'))
 
 
 def test_the_logs_own_time_may_be_taken(tmp_path, signals):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from picchio.campaign.importing.importer import import_record, read_raw
+from picchio.campaign.importing.importer import read_mapped, read_raw
 from picchio.core.errors import InputError, PicchioWarning
 
 from .conftest import MAPPING_RECORD as RECORD
@@ -57,7 +57,7 @@ def test_uff_58(tmp_path, signals, binary):
     raw = read_raw(path)
     assert [(c.name, c.unit) for c in raw.channels.values()] == [("7+X", "g"), ("7-Z", "g")]
     assert "acc z" in raw.channels["7-Z"].note
-    campaign = import_record(path, mapped(tmp_path, UFF_CHANNELS + RECORD))
+    campaign = read_mapped(path, mapped(tmp_path, UFF_CHANNELS + RECORD))
     read = campaign["run.csv"].read()
     # ASCII double precision of data set 58 is E20.12.
     tolerance = 0.0 if binary else 1e-11

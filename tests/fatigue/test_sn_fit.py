@@ -18,6 +18,7 @@ from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.fit import Estimate, SNFit, fit_sn
 from picchio.fatigue.sn.kernel import bivariate_upper
 from picchio.fatigue.sn.likelihood import Likelihood
+from picchio.fatigue.sn.test_table import SNTests
 
 TRUTH = SNCurve(
     name="truth", strength=290e6, cycles=1e6, slopes=(8.0,), knees=(1e6,), survival=0.5,
@@ -107,7 +108,7 @@ def test_without_run_outs_it_is_least_squares() -> None:
     rng = np.random.default_rng(5)
     stress = np.repeat([300e6, 340e6, 380e6, 420e6], 4)
     cycles = 1e6 * (stress / 300e6) ** -9.0 * np.exp(0.4 * rng.standard_normal(16))
-    fit = fit_sn(stress, cycles, np.ones(16, dtype=bool), knee=False)
+    fit = fit_sn(SNTests(stress, cycles, np.ones(16, dtype=bool)), knee=False)
     line = stats.linregress(np.log(stress), np.log(cycles))
     assert fit.slope.value == pytest.approx(-line.slope, rel=1e-6)
     half = stats.t.ppf(0.95, 14) * line.stderr
@@ -131,7 +132,7 @@ def test_without_a_knee_run_outs_are_censored_lives() -> None:
     cycles = 1e6 * (stress / 300e6) ** -9.0 * np.exp(0.5 * rng.standard_normal(32))
     failed = cycles < 1e6
     cycles = np.minimum(cycles, 1e6)
-    fit = fit_sn(stress, cycles, failed, knee=False)
+    fit = fit_sn(SNTests(stress, cycles, failed), knee=False)
     level = np.log(stress / 300e6)
 
     def loss(x: np.ndarray) -> float:
@@ -147,7 +148,7 @@ def test_without_a_knee_run_outs_are_censored_lives() -> None:
 
 def test_large_sample_finds_the_truth_and_agrees_with_pylife() -> None:
     tests = synthetic(3000, np.random.default_rng(3))
-    fit, theirs = fit_sn(*tests), run_pylife(tests)
+    fit, theirs = fit_sn(SNTests(*tests)), run_pylife(tests)
     assert fit.knee is not None
     assert fit.slope.value == pytest.approx(8.0, rel=0.03)
     assert fit.knee.value == pytest.approx(1e6, rel=0.05)
@@ -173,7 +174,7 @@ def test_levels_that_never_mix_still_give_a_scatter() -> None:
     cycles[~failed] = STOP
     with pytest.raises(ValueError, match="mixed load levels"):
         run_pylife((stress, cycles, failed), pylife.MaxLikeInf)
-    fit = fit_sn(stress, cycles, failed)
+    fit = fit_sn(SNTests(stress, cycles, failed))
     assert fit.scatter.low > 0.0
     # The true scatter in strength is 0.3 / 8 / ln 10 = 0.0163.
     assert fit.scatter.low < 0.0163 < fit.scatter.high
@@ -201,7 +202,7 @@ def test_real_data_agree_with_pylife() -> None:
     tests = pylife_example()
     assert len(tests[0]) > 400
     assert 80 < (~tests[2]).sum() < 100
-    fit, theirs = fit_sn(*tests), run_pylife(tests)
+    fit, theirs = fit_sn(SNTests(*tests)), run_pylife(tests)
     assert fit.knee is not None
     # Two models of one knee: pyLife's estimates lie within our 90 % intervals.
     assert fit.endurance_limit.low < theirs.SD * 1e6 < fit.endurance_limit.high
@@ -213,7 +214,7 @@ def test_real_data_agree_with_pylife() -> None:
 
 
 def test_small_real_looking_set_gives_honest_ends() -> None:
-    fit = fit_sn(*synthetic(12, np.random.default_rng(8)), survival=0.9)
+    fit = fit_sn(SNTests(*synthetic(12, np.random.default_rng(8))), survival=0.9)
     record = fit.to_dict()
     assert record["format"] == "picchio-sn/1"
     for name in ("slope", "endurance_limit", "design", "scatter"):
@@ -230,7 +231,10 @@ def test_small_real_looking_set_gives_honest_ends() -> None:
 
 def test_fit_is_in_the_users_units_only_by_scale() -> None:
     stress, cycles, failed = synthetic(40, np.random.default_rng(2))
-    one, two = fit_sn(stress, cycles, failed), fit_sn(2.0 * stress, 3.0 * cycles, failed)
+    one, two = (
+        fit_sn(SNTests(stress, cycles, failed)),
+        fit_sn(SNTests(2.0 * stress, 3.0 * cycles, failed)),
+    )
     assert one.knee is not None
     assert two.knee is not None
     assert two.slope.value == pytest.approx(one.slope.value, rel=1e-6)
@@ -244,7 +248,7 @@ def test_the_median_band_without_a_knee_is_a_regression_band() -> None:
     rng = np.random.default_rng(5)
     stress = np.repeat([300e6, 340e6, 380e6, 420e6], 10)
     cycles = 1e6 * (stress / 300e6) ** -9.0 * np.exp(0.4 * rng.standard_normal(40))
-    fit = fit_sn(stress, cycles, np.ones(40, dtype=bool), knee=False)
+    fit = fit_sn(SNTests(stress, cycles, np.ones(40, dtype=bool)), knee=False)
     line = stats.linregress(np.log(stress), np.log(cycles))
     x, middle = np.log(stress).mean(), np.log(cycles).mean()
     residual = np.log(cycles) - line.intercept - line.slope * np.log(stress)
@@ -267,7 +271,7 @@ def test_intervals_cover_what_they_say(number: int) -> None:
     sets, names = 2000, ("slope", "knee", "endurance_limit", "design", "scatter")
     hits = dict.fromkeys(names, 0)
     for _ in range(sets):
-        fit = fit_sn(*synthetic(number, rng))
+        fit = fit_sn(SNTests(*synthetic(number, rng)))
         for name in names:
             hits[name] += contains(fit, name)
     cover = {name: count / sets for name, count in hits.items()}
@@ -298,7 +302,7 @@ def test_coverage_under_another_truth(
     sets, names = 400, ("slope", "knee", "endurance_limit", "design", "scatter")
     hits = dict.fromkeys(names, 0)
     for _ in range(sets):
-        fit = fit_sn(*synthetic(number, rng, share, rng.uniform(0.98, 1.02)))
+        fit = fit_sn(SNTests(*synthetic(number, rng, share, rng.uniform(0.98, 1.02))))
         for name in names:
             hits[name] += contains(fit, name)
     cover = {name: count / sets for name, count in hits.items()}
@@ -310,8 +314,8 @@ def test_coverage_under_another_truth(
 
 def test_scatter_of_one_kind_is_told() -> None:
     rng = np.random.default_rng(9)
-    notes = [fit_sn(*synthetic(200, rng, share, 1.01)).assumptions for share in (0.0, 0.5)]
-    assert any("nearly all in life" in line for line in notes[0])
+    notes = [fit_sn(SNTests(*synthetic(200, rng, share, 1.01))).assumptions for share in (0.0, 0.5)]
+    assert any("nearly all of life" in line for line in notes[0])
     assert not any("nearly all" in line for line in notes[1])
 
 
@@ -335,10 +339,12 @@ def test_bad_tests_are_named(changes: dict[str, object], key: str) -> None:
         "failed": [True] * 8, "knee": False,
     }  # fmt: skip
     with pytest.raises(InputError, match=key):
-        fit_sn(**{**values, **changes})  # type: ignore[arg-type]
+        given = {**values, **changes}
+        tests = SNTests(*(np.array(given.pop(name)) for name in ("amplitude", "cycles", "failed")))
+        fit_sn(tests, **given)  # type: ignore[arg-type]
 
 
 def test_a_perfect_line_has_no_scatter_and_is_refused() -> None:
     stress = np.linspace(3e8, 4e8, 8)
     with pytest.raises(InputError, match="no scatter"):
-        fit_sn(stress, 1e6 * (stress / 3e8) ** -8.0, [True] * 8, knee=False)
+        fit_sn(SNTests(stress, 1e6 * (stress / 3e8) ** -8.0, np.ones(8, bool)), knee=False)

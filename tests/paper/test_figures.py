@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from picchio.cli.output import finite
+from picchio.core.results import plain
 from picchio.paper.assumptions import Assumptions
 from picchio.paper.conflicts import CONFLICTS
 from picchio.paper.figures import blows, envelope, life, reach, rivets, table2
@@ -34,7 +34,7 @@ def test_each_can_be_drawn_and_told(figures):
         assert figure._repr_png_().startswith(b"\x89PNG")
         assert len(figure.caption) > 40
         assert len(figure.alt) > 20
-        json.dumps(finite(figure.to_dict()), allow_nan=False)
+        json.dumps(plain(figure.to_dict()), allow_nan=False)
     assert len(figures) >= 20
 
 

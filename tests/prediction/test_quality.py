@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from picchio.measurement.quality.report import check_campaign
+import picchio
 from picchio.robot.loading.load import load_robot
 
 SENSOR = "accelerometer.tool"
@@ -33,7 +33,7 @@ def robot():
 def check(worlds, robot, causes, seed=0, **options):
     made, truth = worlds.make(robot=options.pop("robot_name", "fanuc_like_3dof"), seed=seed,
                               causes=causes, **{"records": 9, **options})  # fmt: skip
-    report = check_campaign(made, robot)
+    report = picchio.check(made, robot)
     return report, truth, [f for f in report.findings if f.severity != "note"]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from picchio.measurement.quality.registry import CHECKS
-from picchio.measurement.quality.report import check_campaign
+from picchio.measurement.quality.report import check
 from picchio.robot.loading.load import load_robot
 
 from .broken import SPOILERS, sound
@@ -26,7 +26,7 @@ def usual():
 
 
 def findings(campaign, robot=None):
-    report = check_campaign(campaign, robot)
+    report = check(campaign, robot, use_robot=robot is not None)
     assert len(report.records) == len(campaign)  # nothing lost
     return [f for f in report.findings if not (robot is not None and f.check in ("axes", "phase"))]
 

@@ -12,6 +12,7 @@ from lxml import html as lxml_html
 import picchio
 from picchio.core.html import MOST_ROWS, cell, sheet
 from picchio.fatigue.sn.fit import fit_sn
+from picchio.fatigue.sn.test_table import SNTests
 from picchio.studies.envelopes import direction_envelope
 from picchio.studies.uncertainty import uncertain_life
 
@@ -67,7 +68,7 @@ def test_curves_fits_modes_tasks_and_models(arm: SimpleNamespace) -> None:
     assert float(facts["endurance limit [MPa]"]) == pytest.approx(curve.endurance_limit / 1e6, 1e-3)
     stress = np.repeat([300e6, 350e6, 400e6, 260e6], 4)
     cycles = 1e5 * (stress / 350e6) ** -6 * np.tile([0.8, 0.9, 1.1, 1.2], 4)
-    fit = fit_sn(stress, cycles, np.ones(16, bool), knee=False)
+    fit = fit_sn(SNTests(stress, cycles, np.ones(16, bool)), knee=False)
     assert float(tables(fit)[0][1][1]) == pytest.approx(fit.slope.value, rel=1e-3)
     modes = tables(picchio.modal_analysis(picchio.Model(arm.robot).linear_system(arm.worst.pose)))
     frequencies = [float(c) for c in column(modes[0], "natural")]

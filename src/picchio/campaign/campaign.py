@@ -175,17 +175,20 @@ def _check_record(record: Record, key: str, file: Path | None) -> None:
         )  # fmt: skip
 
 
-def load_campaign(path: str | Path, *, clock_tolerance: float = TOLERANCE) -> Campaign:
+def load_campaign(path: str | Path | Campaign, *, clock_tolerance: float = TOLERANCE) -> Campaign:
     """Open a campaign: its table and the headers of its files are read, the samples are not.
 
     Args:
-        path: the folder, or its `campaign.toml`.
+        path: the folder, or its `campaign.toml`. A campaign that is loaded already is taken as
+            it is.
         clock_tolerance: how uneven a record's clock may be, in steps; infinite to take any
             clock that ascends (to look at a bad record).
 
     Raises:
         InputError: a wrong table, a missing file, a wrong header.
     """
+    if isinstance(path, Campaign):
+        return path
     given = Path(path)
     if not given.exists():
         raise InputError("no such campaign", file=given)

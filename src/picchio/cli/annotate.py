@@ -30,27 +30,15 @@ def annotate(
 
     Without --flex the robot's own flex.toml is used. Mesh files are not copied.
     """
+    import picchio
     from picchio.cli.output import check_target, write_json
-    from picchio.core.errors import InputError
-    from picchio.core.files import atomic_write
-    from picchio.core.provenance import provenance
-    from picchio.robot.annotations.annotate import annotate as annotated
-    from picchio.robot.annotations.sidecar import read_sidecar
-    from picchio.robot.loading.find import find_robot
 
     for target in (out, json):
         check_target(target, [flex])
-    found = find_robot(robot)
-    sidecar = flex or found.flex
-    if sidecar is None:
-        raise InputError("this robot has no flex.toml of its own", key="--flex",
-                         hint="name a sidecar")  # fmt: skip
+    made = picchio.annotate(robot, flex=flex)
     for target in (out, json):
-        check_target(target, [found.urdf, sidecar])
-    content = annotated(found.urdf, read_sidecar(sidecar))
-    with atomic_write(out, "wb") as stream:
-        stream.write(content)
+        check_target(target, [made.urdf, made.sidecar])
+    made.save(out)
     if json is not None:
-        record = {"format": "picchio-annotation/1", "file": str(out)}
-        write_json(record | {"provenance": provenance([found.urdf, sidecar])}, json)
-    typer.echo(f"{out}: {found.urdf.name} with the values of {sidecar.name}", err=True)
+        write_json(made.to_dict(), json)
+    typer.echo(f"{out}: {made.urdf.name} with the values of {made.sidecar.name}", err=True)

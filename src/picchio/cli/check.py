@@ -15,10 +15,8 @@ from picchio.cli.options import FlexOption, JsonOption, ToolOption
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from picchio.campaign.campaign import Campaign
     from picchio.measurement.quality.check import Finding
     from picchio.measurement.quality.report import QualityReport, RecordSummary
-    from picchio.robot.flexible_robot import FlexibleRobot
 
 
 # What `picchio check` prints for people.
@@ -67,7 +65,7 @@ def _head(out: Console, report: QualityReport) -> None:
 
     campaign, records = report.campaign, report.records
     name = str(campaign.folder) if campaign.folder is not None else "campaign in memory"
-    robot = report.robot or "no robot: limits and axes are not checked"
+    robot = report.robot.name if report.robot else "no robot: limits and axes are not checked"
     out.print(f"[bold]{escape(name)}[/bold]: {_many(len(records), 'record')}; {escape(robot)}")
     hits = [r for r in records if r.kind == "percussion"]
     motions = [r for r in records if r.kind == "motion"]
@@ -272,91 +270,42 @@ def check(
     Clipping, dropouts, spikes, drift, uneven clocks, swapped or flipped axes, hum, high-passes,
     delays, records that are too short, aliasing, repeats, and the noise of every channel.
     """
-    import dataclasses
     import math
 
-    from picchio.campaign.campaign import load_campaign
-    from picchio.cli.output import check_target, progress, say_warning, write_json
+    import picchio
+    from picchio.cli.output import (
+        check_target,
+        command_line,
+        progress,
+        said_warnings,
+        say_warning,
+        write_json,
+    )
     from picchio.core.errors import InputError
-    from picchio.measurement.quality.report import check_campaign
 
     if no_robot and (robot is not None or flex is not None or tool is not None):
         raise InputError("stands against --robot, --flex and --tool", key="--no-robot")
-    if report is not None and no_robot:
-        raise InputError("needs a robot", key="--report")
-    for target in (json, report):
-        check_target(target, [robot, flex])
-    loaded = load_campaign(campaign, clock_tolerance=math.inf)
-    for target in (json, report):
-        check_target(target, loaded.files)
-    found, problem = (None, None) if no_robot else _robot(loaded, robot, flex, tool)
-    if report is not None and found is None:
+    loaded = picchio.load_campaign(campaign, clock_tolerance=math.inf)
+    if report is not None and (no_robot or (robot or loaded.robot) is None):
         raise InputError("needs a robot", key="--report", hint="name one with --robot")
+    for target in (json, report):
+        check_target(target, [robot, flex, *loaded.files])
     with progress("records") as tell:
-        result = check_campaign(loaded, found, keep_going=keep_going, progress=tell)
-    if problem is not None:
-        result = dataclasses.replace(result, findings=(problem, *result.findings))
-    if report is not None and found is not None:
-        _write_report(report, found, loaded, result, gravity_stiffness)
+        found = picchio.check(
+            loaded, robot, flex=flex, tool=tool, use_robot=not no_robot, keep_going=keep_going,
+            progress=tell,
+        )  # fmt: skip
+    if report is not None:
+        picchio.report(
+            found,
+            command=command_line(),
+            warnings=said_warnings(),
+            gravity_stiffness=gravity_stiffness,
+        ).save(report)
     if json is not None:
-        write_json(result.to_dict(), json)
+        write_json(found.to_dict(), json)
     if json != "-":
-        show(result, verbose=verbose)
+        show(found, verbose=verbose)
     else:
-        for line in warning_lines(result):
+        for line in warning_lines(found):
             say_warning(line)
-
-
-def _write_report(
-    target: Path,
-    robot: FlexibleRobot,
-    campaign: Campaign,
-    result: QualityReport,
-    gravity_stiffness: bool,
-) -> None:
-    """The page of how the simulation differs."""
-    import shlex
-    import sys
-
-    from picchio.cli.output import said_warnings
-    from picchio.core.files import atomic_write
-    from picchio.visuals.report.residual import residual_report
-
-    page = residual_report(
-        robot,
-        campaign,
-        quality=result,
-        command=shlex.join(["picchio", *sys.argv[1:]]),
-        warnings=said_warnings(),
-        gravity_stiffness=gravity_stiffness,
-    )
-    with atomic_write(target) as stream:
-        stream.write(page)
-
-
-def _robot(
-    campaign: Campaign, robot: str | None, flex: Path | None, tool: str | None
-) -> tuple[FlexibleRobot | None, Finding | None]:
-    """The robot asked for, or else the campaign's; what is wrong with the campaign's own."""
-    from picchio.core.errors import InputError
-    from picchio.measurement.quality.check import Finding
-    from picchio.robot.loading.load import load_robot
-
-    name = robot or campaign.robot
-    if name is None:
-        if flex is not None or tool is not None:
-            raise InputError("needs a robot", key="--flex" if flex is not None else "--tool",
-                             hint="name it with --robot")  # fmt: skip
-        return None, None
-    try:
-        return load_robot(name, flex=flex, tool=tool or campaign.tool), None
-    except InputError as error:
-        if robot is not None or flex is not None or tool is not None:
-            raise
-        return None, Finding(
-            "robot",
-            "error",
-            f"the campaign's robot cannot be used: {error}",
-            "correct `robot` or `tool` in campaign.toml, or give another with --robot; what needs "
-            "a robot was not checked",
-        )

@@ -43,16 +43,17 @@ def envelope(
     json: JsonOption = None,
 ) -> None:
     """The worst force direction of every joint at a pose, exact: no direction is sampled."""
-    from picchio.cli.inputs import choose_blows, numbers
+    from picchio.cli.inputs import numbers
     from picchio.cli.output import check_target, write_json
     from picchio.robot.dynamics.pose import warn_beyond_limits
     from picchio.robot.loading.load import load_robot
+    from picchio.studies.blows import blows_of
     from picchio.studies.envelopes import envelope as run
 
     check_target(json, [robot, flex])
     loaded = load_robot(robot, flex=flex, tool=tool)
     check_target(json, loaded.files)
-    blows = choose_blows(loaded, force, period, width)
+    blows = blows_of(loaded, force=force, period=period, width=width)
     at = loaded.pose(numbers(pose, "--pose"))
     warn_beyond_limits(loaded, [at], "the pose")
     found = run(loaded, at, blows, hits=hits, gravity_stiffness=gravity_stiffness)

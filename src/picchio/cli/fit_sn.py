@@ -12,13 +12,7 @@ from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
     from picchio.fatigue.sn.fit import Estimate, SNFit
-    from picchio.fatigue.sn.test_table import SNTests
 
-# Distortion energy: the shear strength of ductile steel is 1 / sqrt(3) of the normal one.
-_TO_SHEAR = {
-    "shear": (1.0, "the tests' stresses are taken as shear (--kind)"),
-    "normal": (3.0**-0.5, "normal stresses were divided by sqrt(3) to shear"),
-}
 _PICTURES = (".png", ".svg", ".pdf")
 EPILOG = "Example: picchio fit-sn tests.csv --survival 0.99 --out my-steel.toml --plot fit.png"
 
@@ -56,69 +50,31 @@ def fit_sn_command(
     json: JsonOption = None,
 ) -> None:
     """Fit slope, knee, endurance limit and scatter, each with its interval."""
+    import picchio
     from picchio.cli.output import check_target, write_json
-    from picchio.core.provenance import provenance
-    from picchio.fatigue.sn.fit import fit_sn
-    from picchio.fatigue.sn.test_table import read_sn_tests
+    from picchio.fatigue.sn.library import write_sn_curve
 
     for target in (out, plot, json):
         check_target(target, [tests])
     if plot is not None and plot.suffix.lower() not in _PICTURES:
         raise InputError("unknown kind", key="--plot", value=plot.name, choices=_PICTURES)
-    if run_out_cycles is not None and not 0.0 < run_out_cycles < float("inf"):
-        raise InputError("must be positive", key="--run-out-cycles", value=run_out_cycles)
-    if kind not in _TO_SHEAR:
-        raise InputError("unknown", key="--kind", value=kind, choices=_TO_SHEAR)
-    data = read_sn_tests(tests, run_out_cycles=run_out_cycles)
-    factor, note = _TO_SHEAR[kind]
-    for key, value in (("--survival", survival), ("--level", level)):
-        if not 0.0 < value < 1.0:
-            raise InputError("must lie between 0 and 1", key=key, value=value)
-    found = fit_sn(
-        factor * data.amplitude, data.cycles, data.failed, level=level, survival=survival
+    found = picchio.fit_sn(
+        tests, kind=kind, survival=survival, level=level, run_out_cycles=run_out_cycles
     )
     if out is not None:
-        _write_curve(found, survival, out, note)
+        write_sn_curve(found.curve(survival, name=out.stem), out)
     if plot is not None:
-        _draw(found, data, factor, plot)
+        from picchio.visuals.plots.sn import plot_sn_fit
+        from picchio.visuals.plots.style import blank_figure, save_figure
+
+        save_figure(plot_sn_fit(found, blank_figure(height=3.8)), plot)
     if json is not None:
-        content = found.to_dict()
-        content["assumptions"] = [note, *content["assumptions"], *data.assumptions]
-        write_json(content | {"provenance": provenance([tests])}, json)
+        write_json(found.to_dict(), json)
     if json != "-":
-        _show(found, tests, (note, *data.assumptions))
+        _show(found, tests)
 
 
-def _write_curve(found: SNFit, survival: float, out: Path, note: str) -> None:
-    import tomlkit
-
-    from picchio.core.files import atomic_write
-    from picchio.fatigue.sn.library import SN_FORMAT
-
-    curve = found.curve(survival, name=out.stem)
-    keys = ("name", "kind", "strength", "cycles", "slopes", "knees", "miner", "survival", "scatter")
-    values = {"format": SN_FORMAT, **{key: getattr(curve, key) for key in keys}}
-    values |= {"source": curve.source, "assumptions": (note, *curve.assumptions)}
-    text = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
-    with atomic_write(out) as stream:
-        stream.write(tomlkit.dumps(text))
-
-
-def _draw(found: SNFit, data: SNTests, factor: float, plot: Path) -> None:
-    import dataclasses
-
-    from picchio.core.files import atomic_write
-    from picchio.visuals.plots.sn import plot_sn_fit
-    from picchio.visuals.plots.style import PAPER, blank_figure
-
-    shear = dataclasses.replace(data, amplitude=factor * data.amplitude)
-    figure = plot_sn_fit(found, shear, blank_figure(height=3.8)).get_figure(root=True)
-    assert figure is not None
-    with atomic_write(plot, "wb") as stream:
-        figure.savefig(stream, format=plot.suffix[1:].lower(), dpi=160, facecolor=PAPER)
-
-
-def _show(found: SNFit, tests: Path, notes: tuple[str, ...]) -> None:
+def _show(found: SNFit, tests: Path) -> None:
     from rich import box
     from rich.table import Table
 
@@ -147,5 +103,5 @@ def _show(found: SNFit, tests: Path, notes: tuple[str, ...]) -> None:
         low, high = (format(end * factor, spec) for end in (value.low, value.high))
         table.add_row(name, format(value.value * factor, spec), f"{low} to {high}")
     screen.print(table)
-    for line in (*found.assumptions, *notes):
+    for line in found.assumptions:
         screen.print(f"[dim]  - {line}[/dim]")

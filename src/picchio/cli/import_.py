@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from picchio.cli.options import JsonOption
-
-if TYPE_CHECKING:
-    from picchio.campaign.campaign import Campaign
 
 EPILOG = (
     "Example: picchio import run.mcap --write-mapping mapping.toml, edit it, then "
@@ -54,10 +51,10 @@ def import_(
     json: JsonOption = None,
 ) -> None:
     """Import a file as a record of a campaign; the mapping is kept beside it as mapping.toml."""
-    from picchio.campaign.campaign import write_campaign
-    from picchio.campaign.importing.importer import import_record, read_raw
-    from picchio.campaign.importing.mapping import read_mapping
+    import picchio
+    from picchio.campaign.importing.importer import read_raw
     from picchio.campaign.importing.template import mapping_template
+    from picchio.cli.output import check_target, write_json
     from picchio.core.errors import InputError
     from picchio.core.files import atomic_write
 
@@ -73,77 +70,10 @@ def import_(
         return
     if to is None:
         raise InputError("say where the campaign goes", key="--to")
-    if mapping is None:
-        if not file.is_file():
-            raise InputError("no such file", file=file)
-        raise InputError(
-            "needs a mapping from its series to the campaign's channels",
-            file=file,
-            key="--mapping",
-            hint=f"`picchio import {file} --write-mapping mapping.toml` writes one to edit",
-        )
-    new = import_record(file, read_mapping(mapping), file=name, mapping_file=mapping)
-    kept = mapping.read_bytes()
-    extra = {"mapping.toml": kept}
-    if append:
-        new, extra = _appended(new, to, kept)
-    campaign = write_campaign(
-        _with_provenance(new, file, mapping), to, overwrite=append, extra_files=extra
-    )
-    imported = campaign.records[-1]
-    clock = imported.clock
+    check_target(json, [file, mapping])
+    made = picchio.import_record(file, to, mapping, name=name, append=append)
     if json is not None:
-        from picchio.cli.output import write_json
-        from picchio.core.provenance import provenance
-
-        write_json(
-            {
-                "format": "picchio-import/1",
-                "campaign": str(to),
-                "record": imported.file,
-                "channels": list(imported.channels),
-                "samples": clock.samples,
-                "sample_rate": clock.rate,
-                "provenance": provenance([file, mapping]),
-            },
-            json,
-        )
-    text = f"{to}: {imported.file}, {clock.samples} samples at {clock.rate:.6g} Hz, "
-    typer.echo(text + ", ".join(imported.channels), err=json == "-")
-
-
-def _appended(new: Campaign, to: Path, mapping: bytes) -> tuple[Campaign, dict[str, bytes]]:
-    """The campaign at `to` with the new record in it, and the mapping's file."""
-    from picchio.campaign.campaign import Campaign, load_campaign
-    from picchio.core.errors import InputError
-
-    old = load_campaign(to)
-    settings = new.table.model_dump(exclude_none=True, exclude_defaults=True, exclude={"record"})
-    standing = old.table.model_dump(exclude_none=True, exclude_defaults=True, exclude={"record"})
-    for key, value in settings.items():
-        if standing.get(key) != value:
-            raise InputError("the mapping says otherwise than the campaign that stands there",
-                             file=to, key=key, value=value,
-                             hint="what is this record's own belongs under [record]")  # fmt: skip
-    if old.robot is not None:
-        standing["robot"] = old.robot
-    campaign = Campaign.from_records([*old.records, *new.records], **standing)
-    first = to / "mapping.toml"
-    if first.is_file() and first.read_bytes() != mapping:
-        return campaign, {f"{Path(new.records[0].file).stem}.mapping.toml": mapping}
-    return campaign, {"mapping.toml": mapping}
-
-
-def _with_provenance(campaign: Campaign, *inputs: Path) -> Campaign:
-    """The campaign with the import noted in its [provenance]."""
-    from dataclasses import replace
-
-    from picchio.core.provenance import provenance
-
-    made: dict[str, Any] = provenance(inputs)
-    before = (campaign.table.provenance or {}).get("inputs", [])
-    found = {
-        "picchio": made["picchio"],
-        "inputs": [entry for entry in before if entry not in made["inputs"]] + made["inputs"],
-    }
-    return replace(campaign, table=campaign.table.model_copy(update={"provenance": found}))
+        write_json(made.to_dict(), json)
+    record = made.record
+    text = f"{to}: {record.file}, {record.clock.samples} samples at {record.clock.rate:.6g} Hz, "
+    typer.echo(text + ", ".join(record.channels), err=json == "-")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import warnings
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import typer
@@ -23,7 +24,7 @@ import picchio.cli.reproduce
 import picchio.cli.robots
 import picchio.cli.simulate
 import picchio.cli.view
-from picchio.core.errors import PicchioError
+from picchio.core.errors import InputError, PicchioError
 
 app = typer.Typer(
     name="picchio",
@@ -92,7 +93,7 @@ def run(arguments: list[str] | None = None) -> int:
         code = app(args=given or ["--help"], prog_name="picchio", standalone_mode=False)
         sys.stdout.flush()
     except PicchioError as error:
-        return _fail(str(error))
+        return _fail(str(_as_typed(error, given)))
     except _UsageError as error:
         where = error.ctx.command_path if error.ctx else "picchio"
         return _fail(f"{error.format_message()} See {where} --help")
@@ -106,6 +107,16 @@ def run(arguments: list[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     return code if isinstance(code, int) else 0
+
+
+def _as_typed(error: PicchioError, given: Sequence[str]) -> PicchioError:
+    """The error of a function's argument, told of the option that set it."""
+    if not isinstance(error, InputError) or error.file is not None or error.key is None:
+        return error
+    option = f"--{error.key.replace('_', '-')}"
+    commands: Any = typer.main.get_command(app)
+    options = {name for p in commands.commands[given[0]].params for name in p.opts}
+    return error.placed(key=option) if option in options else error
 
 
 def _fail(problem: str) -> int:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from picchio.cli.inputs import choose_blows, numbers
+from picchio.cli.inputs import numbers
 from picchio.cli.options import (
     FlexOption,
     ForceOption,
@@ -202,6 +202,7 @@ def map_(
     """Map the workspace; stopped and started again, it goes on where it was."""
     from picchio.cli.output import check_numbers, check_target, progress, write_json
     from picchio.robot.loading.load import load_robot
+    from picchio.studies.blows import blows_of
     from picchio.studies.maps.run import workspace_map
 
     for target in (out, json):
@@ -220,7 +221,7 @@ def map_(
     if direction is None:
         direction = "worst" if surface is None else "normal"
     along = direction if direction in ("worst", "normal") else numbers(direction, "--direction")
-    blows = choose_blows(loaded, force, period, width)
+    blows = blows_of(loaded, force=force, period=period, width=width)
     with progress("places") as report:
         found = workspace_map(
             loaded, where, blows, out, direction=along, branch=branch, hits=hits,

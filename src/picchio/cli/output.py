@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -31,6 +32,11 @@ def say_warning(message: str) -> None:
 def said_warnings() -> list[str]:
     """The warnings printed so far."""
     return list(_said)
+
+
+def command_line() -> str:
+    """What was typed, for a report."""
+    return shlex.join(["picchio", *sys.argv[1:]])
 
 
 def console() -> Console:
@@ -82,26 +88,14 @@ def check_numbers(**options: float | None) -> None:
 def write_json(data: dict[str, Any], target: str) -> None:
     """Write JSON to a file, whole or not at all, or to stdout for "-"."""
     from picchio.core.files import atomic_write
+    from picchio.core.results import plain
 
-    text = json.dumps(finite(data), indent=2, allow_nan=False) + "\n"
+    text = json.dumps(plain(data), indent=2, allow_nan=False) + "\n"
     if target == "-":
         sys.stdout.write(text)
         return
     with atomic_write(target) as stream:
         stream.write(text)
-
-
-def finite(value: Any) -> Any:
-    """The same structure with None for numbers that JSON can't hold, arrays as lists."""
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, dict):
-        return {str(k): finite(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [finite(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 @contextmanager

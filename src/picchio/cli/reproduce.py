@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from picchio.cli.options import JsonOption
-from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
     from picchio.paper.run import Reproduction
@@ -37,28 +36,20 @@ def reproduce(
     json: JsonOption = None,
 ) -> None:
     """Recompute the figures, tables and claims of Nie et al. 2016, and say which hold."""
-    from picchio.cli.output import check_target, progress, write_json
-    from picchio.core.files import atomic_write
+    import picchio
+    from picchio.cli.output import check_target, command_line, progress, said_warnings, write_json
     from picchio.paper.assumptions import parse_assumptions
     from picchio.paper.printed import paper_file
-    from picchio.paper.run import reproduce as run
     from picchio.paper.study import WORLDS
 
     for target in (report, json):
         check_target(target, [paper_file()])
-    if worlds is not None and worlds < 8:
-        raise InputError("must be at least 8", key="--worlds", value=worlds)
     given = parse_assumptions(assume or [])
     with progress("hypotheses about Table 2") as told:
-        found = run(given, worlds=worlds or WORLDS, progress=told)
+        found = picchio.reproduce(given, worlds=WORLDS if worlds is None else worlds, progress=told)
     if report is not None:
-        from picchio.paper.page import reproduction_report
-
-        words = "".join(f" --assume {word}" for word in assume or [])
-        words += f" --worlds {worlds}" if worlds is not None else ""
-        page = reproduction_report(found, command=f"picchio reproduce{words} --report page.html")
-        with atomic_write(report) as stream:
-            stream.write(page)
+        page = picchio.report(found, command=command_line(), warnings=said_warnings())
+        page.save(report)
     if json is not None:
         write_json(found.to_dict(), json)
     if json != "-":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -24,28 +24,12 @@ def robots(json: JsonOption = None) -> None:
     from rich import box
     from rich.table import Table
 
+    import picchio
     from picchio.cli.output import console, write_json
-    from picchio.robot.loading.catalogue import list_robots
 
-    entries = list_robots()
+    found = picchio.robots()
     if json is not None:
-        content: dict[str, Any] = {
-            "format": "picchio-robots/1",
-            "robots": [
-                {
-                    "name": entry.name,
-                    "urdf": str(entry.urdf),
-                    "dof": entry.dof,
-                    "flexible": list(entry.flexible),
-                    "with_stiffness": list(entry.with_stiffness),
-                    "stiffness_source": entry.stiffness_source,
-                    "estimated": entry.estimated,
-                    "problem": entry.problem,
-                }
-                for entry in entries
-            ],
-        }
-        write_json(content, json)
+        write_json(found.to_dict(), json)
     if json == "-":
         return
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
@@ -53,7 +37,7 @@ def robots(json: JsonOption = None) -> None:
     table.add_column("DoF", justify="right")
     table.add_column("stiffness known")
     table.add_column("source")
-    for entry in entries:
+    for entry in found:
         table.add_row(
             entry.name,
             str(entry.dof),

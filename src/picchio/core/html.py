@@ -1,10 +1,11 @@
-"""Small tables for notebooks: what an object shows as the last line of a cell."""
+"""HTML: small tables for notebooks, and whole pages that are written to a file."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
+from pathlib import Path
 from typing import Any
 
 MOST_ROWS = 30
@@ -65,3 +66,42 @@ def cell(value: Any) -> str:
         text = ", ".join(cell(part) for part in value)
         return text if len(value) == 1 else f"({text})"
     return escape("–" if value is None else str(value))
+
+
+class Page:
+    """An HTML page that needs nothing but itself: shown in a notebook, or written to a file.
+
+    Attributes:
+        title: what it shows.
+    """
+
+    title: str
+
+    def html(self) -> str:
+        """The page."""
+        raise NotImplementedError
+
+    def save(self, path: str | Path) -> Path:
+        """Write the page to a file, whole or not at all.
+
+        Args:
+            path: the file; its folder must exist.
+
+        Returns:
+            the same path.
+
+        Raises:
+            InputError: it cannot be written there.
+        """
+        from picchio.core.files import atomic_write
+
+        with atomic_write(path) as stream:
+            stream.write(self.html())
+        return Path(path)
+
+    def _repr_html_(self) -> str:
+        page = escape(self.html(), quote=True)
+        return (
+            f'<iframe title="{escape(self.title)}" srcdoc="{page}" '
+            'style="width:100%;height:560px;border:0"></iframe>'
+        )

@@ -20,14 +20,17 @@ _MARKS = {"holds": "good", "holds only if": "partly", "does not hold": "bad",
 REDRAWN = ("fig-4", "fig-8", "fig-9", "fig-10", "fig-11", "fig-12", "fig-13-15")
 
 
-def reproduction_report(found: Reproduction, *, command: str = "picchio reproduce") -> str:
+def reproduction_page(
+    found: Reproduction, *, command: str | None = None, warnings: Sequence[str] = ()
+) -> str:
     """The page: claims, Table 2, what does not fit, the life, figures, assumptions, equations.
 
     It needs nothing from outside, prints, and follows the reader's light or dark theme.
 
     Args:
-        found: of `picchio.paper.run.reproduce`.
+        found: of `picchio.reproduce`.
         command: the command line that gave this.
+        warnings: what was warned of on the way.
 
     Returns:
         the HTML.
@@ -72,7 +75,8 @@ def reproduction_report(found: Reproduction, *, command: str = "picchio reproduc
             if tried.sentence.page == found.study.printed.abstract_page
         ),
         influence={row.name: row for row in found.influences},
-        command=command,
+        command=command or "picchio reproduce",
+        warnings=warnings,
     )
 
 

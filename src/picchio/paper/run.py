@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from picchio.core.errors import InputError
+from picchio.core.html import sheet
 from picchio.core.provenance import provenance
-from picchio.paper.assumptions import INPUTS, Assumptions
+from picchio.core.results import TableResult
+from picchio.paper.assumptions import INPUTS, Assumptions, parse_assumptions
 from picchio.paper.claims.trial import Tried, try_claims
 from picchio.paper.conflicts import Conflict, conflicts
 from picchio.paper.equations import Equation, equations
@@ -24,9 +27,9 @@ from picchio.paper.waterfall import Step, waterfall
 FORMAT = "picchio-reproduction/1"
 
 
-@dataclass(frozen=True, eq=False)
-class Reproduction:
-    """All that was found.
+@dataclass(frozen=True, eq=False, repr=False)
+class Reproduction(TableResult):
+    """All that was found; its table is the claims with their verdicts.
 
     Attributes:
         study: what it was found with.
@@ -39,6 +42,8 @@ class Reproduction:
         answer: what explains Table 2.
         origin: provenance.
     """
+
+    PAGE = "paper.page:reproduction_page"
 
     study: Study
     claims: tuple[Tried, ...]
@@ -55,8 +60,22 @@ class Reproduction:
         """How many claims got each verdict."""
         return {str(v): sum(tried.finding.verdict is v for tried in self.claims) for v in Verdict}
 
-    def to_dict(self) -> dict[str, Any]:
-        """The content of `picchio-reproduction/1`."""
+    def _headline(self) -> str:
+        counts = ", ".join(f"{n} {verdict}" for verdict, n in self.counts.items())
+        return f"{len(self.claims)} claims: {counts}"
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [tried.to_dict() for tried in self.claims]
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (t.sentence.page, t.sentence.quote, f"{t.finding.verdict} {t.finding.condition}")
+            for t in self.claims
+        ]
+        title = f"{self.study.printed.title}: {self._headline()}"
+        return sheet(title, None, ("p.", "claim", "verdict"), rows)
+
+    def _content(self) -> dict[str, Any]:
         printed = self.study.printed
         return {
             "format": FORMAT,
@@ -74,7 +93,7 @@ class Reproduction:
             },
             "worlds": len(self.study.worlds),
             "counts": self.counts,
-            "claims": [tried.to_dict() for tried in self.claims],
+            "claims": self._rows(),
             "conflicts": [found.to_dict() for found in self.conflicts],
             "slips": [slip.model_dump() for slip in printed.slips],
             "equations": [equation.to_dict() for equation in self.equations],
@@ -105,25 +124,29 @@ def one_thread() -> Iterator[None]:
 
 
 def reproduce(
-    given: Assumptions | None = None,
+    assume: Assumptions | Mapping[str, float | str] | None = None,
     *,
     worlds: int = WORLDS,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> Reproduction:
-    """Recompute every figure, table and claim of the paper.
+    """Recompute the figures, tables and claims of Nie et al. 2016, and say which hold.
 
     Args:
-        given: the base world's assumptions.
-        worlds: how many other worlds claims are tried in.
+        assume: what the paper leaves open, for the base world: `{"period": 0.1}`, or all of it.
+        worlds: how many other sets of assumptions a claim is tried in, at least 8.
         seed: of their draw.
         progress: called with (steps done, steps in all).
 
     Raises:
-        InputError: assumptions that put the rivets out of reach.
+        InputError: an unknown assumption, or assumptions that put the rivets out of reach.
     """
+    if worlds < 8:
+        raise InputError("must be at least 8", key="worlds", value=worlds)
+    if not isinstance(assume, Assumptions):
+        assume = parse_assumptions(f"{name}={value}" for name, value in (assume or {}).items())
     with one_thread():
-        return _run(Study(given or Assumptions(), worlds, seed, progress))
+        return _run(Study(assume, worlds, seed, progress))
 
 
 def _run(study: Study) -> Reproduction:

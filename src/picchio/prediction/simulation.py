@@ -3,25 +3,133 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from picchio.campaign.campaign import Campaign
+from picchio.campaign.campaign import Campaign, write_campaign
 from picchio.campaign.channels import Channel
 from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
+from picchio.core.results import Result
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 from picchio.prediction.percussion import PercussionSetup, percussion_setups
-from picchio.prediction.plan import Plan, PlannedRecord
+from picchio.prediction.plan import Plan, PlannedRecord, read_plan
+from picchio.robot.dynamics.pose import warn_beyond_limits
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.loading.load import load_robot
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(Result):
+    """The campaign that a test plan would give.
+
+    Attributes:
+        campaign: as it stands on disk; in memory where nothing was to be written.
+        plan: what was simulated.
+        robot: its name.
+        origin: provenance.
+    """
+
+    campaign: Campaign
+    plan: Plan
+    robot: str
+    origin: dict[str, Any]
+
+    def _headline(self) -> str:
+        blows = "steady state" if self.plan.burst is None else f"{self.plan.burst} blows from rest"
+        records = len(self.campaign)
+        return (
+            f"{records} record{'s' if records != 1 else ''}, {len(self.plan.poses)} poses, "
+            f"{sum(self.plan.samples)} samples at {self.plan.sample_rate:g} Hz, {blows}"
+        )
+
+    def _repr_html_(self) -> str:
+        return self.campaign._repr_html_()
+
+    def _content(self) -> dict[str, Any]:
+        first = self.campaign.records[0]
+        return {
+            "format": "picchio-simulation/1",
+            "campaign": self.campaign.folder,
+            "robot": self.robot,
+            "records": [record.file for record in self.campaign],
+            "channels": list(first.channels),
+            "samples": first.clock.samples,
+            "sample_rate": self.plan.sample_rate,
+            "effects": [table.model_dump() for table in self.plan.effect],
+            "provenance": self.origin,
+        }
 
 
 def simulate(
+    robot: str | Path | FlexibleRobot,
+    plan: str | Path | Plan,
+    to: str | Path | None = None,
+    *,
+    flex: str | Path | None = None,
+    tool: str | None = None,
+    robot_name: str | None = None,
+    effects: Sequence[Effect] = (),
+    seed: int | None = None,
+    gravity_stiffness: bool = True,
+    parquet: bool = False,
+    overwrite: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Simulation:
+    """Simulate a test before doing it: which sensors, poses, directions, levels.
+
+    Args:
+        robot: the robot, or its name or file.
+        plan: poses, directions, levels, blows, sample rate, and sensors with their noise
+            (`picchio-plan/1`); effects in it make the world differ from the model.
+        to: the campaign's folder; None: the campaign stays in memory.
+        flex: sidecar of the robot.
+        tool: the frame that carries the tool.
+        robot_name: what the campaign calls the robot; as `robot` does if None.
+        effects: besides those of the plan and of a saved model.
+        seed: of the noise and of what effects draw; the plan's if None.
+        gravity_stiffness: add gravity's stiffness dg/dq to the springs'.
+        parquet: Parquet files instead of CSV.
+        overwrite: replace a campaign that stands at `to`.
+        progress: called with (done, total) records.
+
+    Raises:
+        InputError: a robot or a plan that cannot be read or do not fit each other.
+    """
+    loaded = load_robot(robot, flex=flex, tool=tool)
+    file = None if isinstance(plan, Plan) else Path(plan)
+    asked = plan if isinstance(plan, Plan) else read_plan(plan)
+    if seed is not None:
+        asked = asked.model_copy(update={"seed": seed})
+    files = [*([] if file is None else [file]), *loaded.files]
+    try:
+        warn_beyond_limits(loaded, [loaded.pose(p) for p in asked.poses], "the plan")  # type: ignore[arg-type]
+        made = simulated_campaign(
+            loaded,
+            asked,
+            effects,
+            robot_name=robot_name or (None if robot is loaded else str(robot)),
+            gravity_stiffness=gravity_stiffness,
+            suffix=".parquet" if parquet else ".csv",
+            inputs=files,
+            progress=progress,
+        )
+    except InputError as error:
+        if error.file is not None or file is None:
+            raise
+        raise error.placed(file=file) from None
+    if to is not None:
+        made = write_campaign(made, to, overwrite=overwrite)
+    return Simulation(made, asked, loaded.name, provenance(files, seed=asked.seed))
+
+
+def simulated_campaign(
     robot: FlexibleRobot,
     plan: Plan,
     effects: Sequence[Effect] = (),

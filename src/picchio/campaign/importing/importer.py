@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
-from picchio.campaign.campaign import Campaign
+from picchio.campaign.campaign import Campaign, load_campaign, write_campaign
 from picchio.campaign.channels import TIME, parse_channel
 from picchio.campaign.importing import read_csv, read_matlab, read_mcap, read_uff
-from picchio.campaign.importing.mapping import ChannelTable, Mapping
+from picchio.campaign.importing.mapping import ChannelTable, Mapping, read_mapping
 from picchio.campaign.importing.raw import RawChannel, RawFile, Reader
 from picchio.campaign.importing.resample import common_clock
 from picchio.campaign.record import Record
 from picchio.campaign.units import conversion
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.provenance import provenance
+from picchio.core.results import Result
 
 READERS: MappingProxyType[str, Reader] = MappingProxyType(
     {"csv": read_csv.read, "uff": read_uff.read, "mcap": read_mcap.read, "matlab": read_matlab.read}
@@ -42,7 +46,7 @@ def read_raw(path: str | Path, mapping: Mapping | None = None) -> RawFile:
     return READERS[kind](source, mapping)
 
 
-def import_record(
+def read_mapped(
     path: str | Path, mapping: Mapping, *, file: str | None = None, mapping_file: Path | None = None
 ) -> Campaign:
     """Read a foreign file as a campaign of one record, in memory.
@@ -148,3 +152,112 @@ def _converted(
                              file=file, key=f"{entry.to}.remove", value="quiet")  # fmt: skip
         values = values - chosen.mean()
     return values, channel.unit
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ImportedRecord(Result):
+    """A record that was imported, and the campaign that it is part of.
+
+    Attributes:
+        campaign: as it stands on disk; in memory where nothing was to be written.
+        origin: provenance of this record.
+    """
+
+    campaign: Campaign
+    origin: dict[str, Any]
+
+    @property
+    def record(self) -> Record:
+        """The record that was imported."""
+        return self.campaign.records[-1]
+
+    def _headline(self) -> str:
+        clock = self.record.clock
+        return f"{self.record.file}, {clock.samples} samples at {clock.rate:.6g} Hz"
+
+    def _repr_html_(self) -> str:
+        return self.campaign._repr_html_()
+
+    def _content(self) -> dict[str, Any]:
+        return {
+            "format": "picchio-import/1",
+            "campaign": self.campaign.folder,
+            "record": self.record.file,
+            "channels": list(self.record.channels),
+            "samples": self.record.clock.samples,
+            "sample_rate": self.record.clock.rate,
+            "provenance": self.origin,
+        }
+
+
+def import_record(
+    file: str | Path,
+    to: str | Path | None = None,
+    mapping: str | Path | None = None,
+    *,
+    name: str | None = None,
+    append: bool = False,
+) -> ImportedRecord:
+    """Import a file of another format (UFF 58, MCAP, MATLAB, CSV) as a record of a campaign.
+
+    Args:
+        file: the file.
+        to: the campaign's folder; the mapping is kept there as mapping.toml. None: the campaign
+            stays in memory.
+        mapping: what the file's series become (`picchio-mapping/1`).
+        name: the record's name (.csv or .parquet); the file's own with .csv if None.
+        append: add the record to the campaign that stands at `to`.
+
+    Raises:
+        InputError: the file or the mapping cannot be read, they do not fit each other, or the
+            campaign at `to` says otherwise than the mapping.
+    """
+    source = Path(file)
+    if mapping is None:
+        if not source.is_file():
+            raise InputError("no such file", file=source)
+        raise InputError(
+            "needs a mapping from its series to the campaign's channels",
+            file=source,
+            key="--mapping",
+            hint=f"`picchio import {source} --write-mapping mapping.toml` writes one to edit",
+        )
+    rules = Path(mapping)
+    new = read_mapped(source, read_mapping(rules), file=name, mapping_file=rules)
+    origin = provenance([source, rules])
+    if to is None:
+        return ImportedRecord(_noted(new, origin), origin)
+    extra = {"mapping.toml": rules.read_bytes()}
+    if append:
+        new, extra = _appended(new, Path(to), extra["mapping.toml"])
+    made = write_campaign(_noted(new, origin), to, overwrite=append, extra_files=extra)
+    return ImportedRecord(made, origin)
+
+
+def _appended(new: Campaign, to: Path, mapping: bytes) -> tuple[Campaign, dict[str, bytes]]:
+    """The campaign at `to` with the new record in it, and the mapping's file."""
+    old = load_campaign(to)
+    settings = new.table.model_dump(exclude_none=True, exclude_defaults=True, exclude={"record"})
+    standing = old.table.model_dump(exclude_none=True, exclude_defaults=True, exclude={"record"})
+    for key, value in settings.items():
+        if standing.get(key) != value:
+            raise InputError("the mapping says otherwise than the campaign that stands there",
+                             file=to, key=key, value=value,
+                             hint="what is this record's own belongs under [record]")  # fmt: skip
+    if old.robot is not None:
+        standing["robot"] = old.robot
+    campaign = Campaign.from_records([*old.records, *new.records], **standing)
+    first = to / "mapping.toml"
+    if first.is_file() and first.read_bytes() != mapping:
+        return campaign, {f"{Path(new.records[0].file).stem}.mapping.toml": mapping}
+    return campaign, {"mapping.toml": mapping}
+
+
+def _noted(campaign: Campaign, made: dict[str, Any]) -> Campaign:
+    """The campaign with the import noted in its [provenance]."""
+    before = (campaign.table.provenance or {}).get("inputs", [])
+    found = {
+        "picchio": made["picchio"],
+        "inputs": [entry for entry in before if entry not in made["inputs"]] + made["inputs"],
+    }
+    return replace(campaign, table=campaign.table.model_copy(update={"provenance": found}))

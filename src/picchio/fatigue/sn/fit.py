@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import NormalDist
 from typing import Any
 
@@ -13,15 +14,25 @@ import numpy.typing as npt
 
 from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.html import sheet
+from picchio.core.results import TableResult
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.likelihood import Likelihood, maximise
 from picchio.fatigue.sn.profile import Profile
+from picchio.fatigue.sn.test_table import SNTests, read_sn_tests
 
 METHOD = (
     "maximum likelihood; Basquin's line with an endurance limit; log-normal strength and "
     "life; profile likelihood intervals with Student's t threshold, scatter by the Cox-Reid "
     "adjusted profile"
 )
+
+# What shear stress a tested stress stands for, and how that is told. Distortion energy: the shear
+# strength of ductile steel is 1 / sqrt(3) of the normal one.
+_TO_SHEAR = {
+    "shear": (1.0, "the tests' stresses are taken as shear (--kind)"),
+    "normal": (3.0**-0.5, "normal stresses were divided by sqrt(3) to shear"),
+}
 
 
 @dataclass(frozen=True)
@@ -40,11 +51,12 @@ class Estimate:
         }
 
 
-@dataclass(frozen=True)
-class SNFit:
-    """A fitted S-N curve.
+@dataclass(frozen=True, eq=False, repr=False)
+class SNFit(TableResult):
+    """A fitted S-N curve; its table is the fitted values with their intervals.
 
     Attributes:
+        tests: what was fitted, their stresses in shear.
         slope: k of N ~ amplitude^-k.
         knee: cycles at the knee; None where no run-out shows one.
         endurance_limit: Pa, median. Without a knee: the median strength at `reference_cycles`.
@@ -65,6 +77,7 @@ class SNFit:
             as the intervals are; zeros for a knee that is none.
     """
 
+    tests: SNTests
     slope: Estimate
     knee: Estimate | None
     endurance_limit: Estimate
@@ -80,9 +93,31 @@ class SNFit:
     assumptions: tuple[str, ...]
     covariance: tuple[tuple[float, ...], ...] = ()
 
-    def _repr_html_(self) -> str:
-        from picchio.core.html import sheet
+    def _headline(self) -> str:
+        strength = (
+            "endurance limit" if self.knee else f"strength at {self.reference_cycles:g} cycles"
+        )
+        return (
+            f"slope {self.slope.value:.3g}, "
+            f"{strength} {1e-6 * self.endurance_limit.value:.4g} MPa, "
+            f"{self.failures} failures, {self.run_outs} run-outs"
+        )
 
+    def _rows(self) -> list[dict[str, Any]]:
+        told = {
+            "slope": (self.slope, ""),
+            "knee": (self.knee, "cycles"),
+            "endurance_limit": (self.endurance_limit, "Pa"),
+            "design": (self.design, "Pa"),
+            "scatter": (self.scatter, ""),
+        }
+        return [
+            {"name": name, "value": e.value, "low": e.low, "high": e.high, "unit": unit}
+            for name, (e, unit) in told.items()
+            if e is not None
+        ]
+
+    def _repr_html_(self) -> str:
         told = {
             "slope k": (self.slope, 1.0),
             "knee [cycles]": (self.knee, 1.0),
@@ -139,8 +174,9 @@ class SNFit:
         low, high = np.percentile(np.exp(draws[:, :1] + above), [tail, 100.0 - tail], axis=0)
         return low, high
 
-    def to_dict(self) -> dict[str, Any]:
-        """The `picchio-sn/1` record."""
+    def _content(self) -> dict[str, Any]:
+        from picchio.core.provenance import provenance
+
         names = ("slope", "endurance_limit", "design", "scatter")
         return {
             "format": "picchio-sn/1",
@@ -154,20 +190,21 @@ class SNFit:
             "failures": self.failures,
             "run_outs": self.run_outs,
             "log_likelihood": self.log_likelihood,
-            "assumptions": list(self.assumptions),
+            "assumptions": self.assumptions,
+            "provenance": provenance([] if self.tests.file is None else [self.tests.file]),
         }
 
 
 def fit_sn(
-    amplitude: npt.ArrayLike,
-    cycles: npt.ArrayLike,
-    failed: npt.ArrayLike,
+    tests: str | Path | SNTests,
     *,
+    kind: str = "shear",
     level: float = 0.90,
     survival: float = 0.975,
     knee: bool | None = None,
+    run_out_cycles: float | None = None,
 ) -> SNFit:
-    """Fit slope, knee, endurance limit and scatter by maximum likelihood.
+    """Fit slope, knee, endurance limit and scatter to fatigue tests, by maximum likelihood.
 
     The model is `picchio.fatigue.sn.likelihood`'s. Intervals invert the profile likelihood with
     the threshold n ln(1 + t^2 / (n - 2)) that is exact for a regression line, n being the number
@@ -186,22 +223,44 @@ def fit_sn(
     tests, and `assumptions` says so where the tests show it.
 
     Args:
-        amplitude: (n,) stress amplitudes, Pa.
-        cycles: (n,) cycles at failure, or reached without.
-        failed: (n,) True where the specimen failed, False for a run-out.
+        tests: stress amplitudes (Pa), cycles and outcomes, or a table of them (see
+            `read_sn_tests`).
+        kind: what the tested stress is: "shear", or "normal" (bending, axial), which is divided
+            by sqrt(3) (distortion energy).
         level: of the two-sided intervals.
         survival: probability that the design strength is for.
         knee: True: fit a knee. False: a straight line, run-outs censored. None: a knee where the
             tests have run-outs.
+        run_out_cycles: in a table without outcomes, tests that reached this are run-outs.
 
     Raises:
-        InputError: arrays that do not match, values that are not positive, a `level` or
-            `survival` that is no probability, or tests that cannot show a slope or a scatter.
+        InputError: a table that cannot be read, arrays that do not match, values that are not
+            positive, a `level` or `survival` that is no probability, an unknown `kind`, or tests
+            that cannot show a slope or a scatter.
     """
-    tests = _check(amplitude, cycles, failed, level, survival)
-    run_outs = int((~tests.failed).sum())
+    if kind not in _TO_SHEAR:
+        raise InputError("unknown", key="kind", value=kind, choices=_TO_SHEAR)
+    if run_out_cycles is not None and not 0.0 < run_out_cycles < np.inf:
+        raise InputError("must be positive", key="run_out_cycles", value=run_out_cycles)
+    for key, value in (("survival", survival), ("level", level)):
+        if not 0.0 < value < 1.0:
+            raise InputError("must lie between 0 and 1", key=key, value=value)
+    given = tests
+    if not isinstance(given, SNTests):
+        given = read_sn_tests(given, run_out_cycles=run_out_cycles)
+    factor, note = _TO_SHEAR[kind]
+    given = dataclasses.replace(
+        given,
+        amplitude=factor * as_floats(given.amplitude, "amplitude"),
+        cycles=as_floats(given.cycles, "cycles"),
+    )
+    known = _likelihood(given)
+    run_outs = int((~known.failed).sum())
     with_knee = run_outs > 0 if knee is None else knee
-    notes = [f"{tests.failed.sum()} failures, {run_outs} run-outs taken as censored tests"]
+    notes = [
+        note,
+        f"{known.failed.sum()} failures, {run_outs} run-outs taken as tests stopped alive",
+    ]
     if with_knee:
         notes.append("about half of the scatter is strength unless the tests show otherwise")
     else:
@@ -215,13 +274,13 @@ def fit_sn(
             stacklevel=2,
         )
     free = [0, 1, 2, 3, 4] if with_knee else [0, 2, 3]
-    tests = dataclasses.replace(tests, limited=with_knee)
-    theta = _best(tests, free)
-    median = Profile(tests, theta, free, level)
+    known = dataclasses.replace(known, limited=with_knee)
+    theta = _best(known, free)
+    median = Profile(known, theta, free, level)
     at_quantile = theta.copy()
     z = NormalDist().inv_cdf(survival)
     at_quantile[0] -= z * np.exp(theta[3])
-    design = Profile(dataclasses.replace(tests, z=z), at_quantile, free, level)
+    design = Profile(dataclasses.replace(known, z=z), at_quantile, free, level)
 
     share = float(1.0 / (1.0 + np.exp(-median.theta[4])))
     if with_knee and not 0.2 < share < 0.8:
@@ -235,6 +294,7 @@ def fit_sn(
     spread, low, high = (float(np.exp(v) / np.log(10.0)) for v in median.scatter())
     scatter = Estimate(spread, low, high)
     return SNFit(
+        tests=dataclasses.replace(given, failed=known.failed),
         slope=estimate(median, 2),
         knee=estimate(median, 1) if with_knee else None,
         endurance_limit=estimate(median, 0),
@@ -248,19 +308,19 @@ def fit_sn(
         design_survival=survival,
         reference_cycles=float(f"{np.exp(median.theta[1]):.12g}"),
         level=level,
-        failures=int(tests.failed.sum()),
+        failures=int(known.failed.sum()),
         run_outs=run_outs,
         log_likelihood=median.value,
-        assumptions=tuple(notes),
+        assumptions=(*notes, *given.assumptions),
         covariance=median.covariance(),
     )
 
 
-def _check(amplitude: Any, cycles: Any, failed: Any, level: float, survival: float) -> Likelihood:
-    stress, life = as_floats(amplitude, "amplitude"), as_floats(cycles, "cycles")
-    broke = np.asarray(failed)
+def _likelihood(tests: SNTests) -> Likelihood:
+    stress, life = tests.amplitude, tests.cycles
+    broke = np.asarray(tests.failed)
     if broke.dtype != np.bool_ and not np.isin(broke, (0, 1)).all():
-        raise InputError("must be true or false", key="failed", value=failed)
+        raise InputError("must be true or false", key="failed", value=tests.failed)
     broke = broke.astype(bool)
     if stress.ndim != 1 or not stress.shape == life.shape == broke.shape:
         raise InputError(
@@ -271,9 +331,6 @@ def _check(amplitude: Any, cycles: Any, failed: Any, level: float, survival: flo
     for key, values in (("amplitude", stress), ("cycles", life)):
         if values.size and values.min() <= 0:
             raise InputError("must be positive", key=key, value=float(values.min()))
-    for key, value in (("level", level), ("survival", survival)):
-        if not 0.0 < value < 1.0:
-            raise InputError("must lie between 0 and 1", key=key, value=value)
     if broke.sum() < 6:
         raise InputError("needs at least 6 failures", key="tests", value=int(broke.sum()))
     if len(np.unique(stress[broke])) < 2:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.results import plain
 from picchio.core.toml import Positive, StrictModel, parse_toml
 from picchio.fatigue.sn.curve import MinerRule, SNCurve
 
@@ -63,6 +64,27 @@ def load_sn_curve(name_or_path: str | Path, *, quiet: bool = False) -> SNCurve:
     if curve.warning and not quiet:
         warnings.warn(f"S-N curve {curve.name}: {curve.warning}", PicchioWarning, stacklevel=2)
     return curve
+
+
+def write_sn_curve(curve: SNCurve, path: str | Path) -> None:
+    """Write a curve to a TOML file that `load_sn_curve` reads.
+
+    Args:
+        curve: the curve.
+        path: the file; its folder must exist.
+
+    Raises:
+        InputError: it cannot be written there.
+    """
+    import tomlkit
+
+    from picchio.core.files import atomic_write
+
+    values = {name: getattr(curve, name) for name in SNCurveFile.model_fields}
+    known = {name: value for name, value in values.items() if value not in (None, "")}
+    content = {"format": SN_FORMAT, **plain(known)}
+    with atomic_write(path) as stream:
+        stream.write(tomlkit.dumps(content))
 
 
 def _read(path: Path) -> SNCurve:

@@ -29,12 +29,14 @@ class SNTests:
         cycles: (n,) at failure, or reached without.
         failed: (n,) bool.
         assumptions: what the reader had to assume.
+        file: the table they are from; None for arrays.
     """
 
     amplitude: FloatArray
     cycles: FloatArray
     failed: np.ndarray
     assumptions: tuple[str, ...] = ()
+    file: Path | None = None
 
 
 def read_sn_tests(path: str | Path, *, run_out_cycles: float | None = None) -> SNTests:
@@ -68,7 +70,7 @@ def read_sn_tests(path: str | Path, *, run_out_cycles: float | None = None) -> S
         failed = np.array([_failed(row, outcome, path, i) for i, row in enumerate(rows[1:], 2)])
     else:
         failed, notes = _by_cycles(values[:, 1], run_out_cycles)
-    return SNTests(values[:, 0] * factor, values[:, 1], failed, notes)
+    return SNTests(values[:, 0] * factor, values[:, 1], failed, notes, Path(path))
 
 
 def _rows(path: str | Path) -> list[list[str]]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
-from picchio.campaign.campaign import Campaign
+from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.record import Record
 from picchio.core.errors import InputError
+from picchio.core.html import sheet
+from picchio.core.results import TableResult
 from picchio.measurement.noise.estimate import NoiseCollector
 from picchio.measurement.noise.level import Noise
 from picchio.measurement.noise.window import read_window
@@ -18,6 +21,7 @@ from picchio.measurement.quality.checks.repeats import Comparison, RepeatsCheck
 from picchio.measurement.quality.registry import CHECKS
 from picchio.measurement.quality.scan import RecordScan, scan_record
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.loading.load import load_robot
 
 # What is in a campaign: one entry a record, and the campaign as a whole.
 
@@ -97,13 +101,13 @@ def summarise(scan: RecordScan) -> RecordSummary:
 FORMAT = "picchio-check/1"
 
 
-@dataclass(frozen=True, eq=False)
-class QualityReport:
-    """What `check_campaign` saw.
+@dataclass(frozen=True, eq=False, repr=False)
+class QualityReport(TableResult):
+    """What `check` saw; its table is the findings.
 
     Attributes:
         campaign: the campaign.
-        robot: its name, where there was one.
+        robot: what the records were checked against, where there was one.
         records: in the campaign's order; those that cannot be read are missing.
         findings: the gravest first.
         noise: by channel.
@@ -111,8 +115,11 @@ class QualityReport:
         checks: {name: what it looks for}.
     """
 
+    INDEX = ""
+    PAGE = "visuals.report.residual:check_page"
+
     campaign: Campaign
-    robot: str | None
+    robot: FlexibleRobot | None
     records: tuple[RecordSummary, ...]
     findings: tuple[Finding, ...]
     noise: Mapping[str, Noise]
@@ -123,47 +130,110 @@ class QualityReport:
         """How many findings of this severity."""
         return sum(finding.severity == severity for finding in self.findings)
 
-    def to_dict(self) -> dict[str, Any]:
-        """`picchio-check/1`, with the provenance of every file."""
+    def _headline(self) -> str:
+        counts = [(self.count(severity), severity) for severity in SEVERITIES]
+        told = ", ".join(f"{n} {word}{'' if n == 1 else 's'}" for n, word in counts if n)
+        return f"{len(self.records)} records, {told or 'nothing found'}"
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [finding.to_dict() for finding in self.findings]
+
+    def _repr_html_(self) -> str:
+        rows = [(f.severity, f.record, f.channel, f.message, f.advice) for f in self.findings]
+        columns = ("", "record", "channel", "what was seen", "what to do")
+        return sheet(f"Check of {self._headline()}", None, columns, rows)
+
+    def _content(self) -> dict[str, Any]:
         from picchio.core.provenance import provenance
 
         table = self.campaign.table
         return {
             "format": FORMAT,
-            "campaign": None if self.campaign.folder is None else str(self.campaign.folder),
-            "robot": self.robot or table.robot,
+            "campaign": self.campaign.folder,
+            "robot": table.robot if self.robot is None else self.robot.name,
             "robot_used": self.robot is not None,
             "tool": table.tool,
             "tolerance": table.tolerance.model_dump(),
             "records": [record.to_dict() for record in self.records],
-            "findings": [finding.to_dict() for finding in self.findings],
+            "findings": self._rows(),
             "counts": {severity: self.count(severity) for severity in SEVERITIES},
             "noise": {name: noise.to_dict() for name, noise in self.noise.items()},
             "repeats": [vars(comparison) for comparison in self.repeats],
-            "checks": dict(self.checks),
+            "checks": self.checks,
             "provenance": provenance(self.campaign.files),
         }
 
 
-def check_campaign(
-    campaign: Campaign,
-    robot: FlexibleRobot | None = None,
+def check(
+    campaign: str | Path | Campaign,
+    robot: str | Path | FlexibleRobot | None = None,
     *,
+    flex: str | Path | None = None,
+    tool: str | None = None,
+    use_robot: bool = True,
     keep_going: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> QualityReport:
-    """Look a campaign through, record by record, in constant memory.
+    """Check measured data: what is in a campaign, and what is wrong with it.
+
+    Clipping, dropouts, spikes, drift, uneven clocks, swapped or flipped axes, hum, high-passes,
+    delays, records that are too short, aliasing, repeats, and the noise of every channel. Records
+    are read twice and one at a time, in constant memory. Clocks are taken however uneven.
 
     Args:
-        campaign: its records are read twice: the leading part for the noise, then all of them.
-            Clocks are taken however uneven.
-        robot: for what needs one (limits, axes, phases).
+        campaign: the measured data, or their folder.
+        robot: for what needs one (limits, axes, phases); the campaign's own if None. If the
+            campaign's own cannot be loaded, that is a finding.
+        flex: sidecar of the robot.
+        tool: the frame that carries the tool; as the campaign says if None.
+        use_robot: False leaves out what needs a robot.
         keep_going: a record that cannot be read becomes a finding instead of an error.
         progress: called with (done, total) records.
 
     Raises:
-        InputError: a record cannot be read.
+        InputError: a campaign, a robot or a record that cannot be read.
     """
+    campaign = load_campaign(campaign, clock_tolerance=math.inf)
+    found, problem = _robot(campaign, robot, flex, tool) if use_robot else (None, None)
+    return _look_through(campaign, found, problem, keep_going, progress)
+
+
+def _robot(
+    campaign: Campaign,
+    robot: str | Path | FlexibleRobot | None,
+    flex: str | Path | None,
+    tool: str | None,
+) -> tuple[FlexibleRobot | None, Finding | None]:
+    """The robot asked for, or else the campaign's; what is wrong with the campaign's own."""
+    if isinstance(robot, FlexibleRobot):
+        return load_robot(robot, flex=flex, tool=tool), None
+    name = robot or campaign.robot
+    if name is None:
+        for key, value in (("flex", flex), ("tool", tool)):
+            if value is not None:
+                raise InputError("needs a robot", key=key, value=str(value))
+        return None, None
+    try:
+        return load_robot(name, flex=flex, tool=tool or campaign.tool), None
+    except InputError as error:
+        if robot is not None or flex is not None or tool is not None:
+            raise
+        return None, Finding(
+            "robot",
+            "error",
+            f"the campaign's robot cannot be used: {error}",
+            "correct `robot` or `tool` in campaign.toml, or give another with --robot; what needs "
+            "a robot was not checked",
+        )
+
+
+def _look_through(
+    campaign: Campaign,
+    robot: FlexibleRobot | None,
+    problem: Finding | None,
+    keep_going: bool,
+    progress: Callable[[int, int], None] | None,
+) -> QualityReport:
     records = [replace(record, clock_tolerance=math.inf) for record in campaign.records]
     campaign = replace(campaign, records=tuple(records))
     findings: list[Finding] = []
@@ -181,7 +251,7 @@ def check_campaign(
         if progress is not None:
             progress(index + 1, total)
     context = Context(campaign, robot, collector.finish(), collector.periods)
-    checks: list[Check] = [kind(context) for kind in CHECKS]
+    checkers: list[Check] = [kind(context) for kind in CHECKS]
     summaries = []
     for index, record in enumerate(readable):
         try:
@@ -191,18 +261,20 @@ def check_campaign(
                 raise
             findings.append(_unreadable(record, error))
             continue
-        for check in checks:
-            findings.extend(check.record(scan))
+        for checker in checkers:
+            findings.extend(checker.record(scan))
         summaries.append(summarise(scan))
         if progress is not None:
             progress(len(records) + index + 1, total)
-    for check in checks:
-        findings.extend(check.finish())
-    repeats = next((c.comparisons for c in checks if isinstance(c, RepeatsCheck)), [])
+    for checker in checkers:
+        findings.extend(checker.finish())
+    repeats = next((c.comparisons for c in checkers if isinstance(c, RepeatsCheck)), [])
     findings.sort(key=lambda finding: SEVERITIES.index(finding.severity))
+    if problem is not None:
+        findings.insert(0, problem)
     return QualityReport(
         campaign,
-        None if robot is None else robot.name,
+        robot,
         tuple(summaries),
         tuple(findings),
         context.noise,

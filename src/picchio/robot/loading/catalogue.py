@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from picchio.core.errors import InputError
+from picchio.core.html import sheet
+from picchio.core.results import TableResult
 from picchio.robot.annotations.inline import read_annotations
 from picchio.robot.annotations.sidecar import Sidecar, given, read_sidecar
 from picchio.robot.loading.find import FoundRobot, example_robots, shipped_robots
@@ -38,8 +42,43 @@ class RobotEntry:
     problem: str | None = None
 
 
-def list_robots(*, examples: bool = True) -> list[RobotEntry]:
-    """The robots of this project, then those of example-robot-data.
+@dataclass(frozen=True, eq=False, repr=False)
+class RobotList(TableResult):
+    """The robots that can be named; its table is one row a robot.
+
+    Attributes:
+        entries: this project's robots, then those of example-robot-data.
+    """
+
+    entries: tuple[RobotEntry, ...]
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+    def __iter__(self) -> Iterator[RobotEntry]:
+        return iter(self.entries)
+
+    def _headline(self) -> str:
+        known = sum(bool(entry.with_stiffness) for entry in self.entries)
+        return f"{len(self.entries)} robots, {known} with known stiffness"
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [asdict(entry) for entry in self.entries]
+
+    def _repr_html_(self) -> str:
+        columns = ("name", "DoF", "stiffness known", "source")
+        rows = [
+            (e.name, e.dof, ", ".join(e.with_stiffness) or None, e.problem or e.stiffness_source)
+            for e in self.entries
+        ]
+        return sheet(self._headline(), None, columns, rows)
+
+    def _content(self) -> dict[str, Any]:
+        return {"format": "picchio-robots/1", "robots": self._rows()}
+
+
+def robots(*, examples: bool = True) -> RobotList:
+    """The robots that `load_robot` knows by name, and which have stiffness data, from where.
 
     Args:
         examples: also read example-robot-data's 69 URDFs.
@@ -50,7 +89,7 @@ def list_robots(*, examples: bool = True) -> list[RobotEntry]:
         found += [
             FoundRobot(name, urdf) for name, urdf in example_robots().items() if name not in shipped
         ]
-    return [describe_robot(robot) for robot in found]
+    return RobotList(tuple(describe_robot(robot) for robot in found))
 
 
 def describe_robot(robot: FoundRobot) -> RobotEntry:

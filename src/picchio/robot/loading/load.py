@@ -31,7 +31,7 @@ from picchio.robot.urdf.xml import parse_urdf, read_urdf_bytes
 
 
 def load_robot(
-    robot: str | Path,
+    robot: str | Path | FlexibleRobot,
     *,
     flex: str | Path | None = None,
     tool: str | None = None,
@@ -42,7 +42,8 @@ def load_robot(
 
     Args:
         robot: a name from `picchio robots`, a path to a URDF or to a robot's folder, a
-            `package://` address, or a saved model (`picchio-model/1`, a .toml file).
+            `package://` address, or a saved model (`picchio-model/1`, a .toml file). A robot
+            that is loaded already is taken as it is.
         flex: a sidecar `picchio-sidecar/1`.
         tool: the frame that carries the tool.
         values: values that win over every file, by joint and key, as in a sidecar:
@@ -52,6 +53,12 @@ def load_robot(
     Raises:
         InputError: with the file, the key, the value and the valid choices.
     """
+    if isinstance(robot, FlexibleRobot):
+        for key, given in (("flex", flex), ("tool", tool), ("values", values)):
+            if given is not None:
+                raise InputError("comes too late for a robot that is loaded", key=key,
+                                 hint="give the robot's name or file with it")  # fmt: skip
+        return robot
     if is_saved_model(robot):
         return _load_saved(Path(robot), flex=flex, tool=tool, values=values)
     found = find_robot(robot)

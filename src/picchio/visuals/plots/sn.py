@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.fit import SNFit
-from picchio.fatigue.sn.test_table import SNTests
 from picchio.visuals.plots.style import (
     BLUE,
     COLOURS,
@@ -92,20 +91,20 @@ def plot_sn_curve(
 
 
 @styled
-def plot_sn_fit(fit: SNFit, tests: SNTests | None = None, ax: Axes | None = None) -> Axes:
-    """A fitted S-N curve (MPa over cycles): median, P10 and P90, and how sure they are.
+def plot_sn_fit(fit: SNFit, ax: Axes | None = None) -> Axes:
+    """A fitted S-N curve (MPa over cycles) and its tests: median, P10 and P90, how sure they are.
 
     P10 is the life that 90 % of specimens exceed. The band is where the median itself may lie, at
-    the fit's level; the bar at the knee is the knee's interval.
+    the fit's level; the bar at the knee is the knee's interval. Failures are dots, run-outs rings
+    with an arrow.
 
     Args:
         fit: the fit.
-        tests: what it was fitted to, in the same kind of stress: failures are dots, run-outs
-            rings with an arrow.
         ax: where to draw.
     """
     ax = axes_or_new(ax, height=3.8)
-    ends = [fit.reference_cycles, *(tests.cycles if tests is not None else ())]
+    tests = fit.tests
+    ends = [fit.reference_cycles, *tests.cycles]
     if fit.knee is not None:
         # A knee that the tests do not bound may lie anywhere: its bar then runs to the edges.
         near = np.clip([fit.knee.low, fit.knee.high], 0.1 * min(ends), 10.0 * max(ends))
@@ -126,31 +125,28 @@ def plot_sn_fit(fit: SNFit, tests: SNTests | None = None, ax: Axes | None = None
         ax.plot(reach, [limit, limit], "|-", color=INK, linewidth=1.4, markersize=9, zorder=5,
                 label=f"knee, {100 * fit.level:g} % interval")  # fmt: skip
         ax.plot(fit.knee.value, limit, "o", color=INK, markersize=4, zorder=5, label="_knee")
-    if tests is not None:
-        stress, broken = tests.amplitude / 1e6, tests.failed
-        dot: dict[str, Any] = {
-            "markersize": 5,
-            "markeredgecolor": "white",
-            "markeredgewidth": 0.6,
-            "zorder": 4,
-        }
-        ring: dict[str, Any] = {
-            "markersize": 5.5,
-            "markerfacecolor": "none",
-            "markeredgewidth": 1.3,
-            "zorder": 4,
-        }
-        ax.plot(tests.cycles[broken], stress[broken], "o", color=VERMILION, label="failure", **dot)
-        if not broken.all():
-            ax.plot(
-                tests.cycles[~broken], stress[~broken], "o", color=ORANGE, label="run-out", **ring
-            )
-        for place, many in _together(tests.cycles[~broken], stress[~broken]).items():
-            ax.annotate("", (1.75 * place[0], place[1]), xytext=(1.12 * place[0], place[1]),
-                        arrowprops={"arrowstyle": "->", "color": ORANGE, "lw": 1.2})  # fmt: skip
-            if many > 1:
-                ax.annotate(f"{many}", (1.75 * place[0], place[1]), xytext=(-2, 3),
-                            textcoords="offset points", fontsize=8, color=MUTED)  # fmt: skip
+    stress, broken = tests.amplitude / 1e6, tests.failed
+    dot: dict[str, Any] = {
+        "markersize": 5,
+        "markeredgecolor": "white",
+        "markeredgewidth": 0.6,
+        "zorder": 4,
+    }
+    ring: dict[str, Any] = {
+        "markersize": 5.5,
+        "markerfacecolor": "none",
+        "markeredgewidth": 1.3,
+        "zorder": 4,
+    }
+    ax.plot(tests.cycles[broken], stress[broken], "o", color=VERMILION, label="failure", **dot)
+    if not broken.all():
+        ax.plot(tests.cycles[~broken], stress[~broken], "o", color=ORANGE, label="run-out", **ring)
+    for place, many in _together(tests.cycles[~broken], stress[~broken]).items():
+        ax.annotate("", (1.75 * place[0], place[1]), xytext=(1.12 * place[0], place[1]),
+                    arrowprops={"arrowstyle": "->", "color": ORANGE, "lw": 1.2})  # fmt: skip
+        if many > 1:
+            ax.annotate(f"{many}", (1.75 * place[0], place[1]), xytext=(-2, 3),
+                        textcoords="offset points", fontsize=8, color=MUTED)  # fmt: skip
     ax.set_xlim(left, right)
     _few_stress_ticks(ax)
     ax.set(xlabel="cycles to failure [\N{EN DASH}]", ylabel="shear stress amplitude [MPa]",

@@ -10,12 +10,15 @@ import functools
 import math
 import sys
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
+
+from picchio.core.files import atomic_write
 
 INK = "#20262e"
 """Text and axes; the report swaps it for the page's own text colour."""
@@ -116,6 +119,18 @@ def blank_figure(width: float = WIDTH, height: float = HEIGHT, *, polar: bool = 
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(width, height), layout="constrained", facecolor="none")
         return figure.add_subplot(projection="polar" if polar else None)
+
+
+def save_figure(ax: Axes, path: Path) -> None:
+    """Write the figure of some Axes, as the file's ending says (.png, .svg, .pdf).
+
+    Raises:
+        InputError: it cannot be written there.
+    """
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    with atomic_write(path, "wb") as stream:
+        figure.savefig(stream, format=path.suffix[1:].lower(), dpi=160, facecolor=PAPER)
 
 
 def look(index: int) -> dict[str, Any]:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import io
 import math
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
 from importlib.resources import files
 from typing import Any, cast
 
@@ -12,7 +15,10 @@ import matplotlib as mpl
 from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 
+from picchio.core.errors import InputError
+from picchio.core.html import Page
 from picchio.core.provenance import package_version
+from picchio.core.results import Result
 from picchio.visuals.plots.style import BLUE, INK, MUTED, STYLE, VERMILION
 
 # A matplotlib figure as inline SVG that takes the page's text colour and has an alt text.
@@ -136,3 +142,67 @@ def spread(value: float, std: float, unit: str = "") -> str:
 def words(name: str) -> str:
     """An effect's name as people say it."""
     return name.replace("_", " ")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Report(Page):
+    """A result as a page to read, to print and to mail: `save` writes it.
+
+    Attributes:
+        title: what it shows.
+        text: the HTML.
+    """
+
+    title: str
+    text: str
+
+    def html(self) -> str:
+        """The page."""
+        return self.text
+
+    def __repr__(self) -> str:
+        return f"<Report: {self.title}, {len(self.text.encode()) / 1e3:.0f} kB>"
+
+
+def report(
+    result: Result | Page,
+    *,
+    command: str | None = None,
+    warnings: Sequence[str] = (),
+    **options: Any,
+) -> Report:
+    """A result as one HTML page that needs nothing from outside.
+
+    Args:
+        result: what a function of picchio returned: an assessment, a check, a diagnosis, ...
+            One that has no page of its own is shown as in a notebook; a scene is a page.
+        command: how it was made, for the page's foot.
+        warnings: what was warned of on the way.
+        **options: what the result's own page can be told besides, such as `gravity_stiffness`.
+
+    Returns:
+        the page; `report(...).save("page.html")` writes it.
+
+    Raises:
+        InputError: no result of picchio, or one that its page cannot show.
+    """
+    if isinstance(result, Page):
+        return Report(result.title, result.html())
+    if not isinstance(result, Result):
+        raise InputError("is no result of picchio", key="result", value=result)
+    title = repr(result).strip("<>")
+    module, _, name = result.PAGE.partition(":")
+    page = getattr(import_module(f"picchio.{module}"), name)
+    return Report(title, page(result, command=command, warnings=warnings, **options))
+
+
+def plain_page(result: Result, *, command: str | None = None, warnings: Sequence[str] = ()) -> str:
+    """The page of a result that has none of its own: what a notebook shows, and its inputs."""
+    return render(
+        "plain.html.j2",
+        title=repr(result).strip("<>"),
+        body=Markup(result._repr_html_()),
+        command=command,
+        warnings=warnings,
+        provenance=result.to_dict().get("provenance"),
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from picchio.campaign.campaign import Campaign
+from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence, whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem
@@ -20,6 +21,24 @@ from picchio.visuals.report.residual_measures import Spectra, channel_residuals,
 
 # Standard error of the power above which it tells nothing.
 _UNSURE = 0.3
+
+
+def check_page(
+    found: QualityReport,
+    *,
+    command: str | None = None,
+    warnings: Sequence[str] = (),
+    gravity_stiffness: bool = True,
+) -> str:
+    """The page of `residual_report` for the campaign and the robot of a check.
+
+    Raises:
+        InputError: as `residual_report`; the check had no robot.
+    """
+    if found.robot is None:
+        raise InputError("needs a robot", key="report", hint="name one with --robot")
+    return residual_report(found.robot, found.campaign, quality=found, command=command,
+                           warnings=warnings, gravity_stiffness=gravity_stiffness)  # fmt: skip
 
 
 def residual_report(
@@ -41,7 +60,7 @@ def residual_report(
     Args:
         robot: as its files have it.
         campaign: the records; beside percussion records those of motion are left out.
-        quality: what `check_campaign` saw; its errors and warnings are told on the page.
+        quality: what `picchio.check` saw; its errors and warnings are told on the page.
         command: the command line that gave this.
         warnings: what was warned of on the way.
         gravity_stiffness: whether gravity's change with the deflection counts.

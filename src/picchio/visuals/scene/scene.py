@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from html import escape
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.html import Page
 from picchio.core.provenance import package_version
+from picchio.core.results import Result
 from picchio.studies.envelopes import DirectionEnvelope
 from picchio.visuals.kinematics import Frame
 from picchio.visuals.scene.live import send
@@ -30,8 +32,8 @@ class Item:
     joint: int | None = None
 
 
-@dataclass(eq=False)
-class Scene:
+@dataclass(eq=False, repr=False)
+class Scene(Page, Result):
     """Everything that a page, a notebook cell or a live viewer shows.
 
     Attributes:
@@ -55,6 +57,7 @@ class Scene:
         chosen: index of the joint whose envelope is shown at first.
         reach: m, size of the robot.
         envelope: what the double balls are of.
+        file: where it was saved last, or None.
     """
 
     title: str
@@ -77,6 +80,7 @@ class Scene:
     chosen: int = 0
     reach: float = 1.0
     version: str = field(default_factory=package_version)
+    file: Path | None = None
 
     def html(self) -> str:
         """One HTML page that needs nothing but itself."""
@@ -91,15 +95,27 @@ class Scene:
         send(self, viewer)
         return viewer
 
-    def __repr__(self) -> str:
-        return f"Scene({self.title!r}, {self.subtitle!r}, layers={[i for i, _, _ in self.layers]})"
+    def save(self, path: str | Path) -> Path:
+        """Write the page to a file, whole or not at all, and return the path.
 
-    def _repr_html_(self) -> str:
-        page = escape(self.html(), quote=True)
-        return (
-            f'<iframe title="{escape(self.title)}" srcdoc="{page}" '
-            'style="width:100%;height:560px;border:0"></iframe>'
-        )
+        Raises:
+            InputError: it cannot be written there.
+        """
+        self.file = super().save(path)
+        return self.file
+
+    def _headline(self) -> str:
+        return f"{self.title}, {self.subtitle}"
+
+    def _content(self) -> dict[str, Any]:
+        return {
+            "format": "picchio-scene/1",
+            "file": self.file,
+            "bytes": 0 if self.file is None else self.file.stat().st_size,
+            "layers": [{"id": name, "text": text} for name, text, _ in self.layers],
+            "envelope": self.envelope.to_dict(),
+            "provenance": self.envelope.origin,
+        }
 
     def add(self, mesh: Mesh) -> int:
         """Put geometry in; its index."""

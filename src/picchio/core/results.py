@@ -1,0 +1,105 @@
+"""What every answer of picchio can do: one line of text, plain data for JSON, a table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from os import PathLike
+from typing import TYPE_CHECKING, Any, ClassVar
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+
+def plain(value: Any) -> Any:
+    """The same structure as `json.dumps` takes it.
+
+    Arrays and tuples become lists, paths become text, keys become text; numbers that JSON cannot
+    hold (NaN, infinity) become None.
+    """
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
+    if isinstance(value, PathLike):
+        return str(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+class Result:
+    """What the answers of all commands have in common.
+
+    A subclass says what it holds in `_content` and what matters in `_headline`; where a notebook
+    shall show more than that line it has a `_repr_html_` (see `picchio.core.html.sheet`). If it
+    is a dataclass it is declared with `repr=False`, or the dataclass's own repr hides this one.
+
+    Attributes:
+        PAGE: the function that draws it for `picchio.report`, as "module:function" with the
+            module below `picchio`. It is called with the result, `command`, `warnings` and the
+            options given to `report`, and returns HTML. The default page shows what a notebook
+            shows.
+    """
+
+    PAGE: ClassVar[str] = "visuals.report.page:plain_page"
+
+    def _content(self) -> Mapping[str, Any]:
+        """The keys of its JSON format; arrays, NaN and infinite numbers may stand in it."""
+        raise NotImplementedError
+
+    def _headline(self) -> str:
+        """What matters, in a few words."""
+        raise NotImplementedError
+
+    def to_dict(self) -> dict[str, Any]:
+        """What `--json` prints: numbers, text, lists and dictionaries, as `json.dumps` takes them.
+
+        A number without end, or one that does not exist, is None.
+        """
+        return {key: plain(value) for key, value in self._content().items()}
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self._headline()}>"
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        return sheet(type(self).__name__, note=self._headline())
+
+
+class TableResult(Result):
+    """A result that is a table: `to_frame` and `to_xarray` beside what every result has.
+
+    Attributes:
+        INDEX: the column that names a row; "" where rows are counted.
+        UNITS: {column: unit}; columns without a unit are left out.
+    """
+
+    INDEX: ClassVar[str] = "name"
+    UNITS: ClassVar[Mapping[str, str]] = {}
+
+    def _rows(self) -> Iterable[Mapping[str, Any]]:
+        """{column: value} a row, SI; NaN and infinite numbers stay what they are."""
+        raise NotImplementedError
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The table, SI; units by column in `attrs["units"]`."""
+        import pandas
+
+        frame = pandas.DataFrame([dict(row) for row in self._rows()])
+        if self.INDEX and not frame.empty:
+            frame = frame.set_index(self.INDEX)
+        frame.attrs["units"] = {k: v for k, v in self.UNITS.items() if k in frame.columns}
+        return frame
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The same table, with each variable's unit in its `attrs["units"]`."""
+        frame = self.to_frame()
+        found = frame.to_xarray()
+        for column, unit in frame.attrs["units"].items():
+            found[column].attrs["units"] = unit
+        return found
