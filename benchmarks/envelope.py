@@ -37,7 +37,7 @@ from picchio.robot.joint import Shaft
 from picchio.studies.envelopes import icosphere
 from picchio.studies.maps import places
 from picchio.studies.maps.run import workspace_map
-from picchio.studies.rivet.batch import batch_damage
+from picchio.studies.rivet.poses import damage_at
 from picchio.vibration.batch.peaks import batch_peaks
 
 BLOWS = picchio.PulseTrain(force=300.0, period=0.040, width=0.004)
@@ -92,7 +92,7 @@ def ours(robot: picchio.FlexibleRobot, poses: np.ndarray, compiled: bool = True)
 def damaged(robot: picchio.FlexibleRobot, poses: np.ndarray, curve: picchio.SNCurve) -> None:
     """A rivet of 12 hits from rest in one direction, ring-down, cycles counted, in every joint."""
     curves = [curve] * len(robot.flexible_joints)
-    batch_damage(robot, poses, [1.0, 0.0, 0.0], BLOWS, 12, curves)
+    damage_at(picchio.Model(robot), poses, [1.0, 0.0, 0.0], BLOWS, 12, curves)
 
 
 def shafted(robot: picchio.FlexibleRobot) -> picchio.FlexibleRobot:

@@ -40,9 +40,14 @@ if TYPE_CHECKING:
     from picchio.robot.loading.catalogue import robots as robots
     from picchio.robot.loading.load import load_robot as load_robot
     from picchio.studies.assessment.run import assess as assess
+    from picchio.studies.backwards import allowable as allowable
+    from picchio.studies.envelopes import envelope as envelope
+    from picchio.studies.maps.run import workspace_map as workspace_map
+    from picchio.studies.placement.run import place as place
     from picchio.studies.tasks import Task as Task
     from picchio.studies.tasks import load_task as load_task
     from picchio.studies.tasks import task_from_dict as task_from_dict
+    from picchio.studies.uncertainty import uncertain_life as uncertain_life
     from picchio.vibration.closed_form.modes import modal_analysis as modal_analysis
     from picchio.vibration.closed_form.response import response_from_rest as response_from_rest
     from picchio.vibration.closed_form.response import steady_state as steady_state
@@ -52,16 +57,21 @@ if TYPE_CHECKING:
 # Every public name and its module, which is loaded when the name is first used; "" for a package.
 _HOME = {
     # What the commands do: a function each.
+    "allowable": "studies.backwards",
     "annotate": "robot.loading.annotated",
     "assess": "studies.assessment.run",
     "check": "measurement.quality.report",
+    "envelope": "studies.envelopes",
     "fit_sn": "fatigue.sn.fit",
     "import_record": "campaign.importing.importer",
+    "place": "studies.placement.run",
     "report": "visuals.report.page",
     "reproduce": "paper.run",
     "robots": "robot.loading.catalogue",
     "simulate": "prediction.simulation",
+    "uncertain_life": "studies.uncertainty",
     "view": "visuals.view",
+    "workspace_map": "studies.maps.run",
     # What they work on, from files and from Python.
     "Campaign": "campaign.campaign",
     "FlexibleRobot": "robot.flexible_robot",

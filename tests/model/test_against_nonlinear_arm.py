@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import picchio
+from picchio.model.linear_system import LinearSystem
 
 SPRINGS = np.array([2.4e5, 1e5, 1e5])
 BLOWS = {"period": 0.040, "width": 0.004}
@@ -31,7 +32,7 @@ def ours(robot, pose, direction, force, times, gravity_stiffness, damping=None):
     system = picchio.Model(robot, gravity_stiffness).linear_system(robot.pose(pose))
     if damping is not None:
         values = {name: getattr(system, name) for name in system.__dataclass_fields__}
-        system = picchio.LinearSystem(**(values | {"damping_matrix": damping}))
+        system = LinearSystem(**(values | {"damping_matrix": damping}))
     modes = picchio.modal_analysis(system)
     response = picchio.response_from_rest(modes, picchio.PulseTrain(force, **BLOWS), 12)
     return response.deflection(times, direction)

@@ -69,11 +69,11 @@ def test_rings_and_axes(study):
 
 
 def test_the_largest_envelopes_are_the_exact_ones(study):
-    from picchio.studies.envelopes import direction_envelope
+    from picchio.studies.envelopes import envelope as envelope_of
 
     ours = envelope.figure_9(study).data["peak_mrad"]
     for k, pose in enumerate(study.base.path_poses):
-        exact = direction_envelope(study.base.model, pose, study.base.blows)
+        exact = envelope_of(study.base.model, pose, study.base.blows)
         np.testing.assert_allclose(ours[k], 1e3 * exact.peak_deflection, rtol=1e-5)
 
 

@@ -44,10 +44,6 @@ def make_task(robot: FlexibleRobot, force: float = 300.0, hits: int = 3) -> Task
     )  # fmt: skip
 
 
-def curves(robot: FlexibleRobot) -> dict[str, SNCurve]:
-    return dict.fromkeys(robot.flexible_names, STRAIGHT)
-
-
 def life_of(robot: FlexibleRobot, task: Task, curve: SNCurve, joint: str, **more: str) -> float:
     value = assess(robot, task, sn_curve=curve, **more).joint(joint).rivets_to_failure  # type: ignore[arg-type]
     assert value is not None
@@ -60,7 +56,7 @@ def test_each_answer_gives_the_wanted_life(robot: FlexibleRobot, survival: float
     wanted = 2e6
     task = make_task(robot)
     curve = STRAIGHT if survival is None else STRAIGHT.at_survival(survival)
-    for found in allowable(robot, task, curves(robot), wanted, survival=survival):
+    for found in allowable(robot, task, wanted, sn_curve=STRAIGHT, survival=survival):
         assert found.life == pytest.approx(life_of(robot, task, curve, found.joint), rel=1e-9)
         stronger = make_task(robot, 300.0 * found.force_factor)
         assert life_of(robot, stronger, curve, found.joint) == pytest.approx(wanted, rel=1e-6)
@@ -81,7 +77,7 @@ def test_each_answer_gives_the_wanted_life(robot: FlexibleRobot, survival: float
 
 def test_gravity_stays_when_the_force_grows(robot: FlexibleRobot) -> None:
     task = make_task(robot)
-    for found in allowable(robot, task, curves(robot), 2e6, mean_stress="goodman"):
+    for found in allowable(robot, task, 2e6, sn_curve=STRAIGHT, mean_stress="goodman"):
         stronger = make_task(robot, 300.0 * found.force_factor)
         assert life_of(
             robot, stronger, STRAIGHT, found.joint, mean_stress="goodman"
@@ -99,17 +95,22 @@ def test_a_joint_that_does_not_move_allows_anything(robot: FlexibleRobot) -> Non
         },
         robot,
     )
-    first = allowable(robot, task, curves(robot), 1e6)[0]
+    first = allowable(robot, task, 1e6, sn_curve=STRAIGHT)[0]
     assert (first.force_factor, first.radius, first.hits) == (math.inf, 0.0, None)
     assert first.to_dict()["force_factor"] is None
+
+
+def without_shafts(robot: FlexibleRobot) -> FlexibleRobot:
+    joints = tuple(dataclasses.replace(j, shaft=None) for j in robot.flexible_joints)
+    return dataclasses.replace(robot, flexible_joints=joints)
 
 
 def test_bad_questions_are_named(robot: FlexibleRobot) -> None:
     task = make_task(robot)
     for bad in (0.0, -1.0, math.nan, math.inf):
         with pytest.raises(InputError, match="rivets"):
-            allowable(robot, task, curves(robot), bad)
+            allowable(robot, task, bad)
     with pytest.raises(InputError, match="no joint has a shaft"):
-        allowable(robot, task, {}, 1e6)
+        allowable(without_shafts(robot), task, 1e6)
     with pytest.raises(InputError, match="survival"):
-        allowable(robot, task, curves(robot), 1e6, survival=1.5)
+        allowable(robot, task, 1e6, sn_curve=STRAIGHT, survival=1.5)

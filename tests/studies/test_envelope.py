@@ -5,7 +5,8 @@ import pytest
 
 import picchio
 from picchio.core.errors import InputError
-from picchio.studies.envelopes import direction_envelope, icosphere
+from picchio.studies.envelopes import envelope as envelope_of
+from picchio.studies.envelopes import icosphere
 
 BLOWS = picchio.PulseTrain(300.0, 0.040, 0.004)
 POSE = [0.3, 1.1, -1.0]
@@ -25,12 +26,12 @@ def model():
     ],
 )
 def test_reference_figures(model, pose, worst):
-    found = direction_envelope(model, pose, BLOWS)
+    found = envelope_of(model, pose, BLOWS)
     np.testing.assert_allclose(found.peak_deflection * 1e3, worst, atol=5.1e-6)
 
 
 def test_the_surface_is_the_support_function(model):
-    found = direction_envelope(model, POSE, BLOWS)
+    found = envelope_of(model, POSE, BLOWS)
     vertices, faces = found.surface("joint_3", subdivisions=2)
     radius = np.linalg.norm(vertices, axis=1)
     directions = icosphere(2)[0]
@@ -48,7 +49,7 @@ def test_the_surface_is_the_support_function(model):
 
 
 def test_torque_and_stress_follow_the_deflection(model):
-    found = direction_envelope(model, POSE, BLOWS, hits=12)
+    found = envelope_of(model, POSE, BLOWS, hits=12)
     k = np.array([2.4e5, 1e5, 1e5])
     np.testing.assert_allclose(found.peak("torque"), k * found.peak_deflection)
     r = np.array([0.01765, 0.0132, 0.0132])
@@ -59,7 +60,7 @@ def test_torque_and_stress_follow_the_deflection(model):
 
 
 def test_the_tools_largest_displacement_against_brute_force(model):
-    found = direction_envelope(model, POSE, BLOWS)
+    found = envelope_of(model, POSE, BLOWS)
     state = model.robot.state(POSE)
     times = np.linspace(0, 0.04, 4001)
     moved = np.einsum("rm,mdk->krd", state.jacobian, found.response.unit_deflection(times))
@@ -78,7 +79,7 @@ def test_rings_about_joint_2_that_the_papers_figure_lacks(model):
     on the elbow alone."""
     for elbow in (-1.0, -0.3, 0.8):
         peaks = [
-            direction_envelope(model, [a, b, elbow], BLOWS).peak_deflection[1:]
+            envelope_of(model, [a, b, elbow], BLOWS).peak_deflection[1:]
             for a, b in ((0.0, 0.0), (0.4, 0.9), (-1.0, -1.2), (2.0, 0.3))
         ]
         np.testing.assert_allclose(peaks, np.tile(peaks[0], (4, 1)), rtol=1e-9)

@@ -12,7 +12,7 @@ import xarray
 
 import picchio
 from picchio.core.errors import InputError
-from picchio.studies.envelopes import direction_envelope
+from picchio.studies.envelopes import envelope as envelope_of
 from picchio.studies.maps import places
 from picchio.studies.maps.run import workspace_map
 
@@ -36,7 +36,7 @@ def test_every_row_is_the_envelope_of_its_pose(tmp_path, robot, ending):
     model = picchio.Model(robot)
     for k in range(0, found.sizes["point"], 5):
         row = found.isel(point=k)
-        one = direction_envelope(model, row["pose"].values, BLOWS)
+        one = envelope_of(model, row["pose"].values, BLOWS)
         np.testing.assert_allclose(row["peak_deflection"], one.peak_deflection, rtol=1e-9)
         np.testing.assert_allclose(row["natural_frequency"], one.natural_frequencies, rtol=1e-9)
         np.testing.assert_allclose(row["position"], one.tool_position, atol=1e-9)

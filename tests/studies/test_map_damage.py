@@ -11,8 +11,8 @@ from picchio.core.errors import InputError
 from picchio.studies.envelopes import icosphere
 from picchio.studies.maps import places
 from picchio.studies.maps.run import workspace_map
-from picchio.studies.rivet.batch import batch_damage
 from picchio.studies.rivet.life_rules import curves_of
+from picchio.studies.rivet.poses import damage_at
 from picchio.studies.tasks import Operation
 
 # Forty times the paper's blow: shafts of this steel then fail.
@@ -50,13 +50,17 @@ def test_the_searched_direction_is_as_bad_as_any(tmp_path, robot):
     curves = curves_of(robot)
     for k, pose in enumerate(poses):
         every = np.tile(pose, (len(directions), 1))
-        brute = batch_damage(robot, every, directions, BLOWS, 12, curves).damage.max(axis=0)
+        brute = damage_at(picchio.Model(robot), every, directions, BLOWS, 12, curves).damage.max(
+            axis=0
+        )
         own = found["damage_per_rivet"].values[k]
         assert brute.max() > 0.0
         assert (own >= brute * (1 - 2e-3)).all()
         for j in range(3):  # and it is that direction's damage
             there = found["damage_direction"].values[k, j]
-            again = batch_damage(robot, pose[None], there, BLOWS, 12, curves).damage[0, j]
+            again = damage_at(picchio.Model(robot), pose[None], there, BLOWS, 12, curves).damage[
+                0, j
+            ]
             assert own[j] == pytest.approx(again, rel=1e-9)
 
 

@@ -13,8 +13,8 @@ from picchio.fatigue.reducer import load_reducer
 from picchio.studies.placement.loads import reducer_utilisation
 from picchio.studies.placement.run import place
 from picchio.studies.placement.work import Work
-from picchio.studies.rivet.batch import batch_damage
 from picchio.studies.rivet.life_rules import curves_of
+from picchio.studies.rivet.poses import damage_at
 
 # Beyond this, relative, the search's last steps no longer look.
 REFINED = 1e-6
@@ -72,8 +72,8 @@ def test_the_kernel_is_assess(arm):
         (picchio.PulseTrain(300.0, 0.04, 0.004), picchio.load_sn_curve("nie-2016")),
     ):
         curves = curves_of(arm, curve)
-        fast = batch_damage(arm, poses, directions, blows, 12, curves)
-        slow = batch_damage(arm, poses, directions, blows, 12, curves, compiled=False)
+        fast = damage_at(picchio.Model(arm), poses, directions, blows, 12, curves)
+        slow = damage_at(picchio.Model(arm), poses, directions, blows, 12, curves, compiled=False)
         assert slow.damage.max() > 0.0
         np.testing.assert_allclose(fast.damage, slow.damage, rtol=1e-5, atol=1e-30)
         scale = np.abs(slow.highest).max()

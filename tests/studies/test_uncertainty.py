@@ -7,15 +7,18 @@ import numpy as np
 import pytest
 
 from picchio.core.errors import InputError
+from picchio.fatigue.miner import damage
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.uncertain_lives import Uncertain
+from picchio.model.effects.registry import effect_class
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
 from picchio.studies.assessment.run import assess
-from picchio.studies.rivet.loads import loads_at
+from picchio.studies.rivet.pose import Rivet
+from picchio.studies.rivet.variation import FastRest, ShaftStress, VariedRivet
 from picchio.studies.tasks import Task, task_from_dict
-from picchio.studies.uncertainty import DEFAULT_INPUTS, LifeJob, place_of, uncertain_life
+from picchio.studies.uncertainty import DEFAULT_INPUTS, uncertain_life
 
 STRAIGHT = SNCurve(name="straight", strength=60e6, cycles=1e6, slopes=(5.0,))
 SURE = 1e-9
@@ -44,13 +47,9 @@ def task(robot: FlexibleRobot) -> Task:
     )  # fmt: skip
 
 
-def curves(robot: FlexibleRobot, curve: SNCurve = STRAIGHT) -> dict[str, SNCurve]:
-    return dict.fromkeys(robot.flexible_names, curve)
-
-
 def test_without_spread_it_is_the_assessment(robot: FlexibleRobot, task: Task) -> None:
     inputs = {name: Uncertain(1.0, SURE) for name in DEFAULT_INPUTS}
-    found = uncertain_life(robot, task, curves(robot), inputs=inputs, samples=8)
+    found = uncertain_life(robot, task, sn_curve=STRAIGHT, inputs=inputs, samples=8)
     nominal = assess(robot, task, sn_curve=STRAIGHT)
     assert found.robot.p50 == pytest.approx(nominal.rivets_to_failure, rel=1e-6)
     for joint in nominal.joints:
@@ -63,7 +62,7 @@ def test_without_spread_it_is_the_assessment(robot: FlexibleRobot, task: Task) -
 def test_poses_left_out_keep_their_share(robot: FlexibleRobot, task: Task) -> None:
     inputs = {"force": Uncertain(1.0, SURE)}
     lives = [
-        uncertain_life(robot, task, curves(robot), inputs=inputs, samples=8, poses=n).robot.p50
+        uncertain_life(robot, task, sn_curve=STRAIGHT, inputs=inputs, samples=8, poses=n).robot.p50
         for n in (1, 2)
     ]
     assert lives[0] == pytest.approx(lives[1], rel=1e-6)
@@ -72,7 +71,7 @@ def test_poses_left_out_keep_their_share(robot: FlexibleRobot, task: Task) -> No
 def test_force_and_model_error_in_closed_form(robot: FlexibleRobot, task: Task) -> None:
     # Life goes with (force * model error)^-5: log-normal, sigma = 5 sqrt(0.1^2 + 0.1^2).
     inputs = {"force": Uncertain(1.0, 0.1), "model": Uncertain(1.0, 0.1)}
-    found = uncertain_life(robot, task, curves(robot), inputs=inputs, samples=1024).robot
+    found = uncertain_life(robot, task, sn_curve=STRAIGHT, inputs=inputs, samples=1024).robot
     nominal = assess(robot, task, sn_curve=STRAIGHT).rivets_to_failure
     sigma = 5.0 * math.sqrt(0.02)
     assert found.p50 == pytest.approx(nominal, rel=0.03)
@@ -85,7 +84,7 @@ def test_force_and_model_error_in_closed_form(robot: FlexibleRobot, task: Task) 
 def test_specimens_scatter_as_their_curve_says(robot: FlexibleRobot, task: Task) -> None:
     curve = dataclasses.replace(STRAIGHT, survival=0.9, scatter=0.04)
     found = uncertain_life(
-        robot, task, curves(robot, curve), inputs={"force": Uncertain(1.0, SURE)}, samples=1024
+        robot, task, sn_curve=curve, inputs={"force": Uncertain(1.0, SURE)}, samples=1024
     )
     # The curve that 90 % of specimens survive gives the life that 90 % of lives exceed.
     assert found.robot.p10 == pytest.approx(
@@ -94,7 +93,11 @@ def test_specimens_scatter_as_their_curve_says(robot: FlexibleRobot, task: Task)
     assert found.robot.shares["strength"] == pytest.approx(1.0, abs=0.03)
 
 
-def test_a_perturbed_system_is_the_perturbed_robot(robot: FlexibleRobot, task: Task) -> None:
+def stress_of(robot: FlexibleRobot) -> ShaftStress:
+    return ShaftStress.of(robot, STRAIGHT)
+
+
+def test_a_varied_rivet_is_the_varied_robot(robot: FlexibleRobot, task: Task) -> None:
     factor, damping = 1.2, 0.8
     other = dataclasses.replace(
         robot,
@@ -107,13 +110,15 @@ def test_a_perturbed_system_is_the_perturbed_robot(robot: FlexibleRobot, task: T
     )
     operation = task.operations[0]
     pose = operation.poses[0]
-    joints = list(robot.flexible_joints)
-    job = LifeJob(joints, [0, 1, 2], [STRAIGHT] * 3, "half-cycles", "none")
-    ours = job.cycles(place_of(Model(robot), operation, pose), factor, damping, 1.0)
-    theirs = job.cycles(place_of(Model(other), operation, pose), 1.0, 1.0, 1.0)
-    for (a, _), (b, _) in zip(ours, theirs, strict=True):
-        big = b.range > 1.0  # Pa; an upward force does not move joint_1
-        np.testing.assert_allclose(a.range[: len(b)][big], b.range[big], rtol=1e-6)
+    rivet = VariedRivet(Model(robot), operation, pose)
+    theirs = Rivet(Model(other), operation, pose).loads("rest", both=False)
+    for compiled in (True, False):
+        ours = rivet.varied(stiffness=factor, damping=damping, compiled=compiled)
+        cycles = zip(stress_of(robot).cycles(ours), stress_of(robot).cycles(theirs), strict=True)
+        for (a, steady), (b, expected) in cycles:
+            assert steady == pytest.approx(expected, rel=1e-12)
+            big = b.range > 1.0  # Pa; an upward force does not move joint_1
+            np.testing.assert_allclose(a.range[: len(b)][big], b.range[big], rtol=1e-6)
 
 
 @pytest.mark.parametrize("factors", [(1.0, 1.0, 1.0), (0.8, 1.6, 1.3), (1.3, 0.4, 0.7)])
@@ -121,50 +126,63 @@ def test_the_compiled_path_is_the_exact_one(
     robot: FlexibleRobot, task: Task, factors: tuple[float, float, float]
 ) -> None:
     # Damage goes with the fifth power of the range, so every cycle must be there, and right.
-    job = LifeJob(list(robot.flexible_joints), [0, 1, 2], [STRAIGHT] * 3, "half-cycles", "none")
+    stress = stress_of(robot)
+    varied = dict(zip(("stiffness", "damping", "width"), factors, strict=True))
     for operation in task.operations:
         for pose in operation.poses:
-            place = place_of(Model(robot), operation, pose)
-            assert place.fast is not None
-            exact, ours = job.cycles(place, *factors), job.cycles(place, *factors, compiled=True)
-            for k, ((a, steady), (b, other)) in enumerate(zip(ours, exact, strict=True)):
+            rivet = VariedRivet(Model(robot), operation, pose)
+            ours = stress.cycles(rivet.varied(**varied))
+            exact = stress.cycles(rivet.varied(**varied, compiled=False))
+            for (a, steady), (b, other) in zip(ours, exact, strict=True):
                 assert steady == pytest.approx(other, rel=1e-12)
                 if not len(b) or b.range.max() < 1.0:  # Pa; an upward force does not move joint_1
                     continue
                 assert a.range.max() == pytest.approx(b.range.max(), rel=1e-6)
-                for old, new in zip(job.spend(k, b, other, 1.0), job.spend(k, a, steady, 1.0),
-                                    strict=True):  # fmt: skip
-                    assert new == pytest.approx(old, rel=1e-5)
+                assert damage(a.shifted(steady), STRAIGHT) == pytest.approx(
+                    damage(b.shifted(other), STRAIGHT), rel=1e-5
+                )
 
 
 def test_damping_beyond_critical_takes_the_exact_path(robot: FlexibleRobot, task: Task) -> None:
-    job = LifeJob(list(robot.flexible_joints), [0, 1, 2], [STRAIGHT] * 3, "half-cycles", "none")
     operation = task.operations[0]
-    place = place_of(Model(robot), operation, operation.poses[0])
-    assert place.fast is not None
-    assert place.fast.turns(1.0, 100.0, operation.excitation.burst(3)) is None
-    exact = job.cycles(place, 1.0, 100.0, 1.0)
-    ours = job.cycles(place, 1.0, 100.0, 1.0, compiled=True)
-    np.testing.assert_array_equal(ours[1][0].range, exact[1][0].range)
+    rivet = VariedRivet(Model(robot), operation, operation.poses[0])
+    fast = FastRest(rivet.modes, operation.direction)
+    assert fast.turns(1.0, 100.0, operation.excitation.burst(3)) is None
+    ours, exact = (rivet.varied(damping=40.0, compiled=compiled) for compiled in (True, False))
+    for a, b in zip(ours, exact, strict=True):
+        np.testing.assert_array_equal(a.rest, b.rest)
+
+
+@pytest.mark.parametrize("effect", ["base_compliance", "backlash"])
+def test_a_model_that_is_no_sum_of_oscillators_is_varied_whole(
+    robot: FlexibleRobot, task: Task, effect: str
+) -> None:
+    # What yields beside the joints keeps its stiffness, and a gap its size, when the joints vary.
+    given = {
+        "base_compliance": effect_class("base_compliance")("ry", stiffness=2e6, damping=2e3),
+        "backlash": effect_class("backlash")("joint_2", gap=1e-4),
+    }[effect]
+    model = Model(robot).with_effects([given])
+    softer = [effect_class("joint_stiffness")(name, scale=0.7) for name in robot.flexible_names]
+    operation = task.operations[0]
+    expected = Rivet(model.with_effects([given, *softer]), operation, operation.poses[1]).loads()
+    ours = VariedRivet(model, operation, operation.poses[1]).varied(stiffness=0.7)
+    for a, b in zip(ours, expected, strict=True):
+        np.testing.assert_allclose(a.rest, b.rest, rtol=1e-9, atol=1e-15)
 
 
 def test_it_starts_from_the_same_load_as_assess(robot: FlexibleRobot, task: Task) -> None:
     operation = task.operations[0]
-    pose = operation.poses[0]
-    loads = loads_at(Model(robot), operation, pose, need="rest")
-    place = place_of(Model(robot), operation, pose)
-    ours = place.loads(need="rest", both=False)
-    for mine, theirs in zip(ours, loads.joints, strict=True):
-        assert mine.rest is not None
-        assert theirs.rest is not None
-        np.testing.assert_array_equal(mine.rest, theirs.rest)
-        assert (mine.static, mine.stiffness) == (theirs.static, theirs.stiffness)
-        assert mine.steady is None
+    found = assess(robot, task).operations[0]
+    for k, pose in enumerate(operation.poses):
+        ours = VariedRivet(Model(robot), operation, pose).varied()
+        peaks = [np.abs(load.rest).max() for load in ours if load.rest is not None]
+        np.testing.assert_allclose(peaks, found.peak_deflection[k], rtol=1e-7, atol=1e-12)
 
 
 def test_one_seed_one_result(robot: FlexibleRobot, task: Task) -> None:
     first, again, other = (
-        uncertain_life(robot, task, curves(robot), samples=8, seed=seed).to_dict()
+        uncertain_life(robot, task, sn_curve=STRAIGHT, samples=8, seed=seed).to_dict()
         for seed in (1, 1, 2)
     )
     assert first == again
@@ -173,6 +191,8 @@ def test_one_seed_one_result(robot: FlexibleRobot, task: Task) -> None:
 
 def test_bad_input_is_named(robot: FlexibleRobot, task: Task) -> None:
     with pytest.raises(InputError, match="did you mean 'stiffness'"):
-        uncertain_life(robot, task, curves(robot), inputs={"stifness": Uncertain(1.0, 0.1)})
+        uncertain_life(robot, task, sn_curve=STRAIGHT, inputs={"stifness": Uncertain(1.0, 0.1)})
+    joints = tuple(dataclasses.replace(j, shaft=None) for j in robot.flexible_joints)
+    bare = dataclasses.replace(robot, flexible_joints=joints)
     with pytest.raises(InputError, match="no joint has a shaft"):
-        uncertain_life(robot, task, {})
+        uncertain_life(bare, task)

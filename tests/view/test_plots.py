@@ -16,7 +16,7 @@ from picchio.excitation.pulse_train import PulseTrain
 from picchio.fatigue.counting.counter import rainflow
 from picchio.fatigue.sn.fit import fit_sn
 from picchio.fatigue.sn.test_table import SNTests
-from picchio.studies.envelopes import direction_envelope
+from picchio.studies.envelopes import envelope as envelope_of
 from picchio.visuals import plots
 from picchio.visuals.plots.polar import cut_directions
 
@@ -202,7 +202,7 @@ def test_without_shafts_torques_are_shown_and_damage_says_why(ur10: SimpleNamesp
 
 @pytest.mark.parametrize("plane", ["xy", "xz", "yz"])
 def test_polar_cut_is_the_support_function(arm: SimpleNamespace, plane) -> None:
-    envelope = direction_envelope(picchio.Model(arm.robot), arm.worst.pose, BLOWS)
+    envelope = envelope_of(picchio.Model(arm.robot), arm.worst.pose, BLOWS)
     ax = plots.plot_polar_envelope(envelope, plane, count=24)
     angle, directions = cut_directions(plane, 24)
     time = np.linspace(0.0, 0.04, 4001)
@@ -217,7 +217,7 @@ def test_polar_cut_is_the_support_function(arm: SimpleNamespace, plane) -> None:
 
 
 def test_polar_refuses_an_unknown_plane(arm: SimpleNamespace) -> None:
-    envelope = direction_envelope(picchio.Model(arm.robot), arm.worst.pose, BLOWS)
+    envelope = envelope_of(picchio.Model(arm.robot), arm.worst.pose, BLOWS)
     with pytest.raises(picchio.InputError, match=r"plane.*xy, xz, yz"):
         plots.plot_polar_envelope(envelope, "ab")
 

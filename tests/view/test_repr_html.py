@@ -13,7 +13,7 @@ import picchio
 from picchio.core.html import MOST_ROWS, cell, sheet
 from picchio.fatigue.sn.fit import fit_sn
 from picchio.fatigue.sn.test_table import SNTests
-from picchio.studies.envelopes import direction_envelope
+from picchio.studies.envelopes import envelope as envelope_of
 from picchio.studies.uncertainty import uncertain_life
 
 BLOWS = picchio.PulseTrain(300.0, 0.040, 0.004)
@@ -55,7 +55,7 @@ def test_without_shafts_there_are_torques_only(ur10: SimpleNamespace) -> None:
 
 
 def test_an_envelope_shows_peaks_and_directions(arm: SimpleNamespace) -> None:
-    envelope = direction_envelope(picchio.Model(arm.robot), arm.worst.pose, BLOWS)
+    envelope = envelope_of(picchio.Model(arm.robot), arm.worst.pose, BLOWS)
     facts, joints = tables(envelope)
     assert [name for name, _ in facts][:2] == ["pose [rad, m]", "blows"]
     told = [float(c) for c in column(joints, "peak deflection")]
@@ -79,9 +79,7 @@ def test_curves_fits_modes_tasks_and_models(arm: SimpleNamespace) -> None:
 
 def test_an_uncertain_life_shows_its_quantiles(arm: SimpleNamespace) -> None:
     curve = picchio.load_sn_curve("nie-2016", quiet=True)
-    life = uncertain_life(
-        arm.robot, arm.task, dict.fromkeys(arm.robot.flexible_names, curve), samples=8, poses=1
-    )
+    life = uncertain_life(arm.robot, arm.task, sn_curve=curve, samples=8, poses=1)
     *_, rows = tables(life)
     assert [row[0] for row in rows[1:]] == [*arm.robot.flexible_names, "robot"]
     assert float(rows[-1][2].replace(",", "")) == pytest.approx(life.robot.p50, rel=1e-3)
@@ -99,7 +97,7 @@ def test_a_campaign_shows_its_records() -> None:
 
 
 def test_reprs_fit_on_a_line_or_two(arm: SimpleNamespace) -> None:
-    envelope = direction_envelope(picchio.Model(arm.robot), arm.worst.pose, BLOWS)
+    envelope = envelope_of(picchio.Model(arm.robot), arm.worst.pose, BLOWS)
     told = [repr(x) for x in (arm.assessment, arm.task, envelope, arm.worst.modes, arm.robot)]
     assert all(len(text) < 260 for text in told)
     assert "joint_2" in told[0] and "45" in told[1] and "joint_3" in told[2] and "Hz" in told[3]

@@ -19,7 +19,8 @@ from lxml import html as lxml_html
 import picchio
 from picchio.excitation.half_sine_train import HalfSineTrain
 from picchio.excitation.pulse_train import PulseTrain
-from picchio.studies.envelopes import direction_envelope, icosphere
+from picchio.studies.envelopes import envelope as envelope_of
+from picchio.studies.envelopes import icosphere
 from picchio.visuals.kinematics import frames, world
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.compare import compare_scene
@@ -58,7 +59,7 @@ def unpack(page: str):
 def test_surface_is_the_support_function(name: str, hits: int | None, blows) -> None:
     robot = picchio.load_robot(name)
     pose = np.random.default_rng(3).uniform(-1.5, 1.5, len(robot.joint_names))
-    envelope = direction_envelope(picchio.Model(robot), pose, blows, hits)
+    envelope = envelope_of(picchio.Model(robot), pose, blows, hits=hits)
     vertices, _ = envelope_surfaces(envelope, 3)
     directions, _ = icosphere(3)
     radius = np.linalg.norm(vertices, axis=2)

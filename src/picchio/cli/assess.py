@@ -385,7 +385,7 @@ def assess(
     allowed = spread = None
     if for_life is not None:
         allowed = allowable(loaded, work, for_life, survival=survival, **options)
-        content["for_life"] = [joint.to_dict() for joint in allowed]
+        content |= allowed.to_dict()
     if uncertainty:
         with progress("samples") as tick:
             spread = uncertain_life(loaded, work, seed=seed or 0, progress=tick, **options)
@@ -399,7 +399,7 @@ def assess(
             command=" ".join(["picchio", *map(shlex.quote, sys.argv[1:])]),
             gravity_stiffness=gravity_stiffness,
             sn_curve=sn_curve,
-            allowed=allowed or (),
+            allowed=() if allowed is None else allowed.joints,
             spread=spread,
             terms=terms,
         )
@@ -410,7 +410,7 @@ def assess(
     if json != "-":
         show(found, path, terms)
         if allowed is not None:
-            show_allowable(allowed, work)
+            show_allowable(allowed.joints, work)
         if spread is not None:
             show_spread(spread)
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from picchio.core.errors import InputError
+from picchio.core.html import sheet
+from picchio.core.results import TableResult
 from picchio.fatigue.allowable_load import largest_factor
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.counting.cycles import Cycles
@@ -50,12 +53,47 @@ class Allowable:
     hits: int | None
     life: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON; infinite numbers are None."""
-        return {
-            key: None if isinstance(value, float) and math.isinf(value) else value
-            for key, value in dataclasses.asdict(self).items()
-        }
+
+@dataclass(frozen=True, repr=False)
+class AllowableLoads(TableResult):
+    """What a target life allows, joint by joint.
+
+    Attributes:
+        joints: of each joint with a shaft.
+    """
+
+    INDEX = "joint"
+    UNITS: ClassVar[Mapping[str, str]] = {"radius": "m", "life": "1", "rivets": "1"}
+
+    joints: tuple[Allowable, ...]
+
+    def __iter__(self) -> Iterator[Allowable]:
+        return iter(self.joints)
+
+    def __len__(self) -> int:
+        return len(self.joints)
+
+    def __getitem__(self, index: int) -> Allowable:
+        return self.joints[index]
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [dataclasses.asdict(joint) for joint in self.joints]
+
+    def _content(self) -> dict[str, Any]:
+        return {"for_life": self._rows()}
+
+    def _headline(self) -> str:
+        least = min(self.joints, key=lambda joint: joint.force_factor)
+        return (
+            f"for {least.rivets:g} rivets the force may be {least.force_factor:.4g} times as "
+            f"large, by {least.joint}"
+        )
+
+    def _repr_html_(self) -> str:
+        rows = [(j.joint, j.life, j.force_factor, 1e3 * j.radius, j.hits) for j in self.joints]
+        columns = ("joint", "life now [rivets]", "force factor", "least radius [mm]", "most hits")
+        facts = {"target life [rivets]": self.joints[0].rivets, "survival": self.joints[0].survival}
+        return sheet("Allowable loads", facts, columns, rows)
 
 
 def allowable(
@@ -69,7 +107,7 @@ def allowable(
     mean_stress: Rule = "none",
     gravity_stiffness: bool | None = None,
     gravity_balanced: bool | None = None,
-) -> tuple[Allowable, ...]:
+) -> AllowableLoads:
     """Allowable force, hits and shaft radius of every joint for a target life.
 
     Rivets start from rest and ring down, cycles are counted by rainflow. Gravity's stress does not
@@ -100,7 +138,7 @@ def allowable(
     stress = ShaftStress.of(model.robot, sn_curve, survival, residue, mean_stress)
     loads = _Loads(stress, rivets_of(model, task))
     search = _Backwards(stress, loads, task, rivets, survival)
-    return tuple(search.joint(k) for k in range(len(stress.joints)))
+    return AllowableLoads(tuple(search.joint(k) for k in range(len(stress.joints))))
 
 
 Load = list[tuple[Cycles, float, float]]

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from picchio.core.errors import InputError
 from picchio.core.toml import parse_toml
-from picchio.excitation.table import ExcitationTable, excitation_class
 from picchio.excitation.excitation import Excitation
+from picchio.excitation.table import ExcitationTable, excitation_class
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.tasks import FORMAT, TaskTable
 

@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
+from picchio.core.html import sheet
 from picchio.core.provenance import provenance
+from picchio.core.results import TableResult
 from picchio.excitation.excitation import Excitation
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -24,8 +26,8 @@ Quantity = Literal["deflection", "torque", "stress"]
 QUANTITIES: tuple[Quantity, ...] = ("deflection", "torque", "stress")
 
 
-@dataclass(frozen=True, eq=False)
-class DirectionEnvelope:
+@dataclass(frozen=True, eq=False, repr=False)
+class DirectionEnvelope(TableResult):
     """What a force can do to each joint, by its direction.
 
     Joint j's deflection under a force along the unit vector n is g_j(t) . n, so its peak is the
@@ -117,13 +119,18 @@ class DirectionEnvelope:
             radius[i] = radius[mirror[tuple(np.round(-directions[i], 9) + 0.0)]]
         return directions * radius[:, None], faces
 
-    def __repr__(self) -> str:
+    def _headline(self) -> str:
         peaks = dict(zip(self.joint_names, self.peak_deflection.tolist(), strict=True))
-        return f"DirectionEnvelope({self.robot!r}, peak_deflection={peaks})"
+        return f"{self.robot!r}, peak_deflection={peaks}"
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [
+            {key: value for key, value in joint.items() if key != "worst_direction"}
+            | dict(zip(("worst_x", "worst_y", "worst_z"), joint["worst_direction"], strict=True))
+            for joint in self._content()["joints"]
+        ]
 
     def _repr_html_(self) -> str:
-        from picchio.core.html import sheet
-
         columns = ("joint", "peak deflection [mrad, mm]", "worst direction", "peak torque [N m, N]",
                    "peak stress [MPa]")  # fmt: skip
         rows = zip(self.joint_names, 1e3 * self.peak_deflection, self.worst_direction.round(3),
@@ -136,8 +143,7 @@ class DirectionEnvelope:
         }
         return sheet(f"Direction envelope of {self.robot}", facts, columns, rows)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The content of `picchio-envelope/1`."""
+    def _content(self) -> dict[str, Any]:
         joints = zip(
             self.joint_names,
             self.peak_deflection,

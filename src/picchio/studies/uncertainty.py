@@ -12,6 +12,8 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.html import sheet
+from picchio.core.results import TableResult
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.mean_stress import Rule
@@ -20,6 +22,7 @@ from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.uncertain_lives import LifeSpread, Uncertain, design
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.studies.assessment.result import format_count
 from picchio.studies.rivet.variation import ShaftStress, VariedRivet, rivets_of
 from picchio.studies.tasks import Task
 
@@ -33,8 +36,8 @@ DEFAULT_INPUTS: dict[str, Uncertain] = {
 }
 
 
-@dataclass(frozen=True)
-class UncertainLife:
+@dataclass(frozen=True, repr=False)
+class UncertainLife(TableResult):
     """Lives as distributions.
 
     Attributes:
@@ -53,9 +56,6 @@ class UncertainLife:
     seed: int
 
     def _repr_html_(self) -> str:
-        from picchio.core.html import sheet
-        from picchio.studies.assessment.result import format_count
-
         rows = [
             (name, *map(format_count, (s.p10, s.p50, s.p90)), 100 * s.endless)
             for name, s in {**self.joints, "robot": self.robot}.items()
@@ -63,8 +63,18 @@ class UncertainLife:
         columns = ("rivets to failure", "P10", "P50", "P90", "without end [%]")
         return sheet("How sure the life is", {"varied": ", ".join(self.inputs)}, columns, rows)
 
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
+    def _headline(self) -> str:
+        lives = (format_count(x) for x in (self.robot.p10, self.robot.p50, self.robot.p90))
+        return "rivets to failure P10 {}, P50 {}, P90 {}".format(*lives)
+
+    def _rows(self) -> list[dict[str, Any]]:
+        spreads = {**self.joints, "robot": self.robot}
+        return [
+            {"name": name, "p10": s.p10, "p50": s.p50, "p90": s.p90, "endless": s.endless}
+            for name, s in spreads.items()
+        ]
+
+    def _content(self) -> dict[str, Any]:
         return {
             "joints": {name: spread.to_dict() for name, spread in self.joints.items()},
             "robot": self.robot.to_dict(),

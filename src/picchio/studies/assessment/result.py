@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.html import sheet
+from picchio.core.results import TableResult
 
 # What an assessment found: the life of every joint, and where it goes.
 
@@ -168,8 +170,8 @@ class SteadyStateCheck:
         return own | {"peak_ratio": self.peak_ratio, "life_ratio": self.life_ratio}
 
 
-@dataclass(frozen=True, eq=False)
-class Assessment:
+@dataclass(frozen=True, eq=False, repr=False)
+class Assessment(TableResult):
     """The life of a robot on a task.
 
     Attributes:
@@ -186,6 +188,18 @@ class Assessment:
         origins: where each value of the robot came from.
         provenance: version and hashes.
     """
+
+    PAGE = "visuals.report.assessment:assessment_report"
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "peak_deflection": "rad",
+        "peak_torque": "N m",
+        "gravity_torque": "N m",
+        "peak_shear_stress": "Pa",
+        "gravity_shear_stress": "Pa",
+        "peak_total_stress": "Pa",
+        "rivets_to_failure": "1",
+        "damage_per_rivet": "1",
+    }
 
     robot: str
     method: str
@@ -212,13 +226,17 @@ class Assessment:
                 said.setdefault(line.removeprefix(f"{joint.reducer}: "), []).append(joint.name)
         return tuple(f"{', '.join(names)}: {text}" for text, names in said.items())
 
-    def __repr__(self) -> str:
+    def _headline(self) -> str:
+        return f"{self.robot!r}, method={self.method!r}: {verdict(self)}"
 
-        return f"Assessment({self.robot!r}, method={self.method!r}): {verdict(self)}"
+    def _rows(self) -> list[dict[str, Any]]:
+        left_out = ("damage_share", "reducer_warnings")
+        return [
+            {key: value for key, value in joint.to_dict().items() if key not in left_out}
+            for joint in self.joints
+        ]
 
     def _repr_html_(self) -> str:
-        from picchio.core.html import sheet
-
         joints = self.joints
         table: dict[str, list[Any]] = {
             "joint": [j.name for j in joints],
@@ -239,8 +257,7 @@ class Assessment:
         rows = zip(*table.values(), strict=True)
         return sheet(f"Assessment of {self.robot}", facts, list(table), rows, verdict(self))
 
-    def to_dict(self) -> dict[str, Any]:
-        """The content of `picchio-assessment/1`; infinite lives are left as inf."""
+    def _content(self) -> dict[str, Any]:
         return {
             "format": FORMAT,
             "robot": self.robot,

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from picchio.core.arrays import FloatArray
+from picchio.core.html import sheet
+from picchio.core.results import TableResult
 from picchio.studies.placement.search import Spot
 
 FORMAT = "picchio-placement/1"
@@ -95,8 +97,8 @@ class Off:
         return not math.isnan(self.utilisation)
 
 
-@dataclass(frozen=True, eq=False)
-class Placement:
+@dataclass(frozen=True, eq=False, repr=False)
+class Placement(TableResult):
     """Where to put the work.
 
     Attributes:
@@ -147,7 +149,6 @@ class Placement:
         return self.start.utilisation / best if best > 0.0 else math.inf
 
     def _repr_html_(self) -> str:
-        from picchio.core.html import sheet
         from picchio.studies.assessment.result import format_count
 
         rows = [
@@ -159,8 +160,29 @@ class Placement:
         facts = {"work moved by [m, rad]": self.best.spot.move}
         return sheet(f"Placement of the work of {self.robot}", facts, columns, rows)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The content of `picchio-placement/1`; infinite lives are left as inf."""
+    def _headline(self) -> str:
+        if not self.moved:
+            return f"{self.robot!r}: nothing better than where the work is"
+        shift = ", ".join(f"{c:.3g}" for c in self.best.spot.move[:3])
+        return (
+            f"{self.robot!r}: move the work by ({shift}) m and {self.best.spot.move[3]:.3g} rad; "
+            f"utilisation {100 * self.start.utilisation:.3g} -> "
+            f"{100 * self.best.utilisation:.3g} %"
+        )
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [
+            {
+                "name": now.name,
+                "rivets_now": now.rivets_to_failure,
+                "utilisation_now": now.utilisation,
+                "rivets_best": best.rivets_to_failure,
+                "utilisation_best": best.utilisation,
+            }
+            for now, best in zip(self.start.joints, self.best.joints, strict=True)
+        ]
+
+    def _content(self) -> dict[str, Any]:
         return {
             "format": FORMAT,
             "robot": self.robot,
