@@ -95,9 +95,10 @@ def test_a_joint_that_does_not_move_allows_anything(robot: FlexibleRobot) -> Non
         },
         robot,
     )
-    first = allowable(robot, task, 1e6, sn_curve=STRAIGHT)[0]
+    found = allowable(robot, task, 1e6, sn_curve=STRAIGHT)
+    first = found[0]
     assert (first.force_factor, first.radius, first.hits) == (math.inf, 0.0, None)
-    assert first.to_dict()["force_factor"] is None
+    assert found.to_dict()["for_life"][0]["force_factor"] is None
 
 
 def without_shafts(robot: FlexibleRobot) -> FlexibleRobot:

@@ -14,9 +14,14 @@ import picchio
 from picchio.core.errors import InputError
 from picchio.studies.envelopes import envelope as envelope_of
 from picchio.studies.maps import places
-from picchio.studies.maps.run import workspace_map
+from picchio.studies.maps.run import workspace_map as compute_map
 
 BLOWS = picchio.PulseTrain(300.0, 0.040, 0.004)
+
+
+def workspace_map(*arguments, **options):
+    """The dataset of a map."""
+    return compute_map(*arguments, **options).to_xarray()
 
 
 @pytest.fixture(scope="module")

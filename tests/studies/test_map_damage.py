@@ -10,13 +10,18 @@ import picchio
 from picchio.core.errors import InputError
 from picchio.studies.envelopes import icosphere
 from picchio.studies.maps import places
-from picchio.studies.maps.run import workspace_map
+from picchio.studies.maps.run import workspace_map as compute_map
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.poses import damage_at
 from picchio.studies.tasks import Operation
 
 # Forty times the paper's blow: shafts of this steel then fail.
 BLOWS = picchio.PulseTrain(12000.0, 0.040, 0.004)
+
+
+def workspace_map(*arguments, **options):
+    """The dataset of a map."""
+    return compute_map(*arguments, **options).to_xarray()
 
 
 @pytest.fixture(scope="module")

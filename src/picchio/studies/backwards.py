@@ -60,12 +60,14 @@ class AllowableLoads(TableResult):
 
     Attributes:
         joints: of each joint with a shaft.
+        notes: what was left out, and why.
     """
 
     INDEX = "joint"
     UNITS: ClassVar[Mapping[str, str]] = {"radius": "m", "life": "1", "rivets": "1"}
 
     joints: tuple[Allowable, ...]
+    notes: tuple[str, ...] = ()
 
     def __iter__(self) -> Iterator[Allowable]:
         return iter(self.joints)
@@ -80,7 +82,7 @@ class AllowableLoads(TableResult):
         return [dataclasses.asdict(joint) for joint in self.joints]
 
     def _content(self) -> dict[str, Any]:
-        return {"for_life": self._rows()}
+        return {"for_life": self._rows(), "for_life_notes": self.notes}
 
     def _headline(self) -> str:
         least = min(self.joints, key=lambda joint: joint.force_factor)
@@ -138,7 +140,9 @@ def allowable(
     stress = ShaftStress.of(model.robot, sn_curve, survival, residue, mean_stress)
     loads = _Loads(stress, rivets_of(model, task))
     search = _Backwards(stress, loads, task, rivets, survival)
-    return AllowableLoads(tuple(search.joint(k) for k in range(len(stress.joints))))
+    return AllowableLoads(
+        tuple(search.joint(k) for k in range(len(stress.joints))), model.without_load()
+    )
 
 
 Load = list[tuple[Cycles, float, float]]

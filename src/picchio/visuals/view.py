@@ -16,6 +16,7 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
 from picchio.studies.assessment.run import assess
 from picchio.studies.blows import blows_of
+from picchio.studies.maps.result import WorkspaceMap
 from picchio.studies.maps.run import open_map
 from picchio.studies.tasks import Task, load_task
 from picchio.visuals.diagnosis_file import read_diagnosis
@@ -34,7 +35,7 @@ def view(
     pose: ArrayLike | None = None,
     excitation: Excitation | None = None,
     hits: int | None = None,
-    workspace: str | Path | xarray.Dataset | None = None,
+    workspace: str | Path | WorkspaceMap | xarray.Dataset | None = None,
     diagnosis: str | Path | Diagnosis | None = None,
     joint: str | None = None,
     flex: str | Path | None = None,

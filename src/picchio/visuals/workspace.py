@@ -8,18 +8,24 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.studies.maps.result import WorkspaceMap
 
 if TYPE_CHECKING:
     import xarray
 
 
+def dataset_of(workspace: WorkspaceMap | xarray.Dataset) -> xarray.Dataset:
+    """The dataset of a map."""
+    return workspace.dataset if isinstance(workspace, WorkspaceMap) else workspace
+
+
 def best_branch(
-    workspace: xarray.Dataset, joint: str, variable: str = "peak_deflection"
+    workspace: WorkspaceMap | xarray.Dataset, joint: str, variable: str = "peak_deflection"
 ) -> tuple[FloatArray, FloatArray]:
     """Every place of a map once, with the smallest value over the poses that reach it.
 
     Args:
-        workspace: a map of `picchio.studies.maps.run`.
+        workspace: of `picchio.workspace_map`, or its dataset.
         joint: whose value.
         variable: of dimensions (point, joint).
 
@@ -29,6 +35,7 @@ def best_branch(
     Raises:
         InputError: an unknown joint, a map without any value.
     """
+    workspace = dataset_of(workspace)
     names = [str(name) for name in workspace["joint"].values]
     if joint not in names:
         raise InputError("no such joint in the map", key="joint", value=joint, choices=names)

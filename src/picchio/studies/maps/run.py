@@ -25,6 +25,7 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.maps.chunk import Columns, MapJob
 from picchio.studies.maps.files import join_chunks
 from picchio.studies.maps.places import Places
+from picchio.studies.maps.result import WorkspaceMap
 from picchio.vibration.closed_form.response import unit_vector
 
 if TYPE_CHECKING:
@@ -52,8 +53,8 @@ def workspace_map(
     scheduler: str | None = None,
     restart: bool = False,
     progress: Callable[[int, int], None] | None = None,
-) -> xarray.Dataset:
-    """Compute a map, or go on with one that was stopped, and open it.
+) -> WorkspaceMap:
+    """Compute a map, or resume one that was stopped, and open it.
 
     Args:
         robot: with stiffnesses; or a model of it.
@@ -74,8 +75,7 @@ def workspace_map(
         progress: called with (places done, places in all).
 
     Returns:
-        the dataset, lazily opened: `position`, `pose`, `natural_frequency`, `peak_deflection`,
-        `worst_direction` and more, a row a point and branch.
+        the map, opened lazily.
 
     Raises:
         InputError: an unknown ending, direction or branch; no flexible joint; no row at all.
@@ -136,7 +136,7 @@ def workspace_map(
             progress(done, len(places))
     join_chunks(target, (_read(_file(folder, span)) for span in spans), _attributes(job))
     shutil.rmtree(folder)
-    return open_map(target)
+    return WorkspaceMap(open_map(target), target)
 
 
 def open_map(path: str | Path) -> xarray.Dataset:

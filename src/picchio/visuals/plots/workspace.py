@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
+from picchio.studies.maps.result import WorkspaceMap
 from picchio.visuals.plots.style import CMAP, axes_or_new, plain, styled
 from picchio.visuals.workspace import best_branch, spacing
 
@@ -15,14 +16,16 @@ if TYPE_CHECKING:
 
 
 @styled
-def plot_workspace_map(workspace: xarray.Dataset, joint: str, ax: Axes | None = None) -> Axes:
+def plot_workspace_map(
+    workspace: WorkspaceMap | xarray.Dataset, joint: str, ax: Axes | None = None
+) -> Axes:
     """Peak deflection of a joint (mrad) over the plane that the map spans (m).
 
     Of several poses that reach a place the one with the smallest peak counts. A map of a box is
     seen along its shortest side, the smallest peak in front.
 
     Args:
-        workspace: a map of `picchio.studies.maps.run`.
+        workspace: of `picchio.workspace_map`, or its dataset.
         joint: whose peak.
         ax: where to draw.
 

@@ -16,6 +16,7 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import Assessment
 from picchio.studies.envelopes import DirectionEnvelope
 from picchio.studies.envelopes import envelope as envelope_of
+from picchio.studies.maps.result import WorkspaceMap
 from picchio.vibration.closed_form.response import unit_vector
 from picchio.visuals.kinematics import frames, world
 from picchio.visuals.plots.style import direction_label
@@ -32,6 +33,7 @@ from picchio.visuals.scene.overlay import (
 from picchio.visuals.scene.robot.body import Body, build_body
 from picchio.visuals.scene.robot.mesh import Mesh, arrow, ring, sphere, turned_to
 from picchio.visuals.scene.scene import Item, Scene
+from picchio.visuals.workspace import best_branch, dataset_of, spacing
 
 if TYPE_CHECKING:
     import xarray
@@ -46,7 +48,7 @@ def build_scene(
     direction: ArrayLike | None = None,
     assessment: Assessment | None = None,
     joint: str | None = None,
-    workspace: xarray.Dataset | None = None,
+    workspace: WorkspaceMap | xarray.Dataset | None = None,
     diagnosis: Diagnosis | None = None,
     gravity_stiffness: bool | None = None,
     subdivisions: int = 4,
@@ -61,7 +63,7 @@ def build_scene(
         direction: (3,) of the force, for the vibration; the worst one if not given.
         assessment: of a task, for the rivets and the joints' colours.
         joint: whose envelope is shown first; the limiting one if not given.
-        workspace: a map of `picchio.studies.maps.run`, coloured by the peak of the joint shown.
+        workspace: of `picchio.workspace_map`, or its dataset, coloured by the peak of the joint shown.
         diagnosis: of this robot: its causes are drawn where they sit, and the layers about life
             start hidden.
         gravity_stiffness: add dg/dq to the springs.
@@ -91,7 +93,7 @@ def build_scene(
     if assessment is not None:
         _add_rivets(scene, body, assessment)
     if workspace is not None:
-        _add_workspace(scene, workspace, units)
+        _add_workspace(scene, dataset_of(workspace), units)
     if diagnosis is not None:
         along = blow if blow is not None else _against_the_tool(robot, checked)
         site = partial(Site, robot, checked, tree, places, body, along)
@@ -215,8 +217,6 @@ def _add_rivets(scene: Scene, body: Body, assessment: Assessment) -> None:
 
 
 def _add_workspace(scene: Scene, workspace: xarray.Dataset, units: list[str]) -> None:
-    from picchio.visuals.workspace import best_branch, spacing
-
     mapped = [str(name) for name in workspace["joint"].values]
     for k, name in enumerate(scene.envelope.joint_names):
         if name not in mapped and k != scene.chosen:

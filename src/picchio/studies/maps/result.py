@@ -1,0 +1,122 @@
+"""What a workspace map found: where each joint is worst, and which joint limits how much of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from picchio.core.html import sheet
+from picchio.core.results import TableResult
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+_SLICE = 1_000_000
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class WorkspaceMap(TableResult):
+    """A map on disk, opened lazily; close it, or use it in a `with` block.
+
+    Attributes:
+        dataset: `position`, `pose`, `natural_frequency`, `peak_deflection`, `worst_direction` and
+            more, a row a point and branch; units in attrs.
+        path: the file.
+    """
+
+    dataset: xarray.Dataset
+    path: Path
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self.dataset.close()
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The whole map, read as it is used."""
+        return self.dataset
+
+    def to_frame(self) -> pandas.DataFrame:
+        """The joints' largest values, a row a joint; the map itself is `to_xarray()`."""
+        import pandas
+
+        return pandas.DataFrame(self._content()["joints"]).set_index("name")
+
+    def _headline(self) -> str:
+        attrs = self.dataset.attrs
+        return f"{attrs['robot']!r}: {self.dataset.sizes['point']} poses in {self.path}"
+
+    def _repr_html_(self) -> str:
+        content = self._content()
+        columns = ("joint", "largest deflection [mrad, mm]", "torque there [N m, N]",
+                   "stress there [MPa]", "where [m]", "limits [poses]")  # fmt: skip
+        rows = [
+            (j["name"], 1e3 * j["peak_deflection"], j["peak_torque"],
+             1e-6 * j["peak_shear_stress"], j["position"], j["limits_poses"])
+            for j in content["joints"]
+        ]  # fmt: skip
+        facts = {key: content[key] for key in ("file", "excitation", "direction", "poses")}
+        return sheet(f"Workspace map of {content['robot']}", facts, columns, rows)
+
+    def _content(self) -> dict[str, Any]:
+        """The largest values of every joint and where they are, read a slice at a time."""
+        found = self.dataset
+        count = int(found.sizes["point"])
+        names = [str(name) for name in found["joint"].values]
+        best: list[dict[str, Any]] = [{"name": name, "peak_deflection": -1.0} for name in names]
+        limits = np.zeros(len(names), dtype=int)
+        for first in range(0, count, _SLICE):
+            part = found.isel(point=slice(first, first + _SLICE))
+            peaks = part["peak_deflection"].values
+            limits += np.bincount(part["limiting_joint"].values, minlength=len(names))
+            for j, entry in enumerate(best):
+                k = int(peaks[:, j].argmax())
+                if peaks[k, j] > entry["peak_deflection"]:
+                    row = part.isel(point=k)
+                    entry |= {
+                        "peak_deflection": float(peaks[k, j]),
+                        "peak_torque": float(row["peak_torque"].values[j]),
+                        "peak_shear_stress": float(row["peak_shear_stress"].values[j]),
+                        "position": row["position"].values,
+                        "pose": row["pose"].values,
+                        "worst_direction": row["worst_direction"].values[j],
+                    }
+            if "damage_per_rivet" in part:
+                _add_damage(best, part["damage_per_rivet"].values)
+        for entry, poses in zip(best, limits, strict=True):
+            entry["limits_poses"] = int(poses)
+        attrs = found.attrs
+        return {
+            "format": "picchio-map/1",
+            "robot": attrs["robot"],
+            "file": self.path,
+            "excitation": attrs["excitation"],
+            "direction": attrs["direction"],
+            "hits": int(attrs["hits"]) or None,
+            "hits_of_damage": int(attrs["hits_of_damage"]) or None,
+            "poses": count,
+            "joints": best,
+            "notes": [str(note) for note in np.atleast_1d(attrs["notes"]) if str(note)],
+        }
+
+
+def _add_damage(best: list[dict[str, Any]], damage: Any) -> None:
+    for j, entry in enumerate(best):
+        known = damage[:, j][np.isfinite(damage[:, j])]
+        if len(known):
+            entry["damage_per_rivet"] = max(entry.get("damage_per_rivet", 0.0), float(known.max()))
