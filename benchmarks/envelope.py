@@ -32,7 +32,9 @@ import pinocchio as pin
 
 import picchio
 from picchio.core.files import atomic_write
+from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.linear_system import LinearSystem
+from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Shaft
 from picchio.studies.envelopes import icosphere
 from picchio.studies.maps import places
@@ -65,13 +67,13 @@ def memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
-def random_poses(robot: picchio.FlexibleRobot, count: int) -> np.ndarray:
+def random_poses(robot: FlexibleRobot, count: int) -> np.ndarray:
     lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
     upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
     return np.random.default_rng(0).uniform(lower, upper, (count, len(lower)))
 
 
-def floor(robot: picchio.FlexibleRobot, poses: np.ndarray) -> None:
+def floor(robot: FlexibleRobot, poses: np.ndarray) -> None:
     """The two calls that no pose can do without, and nothing else."""
     model, data = robot.rigid._model, robot.rigid._data()
     frame = robot.rigid.frame(robot.tool_point)
@@ -81,7 +83,7 @@ def floor(robot: picchio.FlexibleRobot, poses: np.ndarray) -> None:
         pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
 
 
-def ours(robot: picchio.FlexibleRobot, poses: np.ndarray, compiled: bool = True) -> np.ndarray:
+def ours(robot: FlexibleRobot, poses: np.ndarray, compiled: bool = True) -> np.ndarray:
     mass, jacobian = robot.mass_and_jacobian(poses)
     found = batch_peaks(
         mass, jacobian, robot.stiffness, robot.damping_ratio, BLOWS, compiled=compiled
@@ -89,20 +91,20 @@ def ours(robot: picchio.FlexibleRobot, poses: np.ndarray, compiled: bool = True)
     return found.peak_deflection
 
 
-def damaged(robot: picchio.FlexibleRobot, poses: np.ndarray, curve: picchio.SNCurve) -> None:
+def damaged(robot: FlexibleRobot, poses: np.ndarray, curve: SNCurve) -> None:
     """A rivet of 12 hits from rest in one direction, ring-down, cycles counted, in every joint."""
     curves = [curve] * len(robot.flexible_joints)
     damage_at(picchio.Model(robot), poses, [1.0, 0.0, 0.0], BLOWS, 12, curves)
 
 
-def shafted(robot: picchio.FlexibleRobot) -> picchio.FlexibleRobot:
+def shafted(robot: FlexibleRobot) -> FlexibleRobot:
     """The robot with some shaft in every joint, so that there is a stress to count."""
     shaft = Shaft(0.015, 0.05, 79.3e9)
     joints = tuple(dataclasses.replace(j, shaft=shaft) for j in robot.flexible_joints)
     return dataclasses.replace(robot, flexible_joints=joints)
 
 
-def plain(robot: picchio.FlexibleRobot, pose: np.ndarray, directions: np.ndarray) -> np.ndarray:
+def plain(robot: FlexibleRobot, pose: np.ndarray, directions: np.ndarray) -> np.ndarray:
     """Paper eqs. 7-13: each mode's series summed once, then direction by direction."""
     from scipy.linalg import eigh
 
@@ -132,7 +134,7 @@ def plain(robot: picchio.FlexibleRobot, pose: np.ndarray, directions: np.ndarray
     return peaks
 
 
-def mujoco_runs(robot: picchio.FlexibleRobot) -> list[dict[str, Any]]:
+def mujoco_runs(robot: FlexibleRobot) -> list[dict[str, Any]]:
     """One pose, one direction, by time steps: what each setting costs, and how far off it is.
 
     MuJoCo's damping is one number a joint, which picchio takes, too, as other than modal damping.

@@ -1,11 +1,65 @@
 """The package as it is shipped: built, installed elsewhere, run in an empty folder."""
 
+import ast
 import os
+import re
 import subprocess
 import sys
+import tomllib
 import zipfile
 
 import pytest
+
+# Distributions whose modules have another name. pydantic_core is the other half of pydantic, to
+# which it is pinned.
+MODULE_OF = {
+    "pin": "pinocchio",
+    "u-msgpack-python": "umsgpack",
+    "mcap-ros2-support": "mcap_ros2",
+    "pydantic": "pydantic pydantic_core",
+}
+# Used without being imported: robots that are found among its files; what trimesh reads .dae with.
+NOT_IMPORTED = {"example-robot-data", "pycollada"}
+# Imported only where it runs already: Jupyter brings it.
+FOUND_RUNNING = {"IPython"}
+
+
+def distributions(entries):
+    return {re.match(r"[\w.-]+", entry)[0] for entry in entries}
+
+
+def modules_of(names):
+    return {m for name in names for m in MODULE_OF.get(name, name.replace("-", "_")).split()}
+
+
+def test_dependencies_are_what_is_imported(repository):
+    project = tomllib.loads((repository / "pyproject.toml").read_text())["project"]
+    hard = distributions(project["dependencies"])
+    extras = project["optional-dependencies"]
+    optional = {name for key in extras if key not in ("test", "docs")
+                for name in distributions(extras[key])}  # fmt: skip
+    imported = set()
+    for path in (repository / "src").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Import):
+                imported |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                imported.add(node.module.partition(".")[0])
+    foreign = imported - set(sys.stdlib_module_names) - {"picchio"}
+    assert modules_of(hard - NOT_IMPORTED) <= foreign
+    assert foreign <= modules_of(hard | optional) | FOUND_RUNNING
+    pinned = {line.partition("==")[0].strip().lower().replace("_", "-")
+              for line in (repository / "constraints.txt").read_text().splitlines()}  # fmt: skip
+    asked = hard | {name for key in extras for name in distributions(extras[key])}
+    assert {name.lower().replace("_", "-") for name in asked} <= pinned
+
+
+def test_extras_that_are_advised_exist(repository):
+    extras = tomllib.loads((repository / "pyproject.toml").read_text())["project"]
+    advised = set()
+    for path in [*(repository / "src").rglob("*.py"), repository / "README.md"]:
+        advised |= set(re.findall(r"picchio\[([\w-]+)\]", path.read_text("utf-8")))
+    assert advised and advised <= set(extras["optional-dependencies"])
 
 
 @pytest.mark.slow

@@ -18,24 +18,19 @@ if TYPE_CHECKING:
     from picchio import datasets as datasets
     from picchio.campaign.campaign import Campaign as Campaign
     from picchio.campaign.campaign import load_campaign as load_campaign
-    from picchio.campaign.campaign import write_campaign as write_campaign
     from picchio.campaign.importing.importer import import_record as import_record
     from picchio.campaign.record import Record as Record
     from picchio.core.errors import InputError as InputError
-    from picchio.core.errors import PicchioError as PicchioError
     from picchio.core.errors import PicchioWarning as PicchioWarning
     from picchio.excitation.half_sine_train import HalfSineTrain as HalfSineTrain
     from picchio.excitation.measured import MeasuredForce as MeasuredForce
     from picchio.excitation.pulse_train import PulseTrain as PulseTrain
-    from picchio.fatigue.counting.counter import rainflow as rainflow
-    from picchio.fatigue.sn.curve import SNCurve as SNCurve
     from picchio.fatigue.sn.fit import fit_sn as fit_sn
     from picchio.fatigue.sn.library import load_sn_curve as load_sn_curve
     from picchio.measurement.quality.report import check as check
     from picchio.model.model import Model as Model
     from picchio.paper.run import reproduce as reproduce
     from picchio.prediction.simulation import simulate as simulate
-    from picchio.robot.flexible_robot import FlexibleRobot as FlexibleRobot
     from picchio.robot.loading.annotated import annotate as annotate
     from picchio.robot.loading.catalogue import robots as robots
     from picchio.robot.loading.load import load_robot as load_robot
@@ -44,7 +39,6 @@ if TYPE_CHECKING:
     from picchio.studies.envelopes import envelope as envelope
     from picchio.studies.maps.run import workspace_map as workspace_map
     from picchio.studies.placement.run import place as place
-    from picchio.studies.tasks import Task as Task
     from picchio.studies.tasks import load_task as load_task
     from picchio.studies.tasks import task_from_dict as task_from_dict
     from picchio.studies.uncertainty import uncertain_life as uncertain_life
@@ -74,29 +68,23 @@ _HOME = {
     "workspace_map": "studies.maps.run",
     # What they work on, from files and from Python.
     "Campaign": "campaign.campaign",
-    "FlexibleRobot": "robot.flexible_robot",
     "HalfSineTrain": "excitation.half_sine_train",
     "MeasuredForce": "excitation.measured",
     "Model": "model.model",
     "PulseTrain": "excitation.pulse_train",
     "Record": "campaign.record",
-    "SNCurve": "fatigue.sn.curve",
-    "Task": "studies.tasks",
     "load_campaign": "campaign.campaign",
     "load_robot": "robot.loading.load",
     "load_sn_curve": "fatigue.sn.library",
     "load_task": "studies.tasks",
     "task_from_dict": "studies.tasks",
-    "write_campaign": "campaign.campaign",
     "datasets": "",
     # The steps of the method, for a closer look.
     "modal_analysis": "vibration.closed_form.modes",
-    "rainflow": "fatigue.counting.counter",
     "response_from_rest": "vibration.closed_form.response",
     "steady_state": "vibration.closed_form.response",
     # What goes wrong.
     "InputError": "core.errors",
-    "PicchioError": "core.errors",
     "PicchioWarning": "core.errors",
 }
 

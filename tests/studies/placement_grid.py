@@ -15,6 +15,7 @@ import numpy as np
 import picchio
 from picchio.core.errors import InputError
 from picchio.robot.joint import Shaft
+from picchio.studies.tasks import Task
 
 # A shaft for arms whose own nobody has published: assumed, so that a life exists.
 SHAFT = Shaft(0.008, 0.02, 79.3e9, "42CrMo4-QT-shaft")
@@ -83,7 +84,7 @@ def cost_there(robot, task, move, sn_curve=None):
                     return None
             branches.append(known[key])
         one = dataclasses.replace(op, poses=np.concatenate(branches), direction=direction)
-        told = picchio.assess(robot, picchio.Task((one,)), sn_curve=sn_curve).operations[0]
+        told = picchio.assess(robot, Task((one,)), sn_curve=sn_curve).operations[0]
         whole = np.fmax(told.utilisation, told.reducer_utilisation)
         first = 0
         for poses in branches:

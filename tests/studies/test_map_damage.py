@@ -13,7 +13,7 @@ from picchio.studies.maps import places
 from picchio.studies.maps.run import workspace_map as compute_map
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.poses import damage_at
-from picchio.studies.tasks import Operation
+from picchio.studies.tasks import Operation, Task
 
 # Forty times the paper's blow: shafts of this steel then fail.
 BLOWS = picchio.PulseTrain(12000.0, 0.040, 0.004)
@@ -36,7 +36,7 @@ def test_damage_is_that_of_assess(tmp_path, robot, ending):
         robot, grid, BLOWS, tmp_path / f"map{ending}", direction=[0, 0, 1], damage=12, chunk=2
     )
     operation = Operation("", np.array([0, 0, 1.0]), BLOWS, 12, grid.rows(0, 6))
-    told = picchio.assess(robot, picchio.Task((operation,))).operations[0]
+    told = picchio.assess(robot, Task((operation,))).operations[0]
     assert told.damage_per_rivet.max() > 0.0
     np.testing.assert_allclose(
         found["damage_per_rivet"].values, told.damage_per_rivet, rtol=1e-5, atol=1e-30

@@ -15,6 +15,7 @@ from picchio.studies.placement.run import place
 from picchio.studies.placement.work import Work
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.poses import damage_at
+from picchio.studies.tasks import Task
 
 # Beyond this, relative, the search's last steps no longer look.
 REFINED = 1e-6
@@ -112,7 +113,7 @@ def test_best_is_what_assess_says_and_stands_where_it_says(arm, panel):
         poses = found.best.spot.poses[first : first + len(op.poses)]
         first += len(op.poses)
         ops.append(dataclasses.replace(op, poses=poses, direction=turn @ op.direction))
-    told = picchio.assess(arm, picchio.Task(tuple(ops)), sn_curve="nie-2016")
+    told = picchio.assess(arm, Task(tuple(ops)), sn_curve="nie-2016")
     now = picchio.assess(arm, panel, sn_curve="nie-2016")
     for joint, use in zip(told.joints, found.best.joints, strict=True):
         assert use.rivets_to_failure == pytest.approx(joint.rivets_to_failure, rel=1e-9)
@@ -137,7 +138,7 @@ def test_never_worse_and_poses_alone(arm, panel):
     # From its own optimum nothing is gained, and nothing lost.
     ops = (dataclasses.replace(panel.operations[0], poses=still.best.spot.poses[:5]),
            dataclasses.replace(panel.operations[1], poses=still.best.spot.poses[5:]))  # fmt: skip
-    again = place(arm, picchio.Task(ops), move=[0, 0, 0, 0], placements=10)
+    again = place(arm, Task(ops), move=[0, 0, 0, 0], placements=10)
     assert again.best.utilisation == pytest.approx(again.start.utilisation, rel=1e-6)
     assert again.best.utilisation <= again.start.utilisation
 
@@ -165,7 +166,7 @@ def test_hit_rate_within_the_guns_range(arm, panel):
 
 def test_a_start_beyond_the_limits_is_no_candidate(arm, panel):
     beyond = panel.operations[0].poses + np.array([0.0, 0.0, 2.0 * np.pi])
-    far = picchio.Task((dataclasses.replace(panel.operations[0], poses=beyond),))
+    far = Task((dataclasses.replace(panel.operations[0], poses=beyond),))
     with pytest.warns(PicchioWarning, match="beyond their limits"):
         found = place(arm, far, move=[0.1, 0.1, 0.1, 0], placements=5)
     assert not found.start_valid

@@ -13,6 +13,7 @@ import matplotlib
 import pytest
 
 import picchio
+from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.visuals.worst_rivet import worst_rivet
 
 matplotlib.use("Agg")
@@ -79,7 +80,7 @@ def hostile_urdf(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def recoiling(tmp_path_factory: pytest.TempPathFactory) -> picchio.FlexibleRobot:
+def recoiling(tmp_path_factory: pytest.TempPathFactory) -> FlexibleRobot:
     """The 3-DoF arm with a gun on a recoil spring."""
     from picchio.robot.loading.find import find_robot
 

@@ -17,6 +17,7 @@ from picchio.diagnosis.result import Cause, Diagnosis, Value
 from picchio.excitation.pulse_train import PulseTrain
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.registry import catalogue
+from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.visuals.diagnosis_file import read_diagnosis
 from picchio.visuals.kinematics import world
 from picchio.visuals.scene.build import build_scene
@@ -48,7 +49,7 @@ def named(effect: str, target: str, unit: str = "1", **values: float) -> Diagnos
     return Diagnosis("named", (Cause(effect, target, 0.99, parameters),))
 
 
-def drawn(robot: picchio.FlexibleRobot, found: Diagnosis, layer: str = "causes", **options):
+def drawn(robot: FlexibleRobot, found: Diagnosis, layer: str = "causes", **options):
     """The scene, and its causes' meshes in world coordinates."""
     scene = build_scene(robot, POSE, BLOWS, diagnosis=found, subdivisions=1, **options)
     places = world(scene.frames)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from picchio.visuals.scene.robot.kinematics import frames, world
 
 import picchio
 from picchio.core.errors import PicchioWarning
 from picchio.excitation.pulse_train import PulseTrain
+from picchio.visuals.kinematics import frames, world
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.robot.body import MOST_FACES, build_body, decimate
 from picchio.visuals.scene.robot.mesh import sphere

@@ -81,7 +81,6 @@ def view(
                                  key="pose", hint="give `excitation`")  # fmt: skip
             excitation = blows_of(loaded, task)
         at = loaded.pose(pose)
-        model.linear_system(at)  # bad numbers are told before meshes
         return build_scene(
             model,
             at,

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from picchio.core.errors import InputError, PicchioError
+from picchio.core.errors import InputError
 from picchio.core.files import atomic_write
 from picchio.core.provenance import provenance
 from picchio.excitation.excitation import Excitation
@@ -225,12 +225,8 @@ def _run(
         for span in missing:
             yield compute_chunk(job, folder, span)
         return
-    try:
-        from distributed import Client, LocalCluster, as_completed
-    except ImportError:
-        raise PicchioError(
-            "maps on several workers need dask: pip install 'picchio[map]'"
-        ) from None
+    from distributed import Client, LocalCluster, as_completed
+
     cluster = None
     if scheduler is None:
         cluster = LocalCluster(

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.resources import files
+from inspect import signature
 from typing import Any, cast
 
 import matplotlib as mpl
@@ -178,7 +179,8 @@ def report(
             One that has no page of its own is shown as in a notebook; a scene is a page.
         command: how it was made, for the page's foot.
         warnings: what was warned of on the way.
-        **options: what the result's own page can be told besides, such as `gravity_stiffness`.
+        **options: what the result's own page needs or can be told besides: an assessment's needs
+            `robot` and `task`.
 
     Returns:
         the page; `report(...).save("page.html")` writes it.
@@ -193,7 +195,11 @@ def report(
     title = repr(result).strip("<>")
     module, _, name = result.PAGE.partition(":")
     page = getattr(import_module(f"picchio.{module}"), name)
-    return Report(title, page(result, command=command, warnings=warnings, **options))
+    try:
+        asked = signature(page).bind(result, command=command, warnings=warnings, **options)
+    except TypeError as error:
+        raise InputError(f"the page of {type(result).__name__}: {error}") from None
+    return Report(title, page(*asked.args, **asked.kwargs))
 
 
 def plain_page(result: Result, *, command: str | None = None, warnings: Sequence[str] = ()) -> str:

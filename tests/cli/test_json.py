@@ -1,0 +1,108 @@
+"""`--json` of a command is `to_dict()` of its function."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import picchio
+from picchio.cli.main import run
+
+POSE = "0.3,1.1,-1.0"
+PLAN = """format = "picchio-plan/1"
+poses = [[0.3, 0.5, -0.8]]
+directions = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+hits = 2
+sample_rate = 500.0
+length = 0.2
+seed = 4
+excitation = { kind = "pulse_train", force = 300.0, period = 0.040, width = 0.004 }
+sensor = [{ channels = "deflection", noise = 1e-6 }]
+effect = [{ effect = "payload", target = "tool", parameters = { mass = 2.0 } }]
+"""
+MAPPING = """format = "picchio-mapping/1"
+time = { series = "t" }
+channel = [{ from = "F", to = "force" }]
+record = { kind = "percussion", pose = { joint_1 = 0.3 }, direction = [0.0, 0.0, 1.0] }
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where the commands run, with what they read."""
+    monkeypatch.chdir(tmp_path)
+    Path("plan.toml").write_text(PLAN)
+    Path("mapping.toml").write_text(MAPPING)
+    Path("hit.csv").write_text("t,F\n" + "".join(f"{i / 1e3},{i}\n" for i in range(50)))
+    rng = np.random.default_rng(1)
+    rows = ["Stress [MPa],Cycles,Comment"]
+    for stress in np.repeat([280, 320, 360, 420, 480], 8):
+        strength = 300 * 10 ** (0.03 * rng.normal())
+        life = 1e6 * (stress / strength) ** -6.0
+        broke = stress > strength and life < 1e7
+        rows.append(f"{stress},{life:.0f},Failure" if broke else f"{stress},10000000,RunOut")
+    Path("tests.csv").write_text("\n".join(rows))
+    picchio.simulate("fanuc_like_3dof", "plan.toml", "measured")
+    return tmp_path
+
+
+def annotated() -> Any:
+    made = picchio.annotate("fanuc_like_3dof")
+    made.save("a.urdf")
+    return made
+
+
+def imported() -> Any:
+    shutil.rmtree("imported")
+    return picchio.import_record("hit.csv", "imported", "mapping.toml")
+
+
+def scene() -> Any:
+    robot = picchio.load_robot("fanuc_like_3dof")
+    task = picchio.load_task(robot.task_path, robot)
+    made = picchio.view(robot, pose=[0.3, 1.1, -1.0], excitation=task.operations[0].excitation)
+    made.save("a.html")
+    return made
+
+
+# Command line, and what the function returns; both write what they write where the other did.
+COMMANDS: dict[str, tuple[str, Any]] = {
+    "annotate": ("annotate fanuc_like_3dof --out a.urdf", annotated),
+    "check": ("check measured", lambda: picchio.check("measured")),
+    "fit-sn": (
+        "fit-sn tests.csv --kind normal --survival 0.9",
+        lambda: picchio.fit_sn("tests.csv", kind="normal", survival=0.9),
+    ),
+    "import": (
+        "import hit.csv --mapping mapping.toml --to imported",
+        imported,
+    ),
+    "reproduce": (
+        "reproduce --worlds 8 --assume period=0.05",
+        lambda: picchio.reproduce({"period": 0.05}, worlds=8),
+    ),
+    "robots": ("robots", picchio.robots),
+    "simulate": (
+        "simulate fanuc_like_3dof --plan plan.toml --to made --seed 9",
+        lambda: picchio.simulate("fanuc_like_3dof", "plan.toml", "made", seed=9, overwrite=True),
+    ),
+    "view": (f"view fanuc_like_3dof --pose={POSE} --out a.html", scene),
+}
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n == "reproduce" else n for n in COMMANDS]
+)
+def test_json_is_to_dict(name: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words, function = COMMANDS[name]
+    assert run([*words.split(), "--json", "out.json"]) == 0
+    capsys.readouterr()
+    written = json.loads(Path("out.json").read_text())
+    returned = function().to_dict()
+    assert json.dumps(written) == json.dumps(returned)
+    assert written["format"].startswith("picchio-")

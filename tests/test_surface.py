@@ -1,0 +1,174 @@
+"""`import picchio`: which names it shows, that they are what they seem, and what they return."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import pkgutil
+import re
+import sys
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import picchio
+from picchio.core.html import Page
+from picchio.core.results import Result, TableResult
+from picchio.fatigue.sn.test_table import SNTests
+from picchio.studies.maps.places import joint_grid
+
+FUNCTIONS = {
+    "allowable", "annotate", "assess", "check", "envelope", "fit_sn", "import_record", "place",
+    "report", "reproduce", "robots", "simulate", "uncertain_life", "view", "workspace_map",
+}  # fmt: skip
+# What they return stands within the JSON of `picchio assess`.
+PARTS_OF_ASSESS = {"allowable", "uncertain_life"}
+LOADERS = {"load_campaign", "load_robot", "load_sn_curve", "load_task"}
+BLOWS = picchio.PulseTrain(300.0, 0.040, 0.004)
+POSE = [0.3, 1.1, -1.0]
+TASK = {
+    "excitation": {"kind": "pulse_train", "force": 300.0, "period": 0.040, "width": 0.004},
+    "operation": [{"name": "up", "direction": [0.0, 0.0, 1.0], "poses": [POSE]}],
+}
+PLAN = """format = "picchio-plan/1"
+poses = [[0.3, 0.5, -0.8]]
+directions = [[1.0, 0.0, 0.0]]
+hits = 2
+sample_rate = 500.0
+length = 0.2
+excitation = { kind = "pulse_train", force = 300.0, period = 0.040, width = 0.004 }
+sensor = [{ channels = "deflection", noise = 1e-6 }]
+"""
+MAPPING = """format = "picchio-mapping/1"
+[time]
+series = "t"
+[[channel]]
+from = "F"
+to = "force"
+[record]
+kind = "percussion"
+pose = { joint_1 = 0.3 }
+direction = [0.0, 0.0, 1.0]
+"""
+
+
+def modules() -> list[str]:
+    """Every module of the package, imported."""
+    found = [m.name for m in pkgutil.walk_packages(picchio.__path__, "picchio.")]
+    for name in found:
+        import_module(name)
+    return found
+
+
+def test_dir_shows_the_functions_the_loaders_and_what_the_readme_uses(repository: Path) -> None:
+    readme = set(re.findall(r"\bpicchio\.([A-Za-z]\w*)", (repository / "README.md").read_text()))
+    assert set(dir(picchio)) == FUNCTIONS | LOADERS | (readme & set(picchio.__all__)) | {"datasets"}
+    assert picchio.__all__ == dir(picchio)
+    assert re.fullmatch(r"\d+\.\d+.*", picchio.__version__)
+    with pytest.raises(AttributeError, match="no attribute 'asses'"):
+        picchio.asses  # noqa: B018
+    for name in LOADERS | FUNCTIONS:
+        assert inspect.isfunction(getattr(picchio, name)), name
+    # Those who check types see the same names.
+    stated = re.findall(
+        r"^    from \S+ import \w+ as (\w+)$", Path(picchio.__file__).read_text(), re.M
+    )
+    assert sorted(stated) == picchio.__all__
+
+
+def test_no_module_stands_in_the_way_of_a_name() -> None:
+    before = {name: getattr(picchio, name) for name in dir(picchio)}
+    known = modules()
+    assert len(known) > 300
+    for name, value in before.items():
+        assert getattr(picchio, name) is value, name
+        if name == "datasets":
+            assert inspect.ismodule(value) and value.__doc__
+            continue
+        assert f"picchio.{name}" not in known, name
+        assert f"{value.__module__}.{value.__qualname__}" not in sys.modules, name
+        assert value.__doc__, name
+
+
+def calls(folder: Path) -> dict[str, Any]:
+    """Every public function, called on something small."""
+    robot = picchio.load_robot("fanuc_like_3dof")
+    task = picchio.task_from_dict(TASK, robot)
+    (folder / "plan.toml").write_text(PLAN)
+    (folder / "mapping.toml").write_text(MAPPING)
+    (folder / "hit.csv").write_text("t,F\n" + "".join(f"{i / 1e3},{i}\n" for i in range(50)))
+    rng = np.random.default_rng(0)
+    stress = np.repeat([300e6, 340e6, 380e6, 420e6], 4)
+    cycles = 1e6 * (stress / 300e6) ** -9.0 * np.exp(0.4 * rng.standard_normal(16))
+    return {
+        "allowable": lambda: picchio.allowable(robot, task, 1e6),
+        "annotate": lambda: picchio.annotate("fanuc_like_3dof"),
+        "assess": lambda: picchio.assess(robot, task),
+        "check": lambda: picchio.check(picchio.simulate(robot, folder / "plan.toml").campaign),
+        "envelope": lambda: picchio.envelope(robot, POSE, BLOWS),
+        "fit_sn": lambda: picchio.fit_sn(SNTests(stress, cycles, np.ones(16, bool)), knee=False),
+        "import_record": lambda: picchio.import_record(
+            folder / "hit.csv", mapping=folder / "mapping.toml"
+        ),
+        "place": lambda: picchio.place(robot, task, placements=8, self_collision=False),
+        "report": lambda: picchio.report(picchio.envelope(robot, POSE, BLOWS)),
+        "reproduce": lambda: picchio.reproduce(worlds=8),
+        "robots": lambda: picchio.robots(examples=False),
+        "simulate": lambda: picchio.simulate("fanuc_like_3dof", folder / "plan.toml"),
+        "uncertain_life": lambda: picchio.uncertain_life(robot, task, samples=8, poses=1),
+        "view": lambda: picchio.view(robot, pose=POSE, excitation=BLOWS),
+        "workspace_map": lambda: picchio.workspace_map(
+            robot, joint_grid(robot, 2), BLOWS, folder / "map.nc"
+        ),
+    }
+
+
+def test_every_function_is_called_here(tmp_path: Path) -> None:
+    assert set(calls(tmp_path)) == FUNCTIONS
+
+
+@pytest.mark.filterwarnings("ignore::picchio.PicchioWarning")
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n == "reproduce" else n
+             for n in sorted(FUNCTIONS)],
+)  # fmt: skip
+def test_what_a_function_returns(name: str, tmp_path: Path) -> None:
+    modules()
+    found = calls(tmp_path)[name]()
+    text = repr(found)
+    shown = found._repr_html_()
+    assert shown.startswith("<") and "object at 0x" not in text + shown
+    if name == "workspace_map":  # a table of many dimensions, whose own repr has many lines
+        assert found.sizes["point"] >= 1
+        found.close()
+        return
+    assert "\n" not in text and len(text) < 300
+    if isinstance(found, Page):
+        page = found.save(tmp_path / "page.html").read_text()
+        assert page.lower().startswith("<!doctype html>")
+    if name == "report":
+        return
+    assert isinstance(found, Result)
+    content = found.to_dict()
+    assert json.loads(json.dumps(content, allow_nan=False)) == content
+    if name not in PARTS_OF_ASSESS:
+        assert re.fullmatch(r"picchio-[a-z-]+/\d+", content["format"])
+    if isinstance(found, TableResult):
+        frame, table = found.to_frame(), found.to_xarray()
+        assert len(frame) > 0 and set(frame.attrs["units"]) <= set(frame.columns)
+        assert all(table[c].attrs["units"] == unit for c, unit in frame.attrs["units"].items())
+
+
+def test_a_report_says_what_its_page_needs() -> None:
+    robot = picchio.load_robot("fanuc_like_3dof")
+    with pytest.raises(picchio.InputError, match="no result of picchio"):
+        picchio.report(robot)  # type: ignore[arg-type]
+    made = picchio.robots(examples=False)
+    with pytest.raises(picchio.InputError, match=r"RobotList.*'colour'"):
+        picchio.report(made, colour="red")
+    page = picchio.report(made, command="picchio <robots>", warnings=["a & b"]).html()
+    for word in ("fanuc_like_3dof", "picchio &lt;robots&gt;", "a &amp; b"):
+        assert word in page
