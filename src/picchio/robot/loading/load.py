@@ -208,12 +208,3 @@ def _named_poses(srdf: Srdf | None, names: tuple[str, ...]) -> dict[str, tuple[f
     return {
         pose: tuple(values.get(name, 0.0) for name in names) for pose, values in srdf.poses.items()
     }
-
-
-def load_tree(urdf: Path) -> UrdfTree:
-    """Only the checked tree of a URDF, without Pinocchio.
-
-    Raises:
-        InputError: with the true reason why this is no robot.
-    """
-    return read_tree(parse_urdf(read_urdf_bytes(urdf), urdf), urdf)
