@@ -266,11 +266,11 @@ def test_life_spread_draws_the_percentiles() -> None:
     assert bars[1][1] == ax.get_xlim()[1]
     dots = [float(found.get_xdata()[0]) for found in ax.get_lines() if found.get_marker() == "o"]
     assert dots == [1e6, 3e6]
-    assert any("30 % without end" in text.get_text() for text in ax.texts)
+    assert any("30 % infinite" in text.get_text() for text in ax.texts)
     drawn(ax)
     endless = SimpleNamespace(p10=np.inf, p50=np.inf, p90=np.inf, endless=1.0)
     ax = plots.plot_life_spread(SimpleNamespace(joints={"a": endless}, robot=endless))
-    assert any("no life has an end" in text.get_text() for text in ax.texts)
+    assert any("infinite life" in text.get_text() for text in ax.texts)
 
 
 def test_sn_fit_shows_tests_lines_band_and_knee() -> None:

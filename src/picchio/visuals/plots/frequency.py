@@ -1,4 +1,4 @@
-"""Measured and simulated frequency response over each other, with the coherence."""
+"""The robot by frequency: its modes, its frequency response, and the measured one beside it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from picchio.visuals.plots.style import (
     styled,
 )
 
-# The robot's modes: where they lie and which joints move in them.
+_MOST_HARMONICS = 16
 
 
 @styled
@@ -88,11 +88,6 @@ def plot_mode_shapes(modes: Modes, ax: Axes | None = None) -> Axes:
     ax.grid(axis="x", visible=False)
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax
-
-
-# What each joint does to a sinusoidal force, by frequency.
-
-_MOST_HARMONICS = 16
 
 
 @styled
