@@ -266,15 +266,15 @@ def write_campaign(
 
 def _check_target(target: Path, overwrite: bool) -> None:
     if not target.name or target.is_symlink() or (target.exists() and not target.is_dir()):
-        raise InputError("a campaign is a folder; this is none", file=target)
+        raise InputError("a campaign is a folder, this is a file", file=target)
     if not target.parent.is_dir():
-        raise InputError("no such folder to write in", file=target.parent)
+        raise InputError("the folder to write in does not exist", file=target.parent)
     if not target.exists() or not any(target.iterdir()):
         return
     if not (target / CAMPAIGN_FILE).is_file():
-        raise InputError("the folder exists and is no campaign; it is left alone", file=target)
+        raise InputError("the folder exists and is not a campaign; it is not replaced", file=target)
     if not overwrite:
-        raise InputError("a campaign stands here already", file=target,
+        raise InputError("a campaign exists here already", file=target,
                          hint="choose another folder, or say to overwrite it")  # fmt: skip
 
 

@@ -201,7 +201,7 @@ def _limits(element: etree._Element, kind: str, path: Path, key: str) -> tuple[f
     lower = number(found[0], "lower", path, key, default=0.0, infinite=True)
     upper = number(found[0], "upper", path, key, default=0.0, infinite=True)
     if lower > upper:
-        raise InputError("the lower limit is above the upper one", file=path, key=key,
+        raise InputError("the lower limit is above the upper limit", file=path, key=key,
                          value=(lower, upper))  # fmt: skip
     return lower, upper, effort
 

@@ -68,7 +68,7 @@ class Response:
         slowest = -float(self.modes.poles.real.max())
         if slowest <= 0.0:
             raise InputError(
-                "a mode has no damping: after the blows it rings for ever, and a rivet has no end",
+                "a mode has no damping: after the blows it rings for ever",
                 key="damping_ratio",
                 value=0.0,
                 hint="give the joints a damping ratio above 0",
