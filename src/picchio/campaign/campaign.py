@@ -268,7 +268,7 @@ def _check_target(target: Path, overwrite: bool) -> None:
     if not target.name or target.is_symlink() or (target.exists() and not target.is_dir()):
         raise InputError("a campaign is a folder, this is a file", file=target)
     if not target.parent.is_dir():
-        raise InputError("the folder to write in does not exist", file=target.parent)
+        raise InputError("no such folder to write in", file=target.parent)
     if not target.exists() or not any(target.iterdir()):
         return
     if not (target / CAMPAIGN_FILE).is_file():
