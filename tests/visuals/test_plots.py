@@ -80,7 +80,7 @@ def test_spectrum_is_the_papers_fourier_series() -> None:
 
 def test_modes_are_those_of_the_eigenproblem(arm: SimpleNamespace) -> None:
     system = picchio.Model(arm.robot).linear_system(arm.worst.pose)
-    omega2, shapes = scipy.linalg.eigh(np.diag(arm.robot.stiffness), system.mass_matrix)
+    _, shapes = scipy.linalg.eigh(np.diag(arm.robot.stiffness), system.mass_matrix)
     ax = plots.plot_mode_shapes(arm.worst.modes)
     heights = np.array([[bar.get_height() for bar in group] for group in ax.containers])
     expected = shapes / shapes[np.abs(shapes).argmax(axis=0), range(3)]
