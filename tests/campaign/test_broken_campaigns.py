@@ -240,7 +240,7 @@ def test_a_record_that_is_a_folder_or_leads_out(campaign_folder, tmp_path):
     elsewhere = tmp_path / "elsewhere.csv"
     file.rename(elsewhere)
     file.symlink_to(elsewhere)
-    with pytest.raises(InputError, match="leads out"):
+    with pytest.raises(InputError, match="is outside"):
         load_campaign(campaign_folder)
     file.unlink()
     file.mkdir()

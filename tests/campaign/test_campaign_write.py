@@ -125,20 +125,20 @@ def test_a_rename_that_fails_puts_the_old_one_back(tmp_path, monkeypatch):
 def test_what_stands_there_is_respected(tmp_path):
     campaign = Campaign.from_records([motion()])
     campaign.save(tmp_path / "c")
-    with pytest.raises(InputError, match="stands here already"):
+    with pytest.raises(InputError, match="exists here already"):
         campaign.save(tmp_path / "c")
     campaign.save(tmp_path / "c", overwrite=True)
     precious = tmp_path / "home"
     precious.mkdir()
     (precious / "thesis.tex").write_text("x")
-    with pytest.raises(InputError, match="left alone"):
+    with pytest.raises(InputError, match="is not replaced"):
         campaign.save(precious, overwrite=True)
     assert (precious / "thesis.tex").read_text() == "x"
     (tmp_path / "empty").mkdir()
     assert len(campaign.save(tmp_path / "empty")) == 1
     for target, message in (
         (tmp_path / "none" / "c", "no such folder"),
-        (precious / "thesis.tex", "is none"),
+        (precious / "thesis.tex", "is a file"),
     ):
         with pytest.raises(InputError, match=message):
             campaign.save(target)

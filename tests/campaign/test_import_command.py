@@ -88,7 +88,7 @@ def test_json_and_appending(folder):
     )
     again = ("import", "hit2.csv", "--mapping", "m.toml", "--to", "c")
     done = picchio(*again, cwd=folder)
-    assert (done.returncode, "stands here already" in done.stderr) == (2, True)
+    assert (done.returncode, "exists here already" in done.stderr) == (2, True)
     other = MAPPING.replace('kind = "percussion"', 'kind = "percussion"\nhits = 3')
     (folder / "m2.toml").write_text(other)
     arguments = ("import", "hit2.csv", "--mapping", "m2.toml", "--to", "c", "--append")

@@ -72,7 +72,7 @@ def test_a_campaign_is_not_overwritten_unawares(plan, tmp_path, capsys):
     assert simulate(plan, tmp_path / "c") == 0
     before = (tmp_path / "c" / "r01.csv").read_bytes()
     assert simulate(plan, tmp_path / "c", "--seed", "1") == 2
-    assert "stands here already" in capsys.readouterr().err
+    assert "exists here already" in capsys.readouterr().err
     assert (tmp_path / "c" / "r01.csv").read_bytes() == before
     assert simulate(plan, tmp_path / "c", "--seed", "1", "--overwrite") == 0
     assert (tmp_path / "c" / "r01.csv").read_bytes() != before

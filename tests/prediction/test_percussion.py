@@ -11,11 +11,12 @@ import picchio
 from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.record import Record
 from picchio.core.errors import InputError
-from picchio.measurement.noise.whiteness import whiteness
 from picchio.model.effects.registry import effect_class
 from picchio.model.model import Model
 from picchio.prediction.percussion import InCommon, percussion_setups, predict
 from picchio.robot.loading.load import load_robot
+
+from ..whiteness import whiteness
 
 GROUPS = ("force", "deflection", "acceleration.tool", "accelerometer.tool", "velocity.tool",
           "displacement.tool")  # fmt: skip

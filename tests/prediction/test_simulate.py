@@ -6,13 +6,14 @@ import pytest
 from picchio.campaign.campaign import load_campaign, write_campaign
 from picchio.core.errors import InputError
 from picchio.core.toml import validate
-from picchio.measurement.noise.whiteness import whiteness
 from picchio.model.effects.registry import effect_class
 from picchio.model.model import Model
 from picchio.prediction.percussion import percussion_setups, predict
 from picchio.prediction.plan import FORMAT, Plan, plan_toml, read_plan
 from picchio.prediction.simulation import simulated_campaign
 from picchio.robot.loading.load import load_robot
+
+from ..whiteness import whiteness
 
 # Every kind of channel that a percussion record holds, with a noise in its SI unit.
 NOISE = {

@@ -15,7 +15,9 @@ from picchio.core.errors import InputError, PicchioWarning
 from picchio.robot.annotations.annotate import annotate
 from picchio.robot.annotations.sidecar import JointEntry, Sidecar, read_sidecar
 from picchio.robot.loading.find import example_robots
-from picchio.robot.loading.load import load_robot, load_tree
+from picchio.robot.loading.load import load_robot
+
+from .trees import load_tree
 
 FULL = """format = "picchio-sidecar/1"
 [joint.a]

@@ -14,7 +14,8 @@ from scipy.linalg import eigh
 
 import picchio
 from picchio.robot.loading.find import example_robots
-from picchio.robot.loading.load import load_tree
+
+from .trees import load_tree
 
 ARMS = [
     ("ur5_robot", "tool0", ""),

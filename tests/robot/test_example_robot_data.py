@@ -12,7 +12,9 @@ from lxml import etree
 
 from picchio.core.errors import InputError, PicchioWarning
 from picchio.robot.loading.find import example_robot, example_robots, find_robot, shipped_robots
-from picchio.robot.loading.load import load_robot, load_tree
+from picchio.robot.loading.load import load_robot
+
+from .trees import load_tree
 
 URDFS = example_robots()
 BROKEN = "ur3"

@@ -12,7 +12,9 @@ from picchio.robot.ik.branch import branch_label, tool_joints
 from picchio.robot.ik.inverse_kinematics import solve_many
 from picchio.robot.ik.self_motion import move_along_self_motion, self_motion_basis
 from picchio.robot.loading.find import example_robots
-from picchio.robot.loading.load import load_robot, load_tree
+from picchio.robot.loading.load import load_robot
+
+from .trees import load_tree
 
 ARMS = {
     "ur5_robot": "tool0",

@@ -1,4 +1,4 @@
-"""A campaign: the records of one robot, and what was known about them beforehand."""
+"""A campaign: the measured records of one robot, read from a folder and written to one."""
 
 from __future__ import annotations
 
@@ -28,6 +28,8 @@ from picchio.campaign.tables import (
 )
 from picchio.core.errors import InputError, PicchioWarning
 from picchio.core.toml import parse_toml, validate
+
+MAPPING_FILE = "mapping.toml"
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +197,7 @@ def load_campaign(path: str | Path | Campaign, *, clock_tolerance: float = TOLER
     folder = given if given.is_dir() else given.parent
     file = given / CAMPAIGN_FILE if given.is_dir() else given
     if not file.is_file():
-        raise InputError(f"is no campaign: it holds no {CAMPAIGN_FILE}", file=given)
+        raise InputError(f"is not a campaign: it has no {CAMPAIGN_FILE}", file=given)
     table = parse_toml(file, CampaignTable, format=FORMAT)
     records = tuple(
         Record(entry, _open(folder, entry, index), table.excitation, folder, clock_tolerance)
@@ -209,13 +211,8 @@ def load_campaign(path: str | Path | Campaign, *, clock_tolerance: float = TOLER
 def _open(folder: Path, entry: RecordTable, index: int) -> Source:
     path, key = folder / entry.file, f"record[{index}]"
     if not os.path.realpath(path).startswith(os.path.realpath(folder) + os.sep):
-        raise InputError("leads out of the campaign's folder", file=path, key=f"{key}.file")
+        raise InputError("is outside the campaign's folder", file=path, key=f"{key}.file")
     return ParquetSource(path, key) if path.suffix == ".parquet" else CsvSource(path, key)
-
-
-# A campaign written to disk: the whole folder appears, or nothing changes.
-
-MAPPING_FILE = "mapping.toml"
 
 
 def write_campaign(
@@ -228,14 +225,15 @@ def write_campaign(
 ) -> Campaign:
     """Write a campaign, in memory or from elsewhere, to a folder.
 
-    Samples are checked on the way and written in SI; floats read back bit for bit. Everything
-    goes to a folder beside the target, which is then renamed.
+    The whole folder appears, or nothing changes: everything goes to a folder beside the target,
+    which is then renamed. Samples are checked on the way and written in SI; floats read back bit
+    for bit.
 
     Args:
         campaign: what to write; one larger than memory is copied block by block.
         folder: where; its parent must exist.
         suffix: ".csv" or ".parquet" for all records; as their names say where None.
-        overwrite: replace a campaign that stands there. A folder that is none is never replaced.
+        overwrite: replace a campaign that is there already; any other folder is never replaced.
         extra_files: further files by name, such as {"mapping.toml": b"..."}.
 
     Returns:
@@ -247,7 +245,7 @@ def write_campaign(
     target = Path(folder)
     _check_target(target, overwrite)
     if suffix is not None and suffix not in SUFFIXES:
-        raise InputError("the kind of file is not known", value=suffix, choices=SUFFIXES)
+        raise InputError("unknown kind of file", value=suffix, choices=SUFFIXES)
     try:
         temporary = Path(
             tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
@@ -268,15 +266,15 @@ def write_campaign(
 
 def _check_target(target: Path, overwrite: bool) -> None:
     if not target.name or target.is_symlink() or (target.exists() and not target.is_dir()):
-        raise InputError("a campaign is a folder; this is none", file=target)
+        raise InputError("a campaign is a folder, this is a file", file=target)
     if not target.parent.is_dir():
         raise InputError("no such folder to write in", file=target.parent)
     if not target.exists() or not any(target.iterdir()):
         return
     if not (target / CAMPAIGN_FILE).is_file():
-        raise InputError("the folder exists and is no campaign; it is left alone", file=target)
+        raise InputError("the folder exists and is not a campaign; it is not replaced", file=target)
     if not overwrite:
-        raise InputError("a campaign stands here already", file=target,
+        raise InputError("a campaign exists here already", file=target,
                          hint="choose another folder, or say to overwrite it")  # fmt: skip
 
 

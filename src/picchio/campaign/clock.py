@@ -1,4 +1,4 @@
-"""A record's clock: how fast it ticks, and whether it ticks evenly."""
+"""A record's clock: its rate, and whether it is even."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One record: what was done, and the samples, read when they are asked for."""
+"""One record: what was done, and the samples, read when needed."""
 
 from __future__ import annotations
 

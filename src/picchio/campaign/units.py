@@ -1,4 +1,4 @@
-"""The units that a measured file may use, and how they become SI.
+"""The units that a measured file may use, and their conversion to SI.
 
 pint does the parsing and the dimensions. It gets its own short list of units, because its default
 one takes an angle for a plain number (then `deflection [1]` or `[%]` would pass for radians, and

@@ -1,4 +1,4 @@
-"""Names for array types in signatures; the shapes and units stand in the docstrings."""
+"""Array types for signatures (shapes and units are in the docstrings), and checked conversion."""
 
 from __future__ import annotations
 
@@ -16,11 +16,8 @@ IndexArray: TypeAlias = npt.NDArray[Any]
 BoolArray: TypeAlias = npt.NDArray[Any]
 
 
-# Array types that the fatigue stage shares.
-
-
 def as_floats(values: Any, key: str, *, finite: bool = True) -> FloatArray:
-    """`values` as float64, refusing what is no real number. Not copied where it is that already.
+    """`values` as float64, refusing anything but real numbers; not copied if float64 already.
 
     Args:
         values: a scalar or an array-like of real numbers.

@@ -1,4 +1,4 @@
-"""Files that are either whole or not there, and their fingerprints."""
+"""Atomic writes, bounded reads, and file hashes."""
 
 from __future__ import annotations
 

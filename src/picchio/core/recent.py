@@ -1,4 +1,4 @@
-"""What was made lately, kept for when it is asked for again."""
+"""A small cache of recent results, by key."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ T = TypeVar("T")
 
 
 class Recent(Generic[T]):
-    """The last few results of something that takes long; what was made first goes first.
+    """The last few results of an expensive computation; the oldest is dropped first.
 
     Args:
-        most: how many are kept.
+        most: how many results are kept.
     """
 
     def __init__(self, most: int) -> None:
@@ -20,7 +20,7 @@ class Recent(Generic[T]):
         self._made: dict[Hashable, T] = {}
 
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
-        """What was made under a key; made now where it is not known."""
+        """The result under a key, computed by `make` if it is not there."""
         try:
             return self._made[key]
         except KeyError:

@@ -16,6 +16,20 @@ from picchio.core.files import read_text
 T = TypeVar("T", bound=BaseModel)
 
 
+class StrictModel(BaseModel):
+    """Base of every record in a file that users edit: frozen; unknown keys, NaN and inf refused."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True, strict=False
+    )
+
+
+# Strict: strings and booleans are not taken for numbers.
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
+Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+
+
 def read_toml(path: str | Path) -> dict[str, Any]:
     """The content of a TOML file.
 
@@ -36,8 +50,8 @@ def parse_toml(path: str | Path, model: type[T], *, format: str) -> T:
 
     Args:
         path: the file.
-        model: what it must look like; a `format` key is taken off before.
-        format: the version that is understood, such as "picchio-task/1".
+        model: what it must look like, the `format` key left out.
+        format: the version to accept, such as "picchio-task/1".
 
     Raises:
         InputError: syntax, missing or unknown format, misspelt keys, wrong values.
@@ -53,7 +67,7 @@ def validate(
     found = content.pop("format", None)
     if found is None:
         raise InputError(
-            f'the key is missing; a file of this kind says format = "{format}"',
+            f'the key is missing; write format = "{format}"',
             file=file,
             key="format",
         )
@@ -151,20 +165,3 @@ def _flatten(kind: Any) -> list[Any]:
     if origin in (typing.Union, types.UnionType):
         return [leaf for arm in typing.get_args(kind) for leaf in _flatten(arm)]
     return [kind]
-
-
-# The base of everything that is read from a file a user edits.
-
-
-class StrictModel(BaseModel):
-    """A validated, frozen record: unknown keys, NaN and infinities are refused."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True, strict=False
-    )
-
-
-# Strict: a string or a boolean is no number, though Python could make one of it.
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
-Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]

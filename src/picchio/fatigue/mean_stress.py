@@ -106,8 +106,8 @@ class MeanStress:
     def _divide(self, a: FloatArray, m: FloatArray, strength: float) -> FloatArray:
         if m.size and float(m.max()) >= strength:
             raise InputError(
-                f"the mean shear stress reaches the {strength / 1e6:.4g} MPa that {self.rule} "
-                "divides by: the part fails statically",
+                f"the mean shear stress reaches the {strength / 1e6:.4g} MPa static "
+                f"strength of the {self.rule} rule: the part fails statically",
                 key="mean_stress",
                 value=float(m.max()),
             )

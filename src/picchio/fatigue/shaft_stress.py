@@ -1,45 +1,14 @@
-"""Shear stress in a joint's shaft, from the torque or from the twist, and their agreement."""
+"""Shear stress in a joint's shaft, from the torque or from the twist, and whether the two agree."""
 
 from __future__ import annotations
-
-import math
-from typing import Protocol
 
 import numpy.typing as npt
 
 from picchio.core.arrays import FloatArray, as_floats
-from picchio.core.errors import InputError
+from picchio.robot.joint import Shaft
 
 
-class ShaftLike(Protocol):
-    """A solid round shaft: `picchio.robot.Shaft` is one."""
-
-    @property
-    def radius(self) -> float:
-        """Outer radius, m."""
-
-    @property
-    def length(self) -> float:
-        """Twisted length, m."""
-
-    @property
-    def shear_modulus(self) -> float:
-        """Shear modulus G, Pa."""
-
-
-def polar_moment(radius: float) -> float:
-    """Polar second moment of area of a solid round section, pi r^4 / 2, in m^4.
-
-    Args:
-        radius: m.
-
-    Raises:
-        InputError: not a positive finite number.
-    """
-    return math.pi / 2.0 * _positive(radius, "shaft.radius") ** 4
-
-
-def shear_stress(torque: npt.ArrayLike, shaft: ShaftLike) -> FloatArray:
+def shear_stress(torque: npt.ArrayLike, shaft: Shaft) -> FloatArray:
     """Shear stress at the shaft's surface under a torque: tau = T r / Jp.
 
     This holds whatever else yields in the joint, because shaft and spring carry the same torque.
@@ -53,15 +22,15 @@ def shear_stress(torque: npt.ArrayLike, shaft: ShaftLike) -> FloatArray:
         (...) Pa, with the torque's sign.
 
     Raises:
-        InputError: a torque that is not finite, or a shaft that has no positive size.
+        InputError: a torque that is not finite.
     """
-    return as_floats(torque, "torque") * (shaft.radius / polar_moment(shaft.radius))
+    return as_floats(torque, "torque") * (shaft.radius / shaft.polar_moment)
 
 
-def shear_stress_from_deflection(deflection: npt.ArrayLike, shaft: ShaftLike) -> FloatArray:
-    """Shear stress from the twist, the paper's eq. 14-17: tau = G r x / l.
+def shear_stress_from_deflection(deflection: npt.ArrayLike, shaft: Shaft) -> FloatArray:
+    """Shear stress from the twist, the paper's eqs. 14-17: tau = G r x / l.
 
-    Right only where the whole of the joint's compliance is the shaft's (`check_shaft`).
+    Right only where the shaft is the joint's whole compliance (`check_shaft`).
 
     Args:
         deflection: (...) rad, link side less motor side.
@@ -71,14 +40,13 @@ def shear_stress_from_deflection(deflection: npt.ArrayLike, shaft: ShaftLike) ->
         (...) Pa, with the deflection's sign.
 
     Raises:
-        InputError: a deflection that is not finite, or a shaft that has no positive size.
+        InputError: a deflection that is not finite.
     """
-    modulus = _positive(shaft.shear_modulus, "shaft.shear_modulus")
-    slope = modulus * _positive(shaft.radius, "shaft.radius")
-    return as_floats(deflection, "deflection") * (slope / _positive(shaft.length, "shaft.length"))
+    slope = shaft.shear_modulus * shaft.radius / shaft.length
+    return as_floats(deflection, "deflection") * slope
 
 
-def check_shaft(stiffness: float, shaft: ShaftLike) -> float:
+def check_shaft(stiffness: float, shaft: Shaft) -> float:
     """How far the shaft's own torsional stiffness is from the joint's.
 
     Args:
@@ -90,17 +58,5 @@ def check_shaft(stiffness: float, shaft: ShaftLike) -> float:
         the shaft is stiffer, so something else yields too, and the stress from the deflection
         is too high by this fraction. Negative: the shaft alone would be softer than the joint,
         which no real joint is; one of the values is wrong.
-
-    Raises:
-        InputError: a value that is not positive and finite.
     """
-    modulus = _positive(shaft.shear_modulus, "shaft.shear_modulus")
-    own = modulus * polar_moment(shaft.radius) / _positive(shaft.length, "shaft.length")
-    return own / _positive(stiffness, "stiffness") - 1.0
-
-
-def _positive(value: float, key: str) -> float:
-    number = float(as_floats(value, key))
-    if number <= 0.0:
-        raise InputError("must be positive", key=key, value=value)
-    return number
+    return shaft.torsional_stiffness / stiffness - 1.0

@@ -153,7 +153,7 @@ def design(inputs: Mapping[str, Uncertain], *, samples: int = 1024, seed: int = 
         InputError: no inputs, or samples that are no power of two.
     """
     if not inputs:
-        raise InputError("needs one uncertain input at least", key="inputs")
+        raise InputError("needs at least one uncertain input", key="inputs")
     if samples < 8 or samples & (samples - 1):
         raise InputError("must be a power of two, 8 or more", key="samples", value=samples)
     from scipy.stats import qmc

@@ -1,1 +1,1 @@
-"""What measured data are worth: their noise, and what is wrong with them."""
+"""Quality of measured data: noise, and faults."""

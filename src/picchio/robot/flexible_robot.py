@@ -1,4 +1,4 @@
-"""The robot as every later stage sees it: rigid dynamics at a pose, and springs in its joints."""
+"""The robot as every later stage uses it: rigid dynamics at a pose, and springs in its joints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A flexible joint and the shaft in its drive."""
+"""A flexible joint and its drive: shaft, stiffness curve, gravity balancer."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# Stiffness that grows with the torque, as catalogues of strain-wave gears give it.
-#
-# A catalogue gives three stiffnesses K1, K2, K3 and two torques T1, T2: the wind-up against the
-# torque is three straight lines (for example Harmonic Drive, *Engineering data HFUC*, "torsional
-# stiffness"). Small vibration about the pose's gravity torque sees the slope there, so the model
-# takes the **tangent**. The secant, torque over wind-up, is what a static test between zero and
-# this torque measures, and is given too.
+from picchio.core.errors import InputError
+
+Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class StiffnessCurve:
-    """Wind-up in three straight lines.
+    """Stiffness that grows with the torque, as catalogues of strain-wave gears give it.
+
+    Wind-up against torque is three straight lines (for example Harmonic Drive, *Engineering data
+    HFUC*, "torsional stiffness"). Small vibration about the pose's gravity torque sees the slope
+    there, so the model takes the tangent.
 
     Args:
         k1: N m/rad (N/m for a prismatic joint) below `t1`.
@@ -40,40 +40,14 @@ class StiffnessCurve:
         size = np.abs(np.asarray(torque, dtype=float))
         return np.where(size <= self.t1, self.k1, np.where(size <= self.t2, self.k2, self.k3))
 
-    def wind_up(self, torque: ArrayLike) -> NDArray[np.float64]:
-        """Angle at a torque, rad (m for a prismatic joint); odd. Same shape as `torque`."""
-        signed = np.asarray(torque, dtype=float)
-        size = np.abs(signed)
-        angle = (
-            np.minimum(size, self.t1) / self.k1
-            + np.clip(size - self.t1, 0.0, self.t2 - self.t1) / self.k2
-            + np.maximum(size - self.t2, 0.0) / self.k3
-        )
-        return np.sign(signed) * angle
-
-    def secant(self, torque: ArrayLike) -> NDArray[np.float64]:
-        """Torque over wind-up, N m/rad; `k1` at zero. Same shape as `torque`."""
-        signed = np.asarray(torque, dtype=float)
-        angle = self.wind_up(signed)
-        still = angle == 0.0
-        return np.where(still, self.k1, signed / np.where(still, 1.0, angle))
-
-
-# A gravity balancer: a spring or a cylinder beside a joint that carries part of the weight.
-#
-# It pulls two points together, one fixed to the joint's parent link and one to its child link.
-# With the distance d(q) between them its energy is
-#
-#     E(q) = k (d - d0)^2 / 2 + F d
-#
-# so the drive carries dE/dq on top of gravity's torque, and d2E/dq2 adds to gravity's stiffness.
-
-Vector = tuple[float, float, float]
-
 
 @dataclass(frozen=True)
 class Balancer:
-    """A spring and a constant force between two points of neighbouring links.
+    """A gravity balancer: a spring or cylinder beside a joint that carries part of the weight.
+
+    It pulls two points together, one fixed to the joint's parent link and one to its child link.
+    With the distance d(q) between them its energy is E(q) = k (d - d0)^2 / 2 + F d, so the drive
+    carries dE/dq on top of gravity's torque, and d2E/dq2 adds to gravity's stiffness.
 
     Args:
         parent_point: m, fixed to the parent link, in the joint's frame.
@@ -126,12 +100,21 @@ class Shaft:
         length: m, the part that twists.
         shear_modulus: Pa.
         sn_curve: name of its S-N curve in shear, or None.
+
+    Raises:
+        InputError: a size that is not positive and finite.
     """
 
     radius: float
     length: float
     shear_modulus: float
     sn_curve: str | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("radius", "length", "shear_modulus"):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise InputError("must be positive and finite", key=f"shaft.{name}", value=value)
 
     @property
     def polar_moment(self) -> float:

@@ -1,4 +1,4 @@
-"""What hangs on the robot's end: the tool, and the gun that strikes."""
+"""What the robot carries: the tool, and the gun that strikes."""
 
 from __future__ import annotations
 

@@ -8,6 +8,25 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 
 
+@numba.njit(cache=True, inline="always")
+def _close(
+    stack: FloatArray, depth: int, top: float, ranges: FloatArray, means: FloatArray, closed: int
+) -> tuple[int, int]:
+    """Take the cycles off the stack that a new top closes: the four-point rule."""
+    while depth >= 4:
+        b = stack[depth - 3]
+        c = stack[depth - 2]
+        inner = abs(b - c)
+        if inner > abs(top - c) or inner > abs(stack[depth - 4] - b):
+            break
+        ranges[closed] = inner
+        means[closed] = 0.5 * (b + c)
+        closed += 1
+        stack[depth - 3] = top
+        depth -= 2
+    return depth, closed
+
+
 @numba.njit(cache=True)
 def push(
     values: FloatArray,
@@ -52,17 +71,7 @@ def push(
             top = value
             continue
         stack[depth - 1] = top
-        while depth >= 4:
-            b = stack[depth - 3]
-            c = stack[depth - 2]
-            inner = abs(b - c)
-            if inner > abs(top - c) or inner > abs(stack[depth - 4] - b):
-                break
-            ranges[closed] = inner
-            means[closed] = 0.5 * (b + c)
-            closed += 1
-            stack[depth - 3] = top
-            depth -= 2
+        depth, closed = _close(stack, depth, top, ranges, means, closed)
         stack[depth] = value
         depth += 1
         top = value
@@ -74,17 +83,5 @@ def push(
 @numba.njit(cache=True)
 def finish(stack: FloatArray, depth: int, ranges: FloatArray, means: FloatArray) -> tuple[int, int]:
     """Close the provisional top, at the end of a history. Arguments and result as `push`."""
-    closed = 0
     top = stack[depth - 1] if depth else np.nan
-    while depth >= 4:
-        b = stack[depth - 3]
-        c = stack[depth - 2]
-        inner = abs(b - c)
-        if inner > abs(top - c) or inner > abs(stack[depth - 4] - b):
-            break
-        ranges[closed] = inner
-        means[closed] = 0.5 * (b + c)
-        closed += 1
-        stack[depth - 3] = top
-        depth -= 2
-    return depth, closed
+    return _close(stack, depth, top, ranges, means, 0)

@@ -76,7 +76,7 @@ def read_sn_tests(path: str | Path, *, run_out_cycles: float | None = None) -> S
 def _rows(path: str | Path) -> list[list[str]]:
     lines = [line for line in read_text(path).splitlines() if line.strip()]
     if len(lines) < 2:
-        raise InputError("has no tests: a header and one row at least", file=path)
+        raise InputError("has no tests: needs a header and at least one row", file=path)
     delimiter = max("\t;,", key=lines[0].count)
     return list(csv.reader(lines, delimiter=delimiter))
 

@@ -29,20 +29,18 @@ from picchio.measurement.noise.pieces import (
 )
 from picchio.measurement.noise.window import Window, read_window
 
-# Collects stretches of noise record by record, and makes one estimate of them a channel.
-
 # Enough for 0.6 %: more is not kept.
 _ENOUGH = 1 << 14
-# Fewer than this from surer sources, and the ring-down is looked at.
+# With fewer samples than this from surer sources, the ring-down is used too.
 _TOO_FEW = 1500
 _REPEAT_SAMPLES = 16384
 _REPEATS_KEPT = 24 << 20
-# A source may say this much more than a surer one and still be believed.
+# A source may exceed a surer one by this factor and still be used.
 _SLACK = 1.08
 
 
 def repeat_key(record: Record) -> tuple[object, ...] | None:
-    """What two records have in common that repeat each other; None where nothing says so."""
+    """What records that repeat each other have in common; None where nothing tells."""
     if record.kind == "motion" or record.pose is None or record.direction is None:
         return None
     pose = record.pose
@@ -52,7 +50,7 @@ def repeat_key(record: Record) -> tuple[object, ...] | None:
 
 
 class NoiseCollector:
-    """Takes windows one by one and keeps of each only what is noise.
+    """Takes windows one by one, keeps the stretches of noise, and makes one estimate per channel.
 
     Args:
         campaign: whose records will come, in its order.
@@ -126,7 +124,7 @@ class NoiseCollector:
                                 samples=piece.samples * share))  # fmt: skip
 
     def _poor(self, window: Window, rate: int) -> bool:
-        """Whether some channel of this record has too little noise to judge by so far."""
+        """Whether some channel of this record still has too little noise for an estimate."""
         return any(
             sum(p.samples for pieces in self._pieces[name, rate].values() for p in pieces)
             < _TOO_FEW
@@ -196,7 +194,7 @@ class NoiseCollector:
     @staticmethod
     def _weigh(method: str, pieces: list[Piece], model: AutoRegression,
                sources: list[NoiseSource], chosen: list[Piece]) -> None:  # fmt: skip
-        """Believe a source unless it says clearly more, or less, than a surer one."""
+        """Use a source unless it is clearly noisier, or quieter, than a surer one."""
         std = float(np.sqrt(model.variance))
         error = relative_error(model, sum(p.samples for p in pieces))
         surer = [s for s in sources if s.used]
@@ -231,22 +229,19 @@ def _model(pieces: list[Piece]) -> AutoRegression:
     )
 
 
-__all__ = ["Line", "Noise", "NoiseSource", "noise_levels"]
-
-
 def noise_levels(campaign: Campaign) -> dict[str, Noise]:
     """The noise of every channel, estimated from the records themselves.
 
-    From the quiet time before the first blow and after the robot has rung down, from what is not
-    periodic in steady records, from repeats, and, where these give too little, from what damped
-    waves leave of the ring-down. Motion records have repeats at best, and else a rough floor.
-    Only the leading part of a long record is read.
+    Sources: the quiet time before the first blow and after the robot has rung down, what is not
+    periodic in steady records, the difference of repeats and, where these give too little, what
+    fitted damped sines leave of the ring-down. Motion records have repeats at best, otherwise only
+    a rough floor. Only the first part of a long record is read.
 
     Args:
         campaign: read record by record.
 
     Returns:
-        {channel: noise}; a channel without any stretch to judge by is missing.
+        {channel: noise}; a channel with nothing to estimate it from is missing.
 
     Raises:
         InputError: a sample that cannot be read.

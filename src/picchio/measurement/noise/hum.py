@@ -1,4 +1,4 @@
-"""Mains hum: a line at 50 or 60 Hz in the noise, found and taken out."""
+"""Mains hum: a line at 50 or 60 Hz in the noise, estimated and removed."""
 
 from __future__ import annotations
 

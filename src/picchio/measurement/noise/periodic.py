@@ -1,4 +1,4 @@
-"""What is not periodic in a periodic response: noise, without a model of the response.
+"""Noise from a periodic response: what is not periodic in it; no model is needed.
 
 Every sample is predicted from the samples of *other* periods that lie nearest in phase, so nothing
 is asked of the response but that it repeats: it may jump, and the period need not be a whole

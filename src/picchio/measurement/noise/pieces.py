@@ -1,4 +1,4 @@
-"""Stretches of a record that hold noise alone, and how they were come by."""
+"""Parts of a record that hold only noise, and how they were obtained."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What damped waves do not explain of a ring-down: noise, without a model of the robot.
+"""Noise from a ring-down: what fitted damped sines leave; no model of the robot is needed.
 
 After the last blow any linear structure, seen through any linear sensors, rings down as a sum of
 damped waves whose poles all channels share. The poles come from the signal subspace of the Hankel

@@ -1,4 +1,4 @@
-"""The colour taken out of a noise, sample by sample."""
+"""Compiled whitening of coloured noise, sample by sample."""
 
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The leading part of a record that fits into memory, and where in it nothing should move."""
+"""The first part of a record, as much as fits in memory, and where in it nothing should move."""
 
 from __future__ import annotations
 

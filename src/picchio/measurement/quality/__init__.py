@@ -1,1 +1,1 @@
-"""How good measured data are: what is in a campaign, and what is wrong with it."""
+"""Quality checks of a campaign: what it contains, and what is wrong with it."""

@@ -1,4 +1,4 @@
-"""What a check is, and what it may look at."""
+"""A quality check of measured data: its findings, and what it works on."""
 
 from __future__ import annotations
 
@@ -12,25 +12,23 @@ from picchio.measurement.noise.level import Noise
 from picchio.measurement.quality.scan import RecordScan
 from picchio.robot.flexible_robot import FlexibleRobot
 
-# One thing seen in measured data.
-
 Severity = Literal["error", "warning", "note"]
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "note")
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What a check saw, where, how much of it, and what to do.
+    """One thing a check found in measured data.
 
     Attributes:
         check: the check's name.
-        severity: "error" (these data cannot be used as they are), "warning" (they mislead if
-            nothing is done), "note" (good to know).
-        message: what was seen, without a full stop.
+        severity: "error" (the data cannot be used as they are), "warning" (they mislead unless
+            corrected), "note" (good to know).
+        message: what was found, without a full stop.
         advice: what to do, without a full stop.
         record: the record's file; None for the campaign.
-        channel: or channel group, joint, frame; None for the record as a whole.
-        value: the number that was seen.
+        channel: channel, channel group, joint or frame; None for the whole record.
+        value: the number found.
         unit: of `value`.
     """
 
@@ -55,14 +53,14 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """What is known before the records are looked at one by one.
+    """What the checks know of the campaign before they see the records one by one.
 
     Attributes:
         campaign: the campaign.
         robot: the robot, where there is one.
         noise: of every channel.
         periods: (programmed, found) of the steady records, s, by file.
-        told: channel groups whose axes a check has spoken of already.
+        told: channel groups whose axes have been reported already.
     """
 
     campaign: Campaign
@@ -72,7 +70,7 @@ class Context:
     told: set[str] = field(default_factory=set)
 
     def std(self, channel: str) -> float:
-        """Of a channel's noise; 0 where it is not known, or a rough floor."""
+        """Standard deviation of a channel's noise; 0 where it is not known."""
         noise = self.noise.get(channel)
         return noise.std if noise is not None else 0.0
 
@@ -83,11 +81,11 @@ class Context:
 
 
 class Check(ABC):
-    """Looks at the records one by one, and may say something at the end.
+    """Sees the records one by one, and may report at the end.
 
     Attributes:
         name: in findings.
-        what: what it looks for, for people.
+        what: what it looks for, in words.
     """
 
     name: ClassVar[str]
@@ -98,10 +96,10 @@ class Check(ABC):
 
     @abstractmethod
     def record(self, scan: RecordScan) -> Iterator[Finding]:
-        """What is seen in one record."""
+        """Findings in one record."""
 
     def finish(self) -> Iterator[Finding]:
-        """What is seen in all of them together."""
+        """Findings in all records together."""
         yield from ()
 
     def found(self, severity: Severity, message: str, advice: str = "", *,

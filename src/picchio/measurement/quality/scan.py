@@ -1,4 +1,4 @@
-"""One pass over a record: numbers of the whole of it, and its leading part to look at."""
+"""One pass over a record: statistics of all of it, and its first part in memory."""
 
 from __future__ import annotations
 

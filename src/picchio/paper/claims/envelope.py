@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from picchio.core.arrays import FloatArray
@@ -95,7 +97,8 @@ def envelope_size(study: Study) -> Finding:
     )  # fmt: skip
 
 
-def _dominant(study: Study, k: int) -> Finding:
+def _dominant(k: int, study: Study) -> Finding:
+    """Which joint has the largest envelope at the k-th height from the top."""
     wanted = study.printed.task.dominant_joints[k]
 
     def dominates(world: World) -> tuple[bool, float]:
@@ -112,28 +115,8 @@ def _dominant(study: Study, k: int) -> Finding:
     )  # fmt: skip
 
 
-@claim("dominant_top", "fig-9")
-def dominant_top(study: Study) -> Finding:
-    """At z = 1.5."""
-    return _dominant(study, 0)
-
-
-@claim("dominant_second", "fig-9")
-def dominant_second(study: Study) -> Finding:
-    """At z = 1.2."""
-    return _dominant(study, 1)
-
-
-@claim("dominant_third", "fig-9")
-def dominant_third(study: Study) -> Finding:
-    """At z = 0.9."""
-    return _dominant(study, 2)
-
-
-@claim("dominant_low", "fig-9")
-def dominant_low(study: Study) -> Finding:
-    """At z = 0.6."""
-    return _dominant(study, 3)
+for _k, _name in enumerate(("dominant_top", "dominant_second", "dominant_third", "dominant_low")):
+    claim(_name, "fig-9")(partial(_dominant, _k))
 
 
 @claim("dominant_all", "dominance")

@@ -1,8 +1,7 @@
-"""Write a sidecar's values into a URDF as `picchio:` annotations, touching nothing else.
+"""Write a sidecar's values into a URDF as `picchio:` annotations, changing nothing else.
 
-The file is not parsed and written back: the new elements are cut into its bytes, so comments,
-order, other tools' tags and even odd spacing stay as they are. What comes out is read back
-before it is handed over.
+The file is not parsed and rewritten: new elements are inserted into its bytes, so comments, order,
+other tools' tags and odd spacing stay as they are. The result is read back and checked.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from picchio.robot.annotations.sidecar import JointEntry, Sidecar, given
 from picchio.robot.urdf.check import read_tree
 from picchio.robot.urdf.xml import NAMESPACE, parse_urdf, read_urdf_bytes
 
-# Where in a URDF's bytes annotations stand and where new ones go.
+ROBOT_TAGS = ("tool", "gun", "base")
 
 
 @dataclass(frozen=True)
@@ -73,11 +72,8 @@ class Places:
     at: dict[tuple[str, str], Place]
 
 
-ROBOT_TAGS = ("tool", "gun", "base")
-
-
 def find_places(content: bytes, namespace: str) -> Places:
-    """Read the places off a URDF that has been checked before.
+    """Where in a checked URDF's bytes annotations stand, and where new ones go.
 
     Args:
         content: the file's bytes, in a superset of ASCII.
@@ -93,7 +89,7 @@ def find_places(content: bytes, namespace: str) -> Places:
 
 
 class _Reader:
-    """Walks the file with expat, which knows the byte it is at."""
+    """Reads the file with expat, which reports byte positions."""
 
     def __init__(self, content: bytes, namespace: str) -> None:
         self.content = content
@@ -191,7 +187,7 @@ def _tag_end(content: bytes, start: int) -> int:
 def annotate(urdf: str | Path, sidecar: Sidecar) -> bytes:
     """The URDF's bytes with the sidecar's values in them.
 
-    What the URDF's own annotations say beside the sidecar's values is kept.
+    The URDF's own annotations are kept where the sidecar has no value.
 
     Args:
         urdf: the file; it is not changed.
@@ -245,7 +241,7 @@ def _read_back(
     before: etree._Element,
     expected: Mapping[tuple[str, str], Mapping[str, Any]],
 ) -> None:
-    """Refuse a result that picchio's own reader would refuse, or read as something else."""
+    """Refuse a result that does not read back as the values given."""
     try:
         root = parse_urdf(result, path)
         read_tree(root, path)
@@ -259,7 +255,7 @@ def _read_back(
             raise InputError("cannot be annotated, the result would not read back as the values "
                              "given", file=path, key=f"{kind}.{name}")  # fmt: skip
     if _outline(root) != _outline(before):
-        raise InputError("cannot be annotated without a change to its own elements", file=path)
+        raise InputError("cannot be annotated without changing its own elements", file=path)
 
 
 def _outline(root: etree._Element) -> list[tuple[str, dict[str, str]]]:

@@ -1,4 +1,4 @@
-"""Which joints are flexible, how, and who says so.
+"""Which joints are flexible, with what values, and from which source.
 
 Several sources may speak about a joint. The first that gives a value wins: an argument, the
 sidecar, the URDF's `picchio:` annotation, Drake's tags, the SRDF. The origin of every value

@@ -95,7 +95,7 @@ def read_annotations(root: etree._Element, path: Path) -> Sidecar | None:
             _read_in_joint(element, found["joint"].setdefault(parent.get("name"), {}), path)
         elif parent is root and name in IN_ROBOT:
             if name in found:
-                raise InputError(f"<picchio:{name}> stands twice", file=path)
+                raise InputError(f"<picchio:{name}> occurs twice", file=path)
             found[name] = _attributes(element, IN_ROBOT[name], path, f"picchio:{name}")
         else:
             _refuse(element, path)
@@ -127,7 +127,7 @@ def _read_in_joint(element: etree._Element, entry: dict[str, Any], path: Path) -
     target, attributes = IN_JOINT[name]
     values = _attributes(element, attributes, path, f"{place}: picchio:{name}")
     if parent is not None and len(parent.findall(str(element.tag))) > 1:
-        raise InputError(f"<picchio:{name}> stands twice", file=path, key=place)
+        raise InputError(f"<picchio:{name}> occurs twice", file=path, key=place)
     if target is None:
         entry.update(values)
     else:

@@ -1,4 +1,4 @@
-"""Which frame carries the tool, and what hangs on it."""
+"""Which frame carries the tool, and what is mounted there."""
 
 from __future__ import annotations
 

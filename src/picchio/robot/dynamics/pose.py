@@ -1,4 +1,4 @@
-"""Poses as users give them, checked."""
+"""Poses as users give them: checked, and compared with the joints' limits."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from picchio.core.errors import InputError, PicchioWarning
 if TYPE_CHECKING:
     from picchio.robot.flexible_robot import FlexibleRobot
 
-
 Array = NDArray[np.float64]
+# An angle of more than three turns either way is probably in degrees.
+_TURNS = 3.0
 
 
 def check_pose(
@@ -28,11 +29,11 @@ def check_pose(
     """A pose (nv,).
 
     Args:
-        values: a list in the order of `joint_names`, a mapping by joint name with the rest at
-            zero, or the name of a pose.
+        values: a list in the order of `joint_names` or of `listed`, a mapping by joint name, or
+            the name of a pose; joints not given are at zero.
         joint_names: every coordinate.
         named_poses: poses by name.
-        listed: the joints a shorter list may be about; the others are at zero.
+        listed: the joints of a shorter list.
 
     Raises:
         InputError: wrong length, unknown names, not finite numbers.
@@ -88,14 +89,10 @@ def _finite(value: Any, joint: str) -> float:
     return number
 
 
-# Poses beyond the joints' limits: allowed, but told.
-
-# More than three turns either way is rather a pose in degrees.
-_TURNS = 3.0
-
-
 def warn_beyond_limits(robot: FlexibleRobot, poses: Iterable[FloatArray], what: str) -> None:
-    """Warn of every joint that stands beyond its limits, and of what looks like degrees.
+    """Warn of every joint that is beyond its limits, and of angles that look like degrees.
+
+    Such poses are allowed.
 
     Args:
         robot: whose limits count.

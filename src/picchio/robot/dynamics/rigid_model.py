@@ -115,7 +115,7 @@ class RigidModel:
 
     def _q(self, pose: Array) -> Array:
         if pose.shape != (self.nv,):
-            raise InputError("a pose of the wrong shape", key="pose", value=pose.shape,
+            raise InputError("the pose has the wrong shape", key="pose", value=pose.shape,
                              choices=[str((self.nv,))])  # fmt: skip
         return pose if self._plain else self._follow @ pose + self._offset
 
@@ -172,7 +172,7 @@ class RigidModel:
         """
         self._check_frame(frame)
         if poses.ndim != 2 or poses.shape[1] != self.nv:
-            raise InputError("poses of the wrong shape", key="poses", value=poses.shape,
+            raise InputError("the poses have the wrong shape", key="poses", value=poses.shape,
                              choices=[f"(p, {self.nv})"])  # fmt: skip
         model, data, size = self._model, self._data(), self._all
         crba, frame_jacobian, world = pin.crba, pin.computeFrameJacobian, pin.LOCAL_WORLD_ALIGNED

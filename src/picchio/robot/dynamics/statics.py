@@ -1,4 +1,4 @@
-"""What the flexible joints carry at rest, and how stiff they are under it."""
+"""The flexible joints at a pose: their matrices, the torque they carry, how stiff they are."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from picchio.robot.joint import Joint
 from picchio.robot.urdf.tree import UrdfTree
-
-# What the vibration stage needs of a robot at one pose.
 
 Array = NDArray[np.float64]
 

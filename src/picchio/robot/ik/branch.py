@@ -1,4 +1,4 @@
-"""Which of several poses that reach the same point is meant.
+"""Choice among several poses that reach the same point.
 
 Arms of three joints: "elbow-up" or "elbow-down". Any arm: words such as "joint_3+" and
 "joint_5-", the sign of that joint's angle, alone or in a list.

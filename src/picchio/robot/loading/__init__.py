@@ -1,1 +1,1 @@
-"""From what a user calls a robot to a `FlexibleRobot`."""
+"""Load a robot by name or path as a `FlexibleRobot`."""

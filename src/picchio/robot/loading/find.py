@@ -1,4 +1,4 @@
-"""From what a user calls a robot to a URDF file.
+"""Resolve a robot's name or path to a URDF file.
 
 A name is looked up in this project's `robots/` and then in example-robot-data; anything that
 looks like a path is taken as one. `package://` addresses go through the same roots as meshes.
@@ -42,7 +42,7 @@ def find_robot(robot: str | Path) -> FoundRobot:
     """
     text = os.fspath(robot)
     if not text or "\0" in text:
-        raise InputError("is no robot name and no path", key="ROBOT", value=text)
+        raise InputError("is neither a robot name nor a path", key="ROBOT", value=text)
     if text.startswith("package://"):
         return FoundRobot(None, resolve_package(text))
     path = Path(text)

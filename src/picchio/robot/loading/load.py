@@ -177,8 +177,8 @@ def _warn_of_damping(joints: Mapping[str, Joint], origins: Mapping[str, str]) ->
         if joint.damping_ratio > 1:
             origin = origins[f"{name}.damping_ratio"]
             warnings.warn(
-                f"joint {name!r}: damping_ratio {joint.damping_ratio:g} is above 1 (it does "
-                f"not swing), which is unusual; from {origin}",
+                f"joint {name!r}: damping_ratio {joint.damping_ratio:g} is above 1 "
+                f"(overdamped), which is unusual; from {origin}",
                 PicchioWarning,
                 stacklevel=3,
             )
@@ -192,7 +192,7 @@ def _check_balancers(sources: list[Source], joints: Mapping[str, Joint]) -> None
     for name in all_joint_entries(sources, "balancer"):
         if name not in joints:
             raise InputError(
-                "a balancer beside a rigid joint changes nothing",
+                "a balancer on a rigid joint has no effect",
                 key=f"joint.{name}.balancer",
                 hint="give the joint a stiffness",
             )
@@ -208,12 +208,3 @@ def _named_poses(srdf: Srdf | None, names: tuple[str, ...]) -> dict[str, tuple[f
     return {
         pose: tuple(values.get(name, 0.0) for name in names) for pose, values in srdf.poses.items()
     }
-
-
-def load_tree(urdf: Path) -> UrdfTree:
-    """Only the checked tree of a URDF, without Pinocchio.
-
-    Raises:
-        InputError: with the true reason why this is no robot.
-    """
-    return read_tree(parse_urdf(read_urdf_bytes(urdf), urdf), urdf)

@@ -1,4 +1,4 @@
-"""Bodies without which the vibration has no solution: found and named before any eigenvalue."""
+"""Joints that carry no mass: found and named before any eigenvalue problem is solved."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Is it one tree that can move? What Pinocchio would refuse, accept in silence or crash on."""
+"""Checks that a URDF is one tree that can move: Pinocchio accepts others, or crashes on them."""
 
 from __future__ import annotations
 

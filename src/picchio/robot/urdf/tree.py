@@ -1,7 +1,7 @@
-"""What picchio needs of a URDF: the tree of links and joints, with masses, axes and limits.
+"""A URDF's tree of links and joints, with masses, axes and limits.
 
-Visuals, collisions, transmissions and simulators' tags are left alone. Reading is stricter
-than Pinocchio's, so that what is wrong is said by name instead of "not a valid URDF".
+Visuals, collisions, transmissions and simulators' tags are ignored. Reading is stricter than
+Pinocchio's, so that an error names what is wrong instead of saying "not a valid URDF".
 """
 
 from __future__ import annotations
@@ -16,90 +16,15 @@ from lxml import etree
 from picchio.core.errors import InputError
 from picchio.robot.urdf.xml import children, local_name
 
-# Numbers in a URDF's attributes: finite, of sane size, nothing else beside them.
-
-# Above this a sum of squares in the dynamics is on its way to overflow.
-LARGEST = 1e12
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\Z")
-_INFINITE = re.compile(r"[+-]?inf(inity)?\Z", re.IGNORECASE)
-
-
-def to_number(text: str, *, infinite: bool = False) -> float:
-    """A decimal number.
-
-    Args:
-        text: what the file has.
-        infinite: let "inf" and magnitudes above 1e12 stand, as limits may have them.
-
-    Raises:
-        ValueError: not a number, not finite, or above 1e12; the message says which.
-    """
-    stripped = text.strip()
-    if infinite and _INFINITE.match(stripped):
-        return float(stripped)
-    if not _NUMBER.match(stripped):
-        raise ValueError("is not a finite number")
-    value = float(stripped)
-    if infinite:
-        return value
-    if not math.isfinite(value) or abs(value) > LARGEST:
-        raise ValueError(f"is larger than {LARGEST:g}")
-    return value
-
-
-def number(
-    element: etree._Element,
-    attribute: str,
-    path: Path,
-    key: str,
-    *,
-    default: float | None = None,
-    infinite: bool = False,
-) -> float:
-    """A number from an attribute.
-
-    Raises:
-        InputError: missing without a default, or `to_number` refuses it.
-    """
-    text = element.get(attribute)
-    tag = etree.QName(element).localname
-    if text is None:
-        if default is None:
-            raise InputError(f"<{tag}> has no {attribute}", file=path, key=key)
-        return default
-    try:
-        return to_number(text, infinite=infinite)
-    except ValueError as error:
-        raise InputError(f"<{tag} {attribute}> {error}", file=path, key=key, value=text) from None
-
-
-def three_numbers(
-    element: etree._Element, attribute: str, path: Path, key: str, *, default: Vector
-) -> Vector:
-    """Three numbers from an attribute, such as xyz or rpy.
-
-    Raises:
-        InputError: not three, or `to_number` refuses one.
-    """
-    text = element.get(attribute)
-    if text is None:
-        return default
-    tag = etree.QName(element).localname
-    parts = text.split()
-    if len(parts) != 3:
-        raise InputError(f"<{tag} {attribute}> needs three numbers", file=path, key=key, value=text)
-    try:
-        x, y, z = (to_number(part) for part in parts)
-    except ValueError as error:
-        raise InputError(f"<{tag} {attribute}> {error}", file=path, key=key, value=text) from None
-    return x, y, z
-
-
 MOVABLE = ("revolute", "continuous", "prismatic")
 LOCKED = ("floating", "planar")
 JOINT_TYPES = (*MOVABLE, *LOCKED, "fixed")
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
+# Above this a sum of squares in the dynamics is on its way to overflow.
+LARGEST = 1e12
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\Z")
+_INFINITE = re.compile(r"[+-]?inf(inity)?\Z", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -189,7 +114,7 @@ def read_links(root: etree._Element, path: Path) -> dict[str, Inertial | None]:
     """Every link's inertial, None where it has none.
 
     Raises:
-        InputError: no or duplicate names, numbers that are none, negative mass.
+        InputError: missing or duplicate names, malformed numbers, negative mass.
     """
     links: dict[str, Inertial | None] = {}
     for element in children(root, "link"):
@@ -225,8 +150,8 @@ def read_joints(root: etree._Element, path: Path) -> dict[str, UrdfJoint]:
     """Every joint by name.
 
     Raises:
-        InputError: no or duplicate names, an unknown type, missing parents, children or limits,
-            a zero axis, numbers that are none.
+        InputError: missing or duplicate names, an unknown type, missing parents, children or
+            limits, a zero axis, malformed numbers.
     """
     joints: dict[str, UrdfJoint] = {}
     for element in children(root, "joint"):
@@ -276,7 +201,7 @@ def _limits(element: etree._Element, kind: str, path: Path, key: str) -> tuple[f
     lower = number(found[0], "lower", path, key, default=0.0, infinite=True)
     upper = number(found[0], "upper", path, key, default=0.0, infinite=True)
     if lower > upper:
-        raise InputError("the lower limit is above the upper one", file=path, key=key,
+        raise InputError("the lower limit is above the upper limit", file=path, key=key,
                          value=(lower, upper))  # fmt: skip
     return lower, upper, effort
 
@@ -316,3 +241,74 @@ def _name(element: etree._Element, path: Path) -> str:
         raise InputError(f"a <{local_name(element)}> has no name (line {element.sourceline})",
                          file=path)  # fmt: skip
     return name
+
+
+def to_number(text: str, *, infinite: bool = False) -> float:
+    """A finite decimal number of sane size, with nothing else beside it.
+
+    Args:
+        text: what the file has.
+        infinite: let "inf" and magnitudes above 1e12 stand, as limits may have them.
+
+    Raises:
+        ValueError: not a number, not finite, or above 1e12; the message says which.
+    """
+    stripped = text.strip()
+    if infinite and _INFINITE.match(stripped):
+        return float(stripped)
+    if not _NUMBER.match(stripped):
+        raise ValueError("is not a finite number")
+    value = float(stripped)
+    if infinite:
+        return value
+    if not math.isfinite(value) or abs(value) > LARGEST:
+        raise ValueError(f"is larger than {LARGEST:g}")
+    return value
+
+
+def number(
+    element: etree._Element,
+    attribute: str,
+    path: Path,
+    key: str,
+    *,
+    default: float | None = None,
+    infinite: bool = False,
+) -> float:
+    """A number from an attribute.
+
+    Raises:
+        InputError: missing without a default, or `to_number` refuses it.
+    """
+    text = element.get(attribute)
+    tag = etree.QName(element).localname
+    if text is None:
+        if default is None:
+            raise InputError(f"<{tag}> has no {attribute}", file=path, key=key)
+        return default
+    try:
+        return to_number(text, infinite=infinite)
+    except ValueError as error:
+        raise InputError(f"<{tag} {attribute}> {error}", file=path, key=key, value=text) from None
+
+
+def three_numbers(
+    element: etree._Element, attribute: str, path: Path, key: str, *, default: Vector
+) -> Vector:
+    """Three numbers from an attribute, such as xyz or rpy.
+
+    Raises:
+        InputError: not three, or `to_number` refuses one.
+    """
+    text = element.get(attribute)
+    if text is None:
+        return default
+    tag = etree.QName(element).localname
+    parts = text.split()
+    if len(parts) != 3:
+        raise InputError(f"<{tag} {attribute}> needs three numbers", file=path, key=key, value=text)
+    try:
+        x, y, z = (to_number(part) for part in parts)
+    except ValueError as error:
+        raise InputError(f"<{tag} {attribute}> {error}", file=path, key=key, value=text) from None
+    return x, y, z

@@ -1,4 +1,4 @@
-"""The bytes of a URDF as an XML tree, read with every door closed.
+"""The bytes of a URDF as an XML tree; entities, document types and network access are refused.
 
 No document type declaration, hence no entities; no network; no huge trees. What goes wrong
 is said in one line. Everything that needs the XML itself (reading, annotating) starts here.

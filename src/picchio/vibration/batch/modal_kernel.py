@@ -1,4 +1,10 @@
-"""Compiled modal analysis of small systems with a diagonal stiffness."""
+"""Compiled modes of small systems with a diagonal stiffness, and each mode's closed-form response.
+
+An oscillator eta'' + 2 zeta w eta' + w^2 eta = F is the complex pole z' = pole z + F with
+eta = Im(z) / Im(pole). On a piece of the force z is one row of coefficients:
+
+    z(u) = c0 exp(pole u) + c1 + c2 u + c3 exp(i wave u) + c4 exp(-i wave u).
+"""
 
 from __future__ import annotations
 
@@ -107,14 +113,6 @@ def modes_of(
         for i in range(n):
             ratio[k] += joint_ratio[i] * vectors[k, i] ** 2
     return True
-
-
-# Compiled closed-form response of single oscillators to a force in pieces.
-#
-# An oscillator eta'' + 2 zeta w eta' + w^2 eta = F is the complex pole z' = pole z + F with
-# eta = Im(z) / Im(pole). On a piece of the force z is one row of coefficients:
-#
-#     z(u) = c0 exp(pole u) + c1 + c2 u + c3 exp(i wave u) + c4 exp(-i wave u).
 
 
 @njit(cache=True, error_model="numpy", inline="always")

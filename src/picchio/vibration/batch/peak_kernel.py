@@ -86,6 +86,60 @@ def _pose_peaks(
     return room
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _block_peaks(  # type: ignore[no-untyped-def]
+    first, last, periodic, start, duration, constant, slope, amplitude, wave, mass, jacobian,
+    stiffness, joint_ratio, along, frequency, peak, direction,
+):  # fmt: skip
+    """`peaks` of the poses from `first` to `last` - 1.
+
+    A function of its own, so that the compiler's slow passes for parallel loops never see it.
+    """
+    n = stiffness.shape[1]
+    dims = 3 if along.shape[0] == 0 else 1
+    work = np.empty((n, n))
+    vectors = np.empty((n, n))
+    omega = np.empty(n)
+    ratio = np.empty(n)
+    shapes = np.empty((n, n))
+    push = np.empty((n, 3))
+    found = np.empty((n, 3))
+    g = np.empty(3)
+    terms = np.empty((TERMS, 3))
+    room = room_for(n, 256)
+    poles = np.empty(n, dtype=np.complex128)
+    rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
+    for s in range(first, last):
+        frequency[s, :] = np.nan
+        peak[s, :] = np.nan
+        direction[s, :, :] = np.nan
+        if not modes_of(mass[s], stiffness[s], joint_ratio, work, vectors, omega, ratio, shapes):
+            continue
+        under = True
+        for i in range(n):
+            frequency[s, i] = omega[i] / (2.0 * np.pi)
+            under = under and 0.0 < ratio[i] < 1.0 - 1e-6
+        if not under:
+            continue
+        push[:] = 0.0
+        for i in range(n):
+            for d in range(3):
+                moved = 0.0
+                for j in range(n):
+                    moved += jacobian[s, d, j] * shapes[j, i]
+                if dims == 3:
+                    push[i, d] = moved
+                else:
+                    push[i, 0] += moved * along[s, d]
+        room = _pose_peaks(
+            periodic, start, duration, constant, slope, amplitude, wave, omega, ratio,
+            shapes, push, poles, rows, peak[s], found, dims, g, terms, room,
+        )  # fmt: skip
+        for j in range(n):
+            for d in range(3):
+                direction[s, j, d] = found[j, d] if dims == 3 else along[s, d]
+
+
 @njit(cache=True, parallel=True, error_model="numpy")
 def peaks(
     periodic: bool,
@@ -123,49 +177,10 @@ def peaks(
         peak: (p, n) rad, out; NaN where a mode is not underdamped: take the exact path there.
         direction: (p, n, 3) out; of a fixed direction, itself.
     """
-    poses, n = stiffness.shape
-    dims = 3 if along.shape[0] == 0 else 1
+    poses = stiffness.shape[0]
     for block in prange((poses + _BLOCK - 1) // _BLOCK):
-        work = np.empty((n, n))
-        vectors = np.empty((n, n))
-        omega = np.empty(n)
-        ratio = np.empty(n)
-        shapes = np.empty((n, n))
-        push = np.empty((n, 3))
-        found = np.empty((n, 3))
-        g = np.empty(3)
-        terms = np.empty((TERMS, 3))
-        room = room_for(n, 256)
-        poles = np.empty(n, dtype=np.complex128)
-        rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
-        for s in range(block * _BLOCK, min(poses, (block + 1) * _BLOCK)):
-            frequency[s, :] = np.nan
-            peak[s, :] = np.nan
-            direction[s, :, :] = np.nan
-            if not modes_of(
-                mass[s], stiffness[s], joint_ratio, work, vectors, omega, ratio, shapes
-            ):
-                continue
-            under = True
-            for i in range(n):
-                frequency[s, i] = omega[i] / (2.0 * np.pi)
-                under = under and 0.0 < ratio[i] < 1.0 - 1e-6
-            if not under:
-                continue
-            push[:] = 0.0
-            for i in range(n):
-                for d in range(3):
-                    moved = 0.0
-                    for j in range(n):
-                        moved += jacobian[s, d, j] * shapes[j, i]
-                    if dims == 3:
-                        push[i, d] = moved
-                    else:
-                        push[i, 0] += moved * along[s, d]
-            room = _pose_peaks(
-                periodic, start, duration, constant, slope, amplitude, wave, omega, ratio,
-                shapes, push, poles, rows, peak[s], found, dims, g, terms, room,
-            )  # fmt: skip
-            for j in range(n):
-                for d in range(3):
-                    direction[s, j, d] = found[j, d] if dims == 3 else along[s, d]
+        _block_peaks(
+            block * _BLOCK, min(poses, (block + 1) * _BLOCK), periodic, start, duration, constant,
+            slope, amplitude, wave, mass, jacobian, stiffness, joint_ratio, along, frequency, peak,
+            direction,
+        )  # fmt: skip

@@ -63,8 +63,8 @@ def batch_peaks(
         InputError: a direction of length zero, no hits, a resonance without damping.
     """
     poses, n = mass_matrix.shape[0], mass_matrix.shape[1]
-    springs = np.ascontiguousarray(np.broadcast_to(stiffness, (poses, n)), dtype=float)
-    ratios = np.ascontiguousarray(np.broadcast_to(damping_ratio, (n,)), dtype=float)
+    springs = _plain(np.broadcast_to(stiffness, (poses, n)))
+    ratios = _plain(np.broadcast_to(damping_ratio, (n,)))
     along = _directions(direction, poses)
     if isinstance(excitation, PiecewiseForce):
         force = excitation
@@ -79,8 +79,8 @@ def batch_peaks(
 
         peaks(
             periodic, force.start, force.duration, force.constant, force.slope,
-            force.amplitude, force.angular_frequency, np.ascontiguousarray(mass_matrix),
-            np.ascontiguousarray(jacobian), springs, ratios, along,
+            force.amplitude, force.angular_frequency, _plain(mass_matrix), _plain(jacobian),
+            springs, ratios, along,
             found.natural_frequencies, found.peak_deflection, found.direction,
         )  # fmt: skip
         left = np.isnan(found.peak_deflection[:, 0]) & ~np.isnan(found.natural_frequencies[:, 0])
@@ -90,6 +90,11 @@ def batch_peaks(
         row = along[s] if len(along) else None
         _exactly(mass_matrix[s], jacobian[s], springs[s], ratios, force, row, found, int(s))
     return found
+
+
+def _plain(values: ArrayLike) -> FloatArray:
+    """A contiguous, writable array: the kernel would be compiled again for read-only ones."""
+    return np.require(values, np.float64, ("C", "W"))
 
 
 def _directions(direction: ArrayLike | None, poses: int) -> FloatArray:

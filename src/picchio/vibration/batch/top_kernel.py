@@ -1,4 +1,9 @@
-"""Compiled search for the top of a joint's response: which samples it may be near, then exactly."""
+"""Compiled search for the top of a joint's response |g|.
+
+The response is sampled (`sample`, `joint_norms`); `highest` picks the samples that the top may be
+near, and finds it there exactly: by a series in time about the sample (`series_top`), or by Newton
+steps between two samples (`refine`).
+"""
 
 from __future__ import annotations
 
@@ -11,12 +16,26 @@ from numba import njit
 from picchio.core.arrays import ComplexArray, FloatArray
 from picchio.vibration.batch.modal_kernel import exponential
 
-# Compiled samples of many oscillators, and of what they do to a joint.
-
 # Samples a cycle of the fastest mode. |g|^2 swings twice as fast: a top between two samples is
-# at most 10 % above both, unless modes nearly cancel (see `top_kernel`).
+# at most 10 % above both, unless modes nearly cancel (see `_MISSED`).
 _PER_CYCLE = 10.0
 _FAST = {"contract", "reassoc", "nsz", "arcp"}
+# Of the largest |g|^2 on the samples: no top beside a sample below this is the largest.
+_CANDIDATE = 0.5
+# How much higher than a cubic through values and slopes a top can be: of |g|, the modes'
+# accelerations times their shares, and the step squared. A cubic misses a 48th of that times
+# (omega h)^2, which is 0.4 of the fastest mode; modes that nearly cancel have larger accelerations
+# than |g| itself.
+_MISSED = 0.025
+# Derivatives of g in the series, and how far from the sample, in rad of the fastest mode, it
+# serves: 0.35^12 / 12! = 7e-15 of that mode's share is left out.
+TERMS = 12
+_NEAR = 0.35
+_SERIES_STEPS = 6
+_REFINE_STEPS = 40
+# Of the bracket: the last step's own error is its square, and a maximum is off by the square of
+# that, once what the step itself gains is added.
+_PRECISION = 2e-5
 
 
 class Samples(NamedTuple):
@@ -166,14 +185,6 @@ def joint_norms(
     return largest
 
 
-# Compiled Newton search for the top of a joint's response between two samples.
-
-_REFINE_STEPS = 40
-# Of the bracket: the last step's own error is its square, and a maximum is off by the square of
-# that, once what the step itself gains is added.
-_PRECISION = 2e-5
-
-
 @njit(cache=True, error_model="numpy", inline="always")
 def piece_at(time: float, start: FloatArray) -> int:
     """The last piece of the force that has begun at a time, s."""
@@ -271,15 +282,6 @@ def refine(
     return norm
 
 
-# Compiled search for the top of a joint's response near a sample, by a series in time.
-
-# Derivatives of g that are taken, and how far from the sample, in rad of the fastest mode, they
-# serve: 0.35^12 / 12! = 7e-15 of that mode's share is left out.
-TERMS = 12
-_NEAR = 0.35
-_NEWTON = 6
-
-
 @njit(cache=True, error_model="numpy", inline="always")
 def series_top(
     joint: int,
@@ -342,7 +344,7 @@ def series_top(
         for d in range(3):
             terms[m, d] *= factor
     s = min(max(hint, low), high)
-    for _ in range(_NEWTON):
+    for _ in range(_SERIES_STEPS):
         # The axes side by side: each chain of products waits for itself alone.
         y0, y1, y2 = terms[TERMS - 1, 0], terms[TERMS - 1, 1], terms[TERMS - 1, 2]
         w0, w1, w2, z0, z1, z2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -365,15 +367,6 @@ def series_top(
             return norm - first * first / second
         s += step
     return -1.0
-
-
-# Of the largest |g|^2 on the samples: no top beside a sample below this is the largest.
-_CANDIDATE = 0.5
-# How much higher than a cubic through values and slopes a top can be: of |g|, the modes'
-# accelerations times their shares, and the step squared. A cubic misses a 48th of that times
-# (omega h)^2, which is 0.4 of the fastest mode; modes that nearly cancel have larger accelerations
-# than |g| itself.
-_MISSED = 0.025
 
 
 @njit(cache=True, error_model="numpy", inline="always")

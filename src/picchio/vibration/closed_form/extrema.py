@@ -1,4 +1,4 @@
-"""Where a closed-form response turns: a grid that misses no cycle, and refined roots."""
+"""Turning points of a closed-form response: a grid that misses no cycle, and refined roots."""
 
 from __future__ import annotations
 

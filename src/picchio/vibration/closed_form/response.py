@@ -1,4 +1,7 @@
-"""A closed-form response: its values at any time, its turning points, its worst direction."""
+"""The exact response to a force in pieces: steady, or from rest.
+
+A `Response` has the deflection at any time, the turning points, and the worst direction.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,8 @@ from picchio.vibration.closed_form.modes import Modes
 
 # A ring-down is followed until its envelope has fallen to this share of its start.
 RING_DOWN_LEVEL = 1e-4
+# |1 - exp(pole T)| below this: the blows are in resonance with an undamped mode.
+_RESONANCE = 1e-10
 
 
 class Peak(NamedTuple):
@@ -63,7 +68,7 @@ class Response:
         slowest = -float(self.modes.poles.real.max())
         if slowest <= 0.0:
             raise InputError(
-                "a mode has no damping: after the blows it rings for ever, and a rivet has no end",
+                "a mode has no damping: after the blows it rings for ever",
                 key="damping_ratio",
                 value=0.0,
                 hint="give the joints a damping ratio above 0",
@@ -271,12 +276,6 @@ def unit_vector(direction: ArrayLike) -> FloatArray:
     return n / length
 
 
-# The exact response of every mode to a force in pieces.
-
-# |1 - exp(pole T)| below this: the blows keep step with a mode that nothing damps.
-_RESONANCE = 1e-10
-
-
 def steady_state(modes: Modes, excitation: Excitation | PiecewiseForce) -> Response:
     """The exact periodic response, no Fourier sum: paper eq. 13 without truncation.
 
@@ -305,7 +304,7 @@ def steady_state(modes: Modes, excitation: Excitation | PiecewiseForce) -> Respo
         frequency = float(np.abs(modes.poles[stuck][0].imag)) / (2.0 * np.pi)
         raise InputError(
             f"the mode at {frequency:.6g} Hz has no damping and is in resonance with blows every "
-            f"{force.end:g} s: its vibration grows without end",
+            f"{force.end:g} s: its vibration grows without bound",
             key="damping_ratio",
             value=0.0,
             hint="give the joints a damping ratio above 0, or another period",
@@ -332,7 +331,7 @@ def response_from_rest(
     """
     if isinstance(excitation, Excitation):
         if hits is None:
-            raise InputError("how many hits the burst has must be given", key="hits")
+            raise InputError("give the number of hits of the burst", key="hits")
         force = excitation.burst(hits)
     else:
         force = excitation

@@ -1,4 +1,4 @@
-"""Dry friction within a step: a joint is held still where it can be, compiled."""
+"""Dry friction within a step, compiled: a joint is held still where the friction can hold it."""
 
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations

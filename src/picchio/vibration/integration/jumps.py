@@ -1,4 +1,4 @@
-"""Jumps between samples: sample values from which straight lines keep what a jump does.
+"""Jumps between samples: corrected sample values for filters that interpolate linearly.
 
 A filter that takes straight lines between samples (first-order hold) sees a jump as a ramp of one
 step, wherever within the step it is: its response then moves in stairs as the jump moves, by

@@ -1,4 +1,4 @@
-"""Compiled: steps between samples that end where a force jumps, and the force along them."""
+"""Compiled: one exact step of a linear system under a straight line of force; the grid of steps."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -6,8 +6,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
-# One step of a linear system under a force that is a straight line: exact, compiled.
 
 _TAYLOR = 14
 _MOST_PARTS = 4000

@@ -1,4 +1,4 @@
-"""Compiled time integration of systems in which something sticks: two looks a step.
+"""Compiled time integration with dry friction: two evaluations a step.
 
 As `integrate_kernel`, with dry friction, which may stop a joint anywhere within a step
 (`friction_kernel`).

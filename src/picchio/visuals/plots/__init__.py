@@ -6,7 +6,6 @@ from picchio.visuals.plots.force import plot_force_spectrum, plot_force_train
 from picchio.visuals.plots.frequency import (
     plot_frequency_response,
     plot_mode_shapes,
-    plot_natural_frequencies,
 )
 from picchio.visuals.plots.life import plot_damage, plot_life_spread, plot_utilisation
 from picchio.visuals.plots.polar import plot_polar_envelope
@@ -23,7 +22,6 @@ __all__ = [
     "plot_frequency_response",
     "plot_life_spread",
     "plot_mode_shapes",
-    "plot_natural_frequencies",
     "plot_polar_envelope",
     "plot_response",
     "plot_sn_curve",

@@ -1,4 +1,4 @@
-"""Measured against simulated: the two over time, and what is left between them."""
+"""A diagnosis: causes on the robot, curves before and after, candidates' scores, residual bands."""
 
 from __future__ import annotations
 
@@ -30,7 +30,13 @@ from picchio.visuals.plots.style import (
     styled,
 )
 
-# The arm as a stick figure, with the place of a cause ringed.
+BEFORE: dict[str, Any] = {"color": VERMILION, "linestyle": (0, (5, 1.6))}
+AFTER: dict[str, Any] = {"color": BLUE, "linestyle": "-"}
+MEASURED: dict[str, Any] = {"color": INK, "linewidth": 2.6, "alpha": 0.35}
+# Standard deviations of the noise that hold 95 % of it.
+_BAND = 1.96
+_SHOWN = {"rad": (1e3, "mrad"), "m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
+_LOWEST = 0.5
 
 
 def place_in_words(robot: FlexibleRobot, effect: str, target: str) -> str:
@@ -173,14 +179,6 @@ def _points(
     return [tip]
 
 
-BEFORE: dict[str, Any] = {"color": VERMILION, "linestyle": (0, (5, 1.6))}
-AFTER: dict[str, Any] = {"color": BLUE, "linestyle": "-"}
-MEASURED: dict[str, Any] = {"color": INK, "linewidth": 2.6, "alpha": 0.35}
-# Standard deviations of the noise that hold 95 % of it.
-_BAND = 1.96
-_SHOWN = {"rad": (1e3, "mrad"), "m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
-
-
 def shown_unit(channel: Channel) -> tuple[float, str]:
     """The factor and the unit that a channel is drawn in."""
     return _SHOWN.get(channel.unit, (1.0, channel.unit))
@@ -277,11 +275,6 @@ def plot_left_over(
         ax.set_ylim(-most, most)
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4)
     return ax
-
-
-# The candidates' scores, and the power that is left by frequency.
-
-_LOWEST = 0.5
 
 
 @styled

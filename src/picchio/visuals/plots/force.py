@@ -1,4 +1,4 @@
-"""The blows: the force over time, and what each harmonic carries."""
+"""The blows: the force over time, and its harmonics."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measured and simulated frequency response over each other, with the coherence."""
+"""The robot by frequency: its modes, its frequency response, and the measured one beside it."""
 
 from __future__ import annotations
 
@@ -13,9 +13,7 @@ from picchio.vibration.closed_form.modes import Modes
 from picchio.vibration.closed_form.response import unit_vector
 from picchio.visuals.plots.diagnosis import BEFORE, MEASURED, plain_numbers, shown_unit
 from picchio.visuals.plots.style import (
-    BLUE,
     GREEN,
-    INK,
     MUTED,
     axes_or_new,
     direction_label,
@@ -24,42 +22,7 @@ from picchio.visuals.plots.style import (
     styled,
 )
 
-# The robot's modes: where they lie and which joints move in them.
-
-
-@styled
-def plot_natural_frequencies(
-    modes: Modes, ax: Axes | None = None, *, excitation: Excitation | None = None
-) -> Axes:
-    """Natural frequency (Hz) and damping of every mode; the blows' harmonics as thin lines.
-
-    Args:
-        modes: of the robot at a pose.
-        ax: where to draw.
-        excitation: blows whose harmonics to mark.
-    """
-    frequency = modes.natural_frequencies
-    ax = axes_or_new(ax, height=1.1 + 0.32 * frequency.size)
-    if excitation is not None:
-        harmonics = np.arange(1, int(1.25 * frequency.max() * excitation.period) + 2)
-        for k, f in enumerate(harmonics / excitation.period):
-            ax.axvline(f, color=MUTED, linewidth=0.8, linestyle=":", alpha=0.6,
-                       label=f"harmonics of the blows, {1 / excitation.period:g} Hz apart"
-                       if k == 0 else None)  # fmt: skip
-    row = np.arange(frequency.size)
-    ax.hlines(row, 0.0, frequency, color=BLUE, linewidth=2.2)
-    ax.plot(frequency, row, "o", color=BLUE, markersize=7)
-    for y, (f, ratio) in enumerate(zip(frequency, modes.damping_ratios, strict=True)):
-        ax.annotate(f"{f:.3g} Hz, {100 * ratio:.2g} %", (f, y), xytext=(8, 0), color=INK,
-                    textcoords="offset points", va="center", fontsize=8.5)  # fmt: skip
-    ax.set_yticks(row, [f"mode {k + 1}" for k in row])
-    ax.set(xlabel="natural frequency [Hz], damping ratio [%]", title="Natural frequencies")
-    ax.set_xlim(0.0, 1.25 * float(frequency.max()))
-    ax.set_ylim(frequency.size - 0.4, -0.6)
-    ax.grid(axis="y", visible=False)
-    if excitation is not None:
-        ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
-    return ax
+_MOST_HARMONICS = 16
 
 
 @styled
@@ -88,11 +51,6 @@ def plot_mode_shapes(modes: Modes, ax: Axes | None = None) -> Axes:
     ax.grid(axis="x", visible=False)
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax
-
-
-# What each joint does to a sinusoidal force, by frequency.
-
-_MOST_HARMONICS = 16
 
 
 @styled

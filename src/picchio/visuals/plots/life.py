@@ -1,4 +1,4 @@
-"""Which joint and which operation cost the life: utilisation and damage."""
+"""Life: which joint and operation limit it (utilisation, damage), and how uncertain it is."""
 
 from __future__ import annotations
 
@@ -126,25 +126,23 @@ def _bars(
         ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-# How sure a life is: what 90, 50 and 10 % of the possible worlds exceed.
-
-
 @styled
 def plot_life_spread(spread: UncertainLife, ax: Axes | None = None) -> Axes:
     """Life of every joint and of the robot (rivets): P10 to P90 as a bar, the median as a dot.
 
-    An end at no life at all is drawn as an arrow at the right edge.
+    P10 is the life that 90 % of the samples exceed. A bar whose P90 is infinite ends in an arrow
+    at the right edge.
     """
     rows = {**spread.joints, "robot": spread.robot}
     ax = axes_or_new(ax, height=1.1 + 0.36 * len(rows))
-    ax.set(xlabel="rivets to failure [\N{EN DASH}]", title="How sure the life is, P10 to P90")
+    ax.set(xlabel="rivets to failure [\N{EN DASH}]", title="Uncertainty of the life, P10 to P90")
     ax.set_yticks(range(len(rows)), [plain(name) for name in rows])
     ax.set_ylim(len(rows) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
     lives = np.array([[life.p10, life.p50, life.p90] for life in rows.values()])
     finite = lives[np.isfinite(lives)]
     if not finite.size:
-        note(ax, "no life has an end, however the inputs fall within their doubt")
+        note(ax, "infinite life for every value of the uncertain inputs")
         ax.set_xticks([])
         return ax
     ax.set_xscale("log")
@@ -161,6 +159,6 @@ def plot_life_spread(spread: UncertainLife, ax: Axes | None = None) -> Axes:
         if np.isfinite(life.p50):
             ax.plot(life.p50, y, "o", color=colour, markersize=7)
         if life.endless > 0.0:
-            ax.annotate(f"{100 * life.endless:.0f} % without end", (0.99, y - 0.28), ha="right",
+            ax.annotate(f"{100 * life.endless:.0f} % infinite", (0.99, y - 0.28), ha="right",
                         xycoords=("axes fraction", "data"), fontsize=8, color=MUTED)  # fmt: skip
     return ax

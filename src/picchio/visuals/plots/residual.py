@@ -1,4 +1,4 @@
-"""Residuals by record and channel, by frequency, over time, and by how a record was taken."""
+"""Residuals: by record and channel, frequency, time and condition, and the torque they imply."""
 
 from __future__ import annotations
 
@@ -25,6 +25,8 @@ from picchio.visuals.plots.style import (
 
 _MOST_HARMONICS = 60
 _MOST_ROWS = 60
+_MOST_DOTS = 700
+_BINS = 15
 
 
 @styled
@@ -194,12 +196,6 @@ def plot_by_condition(
     for text in ax.get_xticklabels():
         text.set_fontsize(8)
     return ax
-
-
-# The torque a joint's model lacks, over its deflection and over its velocity.
-
-_MOST_DOTS = 700
-_BINS = 15
 
 
 @styled

@@ -1,4 +1,4 @@
-"""The S-N curve, where the task's poses stand on it, and a curve fitted to tests."""
+"""The S-N curve with the task's poses on it, and a curve fitted to tests."""
 
 from __future__ import annotations
 

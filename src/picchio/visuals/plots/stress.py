@@ -1,4 +1,4 @@
-"""The shear stress in a shaft over one rivet, and the cycles that are counted in it."""
+"""The shear stress in a shaft over one rivet, and its counted cycles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The workspace map: where in its reach the blows shake a joint most."""
+"""The workspace map: where the blows deflect a joint most."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Put a scene together: robot, envelopes, rivets, vibration; all data, no page."""
+"""Build a scene: robot, envelopes, rivets, vibration; data only, no page."""
 
 from __future__ import annotations
 

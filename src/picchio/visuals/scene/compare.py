@@ -1,4 +1,4 @@
-"""Measured against simulated: two ghosts of the robot that play two deflection histories."""
+"""Measured against simulated: two ghosts of the robot that play the two deflection histories."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def compare_scene(
     """
     moments = np.asarray(time, dtype=float)
     if moments.ndim != 1 or len(moments) < 2 or not (np.diff(moments) > 0.0).all():
-        raise InputError("must be two ascending numbers at least", key="time")
+        raise InputError("must be at least two ascending numbers", key="time")
     both = {
         "simulated": _table(robot, simulated, len(moments), "simulated"),
         "measured": _table(robot, measured, len(moments), "measured"),

@@ -1,4 +1,4 @@
-"""The scene of a diagnosis: the causes on the robot, at the pose where it shows most."""
+"""The scene of a diagnosis: the causes on the robot, at the pose where the residual is largest."""
 
 from __future__ import annotations
 

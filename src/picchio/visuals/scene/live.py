@@ -1,4 +1,4 @@
-"""The scene in a running meshcat viewer: the same things, the panel's sliders among its own.
+"""The scene in a running meshcat viewer, the page's sliders included.
 
 Meshcat's JavaScript knows `set_control`, its Python server does not. But the server hands on, and
 replays to whoever comes later, the content of any message that is addressed as `set_property`.

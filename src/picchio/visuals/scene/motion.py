@@ -1,4 +1,4 @@
-"""The vibration for the page to play: g_j(t) of every joint, and how much to exaggerate."""
+"""The vibration that the page animates: g_j(t) of every joint, and its exaggeration."""
 
 from __future__ import annotations
 

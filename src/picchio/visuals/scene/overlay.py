@@ -1,4 +1,4 @@
-"""What is laid over the robot: direction envelopes, worst directions, joint rings, rivets."""
+"""Overlays on the robot: direction envelopes, worst directions, joint rings, rivets."""
 
 from __future__ import annotations
 

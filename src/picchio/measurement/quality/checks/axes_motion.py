@@ -1,4 +1,4 @@
-"""Swapped or flipped joints in motion records: signals that must follow from one another.
+"""Swapped or flipped joints in motion records, by signals that follow from one another.
 
 A position's derivative is the velocity; the motor side follows the link side; the torque carries
 gravity and the masses: M(q) a + g(q), with the rest (friction, products of velocities) small.

@@ -91,19 +91,19 @@ class PercussionAxesCheck(Check):
                                  for _, seen, must in rows]))  # fmt: skip
         if fit.as_labelled < 0.85 and fit.best > 0.93 and fit.best - fit.as_labelled > 0.1:
             self.context.told.add(group)
-            others = f" (or {fit.rivals} other ways: these directions do not tell)"
+            others = f" (or {fit.rivals} other ways: these directions cannot tell them apart)"
             yield self.found(
                 "warning",
                 f"its axes seem swapped or flipped: {fit.words}{others if fit.rivals else ''}. The "
-                f"first milliseconds point the way they must to {100 * fit.best:.0f} %, as "
-                f"labelled to {100 * fit.as_labelled:.0f} %",
+                f"first milliseconds agree to {100 * fit.best:.0f} % with the expected direction, "
+                f"as labelled to {100 * fit.as_labelled:.0f} %",
                 "check how the sensor is mounted, then relabel the columns",
                 channel=group, value=fit.as_labelled,
             )  # fmt: skip
         elif fit.as_labelled < 0.7:
             yield self.found(
                 "warning",
-                "starts to move in another direction than the masses of the robot allow (cosine "
+                "starts to move in another direction than the robot's masses allow (cosine "
                 f"{fit.as_labelled:.2f} over {len(rows)} records)",
                 "check the sensor's mounting, the poses and the force's directions",
                 channel=group, value=fit.as_labelled,

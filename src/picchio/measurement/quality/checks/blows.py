@@ -1,4 +1,4 @@
-"""Do the blows come when, as often and as hard as was programmed?"""
+"""Do the blows have the programmed timing, number and force?"""
 
 from __future__ import annotations
 

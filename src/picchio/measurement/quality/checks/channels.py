@@ -36,12 +36,12 @@ class ChannelsCheck(Check):
                              record=record.file)  # fmt: skip
         if record.kind == "motion":
             if not kinds & {"position", "motor_position"}:
-                yield self.found("error", "no channel tells where the joints are",
+                yield self.found("error", "no channel shows where the joints are",
                                  "record position.<joint> or motor_position.<joint>",
                                  record=record.file)  # fmt: skip
             if "torque" not in kinds and not {"position", "motor_position"} <= kinds:
-                yield self.found("warning", "there is neither a torque nor a second encoder: "
-                                 "nothing to hold against a model",
+                yield self.found("warning", "there is neither a torque nor a second encoder "
+                                 "to compare a model with",
                                  "record torque.<joint> (motor current times its constant)",
                                  record=record.file)  # fmt: skip
         for group in sorted({record.channel(n).group for n in names if record.channel(n).axis}):

@@ -1,4 +1,4 @@
-"""Does the clock tick evenly, and alike in all records?"""
+"""Is the clock even, and the same in all records?"""
 
 from __future__ import annotations
 

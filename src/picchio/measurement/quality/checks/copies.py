@@ -1,4 +1,4 @@
-"""Is the same thing there twice?"""
+"""Are channels or records duplicated?"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Does a channel's zero stand still, and where it should?"""
+"""Does a channel's zero drift, or is it offset?"""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class DriftCheck(Check):
                     "warning",
                     f"its zero wanders: {rate:+.3g} {unit} a second, "
                     f"{100 * abs(rate) * seconds / size:.2g} % of the signal within the record",
-                    "let the sensor warm up; take a line through quiet time off",
+                    "let the sensor warm up; subtract a line fitted to quiet time",
                     record=scan.file, channel=name, value=rate, unit=f"{unit}/s",
                 )  # fmt: skip
                 continue
@@ -101,7 +101,7 @@ class DriftCheck(Check):
         if abs(mean) > _SIGMAS * error + ragged and abs(mean) > 0.02 * size:
             yield self.found(
                 "warning", f"has a mean of {mean:+.3g} {unit}, {mean / size:+.2g} times the signal",
-                "take the mean of each channel of a steady record off",
+                "subtract each channel's mean from steady records",
                 record=scan.file, channel=name, value=mean, unit=unit,
             )  # fmt: skip
         if count < 4:

@@ -1,4 +1,4 @@
-"""Does a channel stand still where it should not: dead sensors, held or zeroed samples?"""
+"""Does a channel stay constant where it should not: dead sensors, held or zeroed samples?"""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class DropoutsCheck(Check):
                     "warning",
                     f"{held} for {longest.length} samples from {scan.line(longest.start)}, "
                     f"t = {scan.when(longest.start):.4g} s{places}",
-                    "data were lost there: leave these samples, or the record, out",
+                    "data were lost there: leave out these samples, or the record",
                     record=scan.file, channel=name, value=float(longest.length), unit="samples",
                 )  # fmt: skip
 

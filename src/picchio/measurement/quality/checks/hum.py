@@ -40,6 +40,6 @@ class HumCheck(Check):
                 "warning" if loud else "note",
                 f"hums at {main.frequency:.4g} Hz{more}, amplitude {main.amplitude:.3g} "
                 f"{noise.unit}: {100 * share:.2g} % of the signal's RMS",
-                "shield or ground the cable; the hum is estimated and can be taken off",
+                "shield or ground the cable; the hum is estimated and can be removed",
                 channel=name, value=main.amplitude, unit=noise.unit,
             )  # fmt: skip

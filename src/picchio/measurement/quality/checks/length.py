@@ -76,7 +76,7 @@ class LengthCheck(Check):
         if worst > 0.1:
             yield self.found(
                 "warning" if worst > 0.6 else "note",
-                f"ends while it still rings, at {100 * worst:.0f} % of the loudest moment",
-                "record until it is silent: the decay tells the damping",
+                f"ends while still ringing, at {100 * worst:.0f} % of the largest amplitude",
+                "record until it is quiet: the decay shows the damping",
                 record=scan.file, channel=where, value=worst,
             )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Does each channel stand out of its noise and its resolution?"""
+"""Is each channel's signal well above its noise and its resolution?"""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class NoiseLevelCheck(Check):
             noise = self.context.noise.get(name)
             if noise is None:
                 if self._seen[name] == "percussion":
-                    yield self.found("note", "there is no stretch to judge its noise by",
+                    yield self.found("note", "no part of the records shows its noise alone",
                                      "record 0.1 s before the first blow, or repeat a record",
                                      channel=name)  # fmt: skip
                 continue

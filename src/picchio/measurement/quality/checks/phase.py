@@ -1,4 +1,4 @@
-"""Delays and high-passes: the phase of a sensor's reading against another one's.
+"""Delays and high-pass filters: the phase of one sensor against another.
 
 In the ring-down every channel is a sum of the same damped waves. Velocity is s times displacement,
 acceleration s^2 times it, s the wave's pole; and with a robot all of them follow from the
@@ -167,9 +167,9 @@ class PhaseCheck(Check):
             if corner > max(5.0 * corner_error, 0.15):
                 yield self.found(
                     "warning",
-                    f"leads {against} the more the slower the wave: as behind a high-pass of "
+                    f"leads {against} more at low frequencies, as after a high-pass of "
                     f"{corner:.2g} Hz",
-                    "switch the sensor to DC, or take the filter into the model (sensor_highpass)",
+                    "switch the sensor to DC, or add the filter to the model (sensor_highpass)",
                     channel=group, value=corner, unit="Hz",
                 )  # fmt: skip
             if abs(delay) > max(5.0 * delay_error, 3e-4):
@@ -179,8 +179,8 @@ class PhaseCheck(Check):
                     f"reads {1e3 * abs(delay):.2g} ms {word} than {against}"
                     + (f" (or through a low-pass of {1 / (2 * np.pi * delay):.2g} Hz)"
                        if delay > 0.0 else ""),
-                    "are the recorders started by one trigger? shift its time, or take the delay "
-                    "into the model (sensor_delay)",
+                    "are the recorders started by one trigger? shift its time, or add the delay "
+                    "to the model (sensor_delay)",
                     channel=group, value=delay, unit="s",
                 )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Can the robot stand where the campaign says, and is that in radians?"""
+"""Can the robot reach the campaign's poses, and are they in radians?"""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class PosesCheck(Check):
         robot = self.context.robot
         if robot is None:
             if degrees:
-                yield self.found("warning", f"a joint stands at {largest:.4g} rad", degrees,
+                yield self.found("warning", f"a joint is at {largest:.4g} rad", degrees,
                                  record=record.file, value=largest, unit="rad")  # fmt: skip
         else:
             yield from self._on_robot(scan, degrees)

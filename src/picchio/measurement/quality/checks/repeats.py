@@ -1,4 +1,4 @@
-"""Do records of the same thing look the same?"""
+"""Do repeated records agree?"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Single samples that stand out of their neighbours."""
+"""Single samples that differ from their neighbours."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ class SpikesCheck(Check):
                     more = f", and {spikes.size - 1} more" if spikes.size > 1 else ""
                     yield self.found(
                         "warning",
-                        f"one sample is off its neighbours by {height:.3g} at {scan.line(at)}, "
-                        f"t = {scan.when(at):.4g} s{more}",
-                        "a lost bit or a bad contact: replace it by its neighbours' mean",
+                        f"one sample differs from its neighbours by {height:.3g} at "
+                        f"{scan.line(at)}, t = {scan.when(at):.4g} s{more}",
+                        "a lost bit or a bad contact: replace it with its neighbours' mean",
                         record=scan.file, channel=name, value=float(height),
                         unit=window.record.channel(name).unit,
                     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Are the numbers of a size that the unit allows?"""
+"""Are the values plausible for their unit?"""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ class UnitsCheck(Check):
             channel = scan.record.channel(name)
             size = max(-seen.least, seen.most)
             if channel.kind.name == "temperature" and not -60.0 < seen.most < 250.0:
-                yield self.found("warning", f"reaches {seen.most:.4g} degC", "K, or counts?",
-                                 record=scan.file, channel=name, value=seen.most,
-                                 unit="degC")  # fmt: skip
+                yield self.found("warning", f"reaches {seen.most:.4g} degC",
+                                 "is it in K, or in raw counts?", record=scan.file,
+                                 channel=name, value=seen.most, unit="degC")  # fmt: skip
             if scan.record.kind == "motion":
                 continue
             most, guess = _MOST.get((channel.kind.name, channel.unit), (float("inf"), ""))
             if size > most and channel.group not in self._told:
                 self._told.add(channel.group)
                 yield self.found(
-                    "warning", f"reaches {size:.4g} {channel.unit}, which no arm stands",
+                    "warning", f"reaches {size:.4g} {channel.unit}, which no arm survives",
                     f"is the header's unit right? {guess}",
                     record=scan.file, channel=name, value=size, unit=channel.unit,
                 )  # fmt: skip

@@ -14,11 +14,16 @@ from picchio.visuals.kinematics import Frame
 from picchio.visuals.scene.robot.mesh import Mesh, merged, rgb, rod, sphere, turned_to
 from picchio.visuals.scene.robot.visuals import Visual, load_mesh, read_visuals
 
-# Fewer triangles by merging vertices that share a cell of a grid (Rossignac and Borrel, 1993).
+MOST_FACES = 60_000
+"""Triangles of the whole robot."""
+_BONE = "#9aa6b2"
+_GUN = "#3f4a57"
 
 
 def decimate(mesh: Mesh, cell: float) -> Mesh:
-    """The mesh with one vertex a cell; triangles that collapse are dropped.
+    """The mesh with one vertex per cell of a grid (Rossignac and Borrel, 1993).
+
+    Triangles that collapse are dropped.
 
     Args:
         mesh: any triangles.
@@ -60,12 +65,6 @@ def decimate(mesh: Mesh, cell: float) -> Mesh:
         vertices[used], renumbered.reshape(-1, 3), colours, mesh.colour, mesh.opacity, mesh.exact,
         mesh.crease,
     )  # fmt: skip
-
-
-MOST_FACES = 60_000
-"""Triangles of the whole robot."""
-_BONE = "#9aa6b2"
-_GUN = "#3f4a57"
 
 
 @dataclass(frozen=True, eq=False)

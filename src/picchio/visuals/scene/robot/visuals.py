@@ -1,4 +1,4 @@
-"""What a URDF says its links look like: primitives and meshes, read only to be looked at."""
+"""The visuals of a URDF's links: primitives and meshes, read only for drawing."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def load_mesh(file: Path) -> Mesh:
         ]  # fmt: skip
         meshes = [_part(part) for part in parts]
     except Exception as error:  # trimesh raises whatever its parsers do
-        raise InputError(f"is no mesh that can be read: {error}", file=file) from None
+        raise InputError(f"is not a readable mesh: {error}", file=file) from None
     if not meshes or not all(np.isfinite(mesh.vertices).all() for mesh in meshes):
         raise InputError("holds no finite triangles", file=file)
     return merged(meshes)

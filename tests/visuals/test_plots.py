@@ -80,11 +80,7 @@ def test_spectrum_is_the_papers_fourier_series() -> None:
 
 def test_modes_are_those_of_the_eigenproblem(arm: SimpleNamespace) -> None:
     system = picchio.Model(arm.robot).linear_system(arm.worst.pose)
-    omega2, shapes = scipy.linalg.eigh(np.diag(arm.robot.stiffness), system.mass_matrix)
-    ax = plots.plot_natural_frequencies(arm.worst.modes, excitation=BLOWS)
-    dots = next(found for found in ax.get_lines() if found.get_marker() == "o")
-    np.testing.assert_allclose(dots.get_xdata(), np.sqrt(omega2) / (2 * np.pi), rtol=1e-9)
-    drawn(ax)
+    _, shapes = scipy.linalg.eigh(np.diag(arm.robot.stiffness), system.mass_matrix)
     ax = plots.plot_mode_shapes(arm.worst.modes)
     heights = np.array([[bar.get_height() for bar in group] for group in ax.containers])
     expected = shapes / shapes[np.abs(shapes).argmax(axis=0), range(3)]
@@ -266,11 +262,11 @@ def test_life_spread_draws_the_percentiles() -> None:
     assert bars[1][1] == ax.get_xlim()[1]
     dots = [float(found.get_xdata()[0]) for found in ax.get_lines() if found.get_marker() == "o"]
     assert dots == [1e6, 3e6]
-    assert any("30 % without end" in text.get_text() for text in ax.texts)
+    assert any("30 % infinite" in text.get_text() for text in ax.texts)
     drawn(ax)
     endless = SimpleNamespace(p10=np.inf, p50=np.inf, p90=np.inf, endless=1.0)
     ax = plots.plot_life_spread(SimpleNamespace(joints={"a": endless}, robot=endless))
-    assert any("no life has an end" in text.get_text() for text in ax.texts)
+    assert any("infinite life" in text.get_text() for text in ax.texts)
 
 
 def test_sn_fit_shows_tests_lines_band_and_knee() -> None:

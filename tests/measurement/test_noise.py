@@ -12,8 +12,8 @@ from picchio.measurement.noise.autoregression import AutoRegression, fit_autoreg
 from picchio.measurement.noise.estimate import noise_levels
 from picchio.measurement.noise.periodic import find_period, not_periodic
 from picchio.measurement.noise.ringdown import fit_ring_down
-from picchio.measurement.noise.whiteness import band_levels, flatness, largest_line, runs, whiteness
 
+from ..whiteness import band_levels, flatness, largest_line, runs, whiteness
 from .signals import CHANNELS, LEVELS, PERIOD, campaign, noise, record, steady
 
 SEEDS = range(12)
