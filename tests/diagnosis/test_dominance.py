@@ -13,7 +13,7 @@ from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import measure_scales
 from picchio.diagnosis.percussion.search.rounds import Look
-from picchio.diagnosis.percussion.search.select import Search
+from picchio.diagnosis.percussion.search.state import Search
 from picchio.model.effects.registry import effect_class
 from worlds import campaign as worlds
 
@@ -48,7 +48,7 @@ def test_what_imitates_the_unknown_rest_is_not_claimed():
     alone = fit(problem, found.hypothesis.minus("hysteresis:joint_2"))
     # it helps a lot, and leaves much
     assert found.cost < alone.cost - 100.0
-    assert not whiteness_test(problem, found.residuals).is_noise
+    assert not whiteness_test(problem, found).is_noise
     assert 0.1 < explained_share(found, alone) < 0.9
     stands = dominant_causes(problem, found, problem.records)
     assert stands.hypothesis.labels == {"joint_stiffness:joint_1"}
@@ -59,13 +59,13 @@ def test_what_imitates_the_unknown_rest_is_not_claimed():
 
 def test_causes_that_are_there_stay():
     problem, found, _ = fitted((SOFTER, TILTED, UNKNOWN), SOFTER, TILTED)
-    assert not whiteness_test(problem, found.residuals).is_noise
+    assert not whiteness_test(problem, found).is_noise
     assert dominant_causes(problem, found, problem.records) is found
 
 
 def test_where_noise_is_left_every_cause_explains_all():
     problem, found, _ = fitted((SOFTER, TILTED), SOFTER, TILTED)
-    assert whiteness_test(problem, found.residuals).is_noise
+    assert whiteness_test(problem, found).is_noise
     assert dominant_causes(problem, found, problem.records) is found
 
 

@@ -50,7 +50,7 @@ def test_a_null_of_another_simulator_leaves_noise(arm):
     campaign, truth = trial.make({**FEW, "kind": "null", "draw": 901})
     problem = Problem(arm, campaign)
     found = fit_growing(problem, Hypothesis.baseline(arm, campaign.tolerance))
-    evidence = whiteness_test(problem, found.residuals)
+    evidence = whiteness_test(problem, found)
     assert evidence.is_noise, (evidence.worst_band, evidence.worst_pose)
     assert evidence.chi_square == pytest.approx(1.0, abs=0.05)
     for effect in found.hypothesis.effects:

@@ -24,14 +24,8 @@ from picchio.diagnosis.percussion.search.candidates import all_candidates, measu
 from picchio.diagnosis.percussion.search.exchange import exchange, prune
 from picchio.diagnosis.percussion.search.restart import restarted
 from picchio.diagnosis.percussion.search.screen import Suspect, acts_either_way, smallest
-from picchio.diagnosis.percussion.search.trials import (
-    Trial,
-    _short_list,
-    fit_short,
-    holdout_choice,
-    over_the_same_samples,
-    records_of_every_pose,
-)
+from picchio.diagnosis.percussion.search.state import Trial
+from picchio.diagnosis.percussion.search.trials import _short_list, fit_short, holdout_choice, over_the_same_samples, records_of_every_pose
 from picchio.model.effects.registry import effect_class
 from worlds import campaign as worlds
 from worlds import cases
@@ -321,11 +315,11 @@ def test_a_contact_that_a_fit_holds_shut_for_ever_is_opened_again(arm):
         "tool", stiffness=9e4, damping=300.0, preload=1000.0
     )  # fmt: skip
     held = fit(problem, baseline.hypothesis.plus(shut), iterations=8)
-    assert not whiteness_test(problem, held.residuals).is_noise
+    assert not whiteness_test(problem, held).is_noise
     effects = held.hypothesis.effects
     scales = measure_scales(problem, effects, problem.predictions(effects))
     opened = restarted(problem, held, scales, problem.records)
-    assert whiteness_test(problem, opened.residuals).is_noise
+    assert whiteness_test(problem, opened).is_noise
     (found,) = opened.hypothesis.causes
     assert found.values["preload"] == pytest.approx(34.0, rel=0.02)
 

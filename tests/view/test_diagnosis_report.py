@@ -24,8 +24,8 @@ from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import measure_scales
-from picchio.diagnosis.percussion.search.select import Search
-from picchio.diagnosis.percussion.search.trials import Trial
+from picchio.diagnosis.percussion.search.state import Search
+from picchio.diagnosis.percussion.search.state import Trial
 from picchio.diagnosis.result import Cause, Diagnosis, Value
 from picchio.model.effects.registry import effect_class
 from picchio.robot.loading.load import load_robot
@@ -86,7 +86,7 @@ def case(repository):
     found = PercussionDiagnosis(
         diagnosis, problem, nominal, whole,
         Search(baseline, best, [[Trial("payload:tool", best, bic(best), 1.0)]]),
-        whiteness_test(problem, nominal.residuals), whiteness_test(problem, whole.residuals),
+        whiteness_test(problem, nominal), whiteness_test(problem, whole),
         measure_scales(problem, nominal.hypothesis.effects,
                        problem.predictions(nominal.hypothesis.effects)),
     )  # fmt: skip

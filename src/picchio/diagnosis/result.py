@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
+
+from picchio.model.effects.effect import Effect
 
 # What percussion and motion records are judged by alike.
 
@@ -71,6 +74,21 @@ class Cause:
 
 
 @dataclass(frozen=True)
+class Estimate:
+    """A cause as one kind of records has it, for the other kind to start from.
+
+    Attributes:
+        effect: at the values that were found.
+        std: parameter -> standard deviation, SI.
+        values: what is told of it, quantities that follow from its parameters included.
+    """
+
+    effect: Effect
+    std: Mapping[str, float]
+    values: Mapping[str, Value] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Gain:
     """How much better the extended model predicts records that it has not seen.
 
@@ -80,6 +98,7 @@ class Gain:
         baseline_nrmse: of the nominal model with its nuisances fitted.
         extended_nrmse: of the extended model.
         noise_floor_nrmse: what noise alone leaves.
+        channels: how many channels of records were judged, to put gains together by.
     """
 
     train_records: tuple[str, ...]
@@ -87,6 +106,24 @@ class Gain:
     baseline_nrmse: float
     extended_nrmse: float
     noise_floor_nrmse: float
+    channels: int = 0
+
+    def plus(self, other: Gain) -> Gain:
+        """On the records of both, each channel counting alike."""
+        signal = [g.channels / g.noise_floor_nrmse**2 for g in (self, other)]
+
+        def together(name: str) -> float:
+            powers = (getattr(g, name) ** 2 * s for g, s in zip((self, other), signal, strict=True))
+            return math.sqrt(sum(powers) / sum(signal))
+
+        return Gain(
+            self.train_records + other.train_records,
+            self.held_out_records + other.held_out_records,
+            together("baseline_nrmse"),
+            together("extended_nrmse"),
+            together("noise_floor_nrmse"),
+            self.channels + other.channels,
+        )
 
     @property
     def explained(self) -> float | None:
@@ -123,6 +160,8 @@ class Diagnosis:
         next_measurement: what to measure to know more; None where there is nothing to ask.
         note: why, where it is not what `VERDICTS` says; empty otherwise.
         scores: every candidate's score, for the report: dicts with effect, target, numbers.
+        kinds: of a campaign with percussion and motion records, each kind's verdict and gain.
+        shared: of such a campaign, what both kinds say of the causes that both could show.
         details: anything else that the report shows; not part of the JSON contract.
     """
 
@@ -136,6 +175,8 @@ class Diagnosis:
     next_measurement: Mapping[str, Any] | None = None
     note: str = ""
     scores: tuple[Mapping[str, Any], ...] = ()
+    kinds: Mapping[str, Any] = field(default_factory=dict)
+    shared: tuple[Mapping[str, Any], ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:

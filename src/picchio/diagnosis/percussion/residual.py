@@ -149,7 +149,7 @@ def percussion_residual(
     fit = fit_growing(problem, Hypothesis.baseline(robot, campaign.tolerance))
     predictions = problem.predictions(fit.hypothesis.effects)
     return PercussionResidual(
-        problem, fit, whiteness_test(problem, fit.residuals), predictions,
+        problem, fit, whiteness_test(problem, fit), predictions,
         channel_residuals(problem, fit, predictions), spectra(problem, fit),
     )  # fmt: skip
 
