@@ -245,7 +245,7 @@ def test_what_all_sensors_have_alike_is_said_and_not_called_noise(case, capsys):
     assert "all of the leads together, none of which is claimed" in text(html)
     assert "they are not claimed" in text(html) and "force at the tool" in text(html)
     assert "helped a little" not in text(html)
-    show_diagnosis(diagnosis, None)
+    show_diagnosis(diagnosis)
     said = " ".join(capsys.readouterr().out.split())
     assert f"unexplained: {why}." in said
     assert "but is not claimed: sensor_gain of deflection" in said
