@@ -105,10 +105,10 @@ def test_explained_is_what_the_contract_says():
     ],
 )
 def test_bad_input_is_one_line_before_anything_is_done(tmp_path, capsys, monkeypatch, change, said):
-    def too_late(*_):
+    def too_late(*_, **__):
         raise AssertionError("diagnosed before all input was read")
 
-    monkeypatch.setattr("picchio.cli.diagnose._percussion", too_late)
+    monkeypatch.setattr("picchio.diagnosis.diagnose.diagnose_percussion", too_late)
     time = np.arange(-50, 200) * 1e-3
     record = picchio.campaign.Record.from_arrays(
         "r01.csv", time, {"deflection.joint_1": np.zeros(time.size)},

@@ -157,7 +157,9 @@ def diagnosis_page(
         )
     if "percussion" not in details:
         return moves
-    hits = replace(details["percussion"], diagnosis=found)
+    own = details["percussion"]
+    # Candidates are shown by each kind's own search.
+    hits = replace(own, diagnosis=replace(found, scores=own.diagnosis.scores))
     return diagnosis_report(
         hits,
         model_toml=text,
