@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from picchio.campaign.record import Record as Record
     from picchio.core.errors import InputError as InputError
     from picchio.core.errors import PicchioWarning as PicchioWarning
+    from picchio.diagnosis.diagnose import diagnose as diagnose
+    from picchio.diagnosis.identify import identify as identify
     from picchio.excitation.half_sine_train import HalfSineTrain as HalfSineTrain
     from picchio.excitation.measured import MeasuredForce as MeasuredForce
     from picchio.excitation.pulse_train import PulseTrain as PulseTrain
@@ -55,8 +57,10 @@ _HOME = {
     "annotate": "robot.loading.annotated",
     "assess": "studies.assessment.run",
     "check": "measurement.quality.report",
+    "diagnose": "diagnosis.diagnose",
     "envelope": "studies.envelopes",
     "fit_sn": "fatigue.sn.fit",
+    "identify": "diagnosis.identify",
     "import_record": "campaign.importing.importer",
     "place": "studies.placement.run",
     "report": "visuals.report.page",

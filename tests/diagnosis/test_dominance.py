@@ -5,15 +5,12 @@ from __future__ import annotations
 import pytest
 
 import picchio
-from picchio.diagnosis.percussion import diagnosis as diagnose
 from picchio.diagnosis.percussion.criteria.dominance import dominant_causes, explained_share
 from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.search.candidates import measure_scales
-from picchio.diagnosis.percussion.search.rounds import Look
-from picchio.diagnosis.percussion.search.select import Search
 from picchio.model.effects.registry import effect_class
 from worlds import campaign as worlds
 
@@ -48,9 +45,9 @@ def test_what_imitates_the_unknown_rest_is_not_claimed():
     alone = fit(problem, found.hypothesis.minus("hysteresis:joint_2"))
     # it helps a lot, and leaves much
     assert found.cost < alone.cost - 100.0
-    assert not whiteness_test(problem, found.residuals).is_noise
+    assert not whiteness_test(problem, found).is_noise
     assert 0.1 < explained_share(found, alone) < 0.9
-    stands = dominant_causes(problem, found, problem.records)
+    stands = dominant_causes(problem, found)
     assert stands.hypothesis.labels == {"joint_stiffness:joint_1"}
     (softer,) = stands.hypothesis.causes
     true = 0.7 * truth["nuisances"]["stiffness"]["joint_1"]
@@ -59,36 +56,18 @@ def test_what_imitates_the_unknown_rest_is_not_claimed():
 
 def test_causes_that_are_there_stay():
     problem, found, _ = fitted((SOFTER, TILTED, UNKNOWN), SOFTER, TILTED)
-    assert not whiteness_test(problem, found.residuals).is_noise
-    assert dominant_causes(problem, found, problem.records) is found
+    assert not whiteness_test(problem, found).is_noise
+    assert dominant_causes(problem, found) is found
 
 
 def test_where_noise_is_left_every_cause_explains_all():
     problem, found, _ = fitted((SOFTER, TILTED), SOFTER, TILTED)
-    assert whiteness_test(problem, found.residuals).is_noise
-    assert dominant_causes(problem, found, problem.records) is found
+    assert whiteness_test(problem, found).is_noise
+    assert dominant_causes(problem, found) is found
 
 
-def test_a_diagnosis_leaves_the_imitation_out(monkeypatch):
-    """Whatever the search ends with: here with a cause too many."""
-
-    def looked(problem, candidates, split, progress):
-        train, kept = split
-        start = Hypothesis.baseline(problem.robot, problem.campaign.tolerance)
-        baseline = fit_growing(problem, start, train)
-        known = baseline.hypothesis
-        for effect, target, values in (SOFTER, IMITATION):
-            known = known.plus(effect_class(effect)(target, **values))
-        effects = baseline.hypothesis.effects
-        scales = measure_scales(problem, effects, problem.predictions(effects))
-        return Look(
-            train, kept, baseline, scales, Search(baseline, fit_growing(problem, known, train))
-        )
-
-    monkeypatch.setattr(diagnose, "look", looked)
-    monkeypatch.setattr(diagnose, "alternatives", lambda *_: ([], []))
-    monkeypatch.setattr(diagnose, "next_measurement", lambda *_: None)
+def test_a_diagnosis_leaves_the_imitation_out():
     campaign, _ = made((SOFTER, UNKNOWN))
-    found = diagnose.diagnose_percussion(picchio.load_robot(ROBOT), campaign, workers=1)
+    found = diagnose_percussion(picchio.load_robot(ROBOT), campaign, workers=1)
     assert found.extended.hypothesis.labels == {"joint_stiffness:joint_1"}
     assert found.diagnosis.verdict in ("partial", "unexplained")

@@ -50,7 +50,7 @@ def test_a_null_of_another_simulator_leaves_noise(arm):
     campaign, truth = trial.make({**FEW, "kind": "null", "draw": 901})
     problem = Problem(arm, campaign)
     found = fit_growing(problem, Hypothesis.baseline(arm, campaign.tolerance))
-    evidence = whiteness_test(problem, found.residuals)
+    evidence = whiteness_test(problem, found)
     assert evidence.is_noise, (evidence.worst_band, evidence.worst_pose)
     assert evidence.chi_square == pytest.approx(1.0, abs=0.05)
     for effect in found.hypothesis.effects:
@@ -105,10 +105,10 @@ def test_explained_is_what_the_contract_says():
     ],
 )
 def test_bad_input_is_one_line_before_anything_is_done(tmp_path, capsys, monkeypatch, change, said):
-    def too_late(*_):
+    def too_late(*_, **__):
         raise AssertionError("diagnosed before all input was read")
 
-    monkeypatch.setattr("picchio.cli.diagnose._percussion", too_late)
+    monkeypatch.setattr("picchio.diagnosis.diagnose.diagnose_percussion", too_late)
     time = np.arange(-50, 200) * 1e-3
     record = picchio.campaign.Record.from_arrays(
         "r01.csv", time, {"deflection.joint_1": np.zeros(time.size)},

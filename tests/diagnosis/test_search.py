@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import permutations
-from types import SimpleNamespace
+from dataclasses import replace
 
 import follow_up
 import pytest
@@ -18,14 +17,13 @@ from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.search import exchange as exchange_module
-from picchio.diagnosis.percussion.search import select
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.search.exchange import exchange, prune
 from picchio.diagnosis.percussion.search.restart import restarted
 from picchio.diagnosis.percussion.search.screen import Suspect, acts_either_way, smallest
+from picchio.diagnosis.percussion.search.select import _chosen, alternatives, run_search
+from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.diagnosis.percussion.search.trials import (
-    Trial,
     _short_list,
     fit_short,
     holdout_choice,
@@ -67,62 +65,67 @@ def plain_problem(arm):
     return Problem(arm, campaign)
 
 
+def search_of(problem, baseline, *, kept=(), best=None, candidates=(), steps=()):
+    """A search of all records of a problem that has come so far."""
+    effects = baseline.hypothesis.effects
+    scales = measure_scales(problem, effects, problem.predictions(effects))
+    records = [r for r in problem.records if r not in kept]
+    return Search(
+        problem, candidates, scales, records, kept, baseline, best or baseline, steps=list(steps)
+    )
+
+
+def trial_with(problem, baseline, effect, target, **values):
+    """A cause fitted beside the nuisances."""
+    cause = effect_class(effect)(target, **values)
+    found = fit_growing(problem, baseline.hypothesis.plus(cause), baseline.records)
+    return Trial(cause.label, found, bic(found), 0.0)
+
+
 @pytest.fixture(scope="module")
 def two_causes(arm):
     """Two causes in the data; one of them is known, the other was taken for hysteresis."""
     campaign, _ = worlds.make(robot=ROBOT, seed=12, causes=TRUE, sensors=SENSORS, records=3)
     problem = Problem(arm, campaign)
-    start = Hypothesis.baseline(arm, campaign.tolerance)
-    baseline = fit_growing(problem, start)
-
-    def trial_of(name, **values):
-        known = baseline.hypothesis.plus(effect_class(name)("joint_1", **values))
-        found = fit_growing(problem, known)
-        return Trial(f"{name}:joint_1", found, bic(found), 0.0)
-
-    wrong = trial_of("hysteresis", torque=20.0, deflection=2e-4)
-    right = trial_of("joint_stiffness", scale=1.3)
+    baseline = fit_growing(problem, Hypothesis.baseline(arm, campaign.tolerance))
+    wrong = trial_with(problem, baseline, "hysteresis", "joint_1", torque=20.0, deflection=2e-4)
+    right = trial_with(problem, baseline, "joint_stiffness", "joint_1", scale=1.3)
     both = wrong.fit.hypothesis.plus(effect_class("force_amplitude")("tool", scale=0.8))
-    best = fit(problem, both, iterations=6)
-    return problem, wrong, right, best
+    return problem, baseline, wrong, right, fit(problem, both, iterations=6)
 
 
 def test_a_rival_replaces_what_was_chosen_too_early(two_causes):
-    problem, wrong, right, best = two_causes
+    problem, baseline, wrong, right, best = two_causes
     later = Trial("force_amplitude:tool", best, bic(best), 0.0)
-    better = exchange(problem, best, [[wrong, right], [later]], problem.records, 8.0)
+    search = search_of(problem, baseline, best=best, steps=[[wrong, right], [later]])
+    better = exchange(search)
     assert better.hypothesis.labels == {"joint_stiffness:joint_1", "force_amplitude:tool"}
     assert better.chi_square / better.samples < 1.1 < best.chi_square / best.samples
 
 
 def test_what_is_right_is_not_replaced(two_causes):
-    problem, wrong, right, _ = two_causes
+    problem, baseline, wrong, right, _ = two_causes
     both = right.fit.hypothesis.plus(effect_class("force_amplitude")("tool", scale=0.8))
     best = fit(problem, both, iterations=6)
     later = Trial("force_amplitude:tool", best, bic(best), 0.0)
-    assert exchange(problem, best, [[right, wrong], [later]], problem.records, 8.0) is best
+    search = search_of(problem, baseline, best=best, steps=[[right, wrong], [later]])
+    assert exchange(search) is best
 
 
-@pytest.mark.parametrize("order", list(permutations("abc")))
-def test_the_idlest_cause_goes_first_in_whatever_order_they_stand(order, monkeypatch):
-    """Either `a` or `b` will do; without `b` it is better."""
-    scores = {"abc": 100.0, "bc": 104.0, "ac": 101.0, "ab": 300.0}
-    scores |= {"a": 500.0, "b": 450.0, "c": 400.0, "": 900.0}
-
-    def of(names):
-        hypothesis = SimpleNamespace(
-            causes=[SimpleNamespace(label=name) for name in names],
-            minus=lambda name: of([other for other in names if other != name]).hypothesis,
-        )
-        return SimpleNamespace(hypothesis=hypothesis, score=scores["".join(sorted(names))])
-
-    def refitted(problem, hypothesis, *_, **__):
-        return of([cause.label for cause in hypothesis.causes])
-
-    monkeypatch.setattr(exchange_module, "fit", refitted)
-    monkeypatch.setattr(exchange_module, "score", lambda found: found.score)
-    left = prune(None, of(order), (), 8.0)
-    assert {cause.label for cause in left.hypothesis.causes} == {"a", "c"}
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0)])
+def test_causes_that_do_nothing_are_taken_out_in_whatever_order_they_stand(order, two_causes):
+    problem, baseline, _, right, _ = two_causes
+    causes = [
+        right.fit.hypothesis.causes[0],
+        effect_class("force_amplitude")("tool", scale=0.8),
+        effect_class("joint_damping")("joint_3", damping=1e-3),
+    ]
+    hypothesis = baseline.hypothesis
+    for number in order:
+        hypothesis = hypothesis.plus(causes[number])
+    search = search_of(problem, baseline, best=fit(problem, hypothesis, iterations=6))
+    left = prune(search, search.best)
+    assert left.hypothesis.labels == {"joint_stiffness:joint_1", "force_amplitude:tool"}
 
 
 @pytest.mark.parametrize("seed", [3, 5])
@@ -135,17 +138,12 @@ def test_rivals_are_compared_over_the_same_samples(seed, arm):
     problem = Problem(arm, campaign)
     baseline = fit_growing(problem, Hypothesis.baseline(arm, campaign.tolerance))
 
-    def trial_of(name, target, **values):
-        cause = effect_class(name)(target, **values)
-        found = fit_growing(problem, baseline.hypothesis.plus(cause))
-        return Trial(cause.label, found, bic(found), 0.0)
-
     trials = [
-        trial_of("clock_drift", SENSORS[0], rate=-0.0043),
-        trial_of("pulse_rate", "tool", scale=1.0043),
+        trial_with(problem, baseline, "clock_drift", SENSORS[0], rate=-0.0043),
+        trial_with(problem, baseline, "pulse_rate", "tool", scale=1.0043),
     ]
     trials.sort(key=lambda t: t.score)
-    again = over_the_same_samples(problem, trials, problem.records)
+    again = over_the_same_samples(search_of(problem, baseline), trials)
     assert [t.score for t in again] == sorted(t.score for t in again)
     assert abs(again[0].score - again[1].score) < SAME
     rate = next(t for t in again if t.label == "pulse_rate:tool").fit.hypothesis.causes[0]
@@ -170,39 +168,46 @@ def test_late_blows_and_what_is_common_are_found_at_once(arm):
         assert max(abs(a - b) for a, b in zip(cause.hidden[record.name], late, strict=True)) < 1e-4
 
 
-@pytest.mark.parametrize("holds", [True, False])
-def test_what_replaces_a_cause_must_hold_on_poses_held_out(holds, two_causes, arm, monkeypatch):
-    """Trials and replacement are given; what is tested is who has the last word."""
-    problem, wrong, right, best = two_causes
-    better = exchange(
-        problem, best, [[wrong, right], [Trial("", best, 0.0, 0.0)]], problem.records, 8.0
+def test_what_replaces_a_cause_must_hold_on_poses_held_out(two_causes):
+    """The records held out have the last word, for what is right and for what is not."""
+    problem, baseline, wrong, right, best = two_causes
+    kept = problem.records[-1:]
+    search = search_of(problem, baseline, kept=kept, best=wrong.fit)
+    assert search.confirmed(best)  # a second cause that is there
+    assert search.held_out_gain(wrong.fit, right.fit) == pytest.approx(
+        sum(float((r * r).sum()) for r in problem.residuals(wrong.fit.hypothesis.effects, kept))
+        - sum(float((r * r).sum()) for r in problem.residuals(right.fit.hypothesis.effects, kept))
     )
-    rounds = iter([[wrong], [Trial("force_amplitude:tool", best, bic(best), 0.0)], [], []])
-    monkeypatch.setattr(select, "try_candidates", lambda *_, **__: next(rounds))
-    monkeypatch.setattr(select, "prune", lambda problem, found, *_, **__: found)
-    monkeypatch.setattr(select, "unstuck", lambda problem, best, *_: best)
-    monkeypatch.setattr(select, "exchange", lambda *_: better)
-    monkeypatch.setattr(select, "replaced", lambda problem, best, *_: best)
-    start = fit(problem, Hypothesis.baseline(arm, problem.campaign.tolerance))
-    found = select.search(
-        problem, [], None, problem.records, start,
-        lambda before, after: 9.0 if holds or after is not better else -9.0,
-    )  # fmt: skip
-    assert found.best is (better if holds else best)
+    search.best = best
+    assert not search.confirmed(wrong.fit)
+    hum = right.fit.hypothesis.plus(
+        effect_class("mains_hum")(SENSORS[0], amplitude=0.0, frequency=50.0)
+    )
+    assert search.held_out_gain(best, replace(right.fit, hypothesis=hum)) is None
 
 
-def test_what_has_nothing_to_do_beside_a_rival_is_taken_out(two_causes, arm, monkeypatch):
-    problem, wrong, right, best = two_causes
-    idle = effect_class("joint_damping")("joint_3", damping=1e-3)
-    force = effect_class("force_amplitude")("tool", scale=0.8)
-    three = fit(problem, right.fit.hypothesis.plus(force).plus(idle), iterations=4)
-    rounds = iter([[wrong], [Trial("force_amplitude:tool", best, bic(best), 0.0)], []])
-    monkeypatch.setattr(select, "try_candidates", lambda *_, **__: next(rounds))
-    monkeypatch.setattr(select, "unstuck", lambda problem, best, *_: best)
-    monkeypatch.setattr(select, "exchange", lambda *_: three)
-    start = fit(problem, Hypothesis.baseline(arm, problem.campaign.tolerance))
-    found = select.search(problem, [], None, problem.records, start)
-    assert found.best.hypothesis.labels == {"joint_stiffness:joint_1", "force_amplitude:tool"}
+def test_a_search_finds_both_causes_though_the_first_hides_the_second(two_causes):
+    """From the nuisances alone, with the two and what imitates them as candidates."""
+    problem, baseline, *_ = two_causes
+    names = ("joint_stiffness", "force_amplitude", "hysteresis", "joint_damping")
+    candidates = [c for c in all_candidates(problem) if c[0].name in names]
+    search = search_of(problem, baseline, candidates=candidates)
+    run_search(search)
+    assert search.labels == {"joint_stiffness:joint_1", "force_amplitude:tool"}
+    assert search.leaves_noise(search.best)
+    same, tried = alternatives(search)
+    assert not same
+    assert all(t.finished(search.records) for t in tried)
+
+
+def test_a_search_that_starts_with_the_wrong_cause_ends_with_the_right_ones(two_causes):
+    """What other records tell may be wrong here: it is taken out again."""
+    problem, baseline, wrong, *_ = two_causes
+    names = ("joint_stiffness", "force_amplitude", "hysteresis")
+    candidates = [c for c in all_candidates(problem) if c[0].name in names]
+    search = search_of(problem, baseline, best=wrong.fit, candidates=candidates)
+    run_search(search)
+    assert search.labels == {"joint_stiffness:joint_1", "force_amplitude:tool"}
 
 
 def test_swapped_axes_are_fitted_with_their_own_slopes(arm):
@@ -223,26 +228,23 @@ def test_swapped_axes_are_fitted_with_their_own_slopes(arm):
     assert found.chi_square / found.samples < 1.1
 
 
-def test_where_poses_held_out_refute_the_best_the_search_goes_wider(two_causes, arm, monkeypatch):
-    """The right cause had not been among the suspects that were fitted."""
-    problem, wrong, right, _ = two_causes
-    asked = []
-
-    def tried(*_, wide=False, **__):
-        asked.append(wide)
-        return [[wrong], [wrong, right], []][len(asked) - 1]
-
-    monkeypatch.setattr(select, "try_candidates", tried)
-    monkeypatch.setattr(select, "prune", lambda problem, found, *_, **__: found)
-    monkeypatch.setattr(select, "unstuck", lambda problem, best, *_: best)
-    start = fit(problem, Hypothesis.baseline(arm, problem.campaign.tolerance))
-    found = select.search(
-        problem, [], None, problem.records, start,
-        lambda before, after: -9.0 if after is wrong.fit else 9.0,
-    )  # fmt: skip
-    assert asked == [False, True, False]
-    assert found.best is right.fit
-    assert found.steps[0][0] is right
+def test_where_poses_held_out_refute_the_best_the_search_goes_wider(two_causes):
+    """The right size had not been among those that were fitted."""
+    problem, baseline, _, right, _ = two_causes
+    candidates = [
+        c for c in all_candidates(problem)
+        if c[0].name in ("joint_stiffness", "hysteresis") and c[1] == "joint_1"
+    ]  # fmt: skip
+    search = search_of(problem, baseline, kept=problem.records[-1:], candidates=candidates)
+    (softer,) = (e.with_values(scale=0.6) for e in right.fit.hypothesis.causes)
+    far = replace(right.fit, hypothesis=baseline.hypothesis.plus(softer))
+    refuted = replace(right, fit=far)
+    assert _chosen(search, [refuted], wider=False) is None
+    trials = [refuted]
+    chosen = _chosen(search, trials, wider=True)
+    assert chosen.label == right.label and chosen is not refuted
+    assert search.confirmed(chosen.fit)
+    assert len(trials) > 1
 
 
 def test_of_faint_trials_that_would_become_one_the_smallest_is_tried():
@@ -321,11 +323,9 @@ def test_a_contact_that_a_fit_holds_shut_for_ever_is_opened_again(arm):
         "tool", stiffness=9e4, damping=300.0, preload=1000.0
     )  # fmt: skip
     held = fit(problem, baseline.hypothesis.plus(shut), iterations=8)
-    assert not whiteness_test(problem, held.residuals).is_noise
-    effects = held.hypothesis.effects
-    scales = measure_scales(problem, effects, problem.predictions(effects))
-    opened = restarted(problem, held, scales, problem.records)
-    assert whiteness_test(problem, opened.residuals).is_noise
+    assert not whiteness_test(problem, held).is_noise
+    opened = restarted(search_of(problem, baseline), held)
+    assert whiteness_test(problem, opened).is_noise
     (found,) = opened.hypothesis.causes
     assert found.values["preload"] == pytest.approx(34.0, rel=0.02)
 
@@ -347,21 +347,11 @@ def test_what_explains_exactly_as_much_as_one_of_the_best_is_fitted_as_well():
     assert len(_short_list(ranked, 2)) == 2
 
 
-def test_what_was_fitted_to_a_part_of_the_records_is_no_alternative(monkeypatch):
+def test_what_was_fitted_to_a_part_of_the_records_is_no_alternative(two_causes):
     """Of few samples chi-square is small: by that alone it once came before what is right."""
-
-    def trial_of(label, records, end):
-        hypothesis = SimpleNamespace(
-            labels=frozenset([label]), causes=(SimpleNamespace(label=label),)
-        )
-        fitted = SimpleNamespace(hypothesis=hypothesis, records=records, end=end)
-        return Trial(label, fitted, 0.0, 1.0)
-
-    records = (object(), object())
-    right = trial_of("payload:tool", records, None)
-    part = trial_of("link_mass:link_3", records[:1], 0.3)
-    rival = trial_of("joint_inertia:joint_3", records, None)
-    found = SimpleNamespace(best=right.fit, steps=[[right, part, rival]])
-    monkeypatch.setattr(select, "behind", lambda problem, best, other, records: -1.0)
-    same, tried = select.alternatives(None, found, [], None, records)
-    assert same == tried == [rival]
+    problem, baseline, wrong, right, _ = two_causes
+    part = fit_growing(problem, wrong.fit.hypothesis, problem.records[:1], windows=(0.06,))
+    short = Trial("hysteresis:joint_1", part, bic(part), 0.0)
+    assert short.score < right.score and not short.finished(problem.records)
+    search = search_of(problem, baseline, best=right.fit, steps=[[right, short]])
+    assert alternatives(search) == ([], [])

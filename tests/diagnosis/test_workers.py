@@ -1,5 +1,6 @@
 """Work shared among processes: the same results to the last bit, whatever happens to them."""
 
+import json
 import os
 import signal
 import subprocess
@@ -18,6 +19,7 @@ from picchio.diagnosis.percussion.fit.parallel_records import parallel_records
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.fit.workers import Workers
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
+from picchio.diagnosis.percussion.search.state import Search
 from picchio.diagnosis.percussion.search.trials import try_candidates
 from picchio.model.effects.registry import effect_class
 
@@ -55,10 +57,10 @@ def test_workers_change_nothing(campaign):
                 problem, base.hypothesis.effects, problem.predictions(base.hypothesis.effects)
             )
             some = [c for c in all_candidates(problem) if c[0].name in names]
+            search = Search(problem, some, scales, problem.records, (), base, base)
             promises = []
-            trials = try_candidates(
-                problem, base.hypothesis, some, scales, problem.records, log=promises.append
-            )
+            search.log = promises.append
+            trials = try_candidates(search, base.hypothesis)
         assert all(t.fit.records for t in trials)
         found.append((promises, [(t.label, t.score, t.fit.hypothesis) for t in trials]))
     assert found[0] == found[1]
@@ -188,6 +190,7 @@ def test_one_process_loads_when_it_needs():
 
 
 ANSWER = """
+import json
 import sys
 sys.path[:0] = {folders!r}
 import picchio, trial
@@ -196,7 +199,7 @@ from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 if __name__ == "__main__":
     campaign, _ = trial.make({case!r})
     found = diagnose_percussion(picchio.load_robot({arm!r}), campaign, workers={workers})
-    print(found.diagnosis)
+    print(json.dumps(found.diagnosis.to_dict()))
 """
 
 
@@ -216,5 +219,5 @@ def test_the_same_data_get_the_same_answer():
         )  # fmt: skip
         assert not told.returncode, told.stderr
         answers.append(told.stdout)
-    assert answers[0].startswith("Diagnosis(verdict=")
+    assert json.loads(answers[0])["format"] == "picchio-diagnosis/1"
     assert len(set(answers)) == 1

@@ -24,8 +24,7 @@ from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import measure_scales
-from picchio.diagnosis.percussion.search.select import Search
-from picchio.diagnosis.percussion.search.trials import Trial
+from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.diagnosis.result import Cause, Diagnosis, Value
 from picchio.model.effects.registry import effect_class
 from picchio.robot.loading.load import load_robot
@@ -83,12 +82,14 @@ def case(repository):
         gain=holdout_gain(problem, baseline.hypothesis, best.hypothesis, train, kept),
         scores=tuple(rows),
     )
+    effects = nominal.hypothesis.effects
+    search = Search(
+        problem, (), measure_scales(problem, effects, problem.predictions(effects)), train, kept,
+        baseline, best, steps=[[Trial("payload:tool", best, bic(best), 1.0)]],
+    )  # fmt: skip
     found = PercussionDiagnosis(
-        diagnosis, problem, nominal, whole,
-        Search(baseline, best, [[Trial("payload:tool", best, bic(best), 1.0)]]),
-        whiteness_test(problem, nominal.residuals), whiteness_test(problem, whole.residuals),
-        measure_scales(problem, nominal.hypothesis.effects,
-                       problem.predictions(nominal.hypothesis.effects)),
+        diagnosis, problem, nominal, whole, search,
+        whiteness_test(problem, nominal), whiteness_test(problem, whole),
     )  # fmt: skip
     return SimpleNamespace(found=found, robot=robot, campaign=campaign, mass=mass)
 
@@ -245,7 +246,7 @@ def test_what_all_sensors_have_alike_is_said_and_not_called_noise(case, capsys):
     assert "all of the leads together, none of which is claimed" in text(html)
     assert "they are not claimed" in text(html) and "force at the tool" in text(html)
     assert "helped a little" not in text(html)
-    show_diagnosis(diagnosis, None)
+    show_diagnosis(diagnosis)
     said = " ".join(capsys.readouterr().out.split())
     assert f"unexplained: {why}." in said
     assert "but is not claimed: sensor_gain of deflection" in said

@@ -5,30 +5,28 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from picchio.cli.options import FlexOption, JsonOption, RobotArgument, ToolOption
-from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
-    from picchio.campaign.campaign import Campaign
-    from picchio.diagnosis.motion.conclude.during_blows import BlowEffects, MotionLife
-    from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
     from picchio.diagnosis.result import Diagnosis
-    from picchio.model.effects.effect import Effect
-    from picchio.robot.flexible_robot import FlexibleRobot
 
 
-# What `picchio diagnose` prints.
+# What is said of a cause that percussion and motion records could both show.
+_STATUS = {
+    "both": "percussion and motion records agree",
+    "percussion": "by the percussion records; the motion records cannot see it",
+    "motion": "by the motion records; the percussion records cannot see it",
+    "drive": "by the motion records; it acts in the drive, which stands still while the tool hits",
+}
 
 
-def show_diagnosis(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
+def show_diagnosis(found: Diagnosis) -> None:
     """Print verdict, causes, gain, life and what to measure next."""
     from rich.table import Table
 
@@ -72,16 +70,20 @@ def show_diagnosis(found: Diagnosis, life: Mapping[str, Any] | None) -> None:
             f"{100 * gain.baseline_nrmse:.3g} % to {100 * gain.extended_nrmse:.3g} % of the "
             f"signal; noise alone is {100 * gain.noise_floor_nrmse:.3g} %{share}."
         )
+    for told in found.shared:
+        if told["status"] in _STATUS:
+            out.print(f"  {told['effect']} of {told['target']}: {_STATUS[told['status']]}")
+    life = found.life
     if life is not None:
         _show_life(life)
         others = life.get("alternatives") or ()
         for pairs, other in zip(found.alternatives, others, strict=False):
             names = " and ".join(f"{effect} of {target}" for effect, target in pairs)
-            told = other.get("why") or (
+            instead = other.get("why") or (
                 f"rivets {format_count(other['rivets_to_failure'])}, "
                 f"utilisation {100 * other['utilisation']:.4g} %"
             )
-            out.print(f"  with {names} instead: {told}")
+            out.print(f"  with {names} instead: {instead}")
         if others:
             out.print("  until the sets are told apart, only the worst of these may be promised")
         elif found.alternatives:
@@ -139,94 +141,6 @@ def _show_life(life: Mapping[str, Any]) -> None:
         )
 
 
-# What `picchio diagnose` does with motion records.
-
-
-@dataclass(frozen=True)
-class MotionAnswer:
-    """A diagnosis of motion records, and what it says of blows.
-
-    Attributes:
-        diagnosis: the answer.
-        carried: which causes act while the tool hits.
-        life: what they do to the task's life.
-    """
-
-    diagnosis: Diagnosis
-    carried: BlowEffects
-    life: MotionLife
-
-    @property
-    def notes(self) -> str:
-        """What a model's file says of causes that it does not hold."""
-        head = "found by picchio diagnose in motion records"
-        why: dict[str, list[str]] = {}
-        for effect, reason in self.carried.left:
-            names = why.setdefault(reason, [])
-            name = f"{effect.name} of {effect.target}"
-            if name not in names:
-                names.append(name)
-        said = [f"{', '.join(names)}: {reason}" for reason, names in why.items()]
-        return f"{head}; found as well, and not in this model: {'; '.join(said)}" if said else head
-
-    def extra(self) -> dict[str, Any]:
-        """Keys that JSON has beside the contract's."""
-        blows = {side: dict(joints) for side, joints in self.life.blows.items()}
-        return {"life_note": self.life.why, "blows": blows or None}
-
-    def page(
-        self, campaign: Campaign, model_toml: str, command: str, warnings: Sequence[str]
-    ) -> str:
-        """The report."""
-        from picchio.visuals.report.motion_diagnosis import motion_diagnosis_report
-
-        return motion_diagnosis_report(
-            self.diagnosis,
-            life=self.life,
-            carried=self.carried,
-            model_toml=model_toml if self.diagnosis.causes else "",
-            command=command,
-            folder=None if campaign.folder is None else campaign.folder.name,
-            warnings=warnings,
-        )
-
-
-def diagnose_motion_records(
-    robot: FlexibleRobot, campaign: Campaign, without: Sequence[str], task: Path | None
-) -> MotionAnswer:
-    """Diagnose, and follow the task's blows before and after.
-
-    Args:
-        robot: the nominal robot.
-        campaign: its motion records.
-        without: effects that must not be considered.
-        task: for the life; the robot's own if None.
-
-    Raises:
-        InputError: as `diagnose_motion`; a bad task that was asked for.
-    """
-    from picchio.cli.output import progress
-    from picchio.diagnosis.motion.conclude.during_blows import (
-        MotionLife,
-        effects_during_blows,
-        motion_life,
-    )
-    from picchio.diagnosis.motion.diagnosis import diagnose_motion
-    from picchio.studies.tasks import load_task
-
-    with progress("diagnosis") as report:
-        found = diagnose_motion(robot, campaign, without=without, progress=report)
-    path = task or robot.task_path
-    try:
-        work = load_task(path, robot) if path is not None else None
-        life = motion_life(robot, work, found)
-    except InputError as error:
-        if task is not None:
-            raise
-        life = MotionLife(None, f"the life could not be computed: {error}")
-    return MotionAnswer(found, effects_during_blows(found), life)
-
-
 EPILOG = "Example: picchio diagnose fanuc_like_3dof --data measurements/ --report why.html"
 
 
@@ -279,152 +193,48 @@ def diagnose(
     against every effect picchio knows; whole poses are held out to judge the gain. What cannot
     be known is said, and what to measure to know it.
     """
-    from picchio.campaign.campaign import load_campaign
-    from picchio.cli.output import check_target, console, said_warnings, write_json
+    import picchio
+    from picchio.cli.output import check_target, console, said_warnings, telling, write_json
     from picchio.core.files import atomic_write
-    from picchio.core.provenance import provenance
     from picchio.model.effects.registry import effect_class
-    from picchio.robot.loading.load import load_robot
-    from picchio.studies.tasks import load_task
 
-    for target in (json, report, model, plan):
+    outputs = (json, report, model, plan)
+    for target in outputs:
         check_target(target, [robot, flex, task])
     for name in without or ():
         effect_class(name)
-    campaign = load_campaign(data)
-    kinds = {record.kind for record in campaign}
-    # What a drive's torque tells needs no stiffness.
-    loaded = load_robot(robot, flex=flex, tool=tool, allow_rigid=kinds == {"motion"})
-    for target in (json, report, model, plan):
+    campaign = picchio.load_campaign(data)
+    moves = {record.kind for record in campaign} == {"motion"}
+    loaded = picchio.load_robot(robot, flex=flex, tool=tool, allow_rigid=moves)
+    for target in outputs:
         check_target(target, [*loaded.files, *campaign.files])
-    if task is not None:
-        load_task(task, loaded)  # what is wrong with it is told now, not minutes later
-    percussion: PercussionDiagnosis | None = None
-    motion: MotionAnswer | None = None
-    if kinds == {"motion"}:
-        motion = diagnose_motion_records(loaded, campaign, without or (), task)
-        found, effects, notes = motion.diagnosis, motion.carried.effects, motion.notes
-        life = motion.life.life
-    else:
-        with _telling() as say:
-            percussion = _percussion(loaded, campaign, without or (), gravity_stiffness, say)
-        found, effects = percussion.diagnosis, percussion.extended.hypothesis.effects
-        life, notes = _life(loaded, task, percussion), "found by picchio diagnose"
-    text = _model_text(robot, flex, tool, effects, model, [*loaded.files, *campaign.files], notes)
-    content = found.to_dict() | {"life": life} | (motion.extra() if motion is not None else {})
-    content["scores"] = [dict(row) for row in found.scores]
-    content["provenance"] = provenance([*loaded.files, *campaign.files])
+    with telling() as say:
+        found = picchio.diagnose(
+            robot,
+            campaign,
+            task=task,
+            without=without or (),
+            flex=flex,
+            tool=tool,
+            gravity_stiffness=gravity_stiffness,
+            progress=say,
+        )
     if model is not None:
         with atomic_write(model) as stream:
-            stream.write(text)
+            stream.write(found.model_text(model.parent))
     if report is not None:
         command = " ".join(["picchio", *map(shlex.quote, sys.argv[1:])])
-        if motion is not None:
-            page = motion.page(campaign, text, command, said_warnings())
-        else:
-            assert percussion is not None
-            page = _page(percussion, text, command, life)
-        with atomic_write(report) as stream:
-            stream.write(page)
-    asked = (found.next_measurement or {}).get("plan")
-    if plan is not None and asked is not None:
+        folder = model.parent if model is not None else None
+        page = picchio.report(found, command=command, warnings=said_warnings(), folder=folder)
+        page.save(report)
+    if plan is not None and found.plan is not None:
         with atomic_write(plan) as stream:
-            stream.write(asked)
+            stream.write(found.plan)
     if json is not None:
-        write_json(content, json)
+        write_json(found.to_dict(), json)
     if json != "-":
-        show_diagnosis(found, life)
-        if motion is not None:
-            console().print(f"Life: {motion.life.why}.")
-        if plan is not None and asked is None:
+        show_diagnosis(found)
+        if found.life_note:
+            console().print(f"Life: {found.life_note}.")
+        if plan is not None and found.plan is None:
             console().print(f"Nothing to measure next that a plan could say: {plan} not written.")
-
-
-def _page(
-    percussion: PercussionDiagnosis, text: str, command: str, life: Mapping[str, Any] | None
-) -> str:
-    from picchio.cli.output import said_warnings
-    from picchio.visuals.report.diagnosis import diagnosis_report
-    from picchio.visuals.scene.diagnosed import diagnosis_scene
-
-    return diagnosis_report(
-        percussion,
-        model_toml=text,
-        command=command,
-        life=life,
-        warnings=said_warnings(),
-        scene=diagnosis_scene(percussion).html(),
-    )
-
-
-def _percussion(
-    robot: FlexibleRobot,
-    campaign: Campaign,
-    without: list[str] | tuple[str, ...],
-    gravity_stiffness: bool,
-    say: Callable[[str], None],
-) -> PercussionDiagnosis:
-    from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
-
-    return diagnose_percussion(
-        robot, campaign, without=without, gravity_stiffness=gravity_stiffness, progress=say
-    )
-
-
-@contextmanager
-def _telling() -> Iterator[Callable[[str], None]]:
-    """What is being done, on stderr, where that is a terminal."""
-    if not sys.stderr.isatty():
-        yield lambda text: None
-        return
-    from rich.console import Console
-
-    with Console(stderr=True).status("") as status:
-        yield status.update
-
-
-def _life(
-    robot: FlexibleRobot, task: Path | None, percussion: PercussionDiagnosis
-) -> dict[str, Any] | None:
-    """Life before and after; None where there is no task or nothing was found."""
-    from picchio.cli.output import say_warning
-    from picchio.diagnosis.life import NO_SHAFT
-    from picchio.studies.tasks import load_task
-
-    path = task or robot.task_path
-    if not any(j.shaft is not None or j.reducer is not None for j in robot.flexible_joints):
-        if task is not None:
-            say_warning(NO_SHAFT)
-        return None
-    if path is None or percussion.diagnosis.verdict in ("nothing-wrong", "unexplained"):
-        return None
-    try:
-        return percussion.life(load_task(path, robot))
-    except InputError as error:  # what took minutes to find is told all the same
-        say_warning(f"the life could not be computed: {error}")
-        return None
-
-
-def _model_text(
-    robot: str,
-    flex: Path | None,
-    tool: str | None,
-    effects: tuple[Effect, ...],
-    model: Path | None,
-    files: list[Path],
-    notes: str,
-) -> str:
-    from picchio.core.provenance import provenance
-    from picchio.robot.loading.saved_model import saved_model_text
-
-    tables = [e.to_dict() for e in effects if e.values != type(e)(e.target).values or e.hidden]
-    stamp = provenance(files)
-    return saved_model_text(
-        robot,
-        tables,
-        flex=flex,
-        tool=tool,
-        folder=model.parent if model is not None else None,
-        notes=notes,
-        provenance={"picchio": str(stamp.get("picchio", stamp.get("version", "")))},
-    )

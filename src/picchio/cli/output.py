@@ -134,3 +134,15 @@ def progress(description: str) -> Iterator[Callable[[int, int], None]]:
         patience.cancel()
         patience.join()
         bar.stop()
+
+
+@contextmanager
+def telling() -> Iterator[Callable[[str], None]]:
+    """What is being done, on stderr, where that is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda text: None
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status("") as status:
+        yield status.update

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
+
+from picchio.core.errors import InputError
+from picchio.core.results import Result
+from picchio.model.effects.effect import Effect
+from picchio.model.model import Model
+from picchio.robot.loading.saved_model import saved_model_text
 
 # What percussion and motion records are judged by alike.
 
@@ -71,6 +79,21 @@ class Cause:
 
 
 @dataclass(frozen=True)
+class Estimate:
+    """A cause as one kind of records has it, for the other kind to start from.
+
+    Attributes:
+        effect: at the values that were found.
+        std: parameter -> standard deviation, SI.
+        values: what is told of it, quantities that follow from its parameters included.
+    """
+
+    effect: Effect
+    std: Mapping[str, float]
+    values: Mapping[str, Value] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Gain:
     """How much better the extended model predicts records that it has not seen.
 
@@ -80,6 +103,7 @@ class Gain:
         baseline_nrmse: of the nominal model with its nuisances fitted.
         extended_nrmse: of the extended model.
         noise_floor_nrmse: what noise alone leaves.
+        channels: how many channels of records were judged, to put gains together by.
     """
 
     train_records: tuple[str, ...]
@@ -87,6 +111,24 @@ class Gain:
     baseline_nrmse: float
     extended_nrmse: float
     noise_floor_nrmse: float
+    channels: int = 0
+
+    def plus(self, other: Gain) -> Gain:
+        """On the records of both, each channel counting alike."""
+        signal = [g.channels / g.noise_floor_nrmse**2 for g in (self, other)]
+
+        def together(name: str) -> float:
+            powers = (getattr(g, name) ** 2 * s for g, s in zip((self, other), signal, strict=True))
+            return math.sqrt(sum(powers) / sum(signal))
+
+        return Gain(
+            self.train_records + other.train_records,
+            self.held_out_records + other.held_out_records,
+            together("baseline_nrmse"),
+            together("extended_nrmse"),
+            together("noise_floor_nrmse"),
+            self.channels + other.channels,
+        )
 
     @property
     def explained(self) -> float | None:
@@ -108,8 +150,8 @@ class Gain:
         }
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, repr=False)
+class Diagnosis(Result):
     """The answer.
 
     Attributes:
@@ -120,11 +162,18 @@ class Diagnosis:
         nuisances: fitted values that are within tolerance: "stiffness.joint_1" -> value.
         gain: on held-out records; None where nothing was fitted.
         life: {"baseline": {...}, "extended": {...}}; None where it can't be known.
+        life_note: what the life takes into account, or why there is none; empty where it is plain.
         next_measurement: what to measure to know more; None where there is nothing to ask.
         note: why, where it is not what `VERDICTS` says; empty otherwise.
         scores: every candidate's score, for the report: dicts with effect, target, numbers.
+        kinds: of a campaign with percussion and motion records, each kind's verdict and gain.
+        shared: of such a campaign, what both kinds say of the causes that both could show.
+        model: the extended model; None where no whole diagnosis was asked for.
+        extra: more keys of the JSON.
         details: anything else that the report shows; not part of the JSON contract.
     """
+
+    PAGE = "visuals.report.diagnosis:diagnosis_page"
 
     verdict: Verdict
     causes: tuple[Cause, ...] = ()
@@ -133,14 +182,37 @@ class Diagnosis:
     nuisances: Mapping[str, Value] = field(default_factory=dict)
     gain: Gain | None = None
     life: Mapping[str, Any] | None = None
+    life_note: str = ""
     next_measurement: Mapping[str, Any] | None = None
     note: str = ""
     scores: tuple[Mapping[str, Any], ...] = ()
+    kinds: Mapping[str, Any] = field(default_factory=dict)
+    shared: tuple[Mapping[str, Any], ...] = ()
+    model: Model | None = None
+    extra: Mapping[str, Any] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
 
-    def to_dict(self) -> dict[str, Any]:
-        """As in JSON."""
+    @property
+    def plan(self) -> str | None:
+        """What to measure next as a `picchio-plan/1` file; None where no plan can say it."""
+        return (self.next_measurement or {}).get("plan")
+
+    def model_text(self, folder: Path | None = None) -> str:
+        """The extended model as a `picchio-model/1` file.
+
+        Args:
+            folder: where the file will stand; paths are written relative to it.
+
+        Raises:
+            InputError: a diagnosis that was not made by `picchio.diagnose`.
+        """
+        if "saved" not in self.details:
+            raise InputError("has no extended model", key="diagnosis", hint="use picchio.diagnose")
+        return saved_model_text(**self.details["saved"], folder=folder)
+
+    def _content(self) -> dict[str, Any]:
         named = lambda pair: {"effect": pair[0], "target": pair[1]}  # noqa: E731
+        more = {"records": self.kinds, "shared": self.shared} if self.kinds else {}
         return {
             "format": FORMAT,
             "verdict": self.verdict,
@@ -152,7 +224,34 @@ class Diagnosis:
             "life": self.life,
             "next_measurement": self.next_measurement,
             "note": self.note or None,
+            **more,
+            **({"life_note": self.life_note} if self.life_note else {}),
+            "scores": self.scores,
+            **self.extra,
         }
+
+    def _headline(self) -> str:
+        causes = " and ".join(f"{c.effect.replace('_', ' ')} of {c.target}" for c in self.causes)
+        text = self.verdict + (f", {causes}" if causes else "")
+        if self.gain is not None and self.gain.explained is not None and self.causes:
+            text += f"; {100.0 * self.gain.explained:.1f} % of the error explained"
+        return text
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        rows = [
+            (c.effect.replace("_", " "), c.target, c.confidence, name, v.value, v.std, v.unit)
+            for c in self.causes for name, v in c.parameters.items()
+        ]  # fmt: skip
+        columns = ("cause", "where", "confidence", "parameter", "value", "std", "unit")
+        facts = {
+            "alternatives": "; ".join(map(in_words, differences(self))) or None,
+            "leads": ", ".join(f"{e} of {t}" for e, t in self.leads) or None,
+            "measure next": (self.next_measurement or {}).get("why"),
+        }
+        text = self.note or VERDICTS[self.verdict]
+        return sheet(self._headline(), facts, columns if rows else (), rows, f"{text}.")
 
 
 # Other sets of causes, told by what they have in place of what.

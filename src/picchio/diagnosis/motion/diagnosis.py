@@ -21,9 +21,9 @@ from picchio.diagnosis.motion.fit.least_squares import Fit, fit
 from picchio.diagnosis.motion.fit.state import State
 from picchio.diagnosis.motion.follow_up.advice import next_measurement
 from picchio.diagnosis.motion.search.alternatives import alternatives
-from picchio.diagnosis.motion.search.candidates import motion_effects
+from picchio.diagnosis.motion.search.candidates import motion_effects, targets
 from picchio.diagnosis.motion.search.select import Step, eliminate, select
-from picchio.diagnosis.result import MOSTLY, Cause, Diagnosis, Gain, Verdict
+from picchio.diagnosis.result import MOSTLY, Cause, Diagnosis, Estimate, Gain, Verdict
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import catalogue as all_effects
 from picchio.prediction.motion.filters import choose_cutoff
@@ -44,6 +44,7 @@ def diagnose_motion(
     without: Collection[str] = (),
     train: Sequence[str] | None = None,
     held_out: Sequence[str] | None = None,
+    known: Sequence[Estimate] = (),
     cutoff: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Diagnosis:
@@ -61,6 +62,8 @@ def diagnose_motion(
         without: names of effects that must not be considered.
         train: files of the records to fit to; see `picchio.diagnosis.motion.data.split`.
         held_out: files of the records to judge on.
+        known: causes that other records tell; the search starts from them, and takes out those
+            that are not needed here.
         cutoff: Hz, of the band in which torques are compared; chosen from the encoders' noise
             where None.
         progress: told (step, steps).
@@ -88,7 +91,8 @@ def diagnose_motion(
     kinds = {n: k for n, k in motion_effects(catalogue).items() if n not in without}
     start = baseline(system, campaign.tolerance.force)
     before = fit(system, start)
-    found, steps = select(system, start, kinds, progress or (lambda done, total: None))
+    informed = _informed(system, start, known)
+    found, steps = select(system, informed, kinds, progress or (lambda done, total: None))
     dropped: list[tuple[Effect, dict[str, float]]] = []
     if outside:
         found, dropped = validate(system, judge_on, found)
@@ -96,6 +100,21 @@ def diagnose_motion(
         found = eliminate(system, found) if dropped else found
     found = fit(system, found.state)
     return _conclude(system, judge_on, before, found, kinds, steps, dropped)
+
+
+def refitted(diagnosis: Diagnosis, known: Sequence[Estimate]) -> Diagnosis:
+    """A diagnosis whose causes are fitted again, with what other records tell of their values."""
+    system, judge_on, before, kinds, steps, dropped = diagnosis.details["search"]
+    state = _informed(system, diagnosis.details["extended"], known)
+    return _conclude(system, judge_on, before, fit(system, state), kinds, steps, dropped)
+
+
+def _informed(system: System, state: State, known: Sequence[Estimate]) -> State:
+    """With those of the causes that may act in these records."""
+    for told in known:
+        if told.effect.target in targets(type(told.effect), system):
+            state = state.informed(told.effect, told.std)
+    return state
 
 
 def _moving(logs: Sequence[MotionLog]) -> list[Any]:
@@ -204,6 +223,7 @@ def _details(system: System, judge_on: System, before: Fit, found: Fit,
         "stiffness": _stiffness(system, found, causes),
         "instruments": instrument_shifts(system, found),
         "systems": {"train": system, "held_out": judge_on},
+        "search": (system, judge_on, before, kinds, steps, dropped),
         "baseline": before.state,
         "extended": found.state,
     }

@@ -6,10 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from picchio.campaign.campaign import Campaign
-from picchio.core.arrays import FloatArray
 from picchio.diagnosis.life import life_before_and_after
 from picchio.diagnosis.percussion.conclude.causes import (
     fitted_causes,
@@ -30,24 +27,27 @@ from picchio.diagnosis.percussion.criteria.bic import SAME, bic
 from picchio.diagnosis.percussion.criteria.common_fault import common_faults
 from picchio.diagnosis.percussion.criteria.dominance import dominant_causes
 from picchio.diagnosis.percussion.criteria.equivalence import bic_difference
+from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence
 from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
-from picchio.diagnosis.percussion.data.split import held_out
-from picchio.diagnosis.percussion.fit.drawn import hum_lines
-from picchio.diagnosis.percussion.fit.least_squares import Fit
+from picchio.diagnosis.percussion.data.split import Split, held_out
+from picchio.diagnosis.percussion.fit.drawn import hum_lines, refit
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.diagnosis.percussion.fit.parallel_records import parallel_records
-from picchio.diagnosis.percussion.fit.unknowns import TOLERATED, Hypothesis
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.follow_up.next_measurement import next_measurement
 from picchio.diagnosis.percussion.search.candidates import all_candidates
-from picchio.diagnosis.percussion.search.rounds import fit_evidence, look
-from picchio.diagnosis.percussion.search.select import LEAST_GAIN, Search, alternatives, refit
-from picchio.diagnosis.percussion.search.trials import Trial
+from picchio.diagnosis.percussion.search.select import (
+    alternatives,
+    begin_search,
+    run_search,
+    start_from,
+)
+from picchio.diagnosis.percussion.search.state import LEAST_GAIN, Search, Trial
 from picchio.diagnosis.percussion.search.warm_up import warm_up
-from picchio.diagnosis.result import Diagnosis
+from picchio.diagnosis.result import Diagnosis, Estimate
 from picchio.measurement.noise.level import Noise
 from picchio.model.effects.effect import Effect
-from picchio.model.effects.scales import Scales
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.tasks import Task
 
@@ -63,7 +63,6 @@ class PercussionDiagnosis:
         extended: with the causes, fitted to all records.
         search: the way there.
         before, after: tests of what the two leave.
-        scales: sizes in this campaign.
         others: models with the alternative sets, in the order of the diagnosis's.
     """
 
@@ -74,7 +73,6 @@ class PercussionDiagnosis:
     search: Search
     before: Evidence
     after: Evidence
-    scales: Scales
     others: tuple[Hypothesis, ...] = ()
 
     def life(self, task: Task) -> dict[str, Any]:
@@ -99,6 +97,7 @@ def diagnose_percussion(
     campaign: Campaign,
     *,
     without: Iterable[str] = (),
+    known: Sequence[Estimate] = (),
     noise: Mapping[str, Noise] | None = None,
     gravity_stiffness: bool = True,
     workers: int | None = None,
@@ -110,6 +109,7 @@ def diagnose_percussion(
         robot: as its files have it.
         campaign: the records; motion records are left out.
         without: names of effects that must not be considered.
+        known: causes that other records tell; the search starts from those that help here, too.
         noise: channel -> noise; estimated where None.
         gravity_stiffness: whether gravity's change with the deflection counts.
         workers: processes (Linux only); as many as cores where None. The result is the same.
@@ -124,54 +124,68 @@ def diagnose_percussion(
     candidates = all_candidates(problem, without)
     warm_up(problem, candidates)
     with parallel_records(problem):
-        return _diagnosed(problem, candidates, say)
+        return _concluded(*_searched(problem, candidates, known, say))
 
 
-def _diagnosed(
+def _searched(
     problem: Problem,
     candidates: Sequence[tuple[type[Effect], str]],
+    known: Sequence[Estimate],
     say: Callable[[str], None],
-) -> PercussionDiagnosis:
-    ways = held_out(problem)
-    looked = look(problem, candidates, ways[0], say)
-    nominal, before = looked.nominal(problem)
-    if looked.found.pinned and not looked.found.best.hypothesis.labels and not before.is_noise:
-        # Noise in the poses that were looked at, and more in all: they hide what is wrong.
-        say("looking at other poses")
-        again = [look(problem, candidates, way, say) for way in ways[1:]]
-        told = [other for other in again if other.found.best.hypothesis.labels]
-        looked = max(told, key=lambda other: other.gained, default=looked)
-    found, train, kept = looked.found, looked.train, looked.kept
-    baseline, scales = looked.baseline, looked.scales
-    say("fitting what was found to all records")
-    whole = nominal
-    if found.best.hypothesis.labels:
-        whole = refit(problem, found.best.hypothesis, problem.records)
-    after = fit_evidence(problem, whole)
-    if len(found.best.hypothesis.labels) > 1 and not after.is_noise:
-        say("looking which of the causes stand far above what is left")
-        stands = dominant_causes(problem, found.best, train)
-        if stands is not found.best:
-            found.best = stands
-            whole = refit(problem, stands.hypothesis, problem.records)
-            after = fit_evidence(problem, whole)
-    gain = holdout_gain(problem, baseline.hypothesis, found.best.hypothesis, train, kept)
-    same: list[Trial] = []
+) -> tuple[Search, Fit, Evidence]:
+    """The search of the usual records, or of others where those may hide what is wrong.
+
+    Beside it the nuisances alone, fitted to all records, and what that leaves.
+    """
+
+    def searched(split: Split) -> Search:
+        search = begin_search(problem, candidates, split, say)
+        start_from(search, known)
+        run_search(search)
+        return search
+
+    first, *others = held_out(problem)
+    search = searched(first)
+    nominal, before = _nominal(search)
+    if search.pinned and not search.labels and not before.is_noise:
+        # Noise in the poses that were searched, and more in all: they hide what is wrong.
+        say("searching other poses")
+        found = [other for other in map(searched, others) if other.labels]
+        search = max(found, key=lambda other: other.gained, default=search)
+    return search, nominal, before
+
+
+def _nominal(search: Search) -> tuple[Fit, Evidence]:
+    problem, baseline = search.problem, search.baseline.hypothesis
+    if search.labels:
+        nominal = fit(problem, baseline, problem.records, None, iterations=3)
+    else:
+        nominal = refit(problem, search.best.hypothesis, problem.records)
+    return nominal, fit_evidence(problem, nominal)
+
+
+def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiagnosis:
+    """What may be said of what a search has found."""
+    problem = search.problem
+    whole, after = _fitted_to_all(search, nominal)
+    gain = holdout_gain(problem, search.baseline.hypothesis, search.best.hypothesis,
+                        search.records, search.kept)  # fmt: skip
     rivals = [
         t
-        for t in (found.steps[0] if found.steps else [])
-        if t.finished(train) and t.fit.hypothesis.labels != whole.hypothesis.labels
+        for t in (search.steps[0] if search.steps else [])
+        if t.finished(search.records) and t.fit.hypothesis.labels != whole.hypothesis.labels
     ]
-    causes = fitted_causes(problem, whole, found, rivals, train)
+    same: list[Trial] = []
+    causes = fitted_causes(search, whole, rivals)
     # More rivals can only lessen the confidence: what isn't sure by now won't be claimed.
     if causes and (after.is_noise or may_be_partial(causes, gain.explained)):
-        say("looking for other causes that would do as well")
+        search.say("looking for other causes that would do as well")
         # Over the same samples: else a rival may lose, or win, by which of them it knows.
-        with problem.pinned(found.best.hypothesis.effects):
-            same, rivals = alternatives(problem, found, candidates, scales, train)
+        with problem.pinned(search.best.hypothesis.effects):
+            same, rivals = alternatives(search)
         with problem.pinned(whole.hypothesis.effects):
             same, refuted = _on_all_records(problem, whole, same)
-        causes = fitted_causes(problem, whole, found, rivals, train, refuted)
+        causes = fitted_causes(search, whole, rivals, refuted)
     common = common_faults(whole.hypothesis, reported_covariance(whole), problem.groups)
     verdict = verdict_of(causes, before, after, bool(same), gain.explained, common)
     if any(e.name == "mains_hum" for e in whole.hypothesis.effects):
@@ -185,10 +199,10 @@ def _diagnosed(
     if note:
         leads = tuple((c.effect, c.target) for c in causes)
     elif verdict == "unexplained":
-        leads = tuple(_leads(found))
+        leads = tuple(_leads(search))
     ask = None
     if verdict in ("ambiguous", "unexplained", "partial") and not common:
-        say("looking for the measurement that would tell most")
+        search.say("looking for the measurement that would tell most")
         ask = next_measurement(problem, whole, rivals, same)
     claimed = verdict in ("named", "ambiguous", "partial")
     diagnosis = Diagnosis(
@@ -199,13 +213,31 @@ def _diagnosed(
         nuisances=fitted_nuisances(whole if claimed or verdict == "nothing-wrong" else nominal),
         gain=gain,
         next_measurement=ask,
-        scores=tuple(_scores(found)),
+        scores=tuple(_scores(search)),
         note=note,
     )
     return PercussionDiagnosis(
-        diagnosis, problem, nominal, whole, found, before, after, scales,
+        diagnosis, problem, nominal, whole, search, before, after,
         tuple(others.values()) if claimed else (),
     )  # fmt: skip
+
+
+def _fitted_to_all(search: Search, nominal: Fit) -> tuple[Fit, Evidence]:
+    """What was found, fitted to all records; where more than noise is left, what dominates."""
+    problem = search.problem
+    if not search.labels:
+        return nominal, fit_evidence(problem, nominal)
+    search.say("fitting what was found to all records")
+    whole = refit(problem, search.best.hypothesis, problem.records)
+    after = fit_evidence(problem, whole)
+    if len(search.labels) > 1 and not after.is_noise:
+        search.say("checking which causes dominate the residual")
+        stands = dominant_causes(problem, search.best)
+        if stands is not search.best:
+            search.best = stands
+            whole = refit(problem, stands.hypothesis, problem.records)
+            after = fit_evidence(problem, whole)
+    return whole, after
 
 
 def _on_all_records(
@@ -216,23 +248,23 @@ def _on_all_records(
     refuted: list[Trial] = []
     for trial in same:
         there = refit(problem, trial.fit.hypothesis, problem.records)
-        alike = bic_difference(problem, whole, there, problem.records) < SAME
+        alike = bic_difference(problem, whole, there) < SAME
         (kept if alike else refuted).append(replace(trial, fit=there, score=bic(there)))
     return kept, refuted
 
 
-def _leads(found: Search) -> list[tuple[str, str]]:
+def _leads(search: Search) -> list[tuple[str, str]]:
     """What helped, though nothing may be claimed."""
-    if not found.steps:
+    if not search.steps:
         return []
-    reference = bic(found.baseline)
-    helpful = [t for t in found.steps[0] if reference - t.score > LEAST_GAIN]
+    reference = bic(search.baseline)
+    helpful = [t for t in search.steps[0] if reference - t.score > LEAST_GAIN]
     return [pair_of(t.label) for t in helpful[:3]]
 
 
-def _scores(found: Search) -> list[dict[str, object]]:
+def _scores(search: Search) -> list[dict[str, object]]:
     rows = []
-    for number, step in enumerate(found.steps):
+    for number, step in enumerate(search.steps):
         for trial in step:
             name, target = pair_of(trial.label)
             rows.append(
@@ -246,13 +278,3 @@ def _scores(found: Search) -> list[dict[str, object]]:
                 }
             )
     return rows
-
-
-def within_tolerance(value: float, sigma: float) -> bool:
-    """Whether a relative difference is a nuisance, not a cause."""
-    return abs(value) <= TOLERATED * sigma
-
-
-def signal(problem: Problem, records: Sequence[MeasuredRecord]) -> list[FloatArray]:
-    """The measured channels in units of their noise, (channels, m) a record."""
-    return [np.stack([v / r.noise[name].std for name, v in r.values.items()]) for r in records]

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
+
+from markupsafe import Markup
 
 from picchio.core.provenance import provenance
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
@@ -117,6 +121,67 @@ def set_words(pairs: Sequence[tuple[str, str]]) -> str:
     return " and ".join(f"{words(effect)}, {target}" for effect, target in pairs)
 
 
+def diagnosis_page(
+    found: Diagnosis,
+    *,
+    command: str | None = None,
+    warnings: Sequence[str] = (),
+    folder: Path | None = None,
+) -> str:
+    """The page of `picchio.diagnose`'s answer, whichever records it is of.
+
+    Args:
+        found: the answer.
+        command: the command line that gave this, to reproduce it.
+        warnings: what was warned of on the way.
+        folder: where the extended model will stand; paths in it are relative to that.
+
+    Raises:
+        InputError: a diagnosis without what led to it.
+    """
+    from picchio.visuals.report.motion_diagnosis import motion_diagnosis_report
+    from picchio.visuals.scene.diagnosed import diagnosis_scene
+
+    text = found.model_text(folder)
+    details = found.details
+    moves = ""
+    if "motion" in details:
+        moves = motion_diagnosis_report(
+            details["motion"],
+            life=details["motion_life"],
+            carried=details["during_blows"],
+            model_toml=text if found.causes and "percussion" not in details else "",
+            command=command,
+            folder=found.details["folder"],
+            warnings=warnings if "percussion" not in details else (),
+        )
+    if "percussion" not in details:
+        return moves
+    own = details["percussion"]
+    # Candidates are shown by each kind's own search.
+    hits = replace(own, diagnosis=replace(found, scores=own.diagnosis.scores))
+    return diagnosis_report(
+        hits,
+        model_toml=text,
+        command=command,
+        life=found.life,
+        warnings=warnings,
+        scene=diagnosis_scene(hits).html(),
+        moves=_section_of(moves),
+    )
+
+
+def _section_of(page: str) -> str:
+    """A page's main part, to stand in another page: its headings one level lower, ids its own."""
+    if not page:
+        return ""
+    main = page.partition("<main>")[2].rpartition("</main>")[0]
+    main = re.sub(r"<(/?)h3\b", r"<\1h4", main)
+    main = re.sub(r"<(/?)h2\b", r"<\1h3", main)
+    main = re.sub(r'\b(id|aria-labelledby)="', r'\1="motion-', main)
+    return re.sub(r'href="#', 'href="#motion-', main)
+
+
 def diagnosis_report(
     found: PercussionDiagnosis,
     *,
@@ -125,6 +190,7 @@ def diagnosis_report(
     life: Mapping[str, Any] | None = None,
     warnings: Sequence[str] = (),
     scene: str | None = None,
+    moves: str = "",
 ) -> str:
     """What the simulation gets wrong, why, and what is gained, as a page to read and print.
 
@@ -139,6 +205,7 @@ def diagnosis_report(
         warnings: what was warned of on the way, a sentence each.
         scene: HTML of `picchio.visuals.scene.diagnosis_scene`, to be shown in the report; it adds
             its own size.
+        moves: HTML of what the motion records of the same campaign say.
 
     Returns:
         the HTML.
@@ -172,6 +239,9 @@ def diagnosis_report(
         warnings=list(dict.fromkeys(warnings)),
         model_toml=model_toml,
         scene=scene,
+        moves=Markup(moves),
+        shared=_shared(diagnosis),
+        kinds=diagnosis.kinds,
         command=command or f"picchio diagnose {name} --data {campaign.folder or 'CAMPAIGN'}",
         folder="in memory" if campaign.folder is None else campaign.folder.name,
         records=len(problem.records),
@@ -181,6 +251,32 @@ def diagnosis_report(
             [] if campaign.folder is None else [campaign.folder / "campaign.toml"]
         ),
     )
+
+
+_AGREEMENT = {
+    "both": "both kinds of records agree",
+    "percussion": "percussion records show it; the motion records cannot see it",
+    "motion": "motion records show it; the percussion records cannot see it",
+    "drive": "motion records show it, or more of it: in the drive, which stands still under blows",
+    "contradiction": "the two kinds of records contradict each other",
+}
+
+
+def _shared(diagnosis: Diagnosis) -> list[tuple[str, str, str, str]]:
+    """Cause; its values by percussion and by motion records; what that means."""
+
+    def values(told: Mapping[str, Any] | None) -> str:
+        shown = [
+            f"{words(name)} {spread(v['value'], v['std'], v['unit'])}"
+            for name, v in (told or {}).items() if v["std"] > 0.0
+        ]  # fmt: skip
+        return ", ".join(shown) or "\N{EN DASH}"
+
+    return [
+        (f"{words(each['effect'])}, {each['target']}", values(each["percussion"]),
+         values(each["motion"]), _AGREEMENT[each["status"]])
+        for each in diagnosis.shared
+    ]  # fmt: skip
 
 
 @dataclass(frozen=True)

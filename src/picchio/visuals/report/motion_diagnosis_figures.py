@@ -343,7 +343,7 @@ class MotionFigures:
         )
         return [self._picture(ax, f"Residual of {joint} by order, with {orders} found", caption)]
 
-    def unconstrained_range(self) -> list[Picture]:
+    def unfitted(self) -> list[Picture]:
         """Before and after in a record that neither model was fitted to."""
         gain = self.diagnosis.gain
         if gain is None or not self.changed or gain.held_out_records == gain.train_records:

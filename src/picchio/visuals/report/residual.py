@@ -7,17 +7,15 @@ from collections.abc import Sequence
 from picchio.campaign.campaign import Campaign
 from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
-from picchio.diagnosis.percussion.criteria.whiteness import Evidence, whiteness_test
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.fit.least_squares import fit_growing
+from picchio.diagnosis.percussion.criteria.whiteness import Evidence
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.residual import Spectra, percussion_residual
 from picchio.measurement.quality.report import QualityReport
 from picchio.prediction.residual import ChannelResidual, Together, growth_with_level, together
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.visuals.plots.style import direction_label
 from picchio.visuals.report.page import number, percent, render
 from picchio.visuals.report.residual_figures import ResidualFigures
-from picchio.visuals.report.residual_measures import Spectra, channel_residuals, spectra
 
 # Standard error of the power above which it tells nothing.
 _UNSURE = 0.3
@@ -76,25 +74,24 @@ def residual_report(
         from picchio.visuals.report.residual_motion import motion_report
 
         return motion_report(robot, campaign, command=command, warnings=told)
-    problem = Problem(robot, campaign, gravity_stiffness=gravity_stiffness)
-    fit = fit_growing(problem, Hypothesis.baseline(robot, campaign.tolerance))
-    evidence = whiteness_test(problem, fit.residuals)
-    predictions = problem.predictions(fit.hypothesis.effects)
-    parts = channel_residuals(problem, fit, predictions)
-    found = spectra(problem, fit)
+    left = percussion_residual(robot, campaign, gravity_stiffness=gravity_stiffness)
+    evidence, parts, problem = left.evidence, left.parts, left.problem
     whole = together(parts)
-    figures = ResidualFigures(problem, fit, parts, found, predictions)
+    figures = ResidualFigures(left)
+    others = sum(record.kind == "motion" for record in campaign.records)
+    if others:
+        told.append(f"{others} motion records are not on this page; picchio diagnose uses both.")
     return render(
         "residual.html.j2",
         robot=robot.name,
-        headline=_headline(whole, evidence, parts, found),
+        headline=_headline(whole, evidence, parts, left.spectra),
         tone="good" if evidence.is_noise else "bad",
         whole=whole,
         figures=figures,
         groups=[(g, together([p for p in parts if p.group == g])) for g in figures.groups],
         scaling=_scaling(parts, evidence),
         rows=_rows(parts),
-        fitted=_fitted(fit.hypothesis),
+        fitted=_fitted(left.fit.hypothesis),
         warnings=told,
         records=len(problem.records),
         n_poses=problem.n_poses,

@@ -8,10 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from picchio.core.arrays import FloatArray
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.fit.least_squares import Fit
-from picchio.prediction.residual import ChannelResidual, together
+from picchio.diagnosis.percussion.residual import (
+    PercussionResidual,
+    over_time,
+    restoring,
+    transfers,
+)
+from picchio.prediction.residual import together
 from picchio.visuals.plots.diagnosis import plot_left_over, plot_overlay
 from picchio.visuals.plots.frequency import plot_transfer
 from picchio.visuals.plots.residual import (
@@ -24,27 +27,20 @@ from picchio.visuals.plots.residual import (
 from picchio.visuals.plots.style import blank_figure, direction_label
 from picchio.visuals.report.diagnosis_figures import Picture, worst_view
 from picchio.visuals.report.page import number, themed_svg
-from picchio.visuals.report.residual_measures import Spectra, over_time, restoring, transfers
 
 
 class ResidualFigures:
     """Draws what a baseline leaves.
 
     Args:
-        problem: data and noise.
-        fit: of the nominal model with its nuisances, to all records.
-        parts: every channel of every record.
-        spectra: by frequency.
+        left: what the nominal model leaves.
     """
 
-    def __init__(
-        self, problem: Problem, fit: Fit, parts: Sequence[ChannelResidual], spectra: Spectra,
-        predictions: Sequence[dict[str, FloatArray]],
-    ) -> None:  # fmt: skip
-        self.problem, self.fit, self.parts, self.spectra = problem, fit, list(parts), spectra
-        self.predictions = predictions
-        self.worst = worst_view(fit)
-        self.groups = tuple(dict.fromkeys(p.group for p in parts))
+    def __init__(self, left: PercussionResidual) -> None:
+        self.problem, self.fit, self.parts = left.problem, left.fit, left.parts
+        self.spectra, self.predictions = left.spectra, left.predictions
+        self.worst = worst_view(left.fit)
+        self.groups = tuple(dict.fromkeys(p.group for p in left.parts))
         self._made = 0
 
     def _picture(self, ax: Axes, alt: str, caption: str) -> Picture:

@@ -3,50 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from picchio.campaign.campaign import Campaign
 from picchio.campaign.channels import parse_channel
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
-from picchio.diagnosis.motion.data.noise import noise_levels
 from picchio.diagnosis.motion.data.system import System
-from picchio.diagnosis.motion.fit.baseline import baseline
-from picchio.diagnosis.motion.fit.least_squares import Fit, fit
-from picchio.model.motion import TORQUE, WINDUP
-from picchio.prediction.motion.filters import choose_cutoff
-from picchio.prediction.motion.log import read_logs
+from picchio.diagnosis.motion.fit.least_squares import Fit
+from picchio.diagnosis.motion.residual import group_words, motion_residual, rms
+from picchio.model.motion import TORQUE
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.visuals.plots.diagnosis import plot_overlay
 from picchio.visuals.plots.residual import plot_restoring
 from picchio.visuals.plots.style import blank_figure, plain
 from picchio.visuals.report.diagnosis_figures import Picture
 from picchio.visuals.report.page import number, percent, render, themed_svg
-
-
-@dataclass(frozen=True)
-class GroupResidual:
-    """One joint's torque or twist, all records together.
-
-    Attributes:
-        name: for people.
-        unit: SI.
-        measured, left, noise: RMS, SI.
-    """
-
-    name: str
-    unit: str
-    measured: float
-    left: float
-    noise: float
-
-    @property
-    def share(self) -> float:
-        """Left over measured."""
-        return self.left / self.measured if self.measured > 0.0 else float("nan")
 
 
 def motion_report(
@@ -63,17 +37,9 @@ def motion_report(
 
     Args and errors: as `residual_report`.
     """
-    logs = read_logs(robot, campaign)
-    moving = [(log.angle[joint], log.rate) for log in logs for joint in log.moving]
-    system = System(robot, logs, choose_cutoff(moving))
-    kept = [g for g in system.groups if g[0] in (TORQUE, WINDUP)]
-    if not kept:
-        raise InputError("the records hold neither blows nor torque nor a second encoder",
-                         file=campaign.folder, key="record")  # fmt: skip
-    found = fit(system, baseline(system, campaign.tolerance.force))
-    noise = noise_levels(system)
+    left = motion_residual(robot, campaign)
+    system, found, groups = left.system, left.fit, left.groups
     prismatic = {j.name for j in robot.tree.joints.values() if j.type == "prismatic"}
-    groups = [_group(system, found, g, noise.get(g, 0.0), g[1] in prismatic) for g in kept]
     worst = max(groups, key=lambda g: g.left / max(g.noise, 1e-300))
     headline = (
         f"The simulation leaves {percent(worst.share)} % of the {worst.name}; noise alone would "
@@ -91,20 +57,18 @@ def motion_report(
              _shown(g.noise, g.unit), number(g.left / g.noise, 3) if g.noise else "\N{EN DASH}")
             for g in groups
         ],
-        sections=[_section(system, found, g, i, g[1] in prismatic) for i, g in enumerate(kept)],
+        sections=[
+            _section(system, found, g.group, i, g.group[1] in prismatic)
+            for i, g in enumerate(groups)
+        ],
         cutoff=number(system.cutoff, 3),
         warnings=list(dict.fromkeys(warnings)),
-        records=[log.file for log in logs],
+        records=[log.file for log in system.logs],
         folder="in memory" if folder is None else folder.name,
         command=command
         or f"picchio check {folder or 'CAMPAIGN'} --robot {robot.name} --report OUT.html",
         provenance=provenance(files),
     )  # fmt: skip
-
-
-def _words(group: tuple[str, str]) -> str:
-    kind, joint = group
-    return f"torque of {joint}" if kind == TORQUE else f"link angle less motor angle of {joint}"
 
 
 def _short(group: tuple[str, str]) -> str:
@@ -117,30 +81,12 @@ def _shown(value: float, unit: str) -> str:
     return f"{number(scale * value, 3)} {name}"
 
 
-def _rms(rows: FloatArray) -> float:
-    return float(np.sqrt(np.mean(rows**2)))
-
-
-def _group(
-    system: System, found: Fit, group: tuple[str, str], noise: float, prismatic: bool
-) -> GroupResidual:
-    parts = system.of(group)
-    units = ("N", "m") if prismatic else ("N*m", "rad")
-    return GroupResidual(
-        _words(group),
-        units[0] if group[0] == TORQUE else units[1],
-        _rms(np.concatenate([s.measured for s in parts])),
-        _rms(np.concatenate([found.residual[s.rows] for s in parts])),
-        noise,
-    )
-
-
 def _section(
     system: System, found: Fit, group: tuple[str, str], index: int, prismatic: bool
 ) -> tuple[str, Picture, list[Picture]]:
     """A heading, the overlay over time, and what is left over the motion."""
     kind, joint = group
-    part = max(system.of(group), key=lambda s: _rms(found.residual[s.rows]))
+    part = max(system.of(group), key=lambda s: rms(found.residual[s.rows]))
     log = system.logs[part.record]
     left = found.residual[part.rows]
     name = f"{'torque' if kind == TORQUE else 'position'}.{joint}"
@@ -150,11 +96,11 @@ def _section(
     ax = plot_overlay(time, part.measured, {"simulated": part.measured - left}, channel,
                       blank_figure(9.0, 2.7))  # fmt: skip
     over = Picture(
-        themed_svg(ax, f"{_words(group)} as measured and as simulated", f"m{index}"),
-        f"In {log.file}, the record that shows most; {percent(_rms(left) / _rms(part.measured))} % "
+        themed_svg(ax, f"{group_words(group)} as measured and as simulated", f"m{index}"),
+        f"In {log.file}, the record that shows most; {percent(rms(left) / rms(part.measured))} % "
         "is left.",
     )
-    return _words(group).capitalize(), over, _clouds(system, found, group, index, prismatic)
+    return group_words(group).capitalize(), over, _clouds(system, found, group, index, prismatic)
 
 
 def _clouds(
@@ -187,7 +133,7 @@ def _clouds(
         if y_label:
             ax.set_ylabel(y_label)
         hint = ": a soft gear is a line, play a step" if over == "torque" else ""
-        alt = f"What is left of the {_words(group)} over the {over}"
+        alt = f"What is left of the {group_words(group)} over the {over}"
         made.append(Picture(themed_svg(ax, alt, f"m{index}{over}"),
                             f"Over the {over}, all records{hint}."))  # fmt: skip
     return made

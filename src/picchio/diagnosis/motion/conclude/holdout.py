@@ -62,6 +62,7 @@ def judge(
         baseline_nrmse=float(np.sqrt(sums[1] / signal)),
         extended_nrmse=float(np.sqrt(sums[2] / signal)),
         noise_floor_nrmse=float(np.sqrt(sums[3] / signal)),
+        channels=int(sums[3]),
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.active_set import bounded_solution
 from picchio.diagnosis.motion.data.system import BLOCKS, Group, System
 from picchio.diagnosis.motion.fit.state import Coordinate, State
 from picchio.prediction.motion.readings import Around
@@ -16,6 +17,7 @@ _ROUNDS = 6
 _TINY = 1e-300
 _ROUNDING = 1e-10
 _PIVOT = 1e-3
+_ROUNDED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,22 +151,11 @@ def solve(columns: FloatArray, residual: FloatArray, coordinates: list[Coordinat
     pull = np.array([p * (c.centre - c.value) for p, c in zip(prior, coordinates, strict=True)])
     normal = columns.T @ columns + np.diag(prior)
     right = columns.T @ residual + pull
-    free = np.ones(len(coordinates), dtype=bool)
-    step = np.zeros(len(coordinates))
     low = np.array([c.lower - c.value for c in coordinates])
     high = np.array([c.upper - c.value for c in coordinates])
-    for _ in range(len(coordinates) + 1):
-        index = np.flatnonzero(free)
-        if not index.size:
-            break
-        held = normal[np.ix_(index, np.flatnonzero(~free))] @ step[~free]
-        step[index] = stable_solve(normal[np.ix_(index, index)], right[index] - held)
-        bad = free & ((step < low - 1e-12) | (step > high + 1e-12))
-        if not bad.any():
-            break
-        step[bad] = np.clip(step[bad], low[bad], high[bad])
-        free &= ~bad
-    return step
+    return bounded_solution(
+        normal, right, low, high, lambda block, part, _: stable_solve(block, part), _ROUNDED
+    )
 
 
 def stable_solve(normal: FloatArray, right: FloatArray) -> FloatArray:

@@ -47,6 +47,7 @@ class State:
         scales: joint -> factor on its rigid-body torque, within the tolerance.
         tolerance: relative standard deviation of that factor.
         fixed: joints whose factor an effect has taken over: it is 1.
+        priors: (label, parameter, value, standard deviation) told by other records.
     """
 
     nuisances: tuple[Effect, ...] = ()
@@ -54,6 +55,7 @@ class State:
     scales: Mapping[str, float] = field(default_factory=dict)
     tolerance: float = 0.05
     fixed: frozenset[str] = frozenset()
+    priors: tuple[tuple[str, str, float, float], ...] = ()
 
     @property
     def every(self) -> tuple[Effect, ...]:
@@ -67,9 +69,28 @@ class State:
                        0.01, self.tolerance, 1.0)
             for joint, value in self.scales.items() if joint not in self.fixed
         ]  # fmt: skip
+        told = {(label, name): (value, std) for label, name, value, std in self.priors}
         for index, effect in enumerate(self.every):
-            found += effect_coordinates(effect, index, rate)
+            for c in effect_coordinates(effect, index, rate):
+                if (effect.label, c.name) in told:
+                    value, std = told[effect.label, c.name]
+                    if (effect.name, c.name) in INVERSE:
+                        value, std = 1.0 / value, std / value**2
+                    c = replace(c, prior=std, centre=value)
+                found.append(c)
         return found
+
+    def informed(self, effect: Effect, std: Mapping[str, float]) -> State:
+        """With an effect of which other records tell the values, and how well.
+
+        Args:
+            effect: at those values; it is added where it is missing.
+            std: parameter -> standard deviation, SI.
+        """
+        there = any(e.label == effect.label for e in self.every)
+        kept = tuple(p for p in self.priors if p[0] != effect.label)
+        told = tuple((effect.label, name, effect.values[name], s) for name, s in std.items())
+        return replace(self if there else self.with_effect(effect), priors=kept + told)
 
     def moved(self, coordinate: Coordinate, value: float) -> State:
         """With another value of one coordinate."""
@@ -93,7 +114,9 @@ class State:
     def without(self, index: int) -> State:
         """Without the effect of this number."""
         kept = tuple(e for i, e in enumerate(self.effects) if i != index)
-        return replace(self, effects=kept)
+        gone = self.effects[index].label
+        priors = tuple(p for p in self.priors if p[0] != gone)
+        return replace(self, effects=kept, priors=priors)
 
 
 def effect_coordinates(effect: Effect, index: int, rate: float) -> list[Coordinate]:

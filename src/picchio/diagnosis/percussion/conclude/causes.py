@@ -16,64 +16,58 @@ from picchio.diagnosis.percussion.criteria.confidence import confidence
 from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_range
 from picchio.diagnosis.percussion.criteria.pose_consistency import jackknife_covariance
 from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.diagnosis.percussion.fit.drawn import width_spread
 from picchio.diagnosis.percussion.fit.least_squares import Fit
 from picchio.diagnosis.percussion.fit.unknowns import NUISANCE_KEYS, Hypothesis
-from picchio.diagnosis.percussion.search.select import EXACT, Search
-from picchio.diagnosis.percussion.search.trials import Trial
+from picchio.diagnosis.percussion.search.state import EXACT, Search, Trial
 from picchio.diagnosis.result import Cause, Value
 from picchio.model.effects.effect import CHANNEL_UNIT, Effect
 from picchio.robot.flexible_robot import FlexibleRobot
 
 
 def fitted_causes(
-    problem: Problem,
-    whole: Fit,
-    found: Search,
-    rivals: Sequence[Trial],
-    train: Sequence[MeasuredRecord],
-    refuted: Sequence[Trial] = (),
+    search: Search, whole: Fit, rivals: Sequence[Trial], refuted: Sequence[Trial] = ()
 ) -> tuple[Cause, ...]:
     """The causes with their values, spreads and confidence.
 
     The spread is that of the fit, larger where more than noise is left, and that of the model; at
-    least as far as a value may go before anybody sees it.
+    least as far as a value may go before chi-square changes by one.
 
     Args:
-        problem: data and noise.
+        search: the way there.
         whole: the fit to all records.
-        found: the way there.
         rivals: other sets, fitted to the records of the search.
-        train: those records.
         refuted: rivals that only the records held out told apart, fitted to all.
     """
     unsettled = {trial.fit.hypothesis.labels for trial in refuted}
     rivals = [r for r in rivals if r.fit.hypothesis.labels not in unsettled]
+    return tuple(
+        Cause(
+            effect.name,
+            effect.target,
+            _confidence(search, rivals, effect, whole, refuted),
+            fitted_values(search.problem, whole, effect),
+        )
+        for effect in whole.hypothesis.causes
+    )
+
+
+def fitted_values(problem: Problem, whole: Fit, effect: Effect) -> dict[str, Value]:
+    """A cause's parameters in a fit to all records, with their standard deviations."""
     variance = reported_covariance(whole).diagonal()
     unknowns, vector = whole.hypothesis.unknowns(), whole.hypothesis.vector()
-    result = []
-    for effect in whole.hypothesis.causes:
-        index = whole.hypothesis.effects.index(effect)
-        values = {}
-        for p in effect.parameters:
-            std = 0.0
-            for k, unknown in enumerate(unknowns):
-                if unknown.effect == index and unknown.name == p.name:
-                    std = abs(unknown.slope(vector[k])) * math.sqrt(max(variance[k], 0.0))
-                    std = max(std, _unconstrained(problem, whole, k))
-            if effect.name == "pulse_jitter":
-                std = _width_spread(whole, effect)
-            values[p.name] = Value(effect.values[p.name], std, _unit(whole, effect, p.name))
-        result.append(
-            Cause(
-                effect.name,
-                effect.target,
-                _confidence(found, rivals, effect, train, whole, refuted),
-                values,
-            )
-        )
-    return tuple(result)
+    index = whole.hypothesis.effects.index(effect)
+    values = {}
+    for p in effect.parameters:
+        std = 0.0
+        for k, unknown in enumerate(unknowns):
+            if unknown.effect == index and unknown.name == p.name:
+                std = abs(unknown.slope(vector[k])) * math.sqrt(max(variance[k], 0.0))
+                std = max(std, _unconstrained(problem, whole, k))
+        if effect.name == "pulse_jitter":
+            std = _width_spread(whole, effect)
+        values[p.name] = Value(effect.values[p.name], std, _unit(whole, effect, p.name))
+    return values
 
 
 def _unconstrained(problem: Problem, whole: Fit, number: int) -> float:
@@ -153,15 +147,14 @@ def _inexact(value: float, neutral: float) -> float:
 
 
 def _confidence(
-    found: Search,
+    search: Search,
     rivals: Sequence[Trial],
     effect: Effect,
-    train: Sequence[MeasuredRecord],
     whole: Fit,
     refuted: Sequence[Trial],
 ) -> float:
     """From the poses' score differences to the best rival, and their spread (Student's t)."""
-    best = found.best
+    best = search.best
     told = [
         confidence(whole, r.fit) for r in refuted if effect.label not in r.fit.hypothesis.labels
     ]
@@ -172,10 +165,10 @@ def _confidence(
     ]
     if others:
         told.append(confidence(best, min(others, key=bic)))
-    if not told and len(best.hypothesis.causes) == 1 and found.baseline is not best:
-        return confidence(best, found.baseline)
+    if not told and len(best.hypothesis.causes) == 1 and search.baseline is not best:
+        return confidence(best, search.baseline)
     if not told:
-        return 0.5 if len(train) < 3 else 1.0
+        return 0.5 if len(search.records) < 3 else 1.0
     return min(told)
 
 

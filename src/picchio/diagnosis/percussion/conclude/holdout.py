@@ -41,6 +41,7 @@ def holdout_gain(
         float(np.sqrt(_mean_square(problem, baseline, judged) / signal)),
         float(np.sqrt(_mean_square(problem, extended, judged) / signal)),
         float(np.sqrt(floor / signal)),
+        floor,
     )
 
 

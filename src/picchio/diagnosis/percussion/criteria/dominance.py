@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 
 # Nine tenths: what imitates something unknown takes away that much of it where the two are
@@ -13,7 +10,7 @@ from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 _FAR_ABOVE = 0.9
 
 
-def dominant_causes(problem: Problem, found: Fit, records: Sequence[MeasuredRecord]) -> Fit:
+def dominant_causes(problem: Problem, found: Fit) -> Fit:
     """The fit without the causes that explain too little of what is wrong without them.
 
     Where the catalogue lacks something, its last causes imitate what it lacks: each takes a part
@@ -23,12 +20,11 @@ def dominant_causes(problem: Problem, found: Fit, records: Sequence[MeasuredReco
     Args:
         problem: data and noise.
         found: the fit, with more than noise left.
-        records: that are fitted.
     """
     best = found
     while len(best.hypothesis.labels) > 1:
         fits = [
-            fit(problem, best.hypothesis.minus(label), records, None, iterations=5)
+            fit(problem, best.hypothesis.minus(label), found.records, None, iterations=5)
             for label in sorted(best.hypothesis.labels)
         ]
         without = min(fits, key=lambda other: other.cost)

@@ -22,25 +22,22 @@ _PARALLEL = 1.0 - 1e-9
 _VAGUE = 3.0
 
 
-def bic_difference(
-    problem: Problem, best: Fit, other: Fit, records: Sequence[MeasuredRecord]
-) -> float:
-    """By how much a fit is behind another in BIC, numbers counted as far as they are told.
+def bic_difference(problem: Problem, best: Fit, other: Fit) -> float:
+    """How much higher a fit's BIC is, numbers counted as far as the records determine them.
 
     Args:
         problem: data and noise.
         best: the one that is claimed.
-        other: its rival.
-        records: that both are fitted to.
+        other: its rival, fitted to the same records.
     """
     by_bic, by_cost = bic(other) - bic(best), other.cost - best.cost
     if by_bic < SAME or by_cost >= SAME:
         return by_bic
-    if _in_series(best.hypothesis.labels ^ other.hypothesis.labels, records):
+    if _in_series(best.hypothesis.labels ^ other.hypothesis.labels, best.records):
         # The base's spring has a damper of its own, the joint's shares the robot's damping: that
         # is told in more numbers, but fits nothing that the joint does not.
         return by_cost
-    told = [_effective_parameters(problem, each, records) for each in (best, other)]
+    told = [_effective_parameters(problem, each) for each in (best, other)]
     return by_cost + (told[1] - told[0]) * math.log(max(best.samples, 2))
 
 
@@ -60,14 +57,16 @@ def _moves_alike(record: MeasuredRecord, joint: str, axis: str) -> bool:
     return bool(abs(a @ b) >= _PARALLEL * np.linalg.norm(a) * np.linalg.norm(b))
 
 
-def _effective_parameters(problem: Problem, found: Fit, records: Sequence[MeasuredRecord]) -> float:
+def _effective_parameters(problem: Problem, found: Fit) -> float:
     """How many of the causes' numbers the records determine, beside the nuisances.
 
     The trace of what data add to next to nothing (D. J. C. MacKay, Neural Computation 4 (1992)
     415, doi:10.1162/neco.1992.4.3.415).
     """
-    if found.jacobians is None or len(found.records) != len(records):
-        found = fit(problem, found.hypothesis, records, None, iterations=0, with_jacobian=True)
+    if found.jacobians is None:
+        found = fit(
+            problem, found.hypothesis, found.records, None, iterations=0, with_jacobian=True
+        )
     free = np.array([u.prior is None for u in found.hypothesis.unknowns()])
     at_work = ~free
     at_work[free] = [not unconstrained_range(problem, found, int(k)) for k in np.flatnonzero(free)]

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.percussion.criteria.whiteness import Evidence, whiteness_test
+from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit
 
 # Poses needed to compare poses; of fewer the records are compared.
@@ -43,6 +47,11 @@ def pose_inconsistency(found: Fit) -> float:
     if degrees < 1:
         return 0.0
     return float(np.clip(norm.isf(chi2.sf(fall - together, degrees)), -38.0, 38.0))
+
+
+def fit_evidence(problem: Problem, whole: Fit) -> Evidence:
+    """What a fit to all records leaves, and whether its unknowns hold at every pose."""
+    return replace(whiteness_test(problem, whole), pose_inconsistency=pose_inconsistency(whole))
 
 
 def jackknife_covariance(found: Fit) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.fit.least_squares import Fit
 
 _BANDS = 8
 # So many times the highest natural frequency still belongs to where the arm answers.
@@ -81,22 +81,17 @@ class Evidence:
         return max((level.z for level in self.poses), default=0.0)
 
 
-def whiteness_test(
-    problem: Problem,
-    residuals: Sequence[FloatArray],
-    records: Sequence[MeasuredRecord] | None = None,
-) -> Evidence:
-    """Test whitened residuals (channels, m) of every record.
+def whiteness_test(problem: Problem, found: Fit) -> Evidence:
+    """Test what a fit leaves of every one of its records.
 
     Periodogram ordinates of white noise of unit variance have mean 1 and variance 1; to the
     scatter of their mean comes that of the noise level itself, which was estimated.
     """
-    chosen = list(problem.records if records is None else records)
     top = _highest_frequency(problem) * _ANSWERS
     powers: dict[str, list[tuple[int, FloatArray, FloatArray]]] = {}
     errors: dict[str, list[float]] = {}
     total, count = 0.0, 0
-    for record, residual in zip(chosen, residuals, strict=True):
+    for record, residual in zip(found.records, found.residuals, strict=True):
         channels = {c.name: c.group for c in record.setup.channels}
         first = int(np.searchsorted(record.setup.samples.times, 0.0))
         frequency = np.fft.rfftfreq(residual.shape[1] - first, record.setup.samples.step)[1:-1]

@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.diagnosis.active_set import bounded_solution
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.diagnosis.percussion.fit.slopes import borrowed, fine_steps, jacobian, updated
@@ -200,26 +202,14 @@ def bounded_step(
     lower: FloatArray,
     upper: FloatArray,
 ) -> FloatArray:
-    """The damped step that stays within the bounds: what would leave them is held, in turn."""
-    size = vector.size
-    free = np.ones(size, dtype=bool)
-    step = np.zeros(size)
-    for _ in range(size + 1):
-        index = np.flatnonzero(free)
-        if not index.size:
-            break
-        held = np.flatnonzero(~free)
-        right = -gradient[index] - normal[np.ix_(index, held)] @ step[held]
-        block = normal[np.ix_(index, index)] / np.outer(scale[index], scale[index])
-        block = block + damping * np.eye(index.size)
-        step[index] = np.linalg.lstsq(block, right / scale[index], rcond=None)[0] / scale[index]
-        new = vector + step
-        out = free & ((new < lower - _INSIDE) | (new > upper + _INSIDE))
-        if not out.any():
-            break
-        step[out] = np.clip(new[out], lower[out], upper[out]) - vector[out]
-        free &= ~out
-    return step
+    """The damped step that stays within the bounds."""
+
+    def solve(block: FloatArray, right: FloatArray, index: NDArray[np.intp]) -> FloatArray:
+        size = scale[index]
+        damped = block / np.outer(size, size) + damping * np.eye(index.size)
+        return np.asarray(np.linalg.lstsq(damped, right / size, rcond=None)[0] / size)
+
+    return bounded_solution(normal, -gradient, lower - vector, upper - vector, solve, _INSIDE)
 
 
 def fit_growing(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -87,6 +87,7 @@ class Hypothesis:
         freed: labels of nuisances that may leave their tolerance: they are causes then.
         scales: label.parameter -> size of a linear parameter.
         drawn: (label, fall of chi-square, count) of numbers drawn anew in every record.
+        priors: (label, parameter, value, standard deviation) of what other records tell of a cause.
     """
 
     effects: tuple[Effect, ...]
@@ -95,6 +96,7 @@ class Hypothesis:
     freed: frozenset[str] = frozenset()
     scales: tuple[tuple[str, float], ...] = ()
     drawn: tuple[tuple[str, float, int], ...] = ()
+    priors: tuple[tuple[str, str, float, float], ...] = ()
 
     @classmethod
     def baseline(cls, robot: FlexibleRobot, tolerance: Tolerance) -> Hypothesis:
@@ -138,6 +140,18 @@ class Hypothesis:
         effects = tuple(cause if e.label == cause.label else e for e in more.effects)
         return replace(more, effects=effects)
 
+    def informed(self, cause: Effect, std: Mapping[str, float]) -> Hypothesis:
+        """With a cause of which other records tell the values, and how well.
+
+        Args:
+            cause: at those values; it is added where it is missing.
+            std: parameter -> standard deviation, SI.
+        """
+        more = self if cause.label in self.labels else self.joined(cause)
+        kept = tuple(p for p in self.priors if p[0] != cause.label)
+        told = tuple((cause.label, name, cause.values[name], s) for name, s in std.items())
+        return replace(more, priors=kept + told)
+
     def minus(self, label: str) -> Hypothesis:
         """Without one of the causes; a nuisance that was freed goes back into its tolerance."""
         if label in self.freed:
@@ -145,12 +159,14 @@ class Hypothesis:
                 self._tolerated(effect) if effect.label == label else effect
                 for effect in self.effects
             )
-            return replace(self, effects=effects, freed=self.freed - {label})
+            priors = tuple(item for item in self.priors if item[0] != label)
+            return replace(self, effects=effects, freed=self.freed - {label}, priors=priors)
         kept = tuple(
             e for i, e in enumerate(self.effects) if i < self.n_nuisances or e.label != label
         )
         drawn = tuple(item for item in self.drawn if item[0] != label)
-        return replace(self, effects=kept, drawn=drawn)
+        priors = tuple(item for item in self.priors if item[0] != label)
+        return replace(self, effects=kept, drawn=drawn, priors=priors)
 
     def _tolerated(self, nuisance: Effect) -> Effect:
         """At the tolerated value nearest to where it is: a jump from there would skip cycles."""
@@ -165,6 +181,7 @@ class Hypothesis:
         """What the fit may move."""
         found = []
         scales = dict(self.scales)
+        told = {(label, name): (value, std) for label, name, value, std in self.priors}
         for i, effect in enumerate(self.effects):
             nuisance = i < self.n_nuisances
             for p in effect.parameters:
@@ -180,11 +197,17 @@ class Hypothesis:
                         lower, upper = self._tolerance(effect)
                         prior = (0.0, sigma)
                 scale = scales.get(f"{effect.label}.{p.name}", 1.0)
+                if (effect.label, p.name) in told:
+                    value, std = told[effect.label, p.name]
+                    prior = (math.log(value), std / value) if p.logarithmic else (
+                        value / scale, std / scale
+                    )  # fmt: skip
                 if p.logarithmic:
                     low = math.log(lower) if lower > 0 else -700.0
                     found.append(Unknown(i, p.name, True, 1.0, low, math.log(upper), prior))
                 else:
-                    found.append(Unknown(i, p.name, False, scale, lower / scale, upper / scale))
+                    ends = lower / scale, upper / scale
+                    found.append(Unknown(i, p.name, False, scale, *ends, prior))
         return found
 
     def vector(self) -> FloatArray:

@@ -23,7 +23,7 @@ from picchio.diagnosis.percussion.follow_up.plan import (
 from picchio.diagnosis.percussion.follow_up.possible_records import possible_records, varied
 from picchio.diagnosis.percussion.follow_up.refit import expected_rise
 from picchio.diagnosis.percussion.follow_up.separation import Separation, new_noise, separation
-from picchio.diagnosis.percussion.search.trials import Trial
+from picchio.diagnosis.percussion.search.state import Trial
 from picchio.prediction.percussion import PercussionSetup
 
 _RIVALS = 4

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing, is_nonsmooth
+from picchio.diagnosis.percussion.search.state import Search
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
 
@@ -22,24 +20,20 @@ _MOVED = 1.3
 _GROWING = (0.16, 0.3, 0.6, None)
 
 
-def restarted(
-    problem: Problem, best: Fit, scales: Scales, records: Sequence[MeasuredRecord]
-) -> Fit:
+def restarted(search: Search, best: Fit) -> Fit:
     """The fit, or a better one from where what does nothing stands at one of its usual sizes again.
 
     What is far off is put back always; where more than noise is left, so is what does nothing where
     it is, such as the preload of a contact that never opens: it may have to be much smaller.
 
     Args:
-        problem: data and noise.
+        search: data, sizes and records.
         best: the fit.
-        scales: sizes in this campaign.
-        records: that are fitted.
     """
     found = best
-    noisy = not whiteness_test(problem, best.residuals, best.records).is_noise
+    problem, noisy = search.problem, not search.leaves_noise(best)
     for effect in best.hypothesis.causes:
-        for name, sizes in _usual(effect, scales).items():
+        for name, sizes in _usual(effect, search.scales).items():
             far = [not 1.0 / _FAR < effect.values[name] / size < _FAR for size in sizes]
             off = all(far) and any(p.logarithmic for p in effect.parameters if p.name == name)
             if not (off or (noisy and _does_nothing(problem, best, effect, name))):
@@ -51,7 +45,7 @@ def restarted(
                 )
                 start = replace(found.hypothesis, effects=effects)
                 windows = _GROWING if is_nonsmooth(start) else (None,)
-                again = fit_growing(problem, start, records, windows=windows, iterations=8)
+                again = fit_growing(problem, start, search.records, windows=windows, iterations=8)
                 found = again if again.cost < found.cost else found
     return found
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.criteria.bic import SAME, bic
-from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
@@ -17,9 +16,9 @@ from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.fit.workers import Workers
 from picchio.diagnosis.percussion.search.screen import Screen, Suspect
+from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import effect_class
-from picchio.model.effects.scales import Scales
 
 # One candidate fitted: to the first part of the records, and from there to all of them.
 
@@ -90,44 +89,27 @@ MOST_RIVALS = 5
 _LITTLE = 1.2
 
 
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """One candidate fitted."""
-
-    label: str
-    fit: Fit
-    score: float
-    promise: float
-
-    def finished(self, records: Sequence[MeasuredRecord]) -> bool:
-        """Whether it was fitted to all of these records, to their ends."""
-        return len(self.fit.records) == len(records) and self.fit.end is None
-
-
 def try_candidates(
-    problem: Problem,
+    search: Search,
     known: Hypothesis,
-    candidates: Sequence[tuple[type[Effect], str]],
-    scales: Scales,
-    records: Sequence[MeasuredRecord],
     *,
     short_list: int = SHORT_LIST,
     long_fits: int = LONG_FITS,
     whole: bool = False,
     wide: bool = False,
-    least: float = 0.0,
     cause: str = "",
     best: Fit | None = None,
-    log: Callable[[dict[str, Any]], None] | None = None,
 ) -> list[Trial]:
     """Screen all candidates, fit the best on growing windows; the best first.
 
     Where plenty is left to explain, the first part of a part of the records screens as well;
-    `whole` takes all there is, and stops where no candidate promises anything near `least`. `wide`
-    fits three times as many suspects, those included that look promising very early.
+    `whole` takes all there is, and stops where no candidate promises anything near what is asked
+    for. `wide` fits three times as many suspects, those included that look promising very early.
     With a `cause`, which is a label among the candidates, its rivals are looked for: it is screened
     to know what may be expected of them; `best` is the fit to all records that has it.
     """
+    problem, scales, candidates = search.problem, search.scales, search.candidates
+    records = search.records
     some = list(records) if whole else records_of_every_pose(records)
     window = None if whole else SCREEN_WINDOW
     start = fit(problem, known, some, window, iterations=4, with_jacobian=True)
@@ -135,7 +117,8 @@ def try_candidates(
         # What is wrong shows only later, or in other records.
         some, window = list(records), None
         start = fit(problem, known, some, window, iterations=4, with_jacobian=True)
-    look = Screen(problem, start, scales, faint=whole, enough=_SHORT * least if whole else 0.0)
+    enough = _SHORT * search.least
+    screen = Screen(problem, start, scales, faint=whole, enough=enough if whole else 0.0)
     early = None
     if window is not None:
         begun = fit(problem, known, some, _EARLY, iterations=4, with_jacobian=True)
@@ -150,17 +133,17 @@ def try_candidates(
     # What takes long begins first, or all others would wait for it at the end.
     candidates = sorted(candidates, key=lambda c: c[0].latent is None)
     functions: dict[str, Callable[[Any], Any]]
-    functions = {"screen": look.suspect, "short": short_fit, "long": long_fit}
+    functions = {"screen": screen.suspect, "short": short_fit, "long": long_fit}
     if early is not None:
         functions["early"] = early.suspect
     with Workers(problem.workers, functions) as pool:
-        suspects = look.ranked(pool.map("screen", candidates))
+        suspects = screen.ranked(pool.map("screen", candidates))
         logarithm = math.log(max(start.samples, 2))
-        if log is not None:
-            log({s.label: s.gain - s.numbers * logarithm for s in suspects})
+        if search.log is not None:
+            search.log({s.label: s.gain - s.numbers * logarithm for s in suspects})
         if whole:
-            enough = max(-logarithm, _SHORT * least)
-            suspects = [s for s in suspects if s.gain - s.numbers * logarithm > enough]
+            least = max(-logarithm, enough)
+            suspects = [s for s in suspects if s.gain - s.numbers * logarithm > least]
             if not any(s.gain - min(s.numbers, 2) * logarithm > 0.0 for s in suspects):
                 return []
         if cause:
@@ -168,9 +151,9 @@ def try_candidates(
         if wide:
             short_list, long_fits = 3 * short_list, 2 * long_fits
         chosen = _short_list(suspects, short_list)
-        little = wide or _promised(suspects) < _HALF * look.total
+        little = wide or _promised(suspects) < _HALF * screen.total
         if early is not None and not cause and little:
-            # What makes a motion differ ever more is only like itself while it differs little.
+            # Growing errors are recognisable only early.
             chosen = _joined(chosen, early.ranked(pool.map("early", candidates)))
         tried = [(suspect, effect) for suspect in chosen for effect in suspect.starts]
         tried.sort(key=lambda each: each[1].latent is None)
@@ -324,9 +307,7 @@ def holdout_choice(tied: Sequence[tuple[Trial, float | None]]) -> Trial | None:
     return other if most is not None and most > least + SAME else best
 
 
-def over_the_same_samples(
-    problem: Problem, trials: Sequence[Trial], records: Sequence[MeasuredRecord]
-) -> list[Trial]:
+def over_the_same_samples(search: Search, trials: Sequence[Trial]) -> list[Trial]:
     """Trials, the best first; where that leaves noise, close rivals are compared with it anew.
 
     Each was fitted with its own choice of which samples are known, by which its cost is rough: a
@@ -336,18 +317,18 @@ def over_the_same_samples(
     close = [
         t
         for t in trials
-        if t.finished(records)
+        if t.finished(search.records)
         and t.score - best.score < _ROUGH
         and effect_class(t.label.split(":")[0]).latent is None
     ]
     if best not in close or len(close) < 2:
         return list(trials)
-    if not whiteness_test(problem, best.fit.residuals, best.fit.records).is_noise:
+    if not search.leaves_noise(best.fit):
         return list(trials)
-    with problem.pinned(best.fit.hypothesis.effects):
+    with search.problem.pinned(best.fit.hypothesis.effects):
         again = []
         for t in close:
-            there = fit(problem, t.fit.hypothesis, records, None, iterations=6)
+            there = search.fit(t.fit.hypothesis, iterations=6)
             again.append(replace(t, fit=there, score=bic(there)))
     others = [t for t in trials if t not in close]
     return sorted([*again, *others], key=lambda t: t.score)

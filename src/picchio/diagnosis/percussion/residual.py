@@ -1,4 +1,4 @@
-"""The numbers of a residual report, from a baseline's fit."""
+"""What the nominal simulation leaves of percussion records, and where; no cause is looked for."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from picchio.campaign.campaign import Campaign
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.percussion.criteria.whiteness import Evidence, whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
-from picchio.diagnosis.percussion.fit.least_squares import Fit
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.prediction.percussion import POSITION_KINDS
 from picchio.prediction.residual import (
     ChannelResidual,
@@ -21,6 +24,7 @@ from picchio.prediction.residual import (
     spectrum,
     transfer,
 )
+from picchio.robot.flexible_robot import FlexibleRobot
 
 _BANDS = 110
 _HIGHEST = 6.0
@@ -105,6 +109,49 @@ def spectra(problem: Problem, fit: Fit) -> Spectra:
             rows.setdefault(_group(record, name), []).append(row)
     power = {group: spectrum(every, step, edges) for group, every in rows.items()}
     return Spectra(edges, power, modes, 1.0 / fit.records[0].setup.blows.interval)
+
+
+@dataclass(frozen=True, eq=False)
+class PercussionResidual:
+    """The nominal model fitted within its tolerance to all records, and what that leaves.
+
+    Attributes:
+        problem: data and noise.
+        fit: stiffness, damping and force within their tolerance.
+        evidence: whether noise is left.
+        predictions: channel -> (m,) SI, a record each.
+        parts: every channel of every record.
+        spectra: by frequency.
+    """
+
+    problem: Problem
+    fit: Fit
+    evidence: Evidence
+    predictions: list[dict[str, FloatArray]]
+    parts: list[ChannelResidual]
+    spectra: Spectra
+
+
+def percussion_residual(
+    robot: FlexibleRobot, campaign: Campaign, *, gravity_stiffness: bool = True
+) -> PercussionResidual:
+    """Fit the nominal model within the campaign's tolerance, and measure what is left.
+
+    Args:
+        robot: as its files have it.
+        campaign: its percussion records; others are passed over.
+        gravity_stiffness: whether gravity's change with the deflection counts.
+
+    Raises:
+        InputError: no record that can be predicted for this robot.
+    """
+    problem = Problem(robot, campaign, gravity_stiffness=gravity_stiffness)
+    fit = fit_growing(problem, Hypothesis.baseline(robot, campaign.tolerance))
+    predictions = problem.predictions(fit.hypothesis.effects)
+    return PercussionResidual(
+        problem, fit, whiteness_test(problem, fit), predictions,
+        channel_residuals(problem, fit, predictions), spectra(problem, fit),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

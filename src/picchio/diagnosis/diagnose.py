@@ -1,0 +1,198 @@
+"""What a simulation gets wrong about measured records, why, and what that does to the life."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from picchio.campaign.campaign import Campaign, load_campaign
+from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.provenance import provenance
+from picchio.diagnosis.life import NO_SHAFT
+from picchio.diagnosis.mixed import MixedDiagnosis, diagnose_mixed
+from picchio.diagnosis.motion.conclude.during_blows import (
+    BlowEffects,
+    MotionLife,
+    effects_during_blows,
+    motion_life,
+)
+from picchio.diagnosis.motion.diagnosis import diagnose_motion
+from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis, diagnose_percussion
+from picchio.diagnosis.result import Diagnosis
+from picchio.model.effects.effect import Effect
+from picchio.model.effects.registry import effect_class
+from picchio.model.model import Model
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.loading.find import shipped_robot
+from picchio.robot.loading.load import load_robot
+from picchio.robot.loading.saved_model import is_saved_model
+from picchio.studies.tasks import Task, load_task
+
+_FOUND = "found by picchio diagnose"
+
+
+def diagnose(
+    robot: str | Path | FlexibleRobot,
+    campaign: str | Path | Campaign,
+    *,
+    task: str | Path | Task | None = None,
+    without: Collection[str] = (),
+    flex: str | Path | None = None,
+    tool: str | None = None,
+    gravity_stiffness: bool = True,
+    workers: int | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Diagnosis:
+    """What the simulation of a robot gets wrong about measured records, and why.
+
+    Percussion records, motion records, or both: of a campaign with both kinds each has its own
+    search, and the causes that both can show have one value (see `picchio.diagnosis.mixed`).
+
+    Args:
+        robot: the nominal robot, its name or its file.
+        campaign: the records, or the folder with their campaign.toml.
+        task: whose life is told before and after; the robot's own example task if None.
+        without: names of effects that must not be considered.
+        flex: sidecar of the robot.
+        tool: the frame that carries the tool.
+        gravity_stiffness: whether gravity's stiffness dg/dq counts beside the springs'.
+        workers: processes for percussion records (Linux only); as many as cores if None. The
+            result is the same.
+        progress: told what is being done.
+
+    Returns:
+        verdict, causes, gain, life, the extended model and what to measure next.
+
+    Raises:
+        InputError: records that can't be predicted for this robot, an unknown effect, a task that
+            was asked for and can't be used.
+    """
+    for name in without:
+        effect_class(name)
+    records = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
+    kinds = {record.kind for record in records}
+    # What a drive's torque tells needs no stiffness.
+    loaded = load_robot(robot, flex=flex, tool=tool, allow_rigid=kinds == {"motion"})
+    work: Task | None = None
+    if task is not None:  # what is wrong with it is told now, not minutes later
+        work = task if isinstance(task, Task) else load_task(task, loaded)
+    say = progress or (lambda text: None)
+    answer: Diagnosis
+    effects: Sequence[Effect]
+    notes = _FOUND
+    if kinds == {"motion"}:
+        found = diagnose_motion(
+            loaded, records, without=without,
+            progress=lambda done, total: say(f"motion records: {done} of {total}"),
+        )  # fmt: skip
+        acting, told = effects_during_blows(found), _motion_life(loaded, found, work)
+        effects, notes = acting.effects, f"{_FOUND} in motion records{_left_out(acting)}"
+        blows = {side: dict(joints) for side, joints in told.blows.items()}
+        answer = replace(
+            found, life=told.life, life_note=told.why, extra={"blows": blows or None},
+            details={"motion": found, "during_blows": acting, "motion_life": told},
+        )  # fmt: skip
+    else:
+        options: dict[str, Any] = {"gravity_stiffness": gravity_stiffness, "workers": workers}
+        hit: PercussionDiagnosis
+        if "motion" in kinds:
+            mixed = diagnose_mixed(loaded, records, without=without, progress=progress, **options)
+            hit, details = mixed.percussion, _mixed_details(mixed)
+            notes += _left_out(details["during_blows"])
+            answer = mixed.diagnosis
+        else:
+            hit = diagnose_percussion(
+                loaded, records, without=without, progress=progress, **options
+            )
+            answer, details = hit.diagnosis, {"percussion": hit}
+        effects = hit.extended.hypothesis.effects
+        answer = replace(answer, life=_percussion_life(hit, answer, work), details=details)
+    files = [*loaded.files, *records.files]
+    folder = None if records.folder is None else records.folder.name
+    stamp = provenance(files)
+    tables = [e.to_dict() for e in effects if e.values != type(e)(e.target).values or e.hidden]
+    saved = {
+        **_named(robot, loaded, flex, tool), "effects": tables, "notes": notes,
+        "provenance": {"picchio": str(stamp["picchio"])},
+    }  # fmt: skip
+    return replace(
+        answer,
+        model=Model(loaded, gravity_stiffness).with_effects(effects),
+        extra={**answer.extra, "provenance": stamp},
+        details={**answer.details, "saved": saved, "folder": folder},
+    )
+
+
+def _mixed_details(mixed: MixedDiagnosis) -> dict[str, Any]:
+    acting = effects_during_blows(mixed.motion)
+    why = "the life is told of the percussion part"
+    return {
+        "percussion": mixed.percussion, "motion": mixed.motion, "during_blows": acting,
+        "motion_life": MotionLife(None, why),
+    }  # fmt: skip
+
+
+def _left_out(acting: BlowEffects) -> str:
+    """What a model's file says of causes that it does not hold."""
+    why: dict[str, list[str]] = {}
+    for effect, reason in acting.left:
+        names = why.setdefault(reason, [])
+        name = f"{effect.name} of {effect.target}"
+        if name not in names:
+            names.append(name)
+    said = [f"{', '.join(names)}: {reason}" for reason, names in why.items()]
+    return f"; found as well, and not in this model: {'; '.join(said)}" if said else ""
+
+
+def _motion_life(robot: FlexibleRobot, found: Diagnosis, task: Task | None) -> MotionLife:
+    try:
+        if task is None and robot.task_path is not None:
+            return motion_life(robot, load_task(robot.task_path, robot), found)
+        return motion_life(robot, task, found)
+    except InputError as error:
+        if task is not None:
+            raise
+        return MotionLife(None, f"the life could not be computed: {error}")
+
+
+def _percussion_life(
+    hit: PercussionDiagnosis, answer: Diagnosis, task: Task | None
+) -> dict[str, Any] | None:
+    """Life before and after; None where there is no task or nothing was found."""
+    robot = hit.problem.robot
+    if not any(j.shaft is not None or j.reducer is not None for j in robot.flexible_joints):
+        if task is not None:
+            warnings.warn(NO_SHAFT, PicchioWarning, stacklevel=3)
+        return None
+    if answer.verdict in ("nothing-wrong", "unexplained"):
+        return None
+    try:
+        if task is None and robot.task_path is not None:
+            task = load_task(robot.task_path, robot)
+        return None if task is None else hit.life(task)
+    except InputError as error:  # what took minutes to find is told all the same
+        warnings.warn(f"the life could not be computed: {error}", PicchioWarning, stacklevel=3)
+        return None
+
+
+def _named(
+    robot: str | Path | FlexibleRobot,
+    loaded: FlexibleRobot,
+    flex: str | Path | None,
+    tool: str | None,
+) -> dict[str, Any]:
+    """How a model's file names the robot, its sidecar and its tool."""
+    if not isinstance(robot, FlexibleRobot):
+        return {"robot": str(robot), "flex": flex, "tool": tool}
+    saved = [file for file in loaded.files if is_saved_model(file)]
+    shipped = shipped_robot(loaded.name)
+    if saved:
+        return {"robot": str(saved[-1])}
+    if shipped is not None and shipped.urdf == loaded.source:
+        return {"robot": loaded.name}
+    sidecars = [file for file in loaded.files if file.suffix == ".toml"]
+    return {"robot": str(loaded.source), "flex": sidecars[0] if sidecars else None,
+            "tool": loaded.tool_frame}  # fmt: skip

@@ -1,0 +1,331 @@
+"""What measured records say of a robot's stiffness and damping, as a sidecar for later work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from picchio.campaign.campaign import Campaign, load_campaign
+from picchio.campaign.tables import Tolerance
+from picchio.core.errors import InputError
+from picchio.core.results import TableResult
+from picchio.diagnosis.diagnose import diagnose
+from picchio.diagnosis.result import Cause, Diagnosis, Value
+from picchio.robot.annotations.sidecar import FORMAT as SIDECAR
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.joint import Joint
+from picchio.robot.loading.load import load_robot
+from picchio.robot.tool import Mounting
+
+FORMAT = "picchio-identification/1"
+# Half of a two-sided 90 % interval, standard deviations.
+_HALF = 1.645
+# A spread below this share of the tolerance comes from the records, not from the tolerance.
+_TOLD = 0.5
+
+
+@dataclass(frozen=True)
+class Identified:
+    """One number of a joint.
+
+    Attributes:
+        value, low, high: SI; the interval is 90 %, two-sided.
+        told: whether the records tell it, or only the nominal value and its tolerance do.
+        why: a sentence.
+    """
+
+    value: float
+    low: float
+    high: float
+    told: bool
+    why: str
+
+    @classmethod
+    def of(cls, value: float, std: float, told: bool, why: str) -> Identified:
+        """From a standard deviation."""
+        return cls(value, max(value - _HALF * std, 0.0), value + _HALF * std, told, why)
+
+
+@dataclass(frozen=True)
+class IdentifiedJoint:
+    """A joint's stiffness (N m/rad or N/m) and damping ratio."""
+
+    name: str
+    stiffness: Identified
+    damping_ratio: Identified
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(TableResult):
+    """What `identify` found; its table is the joints.
+
+    Attributes:
+        robot: as it was before.
+        diagnosis: what the numbers are from.
+        source: where the data are from, such as the campaign's name.
+        joints: every flexible joint.
+    """
+
+    INDEX = "joint"
+
+    robot: FlexibleRobot
+    diagnosis: Diagnosis
+    source: str
+    joints: tuple[IdentifiedJoint, ...]
+
+    def sidecar_text(self) -> str:
+        """The robot's sidecar with the values that were found in it, for `--flex`.
+
+        Stiffnesses, rotor inertias (of joints whose gear ratio is known) and the tool's mass are
+        put in with their uncertainty; everything else of the joints stays as it was. What a
+        sidecar has no place for (friction, ripple, delays) stands in comments.
+
+        Raises:
+            InputError: no cause was found.
+        """
+        import tomlkit
+
+        table, remarks = identified_sidecar(self.robot, self.diagnosis, self.source)
+        made = self.diagnosis.extra["provenance"]
+        document = tomlkit.document()
+        said = f"Written by picchio {made['picchio']}; verdict: {self.diagnosis.verdict}."
+        document.add(tomlkit.comment(said))
+        for source in made["inputs"]:
+            document.add(tomlkit.comment(f"{source['file']} sha256 {source['sha256']}"))
+        document.add(
+            tomlkit.comment("Found as well, and no sidecar's:" if remarks else "Nothing else.")
+        )
+        for line in remarks:
+            document.add(tomlkit.comment(f"  {line}"))
+        for key, value in table.items():
+            document[key] = value
+        return tomlkit.dumps(document)
+
+    def _content(self) -> dict[str, Any]:
+        gain = self.diagnosis.gain
+        return {
+            **self.diagnosis.to_dict(),
+            "format": FORMAT,
+            "joints": [asdict(joint) for joint in self.joints],
+            "also": [c.to_dict() for c in self.diagnosis.causes if c.effect != "joint_stiffness"],
+            "residual": {
+                "before": gain.baseline_nrmse if gain else None,
+                "after": gain.extended_nrmse if gain else None,
+                "held_out": list(gain.held_out_records) if gain else [],
+            },
+        }
+
+    def _headline(self) -> str:
+        told = sum(joint.stiffness.told for joint in self.joints)
+        return f"stiffness of {told} of {len(self.joints)} joints; {self.diagnosis._headline()}"
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [
+            {
+                "joint": joint.name,
+                **{f"stiffness_{k}": v for k, v in asdict(joint.stiffness).items()},
+                **{f"damping_ratio_{k}": v for k, v in asdict(joint.damping_ratio).items()},
+            }
+            for joint in self.joints
+        ]
+
+
+def identify(
+    robot: str | Path | FlexibleRobot,
+    campaign: str | Path | Campaign,
+    *,
+    flex: str | Path | None = None,
+    tool: str | None = None,
+    workers: int | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Identification:
+    """Stiffness and damping of every joint, from percussion records, motion records, or both.
+
+    Args:
+        robot: the nominal robot, its name or its file.
+        campaign: the records, or the folder with their campaign.toml.
+        flex: sidecar of the robot.
+        tool: the frame that carries the tool.
+        workers: processes for percussion records (Linux only); as many as cores if None.
+        progress: told what is being done.
+
+    Raises:
+        InputError: as `diagnose`.
+    """
+    records = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
+    moves = any(record.kind == "motion" for record in records)
+    loaded = load_robot(robot, flex=flex, tool=tool, allow_rigid=moves)
+    found = diagnose(loaded, records, workers=workers, progress=progress)
+    folder = records.folder
+    source = "memory" if folder is None else folder.resolve().name
+    joints = tuple(
+        IdentifiedJoint(
+            joint.name,
+            _stiffness_of(loaded, joint, found, records.tolerance),
+            _damping_of(loaded, joint, found, records.tolerance),
+        )
+        for joint in loaded.flexible_joints
+    )
+    return Identification(loaded, found, source, joints)
+
+
+def _stiffness_of(
+    robot: FlexibleRobot, joint: Joint, found: Diagnosis, tolerance: Tolerance
+) -> Identified:
+    for cause in found.causes:
+        if (cause.effect, cause.target) == ("joint_stiffness", joint.name):
+            value = _stiffness(robot, cause)
+            why = "differs from the nominal value by more than the tolerance"
+            return Identified.of(value.value, value.std, True, why)
+    fitted = found.nuisances.get(f"stiffness.{joint.name}")
+    stated = joint.stiffness * tolerance.stiffness
+    if fitted is None:
+        why = "no record shows this joint yield: the nominal value and its tolerance"
+        return Identified.of(joint.stiffness, stated, False, why)
+    told = fitted.std < _TOLD * stated
+    why = "fitted within the tolerance" if told else "the records hardly depend on it"
+    return Identified.of(fitted.value, fitted.std, told, why)
+
+
+def _damping_of(
+    robot: FlexibleRobot, joint: Joint, found: Diagnosis, tolerance: Tolerance
+) -> Identified:
+    ratio = joint.damping_ratio
+    for cause in found.causes:
+        if cause.effect == "modal_damping":
+            scale = cause.parameters["scale"]
+            why = "the robot's modal damping differs from the nominal one, by one factor"
+            return Identified.of(scale.value * ratio, scale.std * ratio, True, why)
+    fitted = found.nuisances.get("damping_ratio")
+    if fitted is None or not fitted.value > 0.0:
+        why = "no record shows the robot vibrate: the nominal value and its tolerance"
+        return Identified.of(ratio, ratio * tolerance.damping_ratio, False, why)
+    share = fitted.std / fitted.value
+    told = share < _TOLD * tolerance.damping_ratio
+    why = "one factor for all modes, fitted within the tolerance"
+    value = fitted.value * ratio / float(np.mean(robot.damping_ratio))
+    return Identified.of(value, share * value, told, why)
+
+
+def identified_sidecar(
+    robot: FlexibleRobot, diagnosis: Diagnosis, source: str
+) -> tuple[dict[str, Any], list[str]]:
+    """The robot's sidecar with the values that were found in it.
+
+    Stiffnesses, rotor inertias (of joints whose gear ratio is known) and the tool's mass are put
+    in with their uncertainty; everything else of the joints stays as it was. What a sidecar has
+    no place for (friction, ripple, delays) is returned as lines for people.
+
+    Args:
+        robot: as it was diagnosed.
+        diagnosis: its causes.
+        source: where the data are from, such as the campaign's name.
+
+    Returns:
+        the sidecar as plain tables, and remarks.
+    """
+    if not diagnosis.causes:
+        raise InputError(f"the diagnosis is {diagnosis.verdict!r}: there is nothing to write")
+    joints = {joint.name: _joint(robot, joint) for joint in robot.flexible_joints}
+    table: dict[str, Any] = {"format": SIDECAR, "description": f"{robot.name}, identified"}
+    remarks: list[str] = []
+    tool = _tool(robot)
+    for cause in diagnosis.causes:
+        if cause.effect == "joint_stiffness" and cause.target in joints:
+            value = _stiffness(robot, cause)
+            entry = joints[cause.target]
+            entry.pop("stiffness_curve", None)
+            entry.pop("estimated", None)
+            entry |= {"stiffness": value.value, "source": _said(source, "stiffness", value)}
+        elif cause.effect == "joint_inertia" and _ratio(robot, cause.target):
+            ratio = _ratio(robot, cause.target)
+            value = cause.parameters["inertia"]
+            joints[cause.target]["rotor_inertia"] = max(value.value, 0.0) / ratio**2
+            remarks.append(_remark(cause) + f" (written as rotor_inertia, over {ratio:g}^2)")
+        elif cause.effect == "payload" and tool["mass"] + cause.parameters["mass"].value >= 0.0:
+            value = cause.parameters["mass"]
+            tool["mass"] += value.value
+            tool["source"] = _said(source, "mass", value)
+        else:
+            remarks.append(_remark(cause))
+    for name, value in diagnosis.nuisances.items():
+        if name.startswith("stiffness.") and name.partition(".")[2] in joints:
+            entry = joints[name.partition(".")[2]]
+            if "stiffness" in entry:
+                entry |= {"stiffness": value.value, "source": _said(source, "stiffness", value)}
+        else:
+            remarks.append(f"{name} = {_number(value)}")
+    table["joint"] = joints
+    table["tool"] = tool
+    table |= _standing(robot)
+    return table, remarks
+
+
+def _joint(robot: FlexibleRobot, joint: Joint) -> dict[str, Any]:
+    """A joint as it is now, with where its stiffness is from."""
+    found: dict[str, Any] = {"stiffness": joint.stiffness, "damping_ratio": joint.damping_ratio}
+    if joint.stiffness_curve is not None:
+        del found["stiffness"]
+        found["stiffness_curve"] = asdict(joint.stiffness_curve)
+    for key in ("reducer", "rotor_inertia", "gear_ratio"):
+        if (value := getattr(joint, key)) is not None:
+            found[key] = value
+    for key in ("shaft", "balancer"):
+        if (value := getattr(joint, key)) is not None:
+            found[key] = {k: v for k, v in asdict(value).items() if v is not None}
+    if joint.estimated:
+        found["estimated"] = True
+    origin = robot.origins.get(f"{joint.name}.stiffness")
+    if origin:
+        found["source"] = origin
+    return found
+
+
+def _tool(robot: FlexibleRobot) -> dict[str, Any]:
+    tool = robot.tool
+    found: dict[str, Any] = {"frame": tool.frame, "xyz": list(tool.xyz), "axis": list(tool.axis),
+                             "mass": tool.mass}  # fmt: skip
+    if tool.mass > 0.0:
+        found |= {"com": list(tool.com), "inertia": list(tool.inertia)}
+    return found
+
+
+def _standing(robot: FlexibleRobot) -> dict[str, Any]:
+    """Gun and mounting, where they are not the usual."""
+    found: dict[str, Any] = {}
+    if robot.gun is not None:
+        found["gun"] = {k: v for k, v in asdict(robot.gun).items() if v is not None}
+    if robot.mounting != Mounting():
+        found["base"] = {k: list(v) for k, v in asdict(robot.mounting).items()}
+    return found
+
+
+def _ratio(robot: FlexibleRobot, joint: str) -> float:
+    found = {j.name: j.gear_ratio for j in robot.flexible_joints}
+    return abs(found.get(joint) or 0.0)
+
+
+def _stiffness(robot: FlexibleRobot, cause: Cause) -> Value:
+    if "stiffness" in cause.parameters:
+        return cause.parameters["stiffness"]
+    scale = cause.parameters["scale"]
+    nominal = {j.name: j.stiffness for j in robot.flexible_joints}[cause.target]
+    return Value(scale.value * nominal, scale.std * nominal, "N*m/rad")
+
+
+def _said(source: str, what: str, value: Value) -> str:
+    return f"picchio identify on {source}: {what} {_number(value)}"
+
+
+def _number(value: Value) -> str:
+    return f"{value.value:.5g} +- {value.std:.2g} {value.unit}"
+
+
+def _remark(cause: Cause) -> str:
+    numbers: Mapping[str, Value] = cause.parameters
+    text = ", ".join(f"{name} {_number(value)}" for name, value in numbers.items())
+    return f"{cause.effect} of {cause.target}: {text}"

@@ -1,0 +1,109 @@
+"""The search for causes: its data, and what it has found so far."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from picchio.diagnosis.percussion.criteria.bic import bic
+from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
+from picchio.diagnosis.percussion.data.problem import Problem, signal_power
+from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.fit.drawn import LATENT
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.model.effects.effect import Effect
+from picchio.model.effects.scales import Scales
+
+# Fall of BIC below which nothing is claimed: with a hundred candidates tried, chance alone
+# reaches it in less than one of a thousand campaigns.
+LEAST_GAIN = 8.0
+# The forward model itself is exact to about this share of the signal (sensors smear jumps, second
+# order in the deflection): what gains less than that is no cause.
+EXACT = 3e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One candidate fitted."""
+
+    label: str
+    fit: Fit
+    score: float
+    promise: float
+
+    def finished(self, records: Sequence[MeasuredRecord]) -> bool:
+        """Whether it was fitted to all of these records, to their ends."""
+        return len(self.fit.records) == len(records) and self.fit.end is None
+
+
+@dataclass(eq=False)
+class Search:
+    """A search for causes in some of the records, others being held out.
+
+    Attributes:
+        problem: data and noise.
+        candidates: effects and targets that may be causes.
+        scales: sizes that matter in this campaign.
+        records: that are fitted.
+        kept: those held out, which must confirm what is found.
+        baseline: nuisances alone, fitted to the first.
+        best: the hypothesis that stands, fitted to the first; the baseline to begin with.
+        say: told what is being done.
+        steps: per step the trials, the best first.
+        pinned: whether noise was all that was left, and what is known is held fixed since.
+        replacements: label of a cause -> the fit it was replaced in, and the trials.
+        log: told every candidate's screened gain, where somebody wants to know.
+    """
+
+    problem: Problem
+    candidates: Sequence[tuple[type[Effect], str]]
+    scales: Scales
+    records: Sequence[MeasuredRecord]
+    kept: Sequence[MeasuredRecord]
+    baseline: Fit
+    best: Fit
+    say: Callable[[str], None] = lambda text: None
+    steps: list[list[Trial]] = field(default_factory=list)
+    pinned: bool = False
+    replacements: dict[str, tuple[Fit, list[Trial]]] = field(default_factory=dict)
+    log: Callable[[dict[str, Any]], None] | None = None
+    least: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.least = max(LEAST_GAIN, EXACT**2 * signal_power(self.records))
+
+    @property
+    def labels(self) -> frozenset[str]:
+        """Of the causes that stand."""
+        return self.best.hypothesis.labels
+
+    @property
+    def gained(self) -> float:
+        """Fall of BIC by what was found."""
+        return bic(self.baseline) - bic(self.best)
+
+    def fit(self, hypothesis: Hypothesis, iterations: int, rival: float = float("inf")) -> Fit:
+        """A hypothesis fitted to all of the records that are fitted."""
+        return fit(self.problem, hypothesis, self.records, None, iterations=iterations, rival=rival)
+
+    def leaves_noise(self, found: Fit) -> bool:
+        """Whether noise is all that a fit leaves."""
+        return whiteness_test(self.problem, found).is_noise
+
+    def held_out_gain(self, before: Fit, after: Fit) -> float | None:
+        """Fall of chi-square in the records held out; None where they can't tell."""
+        if not self.kept or {e.name for e in after.hypothesis.causes} & set(LATENT):
+            return None
+
+        def chi_square(found: Fit) -> float:
+            left = self.problem.residuals(found.hypothesis.effects, self.kept)
+            return float(sum((r * r).sum() for r in left))
+
+        return chi_square(before) - chi_square(after)
+
+    def confirmed(self, other: Fit) -> bool:
+        """Whether the records held out do not speak against a fit in place of the best."""
+        gain = self.held_out_gain(self.best, other)
+        return gain is None or gain > 0.0

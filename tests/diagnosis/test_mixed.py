@@ -1,0 +1,209 @@
+"""Percussion and motion records of one robot: one set of causes, one verdict.
+
+The blows come from the independent simulators in `worlds`, the motions from Pinocchio's inverse
+dynamics (`motion_records`): neither uses the model that is diagnosed.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+
+import motion_records
+import pytest
+
+import picchio
+from picchio.campaign.campaign import Campaign
+from picchio.diagnosis.mixed import _agreement, joint_verdict
+from picchio.diagnosis.result import Estimate, Gain, Value
+from picchio.model.effects.registry import effect_class
+from worlds import campaign as worlds
+
+ARM = motion_records.ARM
+PAYLOAD = ("payload", "tool", {"mass": 5.0})
+SOFTER = ("joint_stiffness", "joint_1", {"scale": 0.7})
+
+
+def mixed(blows, moves, seed=5, records=6):
+    """(robot, campaign of both kinds, truth of the blows)."""
+    robot = picchio.load_robot(ARM)
+    hit, truth = worlds.make(
+        robot=ARM, seed=seed, causes=blows, sensors=("accelerometer.tool", "deflection"),
+        records=records,
+    )  # fmt: skip
+    moving = motion_records.campaign(robot, moves, seed)
+    table = hit.table.model_dump(exclude_none=True)
+    kept = {key: value for key, value in table.items() if key not in ("format", "record")}
+    return robot, Campaign.from_records([*hit, *moving], **kept), truth
+
+
+def pairs(found):
+    return {(c.effect, c.target) for c in found.causes}
+
+
+@pytest.fixture(scope="module")
+def case():
+    """A payload that both kinds show, a soft joint that blows show, friction that motions show."""
+    return mixed([PAYLOAD, SOFTER], {"payload": 5.0, ("viscous", 2): 30.0})
+
+
+@pytest.fixture(scope="module")
+def found(case):
+    robot, campaign, _ = case
+    return picchio.diagnose(robot, campaign, workers=1)
+
+
+def test_both_kinds_of_records_are_used(case, found):
+    _, campaign, _ = case
+    gain = found.gain
+    assert {*gain.train_records, *gain.held_out_records} == {r.file for r in campaign}
+    assert found.verdict == "named"
+    assert pairs(found) == {
+        ("payload", "tool"), ("joint_stiffness", "joint_1"), ("viscous_friction", "joint_3"),
+    }  # fmt: skip
+    assert gain.explained > 0.99
+    assert any(name.startswith("stiffness.") for name in found.nuisances)
+    assert any(name.startswith("inertia.") for name in found.nuisances)
+
+
+def test_what_both_show_has_one_value_that_both_determine(found):
+    (told,) = (s for s in found.shared if s["effect"] == "payload")
+    assert told["status"] == "both"
+    (cause,) = (c for c in found.causes if c.effect == "payload")
+    own, other = (told[kind]["mass"] for kind in ("percussion", "motion"))
+    mass = cause.parameters["mass"]
+    weights = [1.0 / v["std"] ** 2 for v in (own, other)]
+    mean = (own["value"] * weights[0] + other["value"] * weights[1]) / sum(weights)
+    assert mass.value == pytest.approx(mean, abs=0.3 / math.sqrt(sum(weights)))
+    assert mass.std < 1.05 * min(own["std"], other["std"])
+    assert mass.value == pytest.approx(5.0, abs=5.0 * mass.std)
+    apart = {s["effect"]: s["status"] for s in found.shared}
+    assert apart["joint_stiffness"] == "percussion"
+
+
+def test_the_extended_model_and_the_json_are_whole(found, tmp_path):
+    said = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert said["format"] == "picchio-diagnosis/1"
+    assert {kind: told["verdict"] for kind, told in said["records"].items()} == {
+        "percussion": "named", "motion": "named",
+    }  # fmt: skip
+    assert said["life"]["extended"]["utilisation"] != said["life"]["baseline"]["utilisation"]
+    path = tmp_path / "found.toml"
+    path.write_text(found.model_text(tmp_path))
+    robot = picchio.load_robot(path)
+    told = {t["effect"] for t in robot.effect_tables}
+    assert {"payload", "joint_stiffness"} <= told and "viscous_friction" not in told
+    assert "viscous_friction of joint_3" in path.read_text()
+    life = picchio.assess(robot, picchio.load_task(robot.task_path, robot))
+    after = said["life"]["extended"]["joints"]
+    for joint in life.joints:
+        assert after[joint.name]["utilisation"] == pytest.approx(joint.utilisation, rel=1e-9)
+    page = picchio.report(found).text
+    assert "The motion records" in page and "viscous friction" in page
+    assert repr(found).startswith("<Diagnosis: named, ") and "payload" in found._repr_html_()
+
+
+def test_identified_joints_hold_what_both_kinds_say(case, monkeypatch, found):
+    robot, campaign, truth = case
+    monkeypatch.setattr("picchio.diagnosis.identify.diagnose", lambda *_, **__: found)
+    told = picchio.identify(robot, campaign)
+    said = json.loads(json.dumps(told.to_dict(), allow_nan=False))
+    assert said["format"] == "picchio-identification/1"
+    joints = {j["name"]: j for j in said["joints"]}
+    assert set(joints) == set(robot.flexible_names)
+    drawn = truth["nuisances"]["stiffness"]
+    for name, nominal in zip(robot.flexible_names, robot.stiffness, strict=True):
+        true = nominal * drawn[name] * (0.7 if name == "joint_1" else 1.0)
+        stiffness = joints[name]["stiffness"]
+        assert stiffness["low"] < stiffness["value"] < stiffness["high"]
+        assert stiffness["told"] and stiffness["value"] == pytest.approx(true, rel=0.01)
+    assert {c["effect"] for c in said["also"]} == {"payload", "viscous_friction"}
+    assert said["residual"]["after"] < 0.2 * said["residual"]["before"]
+    assert "payload" not in told.sidecar_text() or "mass" in told.sidecar_text()
+    assert "viscous_friction of joint_3" in told.sidecar_text()
+    assert list(told.to_frame().index) == list(robot.flexible_names)
+
+
+def test_records_that_contradict_each_other_claim_nothing():
+    """The arm carried something while it moved that it did not carry when it was hit."""
+    robot, campaign, _ = mixed([], {"payload": 8.0})
+    found = picchio.diagnose(robot, campaign, workers=1)
+    assert found.verdict == "unexplained"
+    assert not found.causes and ("payload", "tool") in found.leads
+    assert "contradict" in found.note and "payload of tool" in found.note
+    assert found.life is None
+
+
+def test_friction_that_only_a_motion_shows_is_in_the_drive():
+    robot, campaign, truth = mixed(
+        [("joint_stiffness", "joint_2", {"scale": 0.75})], {("coulomb", 1): 30.0}
+    )
+    found = picchio.diagnose(robot, campaign, workers=1)
+    assert found.verdict == "named"
+    assert pairs(found) == {("joint_stiffness", "joint_2"), ("coulomb_friction", "joint_2")}
+    assert {s["effect"]: s["status"] for s in found.shared} == {
+        "joint_stiffness": "percussion", "coulomb_friction": "drive",
+    }  # fmt: skip
+    scale = next(c for c in found.causes if c.effect == "joint_stiffness").parameters["scale"]
+    assert scale.value == pytest.approx(0.75 * truth["nuisances"]["stiffness"]["joint_2"], rel=0.01)
+
+
+def test_nothing_wrong_in_either_kind_is_nothing_wrong():
+    robot, campaign, _ = mixed([], {})
+    found = picchio.diagnose(robot, campaign, workers=1)
+    assert found.verdict == "nothing-wrong"
+    assert not found.causes and not found.leads
+
+
+GOOD = Gain(("a",), ("b",), 0.3, 0.011, 0.010, 4)
+POOR = Gain(("c",), ("d",), 0.3, 0.29, 0.010, 4)
+
+
+@pytest.mark.parametrize(
+    ("blows", "moves", "gain", "causes", "contradicted", "verdict"),
+    [
+        ("nothing-wrong", "nothing-wrong", GOOD, False, False, "nothing-wrong"),
+        ("named", "nothing-wrong", GOOD, True, False, "named"),
+        ("ambiguous", "named", GOOD, True, False, "ambiguous"),
+        ("named", "partial", GOOD, True, False, "partial"),
+        ("named", "unexplained", GOOD, True, False, "partial"),
+        ("named", "unexplained", POOR, True, False, "unexplained"),
+        ("unexplained", "nothing-wrong", GOOD, False, False, "unexplained"),
+        ("named", "named", GOOD, True, True, "unexplained"),
+    ],
+)
+def test_the_verdict_of_both(blows, moves, gain, causes, contradicted, verdict):
+    verdicts = {"percussion": blows, "motion": moves}
+    assert joint_verdict(verdicts, gain, causes, contradicted) == verdict
+
+
+def test_gains_are_put_together_channel_by_channel():
+    whole = GOOD.plus(POOR)
+    assert whole.channels == 8
+    assert whole.baseline_nrmse == pytest.approx(0.3)
+    assert whole.noise_floor_nrmse == pytest.approx(0.010)
+    assert whole.extended_nrmse == pytest.approx(math.sqrt((0.011**2 + 0.29**2) / 2))
+    assert whole.held_out_records == ("b", "d")
+
+
+def estimate(effect, value, std, name="mass"):
+    kind = effect_class(effect)
+    told = kind("tool" if effect == "payload" else "joint_1", **{name: value})
+    return Estimate(told, {name: std}, {name: Value(value, std, "kg")})
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "beyond", "status"),
+    [
+        ((5.0, 0.01), (5.01, 0.01), True, "both"),
+        ((5.0, 0.01), (5.2, 0.01), True, "both"),  # masses are no better known than that
+        ((5.0, 0.01), (6.0, 0.01), True, "contradiction"),
+        ((5.0, 0.5), (6.0, 0.2), True, "both"),
+        ((5.0, 0.01), (6.0, 0.01), False, "drive"),  # the rotor turns while the arm moves
+        ((6.0, 0.01), (5.0, 0.01), False, "contradiction"),
+    ],
+)
+def test_when_two_values_are_one(own, other, beyond, status):
+    told, why = _agreement(estimate("payload", *own), estimate("payload", *other), beyond)
+    assert told == status
+    assert bool(why) == (status == "contradiction")
