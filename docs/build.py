@@ -28,9 +28,24 @@ GUIDES = {
     "performance": "What it costs",
     "blind_trial": "The blind trial",
 }
-STAGES = ("robot", "excitation", "model", "vibration", "fatigue", "studies", "campaign",
-          "measurement", "prediction", "diagnosis", "visuals", "paper", "datasets", "reference",
-          "core", "cli")  # fmt: skip
+STAGES = (
+    "robot",
+    "excitation",
+    "model",
+    "vibration",
+    "fatigue",
+    "studies",
+    "campaign",
+    "measurement",
+    "prediction",
+    "diagnosis",
+    "visuals",
+    "paper",
+    "datasets",
+    "reference",
+    "core",
+    "cli",
+)
 _LINK = re.compile(r"\[([^\]]*)\]\(([^)#\s:]+)(#[^)\s]*)?\)")
 
 
@@ -47,8 +62,9 @@ def main() -> int:
     notebooks = sorted((ROOT / "notebooks").glob("*.ipynb"))
     for path, name in pages.items():
         text = relink(path.read_text(encoding="utf-8"), path.parent, pages)
-        (SOURCE / f"{name}.md").write_text(text + (contents(pages, notebooks) * (name == "index")),
-                                           encoding="utf-8")  # fmt: skip
+        (SOURCE / f"{name}.md").write_text(
+            text + (contents(pages, notebooks) * (name == "index")), encoding="utf-8"
+        )
     for path in notebooks:
         shutil.copy(path, SOURCE / "notebooks")
     write("notebooks/index.md", notebook_page(notebooks))
@@ -57,8 +73,20 @@ def main() -> int:
     api_pages()
     # Compiled functions are documented as the functions they are.
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-j", "auto",
-               "-c", str(HERE), str(SOURCE), str(HTML)]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "-W",
+        "--keep-going",
+        "-q",
+        "-j",
+        "auto",
+        "-c",
+        str(HERE),
+        str(SOURCE),
+        str(HTML),
+    ]
     done = subprocess.run(command, env=environment)
     if done.returncode == 0:
         offline(HTML)
@@ -131,19 +159,26 @@ def effects_page() -> str:
     from picchio.reference.effects import effects, shown_bounds, shown_unit, target_meaning
 
     found = effects().effects
-    lines = ["# Effects\n",
-             f"The {len(found)} effects that can be put into a model. `picchio effects` prints them, "
-             "those of installed extensions included.\n"]  # fmt: skip
+    lines = [
+        "# Effects\n",
+        f"The {len(found)} effects that can be put into a model. `picchio effects` prints "
+        "them, those of installed extensions included.\n",
+    ]
     for place in dict.fromkeys(entry.where for entry in found):
         lines.append(f"## {place.capitalize()}\n")
         for entry in (e for e in found if e.where == place):
-            lines += [f"### {entry.name}\n", f"{sentence(entry.meaning)} {entry.detail}\n",
-                      f"- Target: {target_meaning(entry.target)}"]  # fmt: skip
+            lines += [
+                f"### {entry.name}\n",
+                f"{sentence(entry.meaning)} {entry.detail}\n",
+                f"- Target: {target_meaning(entry.target)}",
+            ]
             if entry.source:
                 lines.append(f"- Source: {entry.source}")
             lines.append("")
-            rows = [(f"`{p.name}`", shown_unit(p.unit), shown_bounds(p), f"{p.neutral:g}", p.meaning)
-                    for p in entry.parameters]  # fmt: skip
+            rows = [
+                (f"`{p.name}`", shown_unit(p.unit), shown_bounds(p), f"{p.neutral:g}", p.meaning)
+                for p in entry.parameters
+            ]
             lines += table(("parameter", "unit", "bounds", "no effect at", "meaning"), rows)
             lines += ["```toml", entry.example, "```", ""]
     return "\n".join(lines)
@@ -153,15 +188,19 @@ def formats_page() -> str:
     """Every file format with all keys."""
     from picchio.reference.formats import formats, sections
 
-    lines = ["# File formats\n",
-             "Every file that picchio reads or writes, with all its keys. `picchio formats NAME` "
-             "prints the same.\n"]  # fmt: skip
+    lines = [
+        "# File formats\n",
+        "Every file that picchio reads or writes, with all its keys. `picchio formats NAME` "
+        "prints the same.\n",
+    ]
     for role, title in (("input", "Files that you write"), ("output", "Files that picchio writes")):
         lines.append(f"## {title}\n")
         for entry in (e for e in formats().formats if e.role == role):
             known = f"`{entry.format}`, " if entry.format else ""
-            lines += [f"### {entry.name}\n",
-                      f"{sentence(entry.meaning)} {entry.kind}; {known}`{entry.command}`.\n"]  # fmt: skip
+            lines += [
+                f"### {entry.name}\n",
+                f"{sentence(entry.meaning)} {entry.kind}; {known}`{entry.command}`.\n",
+            ]
             for name, keys in sections(entry).items():
                 if name:
                     lines.append(f"`{name}`:\n")
@@ -169,7 +208,8 @@ def formats_page() -> str:
                 for key in keys:
                     own = key.path.rpartition(".")[2] if name else key.path
                     needed = "required" if key.required and role == "input" else ""
-                    rows.append((f"`{own}`", key.type, key.unit, key.default or needed, key.meaning))
+                    default = key.default or needed
+                    rows.append((f"`{own}`", key.type, key.unit, default, key.meaning))
                 lines += table(("key", "type", "unit", "default", "meaning"), rows)
     return "\n".join(lines)
 
@@ -198,8 +238,11 @@ def api_pages() -> None:
     for title, wanted in (("Functions", False), ("Classes", True)):
         lines += [f"## {title}\n", "```{eval-rst}"]
         for name in (n for n in names if isinstance(kinds[n], type) is wanted):
-            lines += [f".. autoclass:: picchio.{name}\n   :members:\n" if wanted else
-                      f".. autofunction:: picchio.{name}\n"]  # fmt: skip
+            lines += [
+                f".. autoclass:: picchio.{name}\n   :members:\n"
+                if wanted
+                else f".. autofunction:: picchio.{name}\n"
+            ]
         lines += ["```", ""]
     lines += ["## By stage\n", "Every module, in the order in which data flow.\n"]
     lines += [f"- [{stage}]({stage}.md)" for stage in STAGES]
@@ -223,11 +266,16 @@ def stage_page(stage: str) -> str:
 
 def offline(html: Path) -> None:
     """Refuse pages that load something from a network."""
-    loads = re.compile(rb"<(?:script|img|iframe|source)[^>]*\ssrc=[\"']?(?:https?:)?//"
-                       rb"|<link[^>]*rel=[\"']stylesheet[\"'][^>]*href=[\"']?(?:https?:)?//"
-                       rb"|@import[^;]*//|url\([\"']?https?://")  # fmt: skip
-    bad = [path for path in html.rglob("*") if path.suffix in (".html", ".css")
-           and loads.search(path.read_bytes())]  # fmt: skip
+    loads = re.compile(
+        rb"<(?:script|img|iframe|source)[^>]*\ssrc=[\"']?(?:https?:)?//"
+        rb"|<link[^>]*rel=[\"']stylesheet[\"'][^>]*href=[\"']?(?:https?:)?//"
+        rb"|@import[^;]*//|url\([\"']?https?://"
+    )
+    bad = [
+        path
+        for path in html.rglob("*")
+        if path.suffix in (".html", ".css") and loads.search(path.read_bytes())
+    ]
     if bad:
         raise SystemExit(f"docs: {bad[0]} loads something from a network")
 

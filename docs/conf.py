@@ -39,7 +39,7 @@ _CODE = re.compile(r"(`[^`]*`)")
 
 
 def plain_text(app, what, name, obj, options, lines):
-    """Docstrings are plain text with `code` and fenced blocks: keep RST from reading more into it."""
+    """Docstrings are plain text with `code` and fenced blocks: RST shall read no more into it."""
     fenced = False
     made = []
     for line in lines:

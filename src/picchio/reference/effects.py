@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from picchio.core.html import sheet
+from picchio.core.results import TableResult
 from picchio.model.effects.effect import CHANNEL_UNIT, Effect, Parameter
 from picchio.model.effects.registry import catalogue, effect_class
 from picchio.model.effects.scales import Scales
@@ -104,9 +106,9 @@ class EffectDescription:
         }
 
 
-@dataclass(frozen=True)
-class EffectList:
-    """All effects, or one of them.
+@dataclass(frozen=True, repr=False)
+class EffectList(TableResult):
+    """All effects, or one of them; its table is one row an effect.
 
     Attributes:
         effects: by name.
@@ -114,26 +116,29 @@ class EffectList:
 
     effects: tuple[EffectDescription, ...]
 
-    def __repr__(self) -> str:
-        return f"EffectList({len(self.effects)} effects)"
+    def _headline(self) -> str:
+        return f"{len(self.effects)} effects"
 
-    def _repr_html_(self) -> str:
-        from picchio.core.html import sheet
+    def _content(self) -> dict[str, Any]:
+        return {"format": FORMAT, "effects": [effect.to_dict() for effect in self.effects]}
 
-        rows = [
-            (e.name, e.where, e.target, ", ".join(p.name for p in e.parameters), e.meaning)
+    def _rows(self) -> list[dict[str, Any]]:
+        return [
+            {
+                "name": e.name,
+                "where": e.where,
+                "target": e.target,
+                "parameters": ", ".join(p.name for p in e.parameters),
+                "meaning": e.meaning,
+            }
             for e in self.effects
         ]
-        columns = ("effect", "where", "target", "parameters", "meaning")
-        return sheet(f"{len(rows)} effects", None, columns, rows)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The content of `picchio-effects/1`.
-
-        Returns:
-            what `picchio effects --json` prints.
-        """
-        return {"format": FORMAT, "effects": [effect.to_dict() for effect in self.effects]}
+    def _repr_html_(self) -> str:
+        rows = [tuple(row.values()) for row in self._rows()]
+        return sheet(
+            self._headline(), None, ("effect", "where", "target", "parameters", "meaning"), rows
+        )
 
 
 def effects(name: str | None = None) -> EffectList:

@@ -26,6 +26,9 @@ from picchio.campaign import tables as campaign
 from picchio.campaign.channels import KINDS
 from picchio.campaign.importing import mapping
 from picchio.core.errors import InputError
+from picchio.core.html import sheet
+from picchio.core.results import TableResult
+from picchio.excitation.table import ExcitationTable, catalogue
 from picchio.fatigue import reducer
 from picchio.fatigue.sn import library as sn_library
 from picchio.prediction import plan
@@ -98,38 +101,37 @@ class FileFormat:
         return {**asdict(self), "keys": [asdict(key) for key in self.keys]}
 
 
-@dataclass(frozen=True)
-class FormatList:
-    """All formats, or one of them.
+@dataclass(frozen=True, repr=False)
+class FormatList(TableResult):
+    """All formats, or one of them; its table is one row a key.
 
     Attributes:
         formats: inputs first.
     """
 
+    INDEX = ""
+
     formats: tuple[FileFormat, ...]
 
-    def __repr__(self) -> str:
-        return f"FormatList({', '.join(entry.name for entry in self.formats)})"
+    def _headline(self) -> str:
+        return f"{len(self.formats)} formats: {', '.join(entry.name for entry in self.formats)}"
+
+    def _content(self) -> dict[str, Any]:
+        return {"format": FORMAT, "formats": [entry.to_dict() for entry in self.formats]}
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [{"name": f.name, **asdict(key)} for f in self.formats for key in f.keys]
 
     def _repr_html_(self) -> str:
-        from picchio.core.html import sheet
-
         if len(self.formats) == 1:
             only = self.formats[0]
             rows = [(k.path, k.type, k.unit, k.default, k.meaning) for k in only.keys]
-            return sheet(f"{only.name}: {only.meaning}", {"format": only.format},
-                         ("key", "type", "unit", "default", "meaning"), rows)  # fmt: skip
+            columns = ("key", "type", "unit", "default", "meaning")
+            return sheet(f"{only.name}: {only.meaning}", {"format": only.format}, columns, rows)
         lines = [(f.name, f.format, f.kind, f.command, f.meaning) for f in self.formats]
-        columns = ("name", "format", "kind", "command", "meaning")
-        return sheet(f"{len(lines)} formats", None, columns, lines)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The content of `picchio-formats/1`.
-
-        Returns:
-            what `picchio formats --json` prints.
-        """
-        return {"format": FORMAT, "formats": [entry.to_dict() for entry in self.formats]}
+        return sheet(
+            f"{len(lines)} formats", None, ("name", "format", "kind", "command", "meaning"), lines
+        )
 
 
 def formats(name: str | None = None) -> FormatList:
@@ -241,20 +243,37 @@ def _contract_key(path: str, line: str) -> Key:
 def _keys(table: type[BaseModel], before: str = "") -> Iterator[Key]:
     """Every key of a table, tables within it included."""
     meanings = described(table)
-    for name, field in table.model_fields.items():
+    # A table's own keys, then those that it shares with others.
+    own = [name for name in table.model_fields if name in table.__annotations__]
+    for name in dict.fromkeys([*own, *table.model_fields]):
+        field = table.model_fields[name]
         path = before + (field.alias or name)
         unit, meaning = _split_unit(meanings.get(name, ""))
         arms = _arms(field.annotation)
-        yield Key(path, _type(arms, field), unit, _default(field), field.is_required(), meaning)
+        kind = _type(arms, field)
+        if issubclass(table, ExcitationTable) and name == "kind":
+            kind = " | ".join(f'"{known}"' for known in catalogue())
+        yield Key(path, kind, unit, _default(field), field.is_required(), meaning)
         for tail, inner in (found for arm in arms for found in _inner(arm)):
             yield from _keys(inner, f"{path}{tail}.")
+    if issubclass(table, ExcitationTable):
+        yield from _declared(before)
 
 
-def described(table: type[BaseModel]) -> dict[str, str]:
+def _declared(before: str) -> Iterator[Key]:
+    """Keys of `[excitation]` that only one kind of blow has."""
+    for kind, excitation in catalogue().items():
+        for name in (*excitation.needed, *excitation.optional):
+            if name not in ExcitationTable.model_fields:
+                meaning = _split_unit(described(excitation).get(name, f"see {kind}"))
+                yield Key(before + name, f'only of "{kind}"', meaning[0], "", False, meaning[1])
+
+
+def described(table: type) -> dict[str, str]:
     """What the docstrings of a table and its bases say of its keys.
 
     Args:
-        table: a pydantic model with an "Attributes" section.
+        table: a class with an "Attributes" section.
 
     Returns:
         key -> description, the unit first where there is one.
