@@ -84,7 +84,7 @@ class CampaignExcitation(ExcitationTable):
     """`[excitation]`: the blows as programmed.
 
     Attributes:
-        hits: blows of the burst, silence after it; steady state where it is absent.
+        hits: blows of the burst, followed by silence; a steady state where it is left out.
     """
 
     file: InsideFile | None = None
@@ -97,7 +97,13 @@ class CampaignExcitation(ExcitationTable):
 
 
 class Tolerance(StrictModel):
-    """`[tolerance]`: relative standard deviations of the nominal values."""
+    """`[tolerance]`: standard deviations of the nominal values, relative to them.
+
+    Attributes:
+        stiffness: 1, of each joint.
+        damping_ratio: 1, of all modes together.
+        force: 1, of the blows, for the campaign.
+    """
 
     stiffness: NotNegative = 0.05
     damping_ratio: NotNegative = 0.20
@@ -108,15 +114,19 @@ class RecordTable(StrictModel):
     """One `[[record]]`.
 
     Attributes:
-        file: CSV or Parquet, relative to the campaign's folder.
+        file: CSV or Parquet file, relative to the campaign's folder.
         kind: "percussion" (the robot stands, the tool hits) or "motion" (it moves, nothing hits).
-        pose: rad or m, by joint name or in the robot's order; percussion only.
+        pose: rad or m, by joint name or in the robot's joint order; percussion only.
         direction: world, of any length; percussion only.
-        excitation: keys that override the campaign's (so do the flat ones below).
-        hits, force, period, width, preload: as in `[excitation]`.
-        time: when it was taken; taken as UTC where it names no zone.
-        temperature: deg C.
-        notes: for people.
+        excitation: keys that override the campaign's `[excitation]`.
+        hits: blows of the burst, overriding `[excitation]`.
+        force: N, overriding `[excitation]`.
+        period: s, overriding `[excitation]`.
+        width: s, overriding `[excitation]`.
+        preload: N, overriding `[excitation]`.
+        time: when it was taken; UTC where it names no zone.
+        temperature: deg C, of the robot.
+        notes: free text.
     """
 
     file: DataFile
@@ -149,14 +159,14 @@ class CampaignTable(StrictModel):
     """A campaign file as it is written.
 
     Attributes:
-        robot: a name, or a URDF relative to this file.
+        robot: a name from `picchio robots`, or a URDF relative to this file.
         tool: frame where the tool's force acts.
-        excitation: as programmed.
-        tolerance: of the nominal model.
-        controller: a known control law; free keys, for the reader of motion records.
-        record: the records.
-        notes: for people.
-        provenance: where the data come from.
+        excitation: the blows as programmed; a record may override any key.
+        tolerance: how well the nominal values are known.
+        controller: a known control law of motion records; any keys.
+        record: the records, one table for each.
+        notes: free text.
+        provenance: where the data come from; any keys.
     """
 
     robot: Annotated[str, Field(min_length=1)] | None = None

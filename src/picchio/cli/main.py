@@ -14,8 +14,10 @@ import picchio.cli.annotate
 import picchio.cli.assess
 import picchio.cli.check
 import picchio.cli.diagnose
+import picchio.cli.effects
 import picchio.cli.envelope
 import picchio.cli.fit_sn
+import picchio.cli.formats
 import picchio.cli.identify
 import picchio.cli.import_
 import picchio.cli.map
@@ -39,8 +41,10 @@ for register in (
     picchio.cli.assess.register,
     picchio.cli.check.register,
     picchio.cli.diagnose.register,
+    picchio.cli.effects.register,
     picchio.cli.envelope.register,
     picchio.cli.fit_sn.register,
+    picchio.cli.formats.register,
     picchio.cli.identify.register,
     picchio.cli.import_.register,
     picchio.cli.map.register,

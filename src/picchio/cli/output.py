@@ -16,6 +16,7 @@ from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
 
 _PATIENCE = 2.0
 _said: list[str] = []
@@ -45,6 +46,26 @@ def console() -> Console:
 
     plain = not sys.stdout.isatty()
     return Console(width=120 if plain else None, highlight=False, soft_wrap=False)
+
+
+def definitions(rows: Iterable[tuple[str, str]]) -> Table:
+    """Names and what they mean, in two columns; no name is cut, the meaning wraps.
+
+    Args:
+        rows: (name, text) with rich's markup.
+
+    Returns:
+        a table to print.
+    """
+    from rich.table import Table
+
+    table = Table.grid(padding=(0, 2))
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, text in rows:
+        table.add_row(f"  {name}", text)
+    table.add_row("", "")
+    return table
 
 
 def check_target(target: str | Path | None, inputs: Iterable[str | Path | None]) -> None:

@@ -29,7 +29,7 @@ def provenance(inputs: Iterable[str | Path] = (), *, seed: int | None = None) ->
         seed: the random seed, where chance was used.
 
     Returns:
-        `{"picchio", "python", "libraries", "seed", "inputs": [{"file", "sha256"}]}`.
+        versions (`picchio`, `python`, `libraries`), `seed`, and `inputs` with `file` and `sha256`.
     """
     libraries: dict[str, str | None] = {}
     for distribution, name in _LIBRARIES.items():

@@ -50,12 +50,13 @@ class ExcitationTable(StrictModel):
     Keys beside these are those that a kind declares; see `Excitation.needed`.
 
     Attributes:
-        kind: such as "pulse_train".
-        force: N, height or peak.
-        period: s.
-        width: s.
+        kind: shape of the blows; "pulse_train" (rectangular) where no table gives one.
+        force: N, height of a pulse or peak of a half-sine.
+        period: s, from the start of one blow to the start of the next.
+        width: s, duration of one blow.
         preload: N, steady feed force along the direction.
-        file: CSV with `time [s]` and `force [N]`, relative to the file that names it.
+        file: measured force: a CSV file with columns `time [s]` and `force [N]`, relative to
+            this file.
     """
 
     model_config = ConfigDict(extra="allow")

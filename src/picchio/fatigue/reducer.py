@@ -152,7 +152,18 @@ class ReducerCheck:
 
 
 class ReducerEntry(StrictModel):
-    """One reducer of a catalogue file; torques in N m."""
+    """One reducer of a catalogue file; every torque is at the output.
+
+    Attributes:
+        name: as in the catalogue.
+        ratio: 1, input turns for one output turn; may be left out for cycloidal reducers.
+        rated_torque: N m, for which the life is stated.
+        repeated_peak_torque: N m, limit of peaks that belong to the duty.
+        momentary_peak_torque: N m, limit for emergencies.
+        average_torque: N m, limit of the mean torque.
+        ratcheting_torque: N m, at which teeth skip.
+        source: where the ratings come from, if not as for the whole file.
+    """
 
     name: str
     ratio: Positive | None = None
@@ -165,7 +176,17 @@ class ReducerEntry(StrictModel):
 
 
 class ReducerFile(StrictModel):
-    """A catalogue file: what its entries share, and the entries."""
+    """A catalogue file: what its entries share, and the entries.
+
+    Attributes:
+        manufacturer: who makes them.
+        kind: strain-wave (ball bearing, life exponent 3) or cycloidal (rollers, 10/3).
+        rated_speed_rpm: rpm, at which the life is stated; of the input (strain-wave) or the
+            output (cycloidal).
+        rated_life_hours: h, life L10 at rated torque and speed.
+        source: where the ratings come from.
+        reducer: the reducers, one table for each.
+    """
 
     manufacturer: str
     kind: Kind

@@ -31,10 +31,10 @@ class SensorTable(StrictModel):
     """One `[[sensor]]`.
 
     Attributes:
-        channels: a channel, or a group of them: "deflection" is every flexible joint's,
-            "accelerometer.tool" that frame's three axes, "accelerometer" the tool frame's.
+        channels: a channel, or a group of them: "deflection" for every flexible joint,
+            "accelerometer.tool" for that frame's three axes, "accelerometer" for the tool frame's.
         noise: standard deviation of white noise, in `unit`.
-        unit: of `noise`; the channel's SI unit where absent.
+        unit: of `noise`; the channel's SI unit where left out.
     """
 
     channels: Annotated[str, Field(min_length=1)]
@@ -94,9 +94,9 @@ class EffectTable(StrictModel):
     """One `[[effect]]`: a departure of the simulated world from the robot's files.
 
     Attributes:
-        effect: its name.
-        target: the joint, link, axis, channel group, "tool" or "robot".
-        parameters: SI.
+        effect: a name from `picchio effects`.
+        target: the joint, link, axis, channel group, "tool" or "robot" that it acts on.
+        parameters: SI values by name; those left out are neutral.
     """
 
     effect: str
@@ -134,23 +134,24 @@ class Plan(StrictModel):
     """A plan as it is written.
 
     Attributes:
-        poses: rad or m, by joint name or in the robot's order.
+        poses: rad or m, by joint name or in the robot's joint order.
         directions: world, of any length.
-        levels: N, heights of the blows; the excitation's own where absent.
+        levels: N, heights of the blows; the excitation's own where left out.
         combine: "all" takes every pose with every direction and level; "in-turn" takes the
             directions and levels in turn, one record a pose.
         repeats: how often each record is taken.
-        hits: blows of a burst from rest; steady state where absent.
-        sample_rate: Hz.
-        quiet: s before the first blow; none in a steady record.
+        hits: blows of a burst from rest; a steady state where left out.
+        sample_rate: Hz, of every record.
+        quiet: s, before the first blow; none in a steady record.
         length: s, from the first blow on.
-        times, temperatures: of the records in turn, as in a campaign; where given, as many.
+        times: when each record is taken; as many as there are records.
+        temperatures: deg C, of the robot in each record; as many as there are records.
         excitation: the blows.
-        tolerance: of the nominal model, for the campaign.
-        sensor: what is measured, with what noise.
-        effect: what is different in the world from the robot's files.
+        tolerance: how well the nominal values are known; copied to the campaign.
+        sensor: what is measured, and with how much noise.
+        effect: how the simulated world differs from the robot's files.
         seed: of the noise.
-        notes: for people.
+        notes: free text.
     """
 
     poses: list[Pose] = Field(min_length=1)

@@ -28,7 +28,21 @@ Hits = Annotated[int, Field(gt=0, le=10_000, strict=True)]
 
 
 class OperationTable(ExcitationTable):
-    """One `[[operation]]`; keys of the excitation given here override the task's."""
+    """One `[[operation]]`: rivets in one direction; its blows as in `[excitation]`.
+
+    Attributes:
+        name: unique within the task.
+        direction: world; the tool's force on the robot acts along it. Any length.
+        poses: rad or m, one list a pose in the robot's joint order, or a table by joint name;
+            joints left out are at zero. Give poses or points.
+        points: m, world; inverse kinematics finds the poses, the tool pointing against the
+            direction where the arm can aim.
+        branch: which solution of the inverse kinematics: "any", "elbow-up" or "elbow-down"
+            (3 joints), or a list of words for the signs of joints (6 and 7 joints).
+        rivets: 1, rivets at each pose in one pass of the task.
+        hits_per_rivet: blows a rivet takes; overrides the task's.
+        excitation: keys that override the task's `[excitation]`.
+    """
 
     name: str
     direction: list[Finite]
@@ -47,7 +61,13 @@ class OperationTable(ExcitationTable):
 
 
 class TaskTable(StrictModel):
-    """A task file as it is written."""
+    """A task file as it is written.
+
+    Attributes:
+        hits_per_rivet: blows a rivet takes.
+        excitation: the blows; an operation may override any key.
+        operation: rivets in one direction, one table for each.
+    """
 
     hits_per_rivet: Hits = 12
     excitation: ExcitationTable = ExcitationTable()

@@ -24,9 +24,9 @@ class SourceTable(StrictModel):
     """`[source]`: how the file is written; all but `kind` is for CSV.
 
     Attributes:
-        kind: as the file's ending says where absent.
-        delimiter: between columns.
-        decimal: "." or ",".
+        kind: of file; told by its ending where left out.
+        delimiter: one letter between columns.
+        decimal: sign of decimal numbers.
         skip_lines: lines before the header (or the first sample).
         header: whether a line names the columns; without one they are "1", "2", ...
     """
@@ -44,11 +44,11 @@ class TimeTable(StrictModel):
     Attributes:
         series: the series that holds the time, in `unit`; not for UFF and MCAP, which have one.
         unit: of the series.
-        rate: Hz; the clock where there is no series, or the rate to resample to.
-        zero: s; this time of the file becomes t = 0 (the first edge of the first blow). The
-            first sample of a rate, and of UFF or MCAP, is counted as the format says.
-        resample: "linear" puts stamps that are not even onto an even clock of `rate`.
-        stamp: MCAP: the message header's stamp, or the time it was logged.
+        rate: Hz, sample rate where there is no time series, or the rate to resample to.
+        zero: s, the time in the file that becomes t = 0 (the first edge of the first blow). With
+            `rate` alone the first sample is at 0; UFF and MCAP files state the time of theirs.
+        resample: "linear" interpolates uneven time stamps onto an even clock of `rate`.
+        stamp: MCAP only: the message header's stamp, or the time it was logged.
     """
 
     series: str | None = None
@@ -63,12 +63,14 @@ class ChannelTable(StrictModel):
     """One `[[channel]]`: value = sign * (scale * stored + offset), in `unit`.
 
     Attributes:
-        series: the file's name of it (`from` in the file).
-        to: the contract's channel.
-        unit: of the value; as the file says, else the contract's, where absent.
-        scale, offset, sign: as above.
-        remove: subtract the mean of the record ("mean") or of t < 0 ("quiet"), as the
-            contract wants of an accelerometer, or of all channels of a steady record.
+        series: name of the series in the file.
+        to: the channel, such as "accelerometer.tool.x"; `picchio formats record` lists them.
+        unit: of the value; where left out, the file's, or else the channel's SI unit.
+        scale: 1, factor on the stored number.
+        offset: 1, added after the factor, in `unit`.
+        sign: 1 or -1, factor on the result.
+        remove: subtract the mean of the whole record ("mean", for a steady record) or of the quiet
+            time t < 0 ("quiet", for an accelerometer).
     """
 
     series: str = Field(alias="from")
@@ -86,9 +88,9 @@ class Mapping(StrictModel):
     Attributes:
         source: how the file is written.
         time: its clock.
-        channel: what becomes what.
-        record: the `[[record]]` keys of the campaign: kind, pose, direction, ...
-        campaign: its other keys: robot, tool, excitation, ...
+        channel: which series becomes which channel, one table for each.
+        record: keys of the campaign's `[[record]]`: kind, pose, direction, ...
+        campaign: the campaign's other keys: robot, tool, excitation, ...
     """
 
     source: SourceTable = SourceTable()

@@ -19,7 +19,27 @@ SN_FORMAT = "picchio-sn-curve/1"
 
 
 class SNCurveFile(StrictModel):
-    """What an S-N curve's TOML file holds; units and meaning as in `SNCurve`."""
+    """What an S-N curve's TOML file holds.
+
+    Attributes:
+        name: of the curve.
+        kind: of stress; convert normal stresses to shear first.
+        strength: Pa, shear amplitude, fully reversed, that is survived for `cycles` cycles.
+        cycles: cycles, where on the curve `strength` is given.
+        slopes: 1, k of N ~ amplitude^-k, one for each line, from few cycles to many.
+        knees: cycles, at which one line ends and the next begins, ascending. As many as slopes: an
+            endurance limit beyond the last. One fewer: no endurance limit.
+        miner: damage below the endurance limit: none ("original"), the last line continued
+            ("elementary"), or with slope 2k - 1 ("haibach").
+        survival: 1, probability that a part survives this curve.
+        scatter: 1, standard deviation of log10 strength at a given life.
+        ultimate_shear: Pa, static strength, for the mean stress rules.
+        yield_shear: Pa, for the mean stress rules.
+        tensile_strength: Pa, R_m, for FKM's mean stress sensitivity and surface factor.
+        source: where the numbers come from.
+        warning: why not to use the curve for real work, if there is a reason.
+        assumptions: sentences to print with every result.
+    """
 
     name: str
     kind: Literal["shear"]

@@ -79,7 +79,14 @@ Stiffness = Annotated[Positive, AfterValidator(_in_newtons)]
 
 
 class ShaftEntry(StrictModel):
-    """A round shaft: m, m, Pa, and the name of its S-N curve."""
+    """A round solid shaft that carries the joint's torque.
+
+    Attributes:
+        radius: m, at most 2.
+        length: m, at most 2; used to check that k = G Jp / l.
+        shear_modulus: Pa, 79.3e9 for steel.
+        sn_curve: name of a shipped S-N curve, or a `picchio-sn-curve/1` file.
+    """
 
     radius: ShaftLength
     length: ShaftLength
@@ -88,7 +95,15 @@ class ShaftEntry(StrictModel):
 
 
 class StiffnessCurveEntry(StrictModel):
-    """K1, K2, K3 [N m/rad] and T1, T2 [N m] of a strain-wave catalogue."""
+    """Stiffness of a strain-wave gear by torque, as its catalogue gives it.
+
+    Attributes:
+        k1: N m/rad, below the torque t1.
+        k2: N m/rad, from t1 to t2.
+        k3: N m/rad, above t2.
+        t1: N m, first corner.
+        t2: N m, second corner; above t1.
+    """
 
     k1: Stiffness
     k2: Stiffness
@@ -104,7 +119,15 @@ class StiffnessCurveEntry(StrictModel):
 
 
 class BalancerEntry(StrictModel):
-    """Points [m] in the joint's frame at zero, spring [N/m, m] and constant pull [N]."""
+    """A spring between two points that carries part of the gravity torque.
+
+    Attributes:
+        parent_point: m, on the parent link, in the joint's frame at position zero.
+        child_point: m, on the child link, in the joint's frame at position zero.
+        stiffness: N/m, of the spring.
+        free_length: m, of the unloaded spring.
+        force: N, constant pull beside the spring.
+    """
 
     parent_point: Vector
     child_point: Vector
@@ -114,7 +137,22 @@ class BalancerEntry(StrictModel):
 
 
 class JointEntry(StrictModel):
-    """One joint's drive."""
+    """One joint's drive.
+
+    Attributes:
+        stiffness: N m/rad (N/m for a prismatic joint), 1e-3 to 1e12. Without it, or a curve, the
+            joint is rigid.
+        stiffness_curve: in place of `stiffness`: a strain-wave gear's curve, whose slope at the
+            gravity torque is used.
+        damping_ratio: 1, modal damping ratio.
+        shaft: the part whose fatigue is assessed.
+        reducer: a catalogue name, such as "RV-80E-121"; its torque limits are checked.
+        rotor_inertia: kg m^2, at the motor, before the gear.
+        gear_ratio: 1, motor turns for one turn of the joint.
+        balancer: a spring that carries part of the gravity torque.
+        source: where the values come from.
+        estimated: true if the values were not measured.
+    """
 
     stiffness: Stiffness | None = None
     stiffness_curve: StiffnessCurveEntry | None = None
@@ -137,7 +175,17 @@ class JointEntry(StrictModel):
 
 
 class ToolEntry(StrictModel):
-    """The tool: m, kg, kg m^2, all in the tool frame."""
+    """The tool, in addition to the URDF's own masses; all in the tool frame.
+
+    Attributes:
+        frame: the URDF frame that carries the tool.
+        xyz: m, from the frame's origin to the point where the force acts.
+        axis: the way the tool points, of any length.
+        mass: kg, of the tool.
+        com: m, centre of mass.
+        inertia: kg m^2, about the centre of mass: ixx, ixy, ixz, iyy, iyz, izz.
+        source: where the values come from.
+    """
 
     frame: str | None = None
     xyz: Vector = (0.0, 0.0, 0.0)
@@ -161,7 +209,16 @@ class ToolEntry(StrictModel):
 
 
 class GunEntry(StrictModel):
-    """The gun: kg, N/m, 1, N."""
+    """The percussive tool's body, at the tool point.
+
+    Attributes:
+        mass: kg, of the body.
+        recoil_stiffness: N/m, of the spring on which the body slides along the tool's axis; without
+            it the body is fixed.
+        damping_ratio: 1, of the body on its spring.
+        feed_force: N, steady force along the direction, where the task gives no preload.
+        source: where the values come from.
+    """
 
     mass: NotNegative
     recoil_stiffness: Positive | None = None
@@ -177,7 +234,14 @@ class GunEntry(StrictModel):
 
 
 class BaseEntry(StrictModel):
-    """How the robot stands: m, rad, m/s^2."""
+    """How the robot stands.
+
+    Attributes:
+        xyz: m, of the base in the world.
+        rpy: rad, roll, pitch and yaw of the base.
+        gravity: m/s^2, world.
+        source: where the values come from.
+    """
 
     xyz: Vector = (0.0, 0.0, 0.0)
     rpy: Vector = (0.0, 0.0, 0.0)
@@ -186,7 +250,16 @@ class BaseEntry(StrictModel):
 
 
 class Sidecar(StrictModel):
-    """Everything a sidecar may say. `robot` names the arm it belongs to."""
+    """Everything a sidecar may say.
+
+    Attributes:
+        robot: the arm of example-robot-data that it belongs to, where the URDF is not beside it.
+        description: free text.
+        joint: drives, by the URDF's joint names.
+        tool: the tool, in addition to the URDF.
+        gun: the percussive tool's body.
+        base: how the robot stands.
+    """
 
     robot: str | None = None
     description: str | None = None

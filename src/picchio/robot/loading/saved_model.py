@@ -19,10 +19,10 @@ class EffectTable(StrictModel):
     """One `[[effect]]`.
 
     Attributes:
-        effect: its name.
-        target: joint, link, axis, channel group, "tool" or "robot".
-        parameters: name -> value, SI.
-        hidden: record -> numbers drawn anew in every record.
+        effect: a name from `picchio effects`.
+        target: the joint, link, axis, channel group, "tool" or "robot" that it acts on.
+        parameters: SI values by name; those left out are neutral.
+        hidden: by record, the numbers that differ from record to record.
     """
 
     effect: Annotated[str, Field(min_length=1)]
@@ -35,12 +35,12 @@ class SavedModel(StrictModel):
     """A saved model as it is written.
 
     Attributes:
-        robot: a name, or a URDF relative to this file.
+        robot: a name from `picchio robots`, or a URDF relative to this file.
         flex: sidecar, relative to this file.
         tool: frame that carries the tool.
-        notes: for people.
-        provenance: where it comes from.
-        effect: how the world departs from the robot's files.
+        notes: free text.
+        provenance: where the model comes from; any keys.
+        effect: how the real robot differs from its files, one table for each effect.
     """
 
     robot: Annotated[str, Field(min_length=1)]

@@ -63,7 +63,7 @@ def build_scene(
         direction: (3,) of the force, for the vibration; the worst one if not given.
         assessment: of a task, for the rivets and the joints' colours.
         joint: whose envelope is shown first; the limiting one if not given.
-        workspace: of `picchio.workspace_map`, or its dataset, coloured by the peak of the joint shown.
+        workspace: of `picchio.workspace_map`, coloured by the peak of the joint shown.
         diagnosis: of this robot: its causes are drawn where they sit, and the layers about life
             start hidden.
         gravity_stiffness: add dg/dq to the springs.

@@ -1,0 +1,404 @@
+"""Every file format with its keys: type, unit, default and meaning.
+
+The keys of TOML files come from the tables that check them (`picchio.core.toml.StrictModel`): type,
+bounds and default from the fields, unit and meaning from the "Attributes" section of the table's
+docstring. JSON outputs and data files, which no table checks, are described in `contracts.toml`.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import tomllib
+import types
+import typing
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any, Literal
+
+from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from picchio.campaign import tables as campaign
+from picchio.campaign.channels import KINDS
+from picchio.campaign.importing import mapping
+from picchio.core.errors import InputError
+from picchio.core.html import sheet
+from picchio.core.results import TableResult
+from picchio.excitation.table import ExcitationTable, catalogue
+from picchio.fatigue import reducer
+from picchio.fatigue.sn import library as sn_library
+from picchio.prediction import plan
+from picchio.robot.annotations import sidecar
+from picchio.robot.loading import saved_model
+from picchio.studies import tasks
+from picchio.studies.maps.files import EXTRA, VARIABLES
+
+FORMAT = "picchio-formats/1"
+
+# A unit at the start of a description: "N m/rad (N/m for a prismatic joint), ...".
+_UNITS = ("1", "N", "m", "s", "kg", "rad", "Pa", "Hz", "rpm", "h", "days", "cycles", "deg C", "N m",
+          "N/m", "N m/rad", "kg m^2", "m/s", "m/s^2", "rad/s")  # fmt: skip
+_SYMBOL = f"(?:{'|'.join(map(re.escape, _UNITS))})"
+_UNIT = re.compile(rf"({_SYMBOL}(?: or {_SYMBOL})?(?: \([^)]*\))?), (.+)")
+_ENTRY = re.compile(r"([A-Za-z_][\w, ]*): (.*)")
+_BOUNDS = ((Gt, "gt", ">"), (Ge, "ge", ">="), (Lt, "lt", "<"), (Le, "le", "<="))
+_NAMES = {float: "number", int: "whole number", str: "text", bool: "true or false"}
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of a file.
+
+    Attributes:
+        path: dotted, such as "operation[].name"; `[]` repeats, `<name>` is yours to choose.
+        type: what may stand there, with its bounds or choices.
+        unit: SI; "1" for a pure number, empty where a unit makes no sense.
+        default: as JSON would have it; empty where there is none.
+        required: whether the file is refused without it; for outputs, whether it is always there.
+        meaning: in a line or two.
+    """
+
+    path: str
+    type: str
+    unit: str
+    default: str
+    required: bool
+    meaning: str
+
+
+@dataclass(frozen=True)
+class FileFormat:
+    """One file format.
+
+    Attributes:
+        name: short, as `picchio formats NAME` takes it.
+        format: what the file's `format` key says; empty for files without one.
+        kind: "TOML", "JSON", "CSV" or "netCDF or Zarr".
+        role: "input" (people write it), "output" (a command writes it) or "both".
+        meaning: what the file is for.
+        command: commands that read or write it.
+        keys: in the order of the file.
+    """
+
+    name: str
+    format: str
+    kind: str
+    role: str
+    meaning: str
+    command: str
+    keys: tuple[Key, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values.
+
+        Returns:
+            the attributes by name, keys as a list.
+        """
+        return {**asdict(self), "keys": [asdict(key) for key in self.keys]}
+
+
+@dataclass(frozen=True, repr=False)
+class FormatList(TableResult):
+    """All formats, or one of them; its table is one row a key.
+
+    Attributes:
+        formats: inputs first.
+    """
+
+    INDEX = ""
+
+    formats: tuple[FileFormat, ...]
+
+    def _headline(self) -> str:
+        return f"{len(self.formats)} formats: {', '.join(entry.name for entry in self.formats)}"
+
+    def _content(self) -> dict[str, Any]:
+        return {"format": FORMAT, "formats": [entry.to_dict() for entry in self.formats]}
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [{"name": f.name, **asdict(key)} for f in self.formats for key in f.keys]
+
+    def _repr_html_(self) -> str:
+        if len(self.formats) == 1:
+            only = self.formats[0]
+            rows = [(k.path, k.type, k.unit, k.default, k.meaning) for k in only.keys]
+            columns = ("key", "type", "unit", "default", "meaning")
+            return sheet(f"{only.name}: {only.meaning}", {"format": only.format}, columns, rows)
+        lines = [(f.name, f.format, f.kind, f.command, f.meaning) for f in self.formats]
+        return sheet(
+            f"{len(lines)} formats", None, ("name", "format", "kind", "command", "meaning"), lines
+        )
+
+
+def formats(name: str | None = None) -> FormatList:
+    """Every file that picchio reads or writes, with all its keys.
+
+    Args:
+        name: of one format, such as "task" or "picchio-task/1"; all of them if not given.
+
+    Returns:
+        their descriptions.
+
+    Raises:
+        InputError: no such format.
+    """
+    known = _known()
+    if name is None:
+        return FormatList(known)
+    found = [entry for entry in known if name in (entry.name, entry.format)]
+    if not found:
+        raise InputError("no such format", value=name, choices=[entry.name for entry in known])
+    return FormatList(tuple(found[:1]))
+
+
+# TOML files: name, format, table, commands, meaning.
+_TABLES: tuple[tuple[str, str, type[BaseModel], str, str], ...] = (
+    ("task", tasks.FORMAT, tasks.TaskTable, "assess, place, view, diagnose",
+     "the work: blows, directions and the poses or points where rivets are set"),
+    ("sidecar", sidecar.FORMAT, sidecar.Sidecar, "--flex; annotate, identify",
+     "what a URDF does not say: stiffness, damping, shafts, reducers, tool, gun"),
+    ("campaign", campaign.FORMAT, campaign.CampaignTable, "check, diagnose, identify",
+     "campaign.toml: measured records and what was programmed"),
+    ("plan", plan.FORMAT, plan.Plan, "simulate; diagnose --plan",
+     "a test to be done: poses, directions, sensors with their noise"),
+    ("mapping", mapping.FORMAT, mapping.Mapping, "import",
+     "how the series of a measured file become channels"),
+    ("model", saved_model.FORMAT, saved_model.SavedModel, "ROBOT; diagnose --model",
+     "a robot, its sidecar and the effects that a diagnosis found"),
+    ("sn-curve", sn_library.SN_FORMAT, sn_library.SNCurveFile, "--sn-curve; fit-sn --out",
+     "an S-N curve in shear"),
+    ("reducers", reducer.REDUCER_FORMAT, reducer.ReducerFile, "load_reducer(catalogues=...)",
+     "a maker's catalogue of reducers"),
+)  # fmt: skip
+
+
+@cache
+def _known() -> tuple[FileFormat, ...]:
+    tables = [
+        FileFormat(
+            name, format, "TOML", "input", meaning, command,
+            (_format_key(format), *_keys(table)),
+        )
+        for name, format, table, command, meaning in _TABLES
+    ]  # fmt: skip
+    return (*tables, _record(), *_contracts(), _map())
+
+
+def _format_key(format: str) -> Key:
+    return Key("format", f'"{format}"', "", "", True, "which format, and which version of it")
+
+
+def _record() -> FileFormat:
+    """A record's columns, from the kinds of channels that are registered."""
+    keys = [Key("time", "column", "s", "", True, "uniform; 0 is the first edge of the first blow")]
+    keys += [
+        Key(kind.pattern, "column", " or ".join(kind.units), "", False, kind.meaning)
+        for kind in KINDS
+    ]
+    return FileFormat(
+        "record", "", "CSV or Parquet", "input",
+        "one measured record; each column's header is `channel [unit]`",
+        "check, diagnose, identify", tuple(keys),
+    )  # fmt: skip
+
+
+def _map() -> FileFormat:
+    keys = [
+        Key(name, f"({', '.join(dimensions)})", "" if unit == "1" else unit, "", known, meaning)
+        for known, variables in ((True, VARIABLES), (False, EXTRA))
+        for name, (dimensions, unit, meaning) in variables.items()
+    ]
+    return FileFormat(
+        "map", "picchio-map/1", "netCDF or Zarr", "output",
+        "a workspace map: one row a point and branch", "map, view --map", tuple(keys),
+    )  # fmt: skip
+
+
+def _contracts() -> Iterator[FileFormat]:
+    text = (files("picchio.reference") / "contracts.toml").read_text(encoding="utf-8")
+    content = tomllib.loads(text)
+    shared = content.pop("shared")
+    for name, entry in content.items():
+        keys = []
+        if entry["kind"] == "JSON":
+            keys.append(_format_key(entry["format"]))
+        for path, line in entry["keys"].items():
+            group = shared[line[1:]] if line.startswith("@") else {"": line}
+            keys += [_contract_key((path + tail).lstrip("."), text) for tail, text in group.items()]
+        yield FileFormat(name, entry.get("format", ""), entry["kind"], entry["role"],
+                         entry["meaning"], entry["command"], tuple(keys))  # fmt: skip
+
+
+def _contract_key(path: str, line: str) -> Key:
+    """A line such as "number; rad, largest over the task"; "?" after the type: not always."""
+    kind, _, text = line.partition("; ")
+    unit, meaning = _split_unit(text)
+    return Key(path, kind.removesuffix("?"), unit, "", not kind.endswith("?"), meaning)
+
+
+def _keys(table: type[BaseModel], before: str = "") -> Iterator[Key]:
+    """Every key of a table, tables within it included."""
+    meanings = described(table)
+    # A table's own keys, then those that it shares with others.
+    own = [name for name in table.model_fields if name in table.__annotations__]
+    for name in dict.fromkeys([*own, *table.model_fields]):
+        field = table.model_fields[name]
+        path = before + (field.alias or name)
+        unit, meaning = _split_unit(meanings.get(name, ""))
+        arms = _arms(field.annotation)
+        kind = _type(arms, field)
+        if issubclass(table, ExcitationTable) and name == "kind":
+            kind = " | ".join(f'"{known}"' for known in catalogue())
+        yield Key(path, kind, unit, _default(field), field.is_required(), meaning)
+        for tail, inner in (found for arm in arms for found in _inner(arm)):
+            yield from _keys(inner, f"{path}{tail}.")
+    if issubclass(table, ExcitationTable):
+        yield from _declared(before)
+
+
+def _declared(before: str) -> Iterator[Key]:
+    """Keys of `[excitation]` that only one kind of blow has."""
+    for kind, excitation in catalogue().items():
+        for name in (*excitation.needed, *excitation.optional):
+            if name not in ExcitationTable.model_fields:
+                meaning = _split_unit(described(excitation).get(name, f"see {kind}"))
+                yield Key(before + name, f'only of "{kind}"', meaning[0], "", False, meaning[1])
+
+
+def described(table: type) -> dict[str, str]:
+    """What the docstrings of a table and its bases say of its keys.
+
+    Args:
+        table: a class with an "Attributes" section.
+
+    Returns:
+        key -> description, the unit first where there is one.
+    """
+    found: dict[str, str] = {}
+    for kind in reversed(table.__mro__):
+        section = inspect.cleandoc(kind.__doc__ or "").partition("\nAttributes:\n")[2]
+        names: list[str] = []
+        for line in section.splitlines():
+            entry = _ENTRY.fullmatch(line.strip())
+            if entry and line.startswith("    ") and not line.startswith("     "):
+                names = [part.strip() for part in entry[1].split(",")]
+                found |= dict.fromkeys(names, entry[2])
+            elif line.strip() and names:
+                found |= {name: f"{found[name]} {line.strip()}" for name in names}
+    return found
+
+
+def _split_unit(text: str) -> tuple[str, str]:
+    match = _UNIT.fullmatch(text.removesuffix("."))
+    return (match[1], match[2]) if match else ("", text.removesuffix("."))
+
+
+def _arms(kind: Any) -> list[Any]:
+    """The types that an annotation allows, without None and without metadata."""
+    origin = typing.get_origin(kind)
+    if origin is typing.Annotated:
+        return _arms(typing.get_args(kind)[0])
+    if origin in (typing.Union, types.UnionType):
+        return [leaf for arm in typing.get_args(kind) for leaf in _arms(arm)]
+    return [] if kind is types.NoneType else [kind]
+
+
+def _inner(kind: Any) -> Iterator[tuple[str, type[BaseModel]]]:
+    """Tables reached from a type, with what the path to them adds."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        yield "", kind
+    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+    tail = "[]" if origin in (list, tuple) else ".<name>" if origin is dict else ""
+    if tail:
+        for leaf in _arms(arguments[-1 if origin is dict else 0]):
+            for more, table in _inner(leaf):
+                yield tail + more, table
+
+
+def _type(arms: list[Any], field: FieldInfo) -> str:
+    text = " or ".join(dict.fromkeys(_type_name(arm) for arm in arms))
+    return f"{text} {', '.join(_limits(_metadata(field)))}".strip()
+
+
+def _metadata(field: FieldInfo) -> list[Any]:
+    """Bounds may stand on the field, or within its annotation's first arm."""
+    found = list(field.metadata)
+    for arm in typing.get_args(field.annotation) or (field.annotation,):
+        if typing.get_origin(arm) is typing.Annotated:
+            found += typing.get_args(arm)[1:]
+    return [leaf for part in found for leaf in getattr(part, "metadata", None) or [part]]
+
+
+def _limits(metadata: list[Any]) -> list[str]:
+    found = []
+    for part in metadata:
+        for kind, attribute, sign in _BOUNDS:
+            if isinstance(part, kind):
+                found.append(f"{sign} {getattr(part, attribute):g}")
+        if isinstance(part, (MinLen, MaxLen)):
+            many = part.min_length if isinstance(part, MinLen) else part.max_length
+            found.append(f"{'at least' if isinstance(part, MinLen) else 'at most'} {many} long")
+    return list(dict.fromkeys(found))
+
+
+def _type_name(kind: Any) -> str:
+    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+    if origin is typing.Annotated:
+        return _type_name(arguments[0])
+    if origin is Literal:
+        return " | ".join(f'"{value}"' if isinstance(value, str) else str(value)
+                          for value in arguments)  # fmt: skip
+    if origin in (typing.Union, types.UnionType):
+        return " or ".join(dict.fromkeys(_type_name(arm) for arm in _arms(kind)))
+    if origin is tuple and Ellipsis not in arguments:
+        return f"list of {len(arguments)} {_plural(arguments[0])}"
+    if origin in (list, tuple):
+        return f"list of {_plural(arguments[0])}"
+    if origin is dict:
+        return "table of any keys" if arguments[1] is Any else f"table of {_plural(arguments[1])}"
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        return "table"
+    return _NAMES.get(kind, "date and time" if kind.__name__ == "datetime" else "anything")
+
+
+def _plural(kind: Any) -> str:
+    first, _, rest = _type_name(kind).partition(" ")
+    if first == "whole":
+        return "whole numbers"
+    return f"{first}{'s' if first in ('number', 'table', 'list') else ''} {rest}".strip()
+
+
+def _default(field: FieldInfo) -> str:
+    """The default as TOML would have it; empty for none and for tables."""
+    if field.is_required() or field.default_factory is not None:
+        return ""
+    value = field.default
+    if value is None or isinstance(value, BaseModel) or value in ("", ()):
+        return ""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, tuple):
+        return f"[{', '.join(f'{part:g}' for part in value)}]"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def sections(entry: FileFormat) -> Mapping[str, tuple[Key, ...]]:
+    """A format's keys by the table that they stand in.
+
+    Args:
+        entry: a format.
+
+    Returns:
+        the table's path ("" for the top of the file) -> its keys, in order.
+    """
+    found: dict[str, list[Key]] = {}
+    for key in entry.keys:
+        nested = entry.kind in ("TOML", "JSON")
+        found.setdefault(key.path.rpartition(".")[0] if nested else "", []).append(key)
+    return {path: tuple(keys) for path, keys in found.items()}
