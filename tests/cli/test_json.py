@@ -13,6 +13,7 @@ import pytest
 import picchio
 from picchio.cli.main import run
 
+SLOW = {"place", "reproduce"}
 POSE = "0.3,1.1,-1.0"
 PLAN = """format = "picchio-plan/1"
 poses = [[0.3, 0.5, -0.8]]
@@ -51,6 +52,11 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def arm() -> tuple[Any, Any]:
+    robot = picchio.load_robot("fanuc_like_3dof")
+    return robot, picchio.load_task(robot.task_path, robot)
+
+
 def annotated() -> Any:
     made = picchio.annotate("fanuc_like_3dof")
     made.save("a.urdf")
@@ -63,9 +69,7 @@ def imported() -> Any:
 
 
 def scene() -> Any:
-    robot = picchio.load_robot("fanuc_like_3dof")
-    task = picchio.load_task(robot.task_path, robot)
-    made = picchio.view(robot, pose=[0.3, 1.1, -1.0], excitation=task.operations[0].excitation)
+    made = picchio.view("fanuc_like_3dof", pose=[0.3, 1.1, -1.0])
     made.save("a.html")
     return made
 
@@ -73,7 +77,14 @@ def scene() -> Any:
 # Command line, and what the function returns; both write what they write where the other did.
 COMMANDS: dict[str, tuple[str, Any]] = {
     "annotate": ("annotate fanuc_like_3dof --out a.urdf", annotated),
+    "assess": ("assess fanuc_like_3dof", lambda: picchio.assess(*arm())),
     "check": ("check measured", lambda: picchio.check("measured")),
+    "envelope": (
+        f"envelope fanuc_like_3dof --pose={POSE} --hits 3",
+        lambda: picchio.envelope(
+            arm()[0], [0.3, 1.1, -1.0], arm()[1].operations[0].excitation, hits=3
+        ),
+    ),
     "fit-sn": (
         "fit-sn tests.csv --kind normal --survival 0.9",
         lambda: picchio.fit_sn("tests.csv", kind="normal", survival=0.9),
@@ -81,6 +92,10 @@ COMMANDS: dict[str, tuple[str, Any]] = {
     "import": (
         "import hit.csv --mapping mapping.toml --to imported",
         imported,
+    ),
+    "place": (
+        "place fanuc_like_3dof --placements 8 --no-self-collision",
+        lambda: picchio.place(*arm(), placements=8, self_collision=False),
     ),
     "reproduce": (
         "reproduce --worlds 8 --assume period=0.05",
@@ -96,7 +111,7 @@ COMMANDS: dict[str, tuple[str, Any]] = {
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow) if n == "reproduce" else n for n in COMMANDS]
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in COMMANDS]
 )
 def test_json_is_to_dict(name: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words, function = COMMANDS[name]
