@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from picchio.diagnosis.percussion.search.rounds import Look
 
 import picchio
 from picchio.diagnosis.percussion import diagnosis as diagnose
@@ -12,7 +13,6 @@ from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import measure_scales
-from picchio.diagnosis.percussion.search.rounds import Look
 from picchio.diagnosis.percussion.search.state import Search
 from picchio.model.effects.registry import effect_class
 from worlds import campaign as worlds

@@ -25,7 +25,13 @@ from picchio.diagnosis.percussion.search.exchange import exchange, prune
 from picchio.diagnosis.percussion.search.restart import restarted
 from picchio.diagnosis.percussion.search.screen import Suspect, acts_either_way, smallest
 from picchio.diagnosis.percussion.search.state import Trial
-from picchio.diagnosis.percussion.search.trials import _short_list, fit_short, holdout_choice, over_the_same_samples, records_of_every_pose
+from picchio.diagnosis.percussion.search.trials import (
+    _short_list,
+    fit_short,
+    holdout_choice,
+    over_the_same_samples,
+    records_of_every_pose,
+)
 from picchio.model.effects.registry import effect_class
 from worlds import campaign as worlds
 from worlds import cases
@@ -156,7 +162,7 @@ def test_late_blows_and_what_is_common_are_found_at_once(arm):
     start = Hypothesis.baseline(arm, campaign.tolerance)
     early = fit(problem, start, end=0.03)
     known = fit(problem, early.hypothesis, iterations=0)
-    found = fit_latent(problem, known, effect_class("pulse_jitter"), "tool")
+    found = fit_latent(problem, known, effect_class("pulse_jitter")("tool"))
     assert found.chi_square / found.samples < 1.1
     cause = next(e for e in found.hypothesis.effects if e.name == "pulse_jitter")
     for i, record in enumerate(problem.records):

@@ -24,8 +24,7 @@ from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import measure_scales
-from picchio.diagnosis.percussion.search.state import Search
-from picchio.diagnosis.percussion.search.state import Trial
+from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.diagnosis.result import Cause, Diagnosis, Value
 from picchio.model.effects.registry import effect_class
 from picchio.robot.loading.load import load_robot
