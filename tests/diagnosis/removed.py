@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from picchio.diagnosis.percussion.fit.drawn import LATENT
 from worlds import campaign as worlds
 from worlds import robots
 
@@ -27,7 +26,7 @@ def share(found, truth):
     """
     best, baseline = found.search.best.hypothesis, found.search.baseline.hypothesis
     kept = set(found.diagnosis.gain.held_out_records)
-    if not best.labels or any(cause.name in LATENT for cause in best.causes):
+    if not best.labels or any(cause.latent is not None for cause in best.causes):
         return None
     if kept == {record.name for record in found.problem.records}:
         return None

@@ -160,7 +160,7 @@ def test_late_blows_and_what_is_common_are_found_at_once(arm):
     start = Hypothesis.baseline(arm, campaign.tolerance)
     early = fit(problem, start, end=0.03)
     known = fit(problem, early.hypothesis, iterations=0)
-    found = fit_latent(problem, known, effect_class("pulse_jitter"), "tool")
+    found = fit_latent(problem, known, effect_class("pulse_jitter")("tool"))
     assert found.chi_square / found.samples < 1.1
     cause = next(e for e in found.hypothesis.effects if e.name == "pulse_jitter")
     for i, record in enumerate(problem.records):

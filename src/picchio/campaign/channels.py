@@ -2,7 +2,7 @@
 
 A channel's name is its kind, then the joint or frame it belongs to, then an axis where the kind
 has axes: `force`, `deflection.joint_1`, `accelerometer.tool.x`. To add a kind, add a line to
-`KINDS`, or call `register_channel_kind` from elsewhere.
+`KINDS`, or name a `ChannelKind` of your own in the entry-point group `picchio.channels`.
 """
 
 from __future__ import annotations
@@ -12,8 +12,11 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Literal
 
+from picchio.campaign import readers
+from picchio.campaign.readers import Reader
 from picchio.campaign.units import Conversion, conversion
 from picchio.core.errors import InputError
+from picchio.core.registry import with_entry_points
 
 AXES = ("x", "y", "z")
 TIME = "time"
@@ -30,6 +33,17 @@ class ChannelKind:
         axes: whether the name ends in .x, .y or .z.
         meaning: for people.
         free_offset: a constant offset per record and channel is a nuisance (encoder zeros).
+        reader: what an ideal sensor of this kind reads in a percussion record; None where that
+            is not known: such a channel is then not used, and the user is told so.
+        of_force: whether it reads the force, rather than the robot's answer.
+        jumps: whether its reading jumps where the force does: samples beside a jump then say
+            nothing for sure.
+        accelerates: whether its sensor reads acceleration, and so may swing on its mount.
+        ac_corner: Hz, below which sensors of this kind answer less and less (first order), as
+            one that is AC-coupled does; 0 where they answer to a constant.
+        motion: what it is in a motion record: "link", "motor", "reference" or "torque" of a
+            joint; empty where it is nothing that is compared.
+        unused: why it is compared with no prediction, where that needs no warning.
     """
 
     name: str
@@ -38,6 +52,13 @@ class ChannelKind:
     axes: bool = False
     meaning: str = ""
     free_offset: bool = False
+    reader: Reader | None = None
+    of_force: bool = False
+    jumps: bool = False
+    accelerates: bool = False
+    ac_corner: float = 0.0
+    motion: Literal["", "link", "motor", "reference", "torque"] = ""
+    unused: str = ""
 
     @property
     def pattern(self) -> str:
@@ -46,19 +67,32 @@ class ChannelKind:
 
 
 KINDS: list[ChannelKind] = [
-    ChannelKind("force", None, ("N",), meaning="the tool's force along the direction"),
-    ChannelKind("deflection", "joint", ("rad", "m"), meaning="link side minus motor side"),
-    ChannelKind("acceleration", "frame", ("m/s^2",), True, "of the frame's origin, world axes"),
-    ChannelKind("accelerometer", "frame", ("m/s^2",), True, "as read, the frame's axes"),
-    ChannelKind("velocity", "frame", ("m/s",), True, "of the frame's origin, world axes"),
-    ChannelKind("displacement", "frame", ("m",), True, "of the frame's origin, world axes"),
-    ChannelKind("position", "joint", ("rad", "m"), False, "link side", True),
-    ChannelKind("motor_position", "joint", ("rad", "m"), False, "motor side, after the gear", True),
-    ChannelKind("reference_position", "joint", ("rad", "m"), False, "as commanded", True),
-    ChannelKind("velocity", "joint", ("rad/s", "m/s"), meaning="link side"),
-    ChannelKind("torque", "joint", ("N*m", "N"), meaning="of the drive, after the gear"),
-    ChannelKind("temperature", "joint", ("degC",), meaning="of the joint"),
-]
+    ChannelKind("force", None, ("N",), meaning="the tool's force along the direction",
+                reader=readers.force, of_force=True, jumps=True),
+    ChannelKind("deflection", "joint", ("rad", "m"), meaning="link side minus motor side",
+                free_offset=True, reader=readers.deflection),
+    ChannelKind("acceleration", "frame", ("m/s^2",), True, "of the frame's origin, world axes",
+                reader=readers.acceleration, jumps=True, accelerates=True),
+    ChannelKind("accelerometer", "frame", ("m/s^2",), True, "as read, the frame's axes",
+                reader=readers.accelerometer, jumps=True, accelerates=True),
+    ChannelKind("velocity", "frame", ("m/s",), True, "of the frame's origin, world axes",
+                reader=readers.velocity),
+    ChannelKind("displacement", "frame", ("m",), True, "of the frame's origin, world axes",
+                free_offset=True, reader=readers.displacement),
+    ChannelKind("position", "joint", ("rad", "m"), meaning="link side", free_offset=True,
+                motion="link"),
+    ChannelKind("motor_position", "joint", ("rad", "m"), meaning="motor side, after the gear",
+                free_offset=True, motion="motor"),
+    ChannelKind("reference_position", "joint", ("rad", "m"), meaning="as commanded",
+                free_offset=True, motion="reference"),
+    ChannelKind("velocity", "joint", ("rad/s", "m/s"), meaning="link side",
+                unused="positions are differentiated instead"),
+    ChannelKind("torque", "joint", ("N*m", "N"), meaning="of the drive, after the gear",
+                motion="torque"),
+    ChannelKind("temperature", "joint", ("degC",), meaning="of the joint",
+                unused="it is a condition, not an answer of the robot"),
+]  # fmt: skip
+GROUP = "picchio.channels"
 _TIME_KIND = ChannelKind(TIME, None, ("s",), meaning="0 is the first edge of the first blow")
 
 
@@ -97,15 +131,29 @@ def register_channel_kind(kind: ChannelKind) -> None:
     Raises:
         InputError: a kind of this pattern is known already.
     """
-    if any(known.pattern == kind.pattern for known in [*KINDS, _TIME_KIND]):
+    if any(known.pattern == kind.pattern for known in [*kinds(), _TIME_KIND]):
         raise InputError("this kind of channel is known already", value=kind.pattern)
     KINDS.append(kind)
     _parse.cache_clear()
 
 
+def kinds() -> list[ChannelKind]:
+    """Every kind of channel, those of other packages last."""
+    return [*KINDS, *_plugged()]
+
+
+@cache
+def _plugged() -> tuple[ChannelKind, ...]:
+    found = with_entry_points(
+        GROUP, "kind of channel", [*KINDS, _TIME_KIND], lambda x: isinstance(x, ChannelKind),
+        lambda x: x.pattern,
+    )  # fmt: skip
+    return tuple(kind for kind in found.values() if kind not in [*KINDS, _TIME_KIND])
+
+
 def patterns() -> list[str]:
     """How the names of the known kinds look."""
-    return [kind.pattern for kind in KINDS]
+    return [kind.pattern for kind in kinds()]
 
 
 def parse_channel(name: str, unit: str | None = None) -> tuple[Channel, Conversion]:
@@ -124,7 +172,7 @@ def parse_channel(name: str, unit: str | None = None) -> tuple[Channel, Conversi
 @cache
 def _parse(name: str, unit: str | None) -> tuple[Channel, Conversion]:
     problem: InputError | None = None
-    for kind in [_TIME_KIND, *KINDS]:
+    for kind in [_TIME_KIND, *kinds()]:
         parts = _split(name, kind)
         if parts is None:
             continue
@@ -151,10 +199,10 @@ def _split(name: str, kind: ChannelKind) -> tuple[str | None, str | None] | None
 
 
 def _unknown(name: str) -> InputError:
-    alike = [kind.pattern for kind in KINDS if kind.name == name.partition(".")[0]]
+    alike = [kind.pattern for kind in kinds() if kind.name == name.partition(".")[0]]
     if alike:
         return InputError(f"a channel of this kind is named {' or '.join(alike)}", value=name)
-    close = difflib.get_close_matches(name.partition(".")[0], [kind.name for kind in KINDS], n=1)
+    close = difflib.get_close_matches(name.partition(".")[0], [kind.name for kind in kinds()], n=1)
     hint = f"did you mean {close[0]!r}?" if close else None
     return InputError("unknown channel", value=name, choices=patterns(), hint=hint)
 

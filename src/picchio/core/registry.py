@@ -36,7 +36,12 @@ def classes_in(package: str, base: type[T]) -> list[type[T]]:
 
 def is_concrete(value: object, base: type) -> bool:
     """Whether a value is a class derived from `base` that can be made an object of."""
-    return isinstance(value, type) and issubclass(value, base) and not inspect.isabstract(value)
+    return (
+        isinstance(value, type)
+        and issubclass(value, base)
+        and value is not base
+        and not inspect.isabstract(value)
+    )
 
 
 def with_entry_points(

@@ -34,7 +34,7 @@ from picchio.diagnosis.motion.fit.least_squares import Fit as MotionFit
 from picchio.diagnosis.motion.fit.least_squares import fit as fit_motion
 from picchio.diagnosis.motion.fit.least_squares import len_of
 from picchio.diagnosis.motion.fit.state import State
-from picchio.diagnosis.motion.search.candidates import targets
+from picchio.diagnosis.motion.search.candidates import evidence_of
 from picchio.diagnosis.percussion.conclude.causes import fitted_values
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis, diagnose_percussion
@@ -229,7 +229,7 @@ def _motion_gain(motion: Diagnosis, cause: Estimate) -> float:
     """Fall of chi-square in the motion records by a cause at what percussion tells of it."""
     system: System = motion.details["systems"]["train"]
     state: State = motion.details["extended"]
-    if cause.effect.target not in targets(type(cause.effect), system):
+    if cause.effect.target not in cause.effect.applies(evidence_of(system)):
         return 0.0
     without = fit_motion(system, state)
     there = fit_motion(system, state.informed(cause.effect, cause.std))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from picchio.core.arrays import BoolArray, FloatArray
+from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce, superposed
@@ -81,12 +81,6 @@ class Blows:
     def change(self, **changes: object) -> Blows:
         """The same blows with some attributes replaced."""
         return replace(self, **changes)  # type: ignore[arg-type]
-
-    def keep(self, which: BoolArray) -> Blows:
-        """Only some of the blows."""
-        return replace(
-            self, start=self.start[which], height=self.height[which], hit=self.hit[which]
-        )
 
     def with_echo(self, delay: float, ratio: float) -> Blows:
         """Each blow followed by another, `delay` s after its start, `ratio` as high."""

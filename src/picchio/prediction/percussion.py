@@ -10,7 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from picchio.campaign.campaign import Campaign
-from picchio.campaign.channels import Channel
+from picchio.campaign.channels import AXES, Channel
+from picchio.campaign.readers import Reading
 from picchio.campaign.record import Record
 from picchio.campaign.tables import CAMPAIGN_FILE
 from picchio.core.arrays import BoolArray, FloatArray
@@ -26,7 +27,6 @@ from picchio.model.model import Model
 from picchio.model.sensing import SensorChain
 from picchio.model.system import VibratingSystem
 from picchio.prediction.filters import apply_filters
-from picchio.prediction.readings import reading
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.vibration.integration.integrate import (
     AtJumps,
@@ -155,6 +155,9 @@ class PercussionSetup:
     def _group(
         self, model: Model, chain: SensorChain, members: Sequence[Channel]
     ) -> dict[str, FloatArray]:
+        kind = members[0].kind
+        if kind.ac_corner and chain.highpass is None:
+            chain = replace(chain, highpass=kind.ac_corner)
         samples = self._shifted(chain)
         lead, factor = 0, 1
         if chain.filters:
@@ -164,23 +167,25 @@ class PercussionSetup:
             samples = Samples(
                 samples.start - lead * samples.step, fine, factor * (samples.count + lead - 1) + 1
             )
-        kind = members[0].kind.name
-        if kind == "force":
-            values = _history(self.struck(model).force, samples.times)[None]
-        else:
-            at_jumps: AtJumps = "after"
-            if chain.filters:
-                at_jumps = "moments" if chain.smooth else "mean"
-            system, motion = self._motion(model, samples, at_jumps)
-            values = reading(kind, members[0].subject, system, motion)
+        at_jumps: AtJumps = "after"
+        if chain.filters:
+            at_jumps = "moments" if chain.smooth else "mean"
+        assert kind.reader is not None
+        values = kind.reader(
+            Reading(
+                members[0].subject,
+                samples,
+                lambda: self.struck(model).force,
+                lambda: self._motion(model, samples, at_jumps),
+            )
+        )
         if chain.filters:
             filtered = apply_filters(chain, values, samples.step)
             values = np.ascontiguousarray(filtered[:, factor * lead :: factor])
-        axes = "xyz"
-        if len(values) == 3 and members[0].axis is not None:
+        if kind.axes:
             values = chain.gain * (chain.turn @ values)
-            rows = {c.name: values[axes.index(c.axis or "x")] for c in members}
-        elif kind == "deflection":
+            rows = {c.name: values[AXES.index(c.axis or "x")] for c in members}
+        elif kind.of == "joint":
             names = self.geometry.robot.flexible_names
             values = chain.gain * values
             rows = {c.name: values[names.index(c.subject or "")] for c in members}
@@ -251,19 +256,6 @@ class PercussionSetup:
         return self._motions.get(key, make)
 
 
-def _history(force: PiecewiseForce, times: FloatArray) -> FloatArray:
-    return force(np.mod(times, force.end)) if np.isfinite(force.end) else force(times)
-
-
-PREDICTED = (
-    "force",
-    "deflection",
-    "acceleration",
-    "accelerometer",
-    "velocity",
-    "displacement",
-)
-POSITION_KINDS = ("deflection", "displacement")
 _SECONDS_A_DAY = 86400.0
 
 
@@ -357,12 +349,18 @@ def _channels(record: Record, robot: FlexibleRobot) -> tuple[Channel, ...]:
     found = []
     for name in record.channels:
         channel = record.channel(name)
-        kind = channel.kind.name
-        if kind not in PREDICTED or (kind == "velocity" and channel.axis is None):
+        if channel.kind.reader is None:
+            if not channel.kind.unused:
+                warnings.warn(
+                    f"{record.file}: {name} is not used: nothing predicts a {channel.kind.name} "
+                    "while the tool hits",
+                    PicchioWarning,
+                    stacklevel=3,
+                )
             continue
-        if kind == "deflection" and channel.subject not in robot.flexible_names:
+        if channel.kind.of == "joint" and channel.subject not in robot.flexible_names:
             raise InputError(
-                f"{record.file} has a deflection of a joint that is not flexible",
+                f"{record.file} has a {channel.kind.name} of a joint that is not flexible",
                 key=name,
                 value=channel.subject,
                 choices=robot.flexible_names,

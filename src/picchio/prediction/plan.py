@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from picchio.campaign.channels import AXES, Channel, parse_channel
+from picchio.campaign.channels import AXES, Channel, ChannelKind, kinds, parse_channel
 from picchio.campaign.tables import CampaignExcitation, Direction, Hits, Pose, Tolerance
 from picchio.core.errors import InputError
 from picchio.core.toml import Finite, NotNegative, Positive, StrictModel, parse_toml
@@ -22,9 +22,16 @@ from picchio.robot.flexible_robot import FlexibleRobot
 
 FORMAT = "picchio-plan/1"
 MOST_SAMPLES = 50_000_000
-_GROUPS = ("force", "deflection", "accelerometer.tool", "acceleration.tool", "velocity.tool",
-           "displacement.tool")  # fmt: skip
-_FRAMED = ("accelerometer", "acceleration", "velocity", "displacement")
+
+
+def _predicted() -> dict[str, ChannelKind]:
+    """The kinds of channel that a percussion record can hold, by name."""
+    return {kind.name: kind for kind in kinds() if kind.reader is not None}
+
+
+def _groups() -> list[str]:
+    """What a sensor may be asked to read, for messages."""
+    return [name + (".tool" if kind.of == "frame" else "") for name, kind in _predicted().items()]
 
 
 class SensorTable(StrictModel):
@@ -47,13 +54,16 @@ class SensorTable(StrictModel):
         Raises:
             InputError: no such channel, joint or frame, or one that cannot be predicted.
         """
-        kind, _, rest = self.channels.partition(".")
-        if kind == "deflection" and not rest:
-            names = [f"deflection.{joint}" for joint in robot.flexible_names]
-        elif kind in _FRAMED and (not rest or rest.rpartition(".")[2] not in AXES):
+        word, _, rest = self.channels.partition(".")
+        kind = _predicted().get(word)
+        if kind is not None and kind.of == "joint" and not rest:
+            names = [f"{word}.{joint}" for joint in robot.flexible_names]
+        elif kind is not None and kind.of == "frame" and rest.rpartition(".")[2] not in AXES:
             frame = rest or robot.tool_frame
             robot.link_of(frame)
-            names = [f"{kind}.{frame}.{axis}" for axis in AXES]
+            names = [f"{word}.{frame}"]
+            if kind.axes:
+                names = [f"{word}.{frame}.{axis}" for axis in AXES]
         else:
             names = [self.channels]
         found = []
@@ -62,19 +72,17 @@ class SensorTable(StrictModel):
                 channel, convert = parse_channel(name, self.unit or _own_unit(name, robot))
             except InputError as error:
                 raise InputError(error.problem, key="channels", value=self.channels,
-                                 choices=error.choices or _GROUPS) from None  # fmt: skip
-            joint = channel.kind.name == "deflection"
+                                 choices=error.choices or _groups()) from None  # fmt: skip
+            if channel.kind.reader is None:
+                raise InputError("is nothing that a percussion record holds", key="channels",
+                                 value=self.channels, choices=_groups())  # fmt: skip
+            joint = channel.kind.of == "joint"
             if joint and channel.subject not in robot.flexible_names:
                 raise InputError("no such flexible joint", key="channels", value=self.channels,
                                  choices=robot.flexible_names)  # fmt: skip
             if joint and channel.unit != _own_unit(name, robot):
                 raise InputError(f"must be a multiple of {_own_unit(name, robot)}", key="unit",
                                  value=self.unit)  # fmt: skip
-            if channel.kind.name not in ("force", "deflection", *_FRAMED) or (
-                channel.kind.name in _FRAMED and channel.axis is None
-            ):
-                raise InputError("is nothing that a percussion record holds", key="channels",
-                                 value=self.channels, choices=_GROUPS)  # fmt: skip
             if channel.kind.of == "frame":
                 robot.link_of(channel.subject or "")
             found.append((channel, convert.scale * self.noise))
@@ -82,12 +90,13 @@ class SensorTable(StrictModel):
 
 
 def _own_unit(name: str, robot: FlexibleRobot) -> str | None:
-    """A deflection's SI unit, which depends on the joint; None for other channels."""
-    kind, _, joint = name.partition(".")
-    kinds = {j.name: j.kind for j in robot.flexible_joints}
-    if kind != "deflection" or joint not in kinds:
+    """A joint's channel's SI unit, which depends on the joint; None for other channels."""
+    word, _, joint = name.partition(".")
+    kind = _predicted().get(word)
+    slides = {j.name: j.kind == "prismatic" for j in robot.flexible_joints}
+    if kind is None or kind.of != "joint" or joint not in slides:
         return None
-    return "m" if kinds[joint] == "prismatic" else "rad"
+    return kind.units[-1 if slides[joint] else 0]
 
 
 class EffectTable(StrictModel):

@@ -167,7 +167,11 @@ def simulated_campaign(
     names = [f"r{index + 1:0{digits}d}{suffix}" for index in range(plan.count)]
     rng = np.random.default_rng([plan.seed, 1])
     every = [*(table.build() for table in plan.effect), *effects]
-    hidden = [_with_hidden(effect, names, plan.burst or 1, rng) for effect in every]
+    hidden = [
+        effect if effect.latent is None or effect.hidden else
+        effect.with_hidden({name: tuple(effect.draw(rng, plan.burst or 1)) for name in names})
+        for effect in every
+    ]  # fmt: skip
     model = Model(robot, gravity_stiffness).with_effects(hidden)
     records = [
         _blank(name, planned, plan, [c for c, _ in channels])
@@ -252,33 +256,6 @@ def _filled(
     given = record.table.model_dump(exclude_none=True, exclude={"file"})
     units = {channel.name: channel.unit for channel, _ in channels}
     return Record.from_arrays(record.file, record.time, values, units=units, **given)
-
-
-def _with_hidden(
-    effect: Effect, names: Sequence[str], hits: int, rng: np.random.Generator
-) -> Effect:
-    """An effect that draws numbers anew in every record, with them drawn.
-
-    A record's first blow is its t = 0, so it is neither shifted nor missing.
-    """
-    if effect.latent is None or effect.hidden:
-        return effect
-    drawn: dict[str, tuple[float, ...]] = {}
-    for name in names:
-        if effect.latent == "shift":
-            values = effect.values["std"] * rng.standard_normal(hits)
-            values[0] = 0.0
-        elif effect.latent == "missing":
-            values = (rng.random(hits) < effect.values["fraction"]).astype(float)
-            values[0] = 0.0
-        elif effect.latent == "cosine and sine":
-            phase = rng.uniform(0.0, 2.0 * np.pi)
-            values = effect.values["amplitude"] * np.array([np.cos(phase), np.sin(phase)])
-        else:
-            raise InputError("draws numbers that simulate does not know", key=effect.label,
-                             value=effect.latent)  # fmt: skip
-        drawn[name] = tuple(float(value) for value in values)
-    return effect.with_hidden(drawn)
 
 
 def _origin(plan: Plan, effects: Sequence[Effect], inputs: Sequence[str | Path]) -> dict[str, Any]:

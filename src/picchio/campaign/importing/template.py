@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from picchio.campaign.channels import KINDS
+from picchio.campaign.channels import patterns
 from picchio.campaign.importing.mapping import FORMAT
 from picchio.campaign.importing.raw import RawChannel, RawFile
 
@@ -37,7 +37,7 @@ def mapping_template(raw: RawFile) -> str:
         '# robot = "fanuc_like_3dof"',
         "# excitation = { kind = 'pulse_train', force = 300.0, period = 0.040, width = 0.004 }",
         "",
-        "# Channels: " + ", ".join(kind.pattern for kind in KINDS),
+        "# Channels: " + ", ".join(patterns()),
         "# value = sign * (scale * stored + offset), in unit",
     ]
     for channel in raw.channels.values():

@@ -10,7 +10,7 @@ from picchio.core.errors import InputError
 from picchio.diagnosis.motion.conclude.holdout import judge, judged_groups, table
 from picchio.diagnosis.motion.conclude.values import cause, nuisances
 from picchio.diagnosis.motion.criteria.holdout import validate
-from picchio.diagnosis.motion.criteria.necessity import TORQUE_RIPPLE, necessity
+from picchio.diagnosis.motion.criteria.necessity import necessity
 from picchio.diagnosis.motion.criteria.score import Scorer
 from picchio.diagnosis.motion.data.noise import noise_levels
 from picchio.diagnosis.motion.data.split import split
@@ -21,7 +21,7 @@ from picchio.diagnosis.motion.fit.least_squares import Fit, fit
 from picchio.diagnosis.motion.fit.state import State
 from picchio.diagnosis.motion.follow_up.advice import next_measurement
 from picchio.diagnosis.motion.search.alternatives import alternatives
-from picchio.diagnosis.motion.search.candidates import motion_effects, targets
+from picchio.diagnosis.motion.search.candidates import evidence_of, motion_effects
 from picchio.diagnosis.motion.search.select import Step, eliminate, select
 from picchio.diagnosis.result import MOSTLY, Cause, Diagnosis, Estimate, Gain, Verdict
 from picchio.model.effects.effect import Effect
@@ -32,7 +32,6 @@ from picchio.robot.flexible_robot import FlexibleRobot
 
 _NOISE = 1.15  # residual over noise that counts as noise: noise is known to about a tenth
 _SURE = 0.9999
-_READINGS = ("encoder_delay",)
 Pair = tuple[str, str]
 
 
@@ -111,8 +110,9 @@ def refitted(diagnosis: Diagnosis, known: Sequence[Estimate]) -> Diagnosis:
 
 def _informed(system: System, state: State, known: Sequence[Estimate]) -> State:
     """With those of the causes that may act in these records."""
+    evidence = evidence_of(system)
     for told in known:
-        if told.effect.target in targets(type(told.effect), system):
+        if told.effect.target in told.effect.applies(evidence):
             state = state.informed(told.effect, told.std)
     return state
 
@@ -137,7 +137,7 @@ def _conclude(system: System, judge_on: System, before: Fit, found: Fit,
     rivals = alternatives(system, found, kinds)
     order = sorted(
         range(len(found.state.effects)),
-        key=lambda i: (found.state.effects[i].name == TORQUE_RIPPLE, i),
+        key=lambda i: (found.state.effects[i].periodic, i),
     )  # fmt: skip
     causes = tuple(cause(system, found, i, sure[i]) for i in order)
     verdict = _verdict(system, before, found, noise, gain)
@@ -231,16 +231,16 @@ def _details(system: System, judge_on: System, before: Fit, found: Fit,
 
 def _stiffness(system: System, found: Fit, causes: tuple[Cause, ...]) -> dict[str, Any]:
     """Joint -> stiffness found, documented, and what it would be with delays not accounted for."""
-    springs = [c for c in causes if c.effect == "joint_stiffness"]
+    springs = [c for c in causes if "stiffness" in c.parameters]
     if not springs:
         return {}
-    late = [i for i, e in enumerate(found.state.effects) if e.name in _READINGS]
+    late = [i for i, e in enumerate(found.state.effects) if e.late]
     other = found.state
     for i in reversed(late):
         other = other.without(i)
     without = fit(system, other) if late else found
     scale = {e.target: e.values["scale"] for e in without.state.effects
-             if e.name == "joint_stiffness"}  # fmt: skip
+             if "scale" in e.inverse}  # fmt: skip
     documented = dict(zip(system.robot.flexible_names, system.robot.stiffness, strict=True))
     return {
         c.target: {

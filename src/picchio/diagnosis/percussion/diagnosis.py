@@ -14,7 +14,7 @@ from picchio.diagnosis.percussion.conclude.causes import (
     fitted_spread,
     nominal_spread,
     reported_covariance,
-    with_hum,
+    with_solved,
 )
 from picchio.diagnosis.percussion.conclude.holdout import holdout_gain
 from picchio.diagnosis.percussion.conclude.verdict import (
@@ -31,7 +31,7 @@ from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.split import Split, held_out
-from picchio.diagnosis.percussion.fit.drawn import hum_lines, refit
+from picchio.diagnosis.percussion.fit.drawn import refit, with_solved_numbers
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.diagnosis.percussion.fit.parallel_records import parallel_records
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
@@ -188,8 +188,8 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         causes = fitted_causes(search, whole, rivals, refuted)
     common = common_faults(whole.hypothesis, reported_covariance(whole), problem.groups)
     verdict = verdict_of(causes, before, after, bool(same), gain.explained, common)
-    if any(e.name == "mains_hum" for e in whole.hypothesis.effects):
-        causes = with_hum(causes, hum_lines(problem, whole))
+    if any(e.latent and e.latent.linear for e in whole.hypothesis.effects):
+        causes = with_solved(causes, with_solved_numbers(problem, whole))
     others: dict[tuple[tuple[str, str], ...], Hypothesis] = {}
     for t in same:
         pairs = tuple(sorted(pair_of(label) for label in t.fit.hypothesis.labels))

@@ -14,7 +14,6 @@ from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.prediction.percussion import POSITION_KINDS
 from picchio.prediction.residual import (
     ChannelResidual,
     Restoring,
@@ -43,7 +42,7 @@ def channel_residuals(
         source = problem.campaign[record.name]
         for row, (name, values) in enumerate(record.values.items()):
             left, signal = values - predicted[name], values
-            if record.setup.steady or kinds[name].kind.name in POSITION_KINDS:
+            if record.setup.steady or kinds[name].kind.free_offset:
                 left, signal = left - left.mean(), values - values.mean()
             found.append(
                 ChannelResidual(

@@ -1,9 +1,10 @@
 """The base of everything that can be wrong with a simulation: an effect on the model.
 
 An effect is a small immutable object: a name, a target, parameters with units and bounds, and how
-it changes the robot's equations, its blows, its sensors or its motion. To add one, write a class
-in a file of its own in this folder, or anywhere and name it in the entry-point group
-`picchio.effects`.
+it changes the robot's equations, its blows, its sensors or its motion. What else must be known of
+it, it declares: where it may be at work, how it is drawn, what numbers it draws anew in every
+record. To add one, write a class in a file of its own in this folder, or anywhere and name it in
+the entry-point group `picchio.effects`.
 """
 
 from __future__ import annotations
@@ -19,7 +20,12 @@ from picchio.core.errors import InputError
 from picchio.model.conditions import Conditions
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from picchio.core.arrays import FloatArray
     from picchio.model.blows import Blows
+    from picchio.model.effects.evidence import Evidence
+    from picchio.model.effects.latent import Latent
     from picchio.model.effects.scales import Scales
     from picchio.model.motion import Motion
     from picchio.model.plant import Plant
@@ -61,7 +67,27 @@ class Effect(ABC):
 
     Attributes:
         values: its parameters.
-        hidden: record -> numbers that are drawn anew in every record (`latent` says what).
+        hidden: record -> numbers that are drawn anew in every record.
+        name: as in files.
+        where: what it changes.
+        target_kind: what it is about.
+        parameters: what says how strong it is.
+        meaning: one line for people.
+        motion_meaning: another line where it is seen in a motion; `meaning` where empty.
+        source: of the model.
+        latent: what `hidden` holds; None where it draws nothing anew.
+        discrete: nothing lies between its values: they are tried, not fitted.
+        mark: how a scene draws it (`picchio.visuals.scene.causes.drawings`); by its target where
+            empty.
+        tolerance: the key of `[tolerance]` that says how far its `scale` may be from 1 without
+            being a cause; empty where nothing is tolerated.
+        needs: the effect without which, at the same target, this one has no meaning.
+        usual: where effects explain a motion equally well, the smallest comes first.
+        elastic: in a motion, it winds the gear up, which is looked for once loads are known.
+        periodic: in a motion, a wave of `order` periods a turn, found as a line in the residual.
+        late: in a motion, its `delay` is by how many s its channel group is late.
+        inverse: parameters whose inverse a motion tells, 0 being a rigid drive.
+        told_by: what else a motion should have for it to be told from others.
         linear: of a class on a joint: parameters, neutral at 0, in which what `motion` adds is
             linear, all together; such an effect adds to no body torque, scales and delays nothing.
             Fits of motion records go faster by it; nothing else changes.
@@ -77,9 +103,19 @@ class Effect(ABC):
     target_kind: ClassVar[TargetKind]
     parameters: ClassVar[tuple[Parameter, ...]]
     meaning: ClassVar[str]
+    motion_meaning: ClassVar[str] = ""
     source: ClassVar[str] = ""
-    latent: ClassVar[str | None] = None
+    latent: ClassVar[Latent | None] = None
     discrete: ClassVar[bool] = False
+    mark: ClassVar[str] = ""
+    tolerance: ClassVar[str] = ""
+    needs: ClassVar[str] = ""
+    usual: ClassVar[int] = 99
+    elastic: ClassVar[bool] = False
+    periodic: ClassVar[bool] = False
+    late: ClassVar[bool] = False
+    inverse: ClassVar[tuple[str, ...]] = ()
+    told_by: ClassVar[str] = ""
     linear: ClassVar[tuple[str, ...]] = ()
     refused: ClassVar[Mapping[str, str]] = {}
 
@@ -179,6 +215,42 @@ class Effect(ABC):
         """
         return self.trials(scales)
 
+    # Where it may be at work -----------------------------------------------------------------
+
+    @classmethod
+    def shows(cls, motion: bool) -> bool:
+        """Whether it changes anything in motion records, or else in percussion records."""
+        return cls.motion is not Effect.motion if motion else cls.where != "motion"
+
+    @classmethod
+    def targets(cls, evidence: Evidence) -> list[str]:
+        """Where it could be at work, as far as the target goes.
+
+        Args:
+            evidence: what the records can show.
+        """
+        return evidence.targets(cls.target_kind)
+
+    @classmethod
+    def why_not(cls, evidence: Evidence) -> str:
+        """Why these records cannot show it, one clause; empty where they can.
+
+        Args:
+            evidence: what the records can show.
+        """
+        return ""
+
+    @classmethod
+    def applies(cls, evidence: Evidence) -> list[str]:
+        """The targets at which it may be looked for in some records; none where it may not.
+
+        Args:
+            evidence: what the records can show.
+        """
+        if not cls.shows(evidence.motion) or cls.why_not(evidence):
+            return []
+        return cls.targets(evidence)
+
     # Hooks: an effect overrides those that concern it ----------------------------------------
 
     def structure(self, plant: Plant) -> None:  # noqa: B027
@@ -193,6 +265,30 @@ class Effect(ABC):
 
     def motion(self, motion: Motion) -> None:  # noqa: B027
         """Change what drives and encoders read while the robot moves."""
+
+    def draw(self, rng: np.random.Generator, hits: int) -> FloatArray:
+        """The numbers of one more record, drawn at random; see `latent`.
+
+        Args:
+            rng: of the random numbers.
+            hits: blows of the record.
+
+        Returns:
+            `latent.size(hits)` numbers.
+        """
+        raise InputError("draws no numbers", key=self.label)
+
+    def take_out(self, rows: FloatArray, time: FloatArray) -> tuple[FloatArray, tuple[float, ...]]:
+        """What is left of readings without what its own numbers explain; see `Latent.linear`.
+
+        Args:
+            rows: (channels, m) of its channel group.
+            time: (m,) s.
+
+        Returns:
+            (channels, m), and the numbers.
+        """
+        raise InputError("has no numbers that readings are linear in", key=self.label)
 
     def motion_trials(self, motion: Motion) -> list[dict[str, float]]:
         """Values to try of what enters a motion record nonlinearly; the rest is solved for."""

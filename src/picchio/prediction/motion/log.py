@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ import numpy as np
 from picchio.campaign.campaign import Campaign
 from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, PicchioWarning
 from picchio.robot.flexible_robot import FlexibleRobot
 
 _STANDS = 0.01
@@ -57,18 +58,28 @@ def read_log(robot: FlexibleRobot, record: Record) -> MotionLog:
     Raises:
         InputError: a joint that the robot does not have, or no joint's angle in the record.
     """
-    kinds: dict[str, dict[str, FloatArray]] = {
-        "position": {}, "motor_position": {}, "torque": {}, "reference_position": {},
-    }  # fmt: skip
-    wanted = [name for name in record.channels if name.partition(".")[0] in kinds]
+    roles: dict[str, dict[str, FloatArray]] = {"link": {}, "motor": {}, "torque": {},
+                                               "reference": {}}  # fmt: skip
+    wanted = {}
+    for name in record.channels:
+        channel = record.channel(name)
+        if channel.kind.motion:
+            wanted[name] = channel
+        elif not channel.kind.unused:
+            warnings.warn(
+                f"{record.file}: {name} is not used: nothing predicts a {channel.kind.name} "
+                "while the robot moves",
+                PicchioWarning,
+                stacklevel=3,
+            )
     read = record.read(wanted)
-    for name in wanted:
-        kind, _, joint = name.partition(".")
+    for name, channel in wanted.items():
+        joint = channel.subject or ""
         if joint not in robot.joint_names:
             raise InputError("the robot has no joint of this name", file=record.source.path,
                              key=name, value=joint, choices=robot.joint_names)  # fmt: skip
-        kinds[kind][joint] = read[name]
-    link, motor = kinds["position"], kinds["motor_position"]
+        roles[channel.kind.motion][joint] = read[name]
+    link, motor = roles["link"], roles["motor"]
     angle = {j: motor.get(j, link.get(j)) for j in robot.joint_names if j in motor or j in link}
     if not angle:
         raise InputError("the record has no joint's position", file=record.source.path,
@@ -79,9 +90,9 @@ def read_log(robot: FlexibleRobot, record: Record) -> MotionLog:
         rate=record.clock.rate,
         angle={joint: values for joint, values in angle.items() if values is not None},
         group={joint: "motor_position" if joint in motor else "position" for joint in angle},
-        torque={joint: torque for joint, torque in kinds["torque"].items() if joint in angle},
+        torque={joint: torque for joint, torque in roles["torque"].items() if joint in angle},
         link={joint: link[joint] for joint in link if joint in motor},
-        reference=kinds["reference_position"],
+        reference=roles["reference"],
     )
 
 

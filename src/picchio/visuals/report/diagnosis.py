@@ -12,7 +12,6 @@ from markupsafe import Markup
 
 from picchio.core.provenance import provenance
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
-from picchio.diagnosis.percussion.fit.unknowns import NUISANCE_KEYS
 from picchio.diagnosis.percussion.follow_up.plan import when
 from picchio.diagnosis.result import Cause, Diagnosis
 from picchio.model.effects.registry import catalogue
@@ -365,7 +364,7 @@ def _nuisances(found: PercussionDiagnosis) -> list[tuple[str, str, str, str]]:
     hypothesis = fit.hypothesis
     rows = []
     for effect in hypothesis.effects[: hypothesis.n_nuisances]:
-        key = NUISANCE_KEYS[effect.name]
+        key = effect.tolerance
         name = f"{key}.{effect.target}" if key == "stiffness" else key
         value = found.diagnosis.nuisances.get(name)
         if value is None or effect.label in hypothesis.freed:

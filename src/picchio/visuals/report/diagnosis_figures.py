@@ -224,7 +224,7 @@ class DiagnosisFigures:
         """The channel as the hypothesis has it, its free offset as the measurement's."""
         values = self.found.problem.predictions(hypothesis.effects, [view.record])[0]
         predicted = values[view.channel.name]
-        if view.record.setup.steady or view.channel.kind.name in ("deflection", "displacement"):
+        if view.record.setup.steady or view.channel.kind.free_offset:
             predicted = predicted + float(np.mean(view.measured - predicted))
         return predicted
 

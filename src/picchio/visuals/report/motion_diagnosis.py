@@ -16,13 +16,6 @@ from picchio.visuals.report.motion_diagnosis_figures import MotionFigures
 from picchio.visuals.report.page import number, percent, render, spread, words
 
 _DETAILED = 3  # causes of one kind whose numbers a headline gives
-# What an effect of two hooks means where it is seen in a motion.
-_MEANT = {
-    "coulomb_friction": "dry friction between motor and link; a motion does not tell on which side "
-    "of the gear",
-    "joint_inertia": "something unmodelled turns with the joint: most often the motor's rotor, its "
-    "inertia times the ratio squared",
-}
 _DERIVED = {"amplitude": "of the wave", "stiffness": "of the joint"}
 
 
@@ -139,7 +132,7 @@ def _phrase(kind: str, causes: Sequence[Cause]) -> str:
     if len(causes) >= _DETAILED:
         places = len({c.target for c in causes})
         what = f"{words(kind)} in {places} joint{'s' if places > 1 else ''}"
-        if kind == "torque_ripple":
+        if catalogue()[kind].periodic:
             return f"{what}, {len(causes)} harmonics"
         return what
     said = []
@@ -174,7 +167,7 @@ def _kinds(diagnosis: Diagnosis, system: System) -> list[dict[str, object]]:
     made: list[dict[str, object]] = []
     for name, causes in _by_kind(diagnosis).items():
         kind = catalogue().get(name)
-        meaning = _MEANT.get(name, kind.meaning if kind is not None else "")
+        meaning = (kind.motion_meaning or kind.meaning) if kind is not None else ""
         columns = list(dict.fromkeys(key for cause in causes for key in _shown(cause)))
         meanings = {p.name: p.meaning for p in kind.parameters} if kind is not None else {}
         made.append({

@@ -14,6 +14,7 @@ from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.orders import order_spectrum
 from picchio.diagnosis.motion.fit.state import State
 from picchio.diagnosis.result import Diagnosis
+from picchio.model.effects.registry import effect_class
 from picchio.model.motion import TORQUE, WINDUP
 from picchio.visuals.plots.diagnosis import (
     AFTER,
@@ -222,7 +223,6 @@ _NOMINAL = {
     TORQUE: "its masses fitted within their tolerance",
     WINDUP: "which takes the gear as rigid",
 }
-_RIPPLE = "torque_ripple"
 _CANDIDATES = 8
 _PICTURED = 4  # steps of the search
 _SHOWN = 8.0  # s that an overlay shows
@@ -315,14 +315,14 @@ class MotionFigures:
         """The order spectrum of the joint with the most telling ripple."""
         ripples: dict[str, list[float]] = {}
         for cause in self.diagnosis.causes:
-            if cause.effect == _RIPPLE:
+            if effect_class(cause.effect).periodic:
                 ripples.setdefault(cause.target, []).append(cause.parameters["order"].value)
         if not ripples:
             return []
         joint = max(ripples, key=lambda name: len(ripples[name]))
         system: System = self.diagnosis.details["systems"]["train"]
         state: State = self.diagnosis.details["extended"]
-        still = tuple(e for e in state.effects if e.name != _RIPPLE)
+        still = tuple(e for e in state.effects if not e.periodic)
         bare = State(state.nuisances, still, state.scales, state.tolerance, state.fixed)
         before, after = (
             order_spectrum(system, _left(system, s), joint, state) for s in (bare, state)

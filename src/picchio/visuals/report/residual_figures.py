@@ -52,7 +52,7 @@ class ResidualFigures:
         view = self.worst
         index = [r.name for r in self.fit.records].index(view.record.name)
         predicted = self.predictions[index][view.channel.name]
-        if view.record.setup.steady or view.channel.kind.name in ("deflection", "displacement"):
+        if view.record.setup.steady or view.channel.kind.free_offset:
             predicted = predicted + float(np.mean(view.measured - predicted))
         window = view.window(view.measured - predicted)
         ax = plot_overlay(view.time, view.measured, {"simulated": predicted}, view.channel,

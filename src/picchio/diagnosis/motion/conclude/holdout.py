@@ -20,7 +20,7 @@ def judged_groups(system: System, fitted: Fit) -> list[Group]:
     """Torques in the band and windups; what is above the band where a claimed ripple is there."""
     state = fitted.state
     found = [g for g in system.groups if g[0] != RIPPLE]
-    if not any(e.name == "torque_ripple" for e in state.effects):
+    if not any(e.periodic for e in state.effects):
         return found
     predicted = system.predict(state.every, state.scales)
     for group in system.groups:

@@ -8,7 +8,6 @@ import numpy as np
 
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit
-from picchio.diagnosis.motion.fit.state import INVERSE
 from picchio.diagnosis.result import Cause, Value
 from picchio.model.effects.effect import Effect
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -45,16 +44,16 @@ def parameters(system: System, current: Fit, effect: Effect, number: int) -> dic
             continue
         # An order that is locked to the motor's turn has no spread.
         value, spread = effect.values[p.name], std.get(p.name, 0.0)
-        if (effect.name, p.name) in INVERSE:
+        if p.name in effect.inverse:
             spread *= value**2
         found[p.name] = Value(float(value), spread, unit_of(robot, effect.target, p.unit))
-    if effect.name == "joint_stiffness" and "scale" in found:
+    if "scale" in effect.inverse and "scale" in found:
         stated = dict(zip(robot.flexible_names, robot.stiffness, strict=True))
         documented = float(stated[effect.target])
         unit = "N/m" if unit_of(robot, effect.target, "rad") == "m" else "N*m/rad"
         scale = found["scale"]
         found["stiffness"] = Value(scale.value * documented, scale.std * documented, unit)
-    if effect.name == "torque_ripple" and {"cosine", "sine"} <= found.keys():
+    if effect.periodic and {"cosine", "sine"} <= found.keys():
         cosine, sine = found["cosine"], found["sine"]
         size = math.hypot(cosine.value, sine.value)
         spread = math.hypot(cosine.value * cosine.std, sine.value * sine.std) / max(size, 1e-300)

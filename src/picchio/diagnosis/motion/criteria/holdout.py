@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.diagnosis.motion.criteria.necessity import TORQUE_RIPPLE, contribution
+from picchio.diagnosis.motion.criteria.necessity import contribution
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit, clean, fit, row_weights, stable_solve
 from picchio.diagnosis.motion.fit.state import Coordinate, State
@@ -35,12 +35,12 @@ def validate(
                  for i in range(len(current.state.effects))]  # fmt: skip
         failing = [
             i for i, found in enumerate(gains)
-            if found and _fails(found, current.state.effects[i].name == TORQUE_RIPPLE)
+            if found and _fails(found, current.state.effects[i].periodic)
         ]  # fmt: skip
         if not failing:
             break
         # Ripples hardly touch each other and go together; others one by one, the worst first.
-        gone = [i for i in failing if current.state.effects[i].name == TORQUE_RIPPLE]
+        gone = [i for i in failing if current.state.effects[i].periodic]
         others = [i for i in failing if i not in gone]
         if others:
             gone.append(min(others, key=lambda i: min(gains[i].values())))

@@ -9,7 +9,6 @@ from picchio.diagnosis.motion.criteria.score import Score, Scorer
 from picchio.diagnosis.motion.fit.least_squares import Fit
 from picchio.diagnosis.motion.fit.stretches import confidence
 
-TORQUE_RIPPLE = "torque_ripple"
 _LEAST_BIC = 3.0
 _LEAST_CONFIDENCE = 0.90
 _LEAST_SHARE = 0.005
@@ -57,7 +56,7 @@ def _from_neutral(current: Fit, i: int) -> float:
     effect = current.state.every[c.index]
     parameter = next(p for p in effect.parameters if p.name == c.name)
     if parameter.name == "order" or parameter.logarithmic:
-        return 0.0 if (effect.name, c.name) != ("joint_stiffness", "scale") else c.value
+        return c.value if c.name in effect.inverse else 0.0
     return c.value - parameter.neutral
 
 

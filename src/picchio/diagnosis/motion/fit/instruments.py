@@ -113,7 +113,7 @@ def instrument_shifts(system: System, found: Fit) -> list[Shift]:
 
 
 def _nonlinear(state: State, c: Coordinate) -> bool:
-    return c.index >= 0 and state.every[c.index].name in ("encoder_delay", "torque_ripple")
+    return c.index >= 0 and (state.every[c.index].late or state.every[c.index].periodic)
 
 
 def _lagging(reference: FloatArray, angle: FloatArray, rate: float) -> FloatArray:

@@ -177,9 +177,7 @@ def _pieces(system: System, residual: FloatArray, joint: str, state: State) -> l
 
 
 def _delay(state: State, group: str) -> float:
-    return sum(
-        e.values["delay"] for e in state.every if (e.name, e.target) == ("encoder_delay", group)
-    )
+    return sum(e.values["delay"] for e in state.every if e.late and e.target == group)
 
 
 def _range(angle: FloatArray, rate: float) -> tuple[float, float]:
@@ -298,9 +296,7 @@ def find_orders(system: System, residual: FloatArray, joint: str, state: State) 
     spectrum = order_spectrum(system, residual, joint, state)
     if spectrum is None:
         return []
-    known = [
-        e.values["order"] for e in state.every if (e.name, e.target) == ("torque_ripple", joint)
-    ]
+    known = [e.values["order"] for e in state.every if e.periodic and e.target == joint]
     found = [_finer(spectrum, i) / spectrum.ratio for i in _peaks(spectrum, known)]
     return [Line(order, spectrum.noise(order)) for order in found]
 

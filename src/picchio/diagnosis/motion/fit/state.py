@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, replace
 
 from picchio.model.effects.effect import Effect, Parameter
 
-# A motion's baseline takes drives as rigid: these parameters enter by their inverse, from zero.
-INVERSE = frozenset({("joint_stiffness", "scale")})
 _SMALL = 1e-3
 
 
@@ -74,7 +72,7 @@ class State:
             for c in effect_coordinates(effect, index, rate):
                 if (effect.label, c.name) in told:
                     value, std = told[effect.label, c.name]
-                    if (effect.name, c.name) in INVERSE:
+                    if c.name in effect.inverse:
                         value, std = 1.0 / value, std / value**2
                     c = replace(c, prior=std, centre=value)
                 found.append(c)
@@ -126,7 +124,7 @@ def effect_coordinates(effect: Effect, index: int, rate: float) -> list[Coordina
         value, lower, upper = effect.values[p.name], p.lower, p.upper
         if p.name == "order" and value.is_integer():
             continue  # locked to the motor's turn: no measured order is whole to the last digit
-        if (effect.name, p.name) in INVERSE:
+        if p.name in effect.inverse:
             value, lower, upper = 1.0 / value, 1.0 / p.upper, 1.0 / p.lower
             step = 0.1
         else:
@@ -137,7 +135,7 @@ def effect_coordinates(effect: Effect, index: int, rate: float) -> list[Coordina
 
 def with_coordinate(effect: Effect, name: str, value: float) -> Effect:
     """The effect with one parameter set as a fit sees it."""
-    if (effect.name, name) in INVERSE:
+    if name in effect.inverse:
         value = 1.0 / max(value, _SMALL)
     bounds = next(p for p in effect.parameters if p.name == name)
     return effect.with_values(**{name: min(max(value, bounds.lower), bounds.upper)})

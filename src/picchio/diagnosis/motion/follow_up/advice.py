@@ -10,6 +10,7 @@ import numpy as np
 from picchio.diagnosis.motion.conclude.holdout import judged_groups
 from picchio.diagnosis.motion.data.system import Group, System
 from picchio.diagnosis.motion.fit.least_squares import Fit
+from picchio.model.effects.registry import effect_class
 from picchio.model.motion import TORQUE, WINDUP
 
 Pair = tuple[str, str]
@@ -64,8 +65,8 @@ def _separating(system: System, joint: str, names: tuple[str, ...]) -> str:
     moving = np.abs(v[np.abs(v) > still])
     if moving.size and np.quantile(moving, 0.9) < 3.0 * np.quantile(moving, 0.1):
         wishes.append("at several constant speeds, a tenth of the fastest among them")
-    if any(name in ("payload", "torque_gain", "joint_inertia") for name in names):
-        wishes.append("once with a known mass at the tool and once without")
-    if any(name in ("encoder_delay", "joint_stiffness", "backlash") for name in names):
-        wishes.append("slowly under load, then fast: a delay grows with speed, a spring does not")
-    return ", ".join(wishes) or "move it alone, slowly and fast, in both directions"
+    wishes += [effect_class(name).told_by for name in names]
+    return (
+        ", ".join(dict.fromkeys(wish for wish in wishes if wish))
+        or "move it alone, slowly and fast, in both directions"
+    )

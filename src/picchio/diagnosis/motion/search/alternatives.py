@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from picchio.diagnosis.motion.criteria.necessity import (
-    TORQUE_RIPPLE,
     contribution,
     indistinguishable,
     necessity,
@@ -27,11 +26,11 @@ def alternatives(
     A rival takes the effect's place beside all others. It can't be told apart where it is
     nearly as likely, or where its losses are not of one sign over the stretches held out.
     """
-    slow = {name: kind for name, kind in kinds.items() if name != TORQUE_RIPPLE}
+    slow = {name: kind for name, kind in kinds.items() if not kind.periodic}
     scorer = Scorer(system, current)
     found: dict[int, list[tuple[str, str]]] = {}
     for index, effect in enumerate(current.state.effects):
-        if effect.name == TORQUE_RIPPLE:
+        if effect.periodic:
             continue
         score = necessity(scorer, index)
         own, part = contribution(current, index)

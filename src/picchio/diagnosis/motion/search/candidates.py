@@ -11,22 +11,12 @@ from picchio.core.arrays import FloatArray
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit, clean, jacobian
 from picchio.diagnosis.motion.fit.orders import find_orders
-from picchio.diagnosis.motion.fit.state import INVERSE, Coordinate, effect_coordinates
+from picchio.diagnosis.motion.fit.state import Coordinate, effect_coordinates
 from picchio.model.effects.effect import Effect
-from picchio.model.effects.registry import catalogue
+from picchio.model.effects.evidence import Evidence
+from picchio.model.effects.registry import catalogue, effect_class
 from picchio.model.motion import TORQUE, WINDUP
 from picchio.prediction.motion.readings import Around
-
-_RIPPLE = "torque_ripple"
-# Where two explain the same, the first is more usual in a drive. What the data can't tell apart
-# is told as a set; this only says which is put first.
-_USUAL = ("encoder_delay", "payload", "coulomb_friction", "viscous_friction", "asymmetric_friction",
-          "load_friction", "stribeck_friction", "joint_inertia", "torque_offset", "torque_gain",
-          "joint_stiffness", "backlash", "torque_ripple")  # fmt: skip
-
-# These describe how dry friction varies: they make no sense where there is none.
-_NEEDS = {"asymmetric_friction": "coulomb_friction", "stribeck_friction": "coulomb_friction",
-          "load_friction": "coulomb_friction"}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,27 +58,22 @@ def motion_effects(names: Collection[str] | None = None) -> dict[str, type[Effec
     """Those of the catalogue that change a motion record."""
     return {
         name: kind for name, kind in catalogue().items()
-        if kind.motion is not Effect.motion and (names is None or name in names)
+        if kind.shows(motion=True) and (names is None or name in names)
     }  # fmt: skip
 
 
-def targets(kind: type[Effect], system: System) -> list[str]:
-    """Where an effect could act in these records."""
-    robot = system.robot
-    if kind.target_kind == "tool":
-        return ["tool"]
-    if kind.target_kind == "channel group":
-        groups = {group for log in system.logs for group in log.group.values()}
-        groups |= {"position" for log in system.logs if log.link}
-        groups |= {TORQUE for log in system.logs if log.torque}
-        return sorted(groups)
-    wound = [joint for kind_, joint in system.groups if kind_ == WINDUP]
-    driven = [joint for kind_, joint in system.groups if kind_ == TORQUE]
-    if kind.name == "joint_stiffness":
-        return [joint for joint in wound if joint in robot.flexible_names]
-    if kind.name == "backlash":
-        return wound
-    return driven
+def evidence_of(system: System) -> Evidence:
+    """What motion records can show."""
+    groups = {group for log in system.logs for group in log.group.values()}
+    groups |= {"position" for log in system.logs if log.link}
+    groups |= {TORQUE for log in system.logs if log.torque}
+    return Evidence(
+        robot=system.robot,
+        motion=True,
+        groups=tuple(sorted(groups)),
+        driven=tuple(joint for kind, joint in system.groups if kind == TORQUE),
+        wound=tuple(joint for kind, joint in system.groups if kind == WINDUP),
+    )
 
 
 def candidates(
@@ -106,19 +91,18 @@ def candidates(
     predicted = system.measured - base.residual
     around = system.around(base.state.every)
     found: list[Candidate] = []
+    evidence = evidence_of(system)
     for name in sorted(kinds, key=usual):
         kind = kinds[name]
-        for target in targets(kind, system):
+        for target in kind.applies(evidence):
             if near not in (None, target) and kind.target_kind == "joint":
                 continue
-            if name == _RIPPLE:
+            if kind.periodic:
                 for line in find_orders(system, base.residual, target, base.state):
                     effect = kind(target, order=line.order)
                     made = _make(system, base, predicted, effect, {"order"}, around)
                     found += [replace(each, noise=line.noise) for each in made]
-            elif (name, target) not in taken and _NEEDS.get(name, "") in ("", *(
-                effect for effect, where in taken if where == target
-            )):  # fmt: skip
+            elif (name, target) not in taken and (not kind.needs or (kind.needs, target) in taken):
                 for trial in _trials(system, kind, target):
                     effect = kind(target, **trial)
                     found += _make(system, base, predicted, effect, set(trial), around)
@@ -127,7 +111,7 @@ def candidates(
 
 def usual(name: str) -> tuple[int, str]:
     """Where an effect stands among those that explain the same."""
-    return (_USUAL.index(name) if name in _USUAL else len(_USUAL), name)
+    return (effect_class(name).usual, name)
 
 
 def _trials(system: System, kind: type[Effect], target: str) -> list[dict[str, float]]:
@@ -143,7 +127,7 @@ def _trials(system: System, kind: type[Effect], target: str) -> list[dict[str, f
 def _make(system: System, base: Fit, predicted: FloatArray, effect: Effect,
           searched: set[str], around: list[Around]) -> list[Candidate]:  # fmt: skip
     """Derivatives at nothing, by what is not searched for."""
-    inverse = {p for name, p in INVERSE if name == effect.name}
+    inverse = effect.inverse
     rate = system.logs[0].rate
     if inverse:
         # Nothing is an infinite stiffness; the column is what the nominal one does.

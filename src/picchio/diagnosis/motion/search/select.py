@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from picchio.diagnosis.motion.criteria.necessity import TORQUE_RIPPLE, necessity, passes
+from picchio.diagnosis.motion.criteria.necessity import necessity, passes
 from picchio.diagnosis.motion.criteria.score import Score, Scorer
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit, fit, row_weights
@@ -17,7 +17,6 @@ from picchio.diagnosis.motion.search.candidates import Candidate, candidates, us
 from picchio.diagnosis.motion.search.timing import time_by_ripple
 from picchio.model.effects.effect import Effect
 
-_ELASTIC = ("joint_stiffness", "backlash")
 _AGAIN = 3
 _TIE = 1.0
 _ALIKE = 0.9
@@ -60,9 +59,9 @@ def select(
         kinds: the catalogue.
         progress: told (stage, stages).
     """
-    pick = lambda names: {n: k for n, k in kinds.items() if n in names}  # noqa: E731
-    ripple, elastic = pick({TORQUE_RIPPLE}), pick(_ELASTIC)
-    slow = pick(set(kinds) - {TORQUE_RIPPLE, *_ELASTIC})
+    ripple = {n: k for n, k in kinds.items() if k.periodic}
+    elastic = {n: k for n, k in kinds.items() if k.elastic}
+    slow = {n: k for n, k in kinds.items() if not (k.periodic or k.elastic)}
     stages = [(ripple, 2), (slow, _ROUNDS), (elastic, 3), (ripple, _ROUNDS)]
     current = fit(system, start)
     steps: list[Step] = []
@@ -94,10 +93,10 @@ def _forward(system: System, current: Fit, pool: Mapping[str, type[Effect]],
             grown = state.with_effect(candidate.started(score.values))
             state = _take_over(system, current, grown, candidate)
         current = fit(system, state)
-        if TORQUE_RIPPLE in pool:
+        if any(kind.periodic for kind in pool.values()):
             current = lock(system, current)
-        if TORQUE_RIPPLE in pool and "encoder_delay" in kinds:
-            current = time_by_ripple(system, current, kinds["encoder_delay"])
+            for late in (kind for kind in kinds.values() if kind.late):
+                current = time_by_ripple(system, current, late)
     return current
 
 
@@ -135,13 +134,13 @@ def score_all(system: System, base: Fit, kinds: Mapping[str, type[Effect]]) -> l
 
 def choose(scored: list[Scored]) -> list[Scored]:
     """The best of each set of equations; of equals the more usual."""
-    good = [pair for pair in scored if passes(pair[0], pair[1].effect.name == TORQUE_RIPPLE)]
+    good = [pair for pair in scored if passes(pair[0], pair[1].effect.periodic)]
     taken: set[tuple[str, str]] = set()
     chosen: list[Scored] = []
     blocked = False
     for score, candidate in good:
         groups = set(score.groups)
-        if candidate.effect.name == TORQUE_RIPPLE:
+        if candidate.effect.periodic:
             if all(_apart(candidate.effect, other.effect) for _, other in chosen):
                 chosen.append((score, candidate))
             continue
@@ -151,7 +150,7 @@ def choose(scored: list[Scored]) -> list[Scored]:
         blocked = blocked or len(groups) > 1
         equal = [
             pair for pair in good
-            if pair[1].effect.name != TORQUE_RIPPLE and set(pair[0].groups) == groups
+            if not pair[1].effect.periodic and set(pair[0].groups) == groups
             and pair[0].rank >= score.rank - _TIE
         ]  # fmt: skip
         chosen.append(min(equal, key=lambda pair: (usual(pair[1].effect.name), -pair[0].rank)))
@@ -190,7 +189,7 @@ def eliminate(system: System, current: Fit) -> Fit:
         tried = []
         for index, effect in enumerate(current.state.effects):
             score = necessity(scorer, index)
-            if score is None or not passes(score, effect.name == TORQUE_RIPPLE):
+            if score is None or not passes(score, effect.periodic):
                 tried.append((-np.inf if score is None else score.gain, index))
         if not tried:
             return current

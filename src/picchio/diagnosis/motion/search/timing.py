@@ -28,7 +28,7 @@ def time_by_ripple(system: System, current: Fit, delay: type[Effect]) -> Fit:
         delay: the effect's class.
     """
     state = current.state
-    rippling = {e.target for e in state.effects if e.name == "torque_ripple"}
+    rippling = {e.target for e in state.effects if e.periodic}
     # Above the band where there is such; a band up to the highest frequencies has it all.
     groups = [(RIPPLE, joint) for joint in rippling if (RIPPLE, joint) in system.groups]
     groups += [
@@ -60,7 +60,7 @@ def time_by_ripple(system: System, current: Fit, delay: type[Effect]) -> Fit:
 def _shortest_period(system: System, state: State) -> float:
     fastest = 0.0
     for e in state.effects:
-        if e.name == "torque_ripple":
+        if e.periodic:
             for p in system.predictors:
                 if e.target in p.log.moving:
                     speed = float(np.abs(p.nominal.velocity[e.target]).max())
@@ -72,13 +72,13 @@ def _shortest_period(system: System, state: State) -> float:
 def _pieces(system: System, state: State, groups: list) -> list:
     """Of each joint: its ripples' orders, and angle, velocity and measured ripple of records."""
     found = []
-    others = tuple(e for e in state.every if e.name != "torque_ripple")
+    others = tuple(e for e in state.every if not e.periodic)
     target = system.measured - system.predict(others, state.scales)
     for group in groups:
         joint = group[1]
         orders = [
             e.values["order"] * system.predictors[0].nominal.gear_ratio[joint]
-            for e in state.effects if e.name == "torque_ripple" and e.target == joint
+            for e in state.effects if e.periodic and e.target == joint
         ]  # fmt: skip
         parts = []
         for s in system.of(group):

@@ -18,7 +18,7 @@ from picchio.diagnosis.percussion.criteria.pose_consistency import jackknife_cov
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.drawn import width_spread
 from picchio.diagnosis.percussion.fit.least_squares import Fit
-from picchio.diagnosis.percussion.fit.unknowns import NUISANCE_KEYS, Hypothesis
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.state import EXACT, Search, Trial
 from picchio.diagnosis.result import Cause, Value
 from picchio.model.effects.effect import CHANNEL_UNIT, Effect
@@ -64,7 +64,7 @@ def fitted_values(problem: Problem, whole: Fit, effect: Effect) -> dict[str, Val
             if unknown.effect == index and unknown.name == p.name:
                 std = abs(unknown.slope(vector[k])) * math.sqrt(max(variance[k], 0.0))
                 std = max(std, _unconstrained(problem, whole, k))
-        if effect.name == "pulse_jitter":
+        if effect.latent is not None and p.name == effect.latent.spread:
             std = _width_spread(whole, effect)
         values[p.name] = Value(effect.values[p.name], std, _unit(whole, effect, p.name))
     return values
@@ -94,7 +94,8 @@ def _unit(whole: Fit, effect: Effect, parameter: str) -> str:
 def _width_spread(whole: Fit, effect: Effect) -> float:
     for label, fall, count in whole.hypothesis.drawn:
         if label == effect.label:
-            return width_spread(next(iter(effect.values.values())), fall, count)
+            width = effect.values[effect.latent.spread] if effect.latent is not None else 0.0
+            return width_spread(width, fall, count)
     return 0.0
 
 
@@ -187,7 +188,7 @@ def fitted_nuisances(found: Fit) -> dict[str, Value]:
         effect = found.hypothesis.effects[unknown.effect]
         if unknown.effect >= found.hypothesis.n_nuisances:
             continue
-        key = NUISANCE_KEYS[effect.name]
+        key = effect.tolerance
         scale, std = math.exp(vector[k]), math.exp(vector[k]) * math.sqrt(covariance[k, k])
         if key == "stiffness":
             prismatic = robot.tree.joints.get(effect.target)
@@ -200,21 +201,26 @@ def fitted_nuisances(found: Fit) -> dict[str, Value]:
     return result
 
 
-def with_hum(causes: Sequence[Cause], lines: Hypothesis) -> tuple[Cause, ...]:
-    """The causes with the hum's amplitude, which is not fitted but taken out of the residual.
+def with_solved(causes: Sequence[Cause], solved: Hypothesis) -> tuple[Cause, ...]:
+    """The causes with the size of numbers that are not fitted but solved for in the residual.
 
-    What noise adds to the lines' power is taken out of it.
+    What noise adds to their power is taken out of it.
+
+    Args:
+        causes: as they are told without.
+        solved: the hypothesis with these numbers in its effects.
     """
     told = []
-    gains = {label: (fall, count) for label, fall, count in lines.drawn}
+    gains = {label: (fall, count) for label, fall, count in solved.drawn}
+    sources = {(e.name, e.target): e for e in solved.effects if e.latent and e.latent.linear}
     for cause in causes:
-        found = {e.target: e for e in lines.effects if e.name == "mains_hum"}.get(cause.target)
-        if cause.effect == "mains_hum" and found is not None:
-            seen, unit = found.values["amplitude"], cause.parameters["amplitude"].unit
+        found = sources.get((cause.effect, cause.target))
+        if found is not None and found.latent is not None:
+            name = found.latent.spread
+            seen, unit = found.values[name], cause.parameters[name].unit
             fall, count = gains.get(found.label, (math.inf, 0))
-            amplitude = seen * math.sqrt(max(1.0 - count / max(fall, 1e-300), 0.0))
-            std = seen / math.sqrt(max(fall, 1e-300))
-            value = Value(amplitude, std, unit)
-            cause = replace(cause, parameters={**cause.parameters, "amplitude": value})
+            size = seen * math.sqrt(max(1.0 - count / max(fall, 1e-300), 0.0))
+            value = Value(size, seen / math.sqrt(max(fall, 1e-300)), unit)
+            cause = replace(cause, parameters={**cause.parameters, name: value})
         told.append(cause)
     return tuple(told)

@@ -8,12 +8,10 @@ import numpy as np
 
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
-from picchio.diagnosis.percussion.fit.drawn import LATENT, fit_latent
+from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.result import Gain
-from picchio.model.effects.registry import effect_class
-from picchio.prediction.percussion import POSITION_KINDS
 
 
 def holdout_gain(
@@ -46,10 +44,10 @@ def holdout_gain(
 
 
 def _centred(record: MeasuredRecord) -> list[np.ndarray]:
-    kinds = {c.name: c.kind.name for c in record.setup.channels}
+    kinds = {c.name: c.kind for c in record.setup.channels}
     rows = []
     for name, values in record.values.items():
-        offset = values.mean() if kinds[name] in POSITION_KINDS else 0.0
+        offset = values.mean() if kinds[name].free_offset else 0.0
         rows.append((values - offset) / record.noise[name].std)
     return rows
 
@@ -68,13 +66,13 @@ def _own_latent(
     problem: Problem, hypothesis: Hypothesis, records: Sequence[MeasuredRecord]
 ) -> Hypothesis:
     """Numbers that are drawn anew in every record must be found in these, too."""
-    names = [e.name for e in hypothesis.effects if e.name in LATENT and e.name != "mains_hum"]
-    for name in names:
+    drawing = [e for e in hypothesis.effects if e.latent is not None and not e.latent.linear]
+    for effect in drawing:
         found = fit(problem, hypothesis, records, None, iterations=0)
-        found = fit_latent(problem, found, effect_class(name), "tool")
-        own = next(e for e in found.hypothesis.effects if e.name == name)
+        found = fit_latent(problem, found, effect)
+        own = next(e for e in found.hypothesis.effects if e.label == effect.label)
         effects = tuple(
-            e.with_hidden({**e.hidden, **own.hidden}) if e.name == name else e
+            e.with_hidden({**e.hidden, **own.hidden}) if e.label == effect.label else e
             for e in hypothesis.effects
         )
         hypothesis = Hypothesis(

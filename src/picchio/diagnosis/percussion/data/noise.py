@@ -16,7 +16,7 @@ from picchio.core.arrays import FloatArray
 from picchio.measurement.noise.autoregression import AutoRegression
 from picchio.measurement.noise.hum import Line
 from picchio.measurement.noise.level import Noise
-from picchio.prediction.percussion import POSITION_KINDS, PercussionSetup
+from picchio.prediction.percussion import PercussionSetup
 
 # Fewer quiet samples a channel than this say too little.
 LEAST_SAMPLES = 120
@@ -38,7 +38,7 @@ def quiet_noise(
         values: channel -> (m,) of each record, SI.
     """
     groups: dict[str, dict[str, list[FloatArray]]] = {}
-    units: dict[str, tuple[str, float, str]] = {}
+    units: dict[str, tuple[str, float, bool]] = {}
     for setup, data in zip(setups, values, strict=True):
         count = int(np.searchsorted(setup.samples.times, -0.5 * setup.samples.step))
         if setup.steady or count < 16:
@@ -47,7 +47,7 @@ def quiet_noise(
             if channel.name in data:
                 pieces = groups.setdefault(channel.group, {}).setdefault(channel.name, [])
                 pieces.append(data[channel.name][:count][-_LONGEST:])
-                units[channel.name] = (channel.unit, setup.samples.step, channel.kind.name)
+                units[channel.name] = (channel.unit, setup.samples.step, channel.kind.free_offset)
     found: dict[str, Noise] = {}
     for channels in groups.values():
         if min(sum(p.size for p in pieces) for pieces in channels.values()) >= LEAST_SAMPLES:
@@ -56,12 +56,12 @@ def quiet_noise(
 
 
 def _group(
-    channels: Mapping[str, list[FloatArray]], units: Mapping[str, tuple[str, float, str]]
+    channels: Mapping[str, list[FloatArray]], units: Mapping[str, tuple[str, float, bool]]
 ) -> dict[str, Noise]:
     from scipy.optimize import minimize
 
     some = next(iter(channels))
-    step, centred = units[some][1], units[some][2] in POSITION_KINDS
+    _, step, centred = units[some]
     hum = _hum(channels, step)
     basis_of = {
         n: _basis(n, step, hum, centred) for n in {p.size for c in channels.values() for p in c}

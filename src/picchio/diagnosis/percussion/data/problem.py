@@ -18,7 +18,7 @@ from picchio.excitation.piecewise import PiecewiseForce
 from picchio.measurement.noise.level import Noise
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
-from picchio.prediction.percussion import POSITION_KINDS, PercussionSetup, percussion_setups
+from picchio.prediction.percussion import PercussionSetup, percussion_setups
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.vibration.integration.integrate import Samples
 
@@ -73,7 +73,6 @@ def _marked(force: PiecewiseForce, clock: Samples, delay: float, rate: float) ->
 # Effects whose edges are held fixed, with a number of their own.
 Pin = tuple[int, tuple[Effect, ...]]
 _numbers = itertools.count()
-_JUMPING = ("force", "acceleration", "accelerometer")
 
 
 class Helpers(Protocol):
@@ -233,11 +232,13 @@ def residual(record: MeasuredRecord, model: Model, end: float | None = None) -> 
     setup = record.until(end)
     predicted = setup.predict(model)
     count = setup.samples.count
-    hums = [e for e in model.effects if e.name == "mains_hum" and setup.name not in e.hidden]
-    if hums:
+    solved = [
+        e for e in model.effects if e.latent and e.latent.linear and setup.name not in e.hidden
+    ]
+    if solved:
         rows = {name: values[:count] - predicted[name] for name, values in record.values.items()}
-        for hum in hums:
-            take_out_line(rows, setup, hum.target, hum.values["frequency"])
+        for effect in solved:
+            take_out(rows, setup, effect)
         predicted = {name: record.values[name][:count] - row for name, row in rows.items()}
     masked = _kept_edges(record, setup, model)
     out, room, known = np.empty((len(record.values), count)), np.empty(count), np.zeros(0, bool)
@@ -245,10 +246,10 @@ def residual(record: MeasuredRecord, model: Model, end: float | None = None) -> 
         name = channel.name
         simulated = predicted[name]
         offset = 0.0
-        if setup.steady or channel.kind.name in POSITION_KINDS:
+        if setup.steady or channel.kind.free_offset:
             offset = float((record.values[name][:count] - simulated).sum()) / count
         unknown = known
-        if masked is not None and channel.kind.name in _JUMPING:
+        if masked is not None and channel.kind.jumps:
             # Before the filter, which would spread what is not known, and after it; there as
             # large as noise, lest a fit gain by moving edges towards samples it misses.
             unknown = masked[channel.group]
@@ -270,24 +271,26 @@ def signal_power(records: Sequence[MeasuredRecord]) -> float:
     )
 
 
-def take_out_line(
-    rows: dict[str, FloatArray], setup: PercussionSetup, group: str, frequency: float
-) -> tuple[float, float]:
-    """Subtract the best sine of one frequency, common to a group's channels.
+def take_out(
+    rows: dict[str, FloatArray], setup: PercussionSetup, effect: Effect
+) -> tuple[float, ...]:
+    """Subtract what an effect's own numbers explain of its group's channels, in place.
+
+    Args:
+        rows: channel -> (m,) residual.
+        setup: of the record.
+        effect: one whose readings are linear in the numbers that it draws.
 
     Returns:
-        its cosine and sine amplitude.
+        the numbers; 0 where the record has none of these channels.
     """
-    names = [c.name for c in setup.channels if c.group == group and c.name in rows]
+    names = [c.name for c in setup.channels if c.group == effect.target and c.name in rows]
     if not names:
-        return 0.0, 0.0
-    phase = 2.0 * np.pi * frequency * setup.samples.times
-    basis = np.stack([np.cos(phase), np.sin(phase)])
-    mean = np.mean([rows[name] for name in names], axis=0)
-    found = np.linalg.lstsq(basis.T, mean, rcond=None)[0]
-    for name in names:
-        rows[name] = rows[name] - found @ basis
-    return float(found[0]), float(found[1])
+        assert effect.latent is not None
+        return (0.0,) * effect.latent.size(0)
+    left, numbers = effect.take_out(np.stack([rows[n] for n in names]), setup.samples.times)
+    rows |= dict(zip(names, left, strict=True))
+    return numbers
 
 
 def _kept_edges(

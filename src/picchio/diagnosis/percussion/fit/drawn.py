@@ -10,7 +10,7 @@ import numpy as np
 
 from picchio.core.arrays import BoolArray, FloatArray
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.data.problem import Problem, take_out_line
+from picchio.diagnosis.percussion.data.problem import Problem, take_out
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.diagnosis.percussion.fit.least_squares import (
     HOPELESS,
@@ -23,13 +23,7 @@ from picchio.diagnosis.percussion.fit.least_squares import (
 from picchio.diagnosis.percussion.fit.slopes import jacobian
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.model.effects.effect import Effect
-from picchio.model.effects.registry import effect_class
-
-# Effects that draw numbers anew in every record: jitter, missed hits, the phase of the hum.
-
-LATENT = ("pulse_jitter", "missed_hits", "mains_hum")
-_SHIFT = 2e-4  # s
-_WEAKER = 0.2
+from picchio.model.effects.latent import Latent
 
 # What numbers that are drawn anew in every record cost: they come from one distribution.
 
@@ -75,28 +69,31 @@ def width_spread(width: float, fall: float, count: int) -> float:
     return width * fall / (fall - count) / math.sqrt(2.0 * count)
 
 
-def hidden_columns(problem: Problem, known: Fit, kind: type[Effect]) -> list[FloatArray]:
-    """The residual's change with every blow's shift or weakening, per record."""
-    hypothesis = known.hypothesis
-    current = current_hidden(hypothesis, kind.name)
-    most = max(int(r.setup.blows.hit.max()) + 1 for r in known.records)
-    step = _SHIFT if kind.name == "pulse_jitter" else _WEAKER
+# The numbers of every record.
+
+Hidden = Mapping[str, tuple[float, ...]]
+
+
+def hidden_columns(problem: Problem, known: Fit, effect: Effect) -> list[FloatArray]:
+    """The residual's change with every free number that an effect draws, per record."""
+    latent = effect.latent
+    assert latent is not None
+    current = hidden_numbers(known, effect)
+    step = latent.step
     found: list[list[FloatArray]] = [[] for _ in known.records]
-    for hit in range(1, most):
+    for k in range(latent.first, max(numbers.size for numbers in current.values())):
         hidden = {}
-        for record in known.records:
-            count = int(record.setup.blows.hit.max()) + 1
-            numbers = np.array(current.get(record.name, np.zeros(count)), dtype=float)
-            if hit < count:
-                numbers[hit] += step
-            hidden[record.name] = tuple(numbers)
+        for name, numbers in current.items():
+            moved = numbers.copy()
+            moved[k : k + 1] += step
+            hidden[name] = tuple(moved)
         there = problem.residuals(
-            with_hidden(hypothesis, kind, hidden).effects, known.records, known.end
+            with_hidden(known.hypothesis, effect, hidden).effects, known.records, known.end
         )
         for i, (record, new, old) in enumerate(
             zip(known.records, there, known.residuals, strict=True)
         ):
-            if hit <= record.setup.blows.hit.max():
+            if k < current[record.name].size:
                 found[i].append(((new - old) / step).ravel())
     return [
         np.stack(columns, axis=1) if columns else np.zeros((r.size, 0))
@@ -104,21 +101,35 @@ def hidden_columns(problem: Problem, known: Fit, kind: type[Effect]) -> list[Flo
     ]
 
 
-def current_hidden(hypothesis: Hypothesis, name: str) -> dict[str, tuple[float, ...]]:
+def current_hidden(hypothesis: Hypothesis, label: str) -> dict[str, tuple[float, ...]]:
     """Record -> an effect's hidden numbers, as far as they are known."""
     for effect in hypothesis.effects:
-        if effect.name == name:
+        if effect.label == label:
             return dict(effect.hidden)
     return {}
 
 
+def hidden_numbers(here: Fit, effect: Effect) -> dict[str, FloatArray]:
+    """Every record's hidden numbers, 0 where none are known."""
+    current, latent = current_hidden(here.hypothesis, effect.label), effect.latent
+    assert latent is not None
+    return {
+        r.name: np.array(
+            current.get(r.name, np.zeros(latent.size(int(r.setup.blows.hit.max()) + 1))),
+            dtype=float,
+        )
+        for r in here.records
+    }
+
+
 def with_hidden(
-    hypothesis: Hypothesis, kind: type[Effect], hidden: dict[str, tuple[float, ...]]
+    hypothesis: Hypothesis, effect: Effect, hidden: Mapping[str, tuple[float, ...]]
 ) -> Hypothesis:
     """With an effect's hidden numbers (record -> numbers), and the effect if it was not there."""
-    effects = tuple(e.with_hidden(hidden) if e.name == kind.name else e for e in hypothesis.effects)
-    if kind.name not in {e.name for e in hypothesis.effects}:
-        effects = (*effects, kind("tool").with_hidden(hidden))
+    label = effect.label
+    effects = tuple(e.with_hidden(hidden) if e.label == label else e for e in hypothesis.effects)
+    if label not in {e.label for e in hypothesis.effects}:
+        effects = (*effects, effect.with_hidden(hidden))
     return replace(hypothesis, effects=effects)
 
 
@@ -127,36 +138,34 @@ def hidden_cost(hypothesis: Hypothesis, n_records: int, samples: int) -> float:
     known = {label: drawn_cost(fall, count, samples) for label, fall, count in hypothesis.drawn}
     total = 0.0
     for effect in hypothesis.causes:
-        count = 0.0
-        if effect.name == "mains_hum":
-            count = 2 * n_records
-        elif effect.name == "pulse_jitter":
-            count = sum(max(len(v) - 1, 0) for v in effect.hidden.values())
-        elif effect.name == "missed_hits":  # yes or no: a bit each, not a number
-            bits = sum(max(len(v) - 1, 0) for v in effect.hidden.values())
-            total += bits * math.log(2.0) * math.log(max(samples, 2))
+        latent = effect.latent
+        if latent is None:
+            continue
+        count = sum(max(len(v) - latent.first, 0) for v in effect.hidden.values())
+        if latent.linear:
+            count = latent.size(0) * n_records
+        if latent.whole:  # yes or no: a bit each, not a number
+            total += count * math.log(2.0) * math.log(max(samples, 2))
+            count = 0
         total += min(known.get(effect.label, math.inf), count * math.log(max(samples, 2)))
     return total
 
 
-def hum_lines(problem: Problem, found: Fit) -> Hypothesis:
-    """The hum's amplitude and phases of every record written into its effect."""
+def with_solved_numbers(problem: Problem, found: Fit) -> Hypothesis:
+    """The numbers that are solved for in the residual written into their effects."""
     hypothesis = found.hypothesis
     effects = list(hypothesis.effects)
     for i, effect in enumerate(effects):
-        if effect.name != "mains_hum":
+        if effect.latent is None or not effect.latent.linear:
             continue
         others = [e for k, e in enumerate(effects) if k != i]
         predictions = problem.predictions(others)
         hidden = {}
         for record, predicted in zip(problem.records, predictions, strict=True):
             rows = {n: v - predicted[n] for n, v in record.values.items()}
-            frequency = effect.values["frequency"]
-            hidden[record.name] = take_out_line(rows, record.setup, effect.target, frequency)
-        amplitude = float(np.sqrt(np.mean([a * a + b * b for a, b in hidden.values()])))
-        kind = effect_class("mains_hum")
-        effects[i] = kind(effect.target, amplitude=amplitude, frequency=effect.values["frequency"])
-        effects[i] = effects[i].with_hidden(hidden)
+            hidden[record.name] = take_out(rows, record.setup, effect)
+        size = float(np.sqrt(np.mean([sum(x * x for x in v) for v in hidden.values()])))
+        effects[i] = effect.with_values(**{effect.latent.spread: size}).with_hidden(hidden)
     return replace(hypothesis, effects=tuple(effects))
 
 
@@ -173,8 +182,6 @@ _FINER = 4
 _MOVES = 3
 # After so many blows the rest is fitted again.
 _REFIT = (1, 2, 4, 8)
-
-Hidden = Mapping[str, tuple[float, ...]]
 
 
 def blow_by_blow(
@@ -314,102 +321,113 @@ _CONVERGED = 1e-4
 _SMALLEST = 1e-6  # of the singular values of what a record's blows can do
 
 
-def fit_latent(
-    problem: Problem, start: Fit, kind: type[Effect], target: str, rival: float = np.inf
-) -> Fit:
+def fit_latent(problem: Problem, start: Fit, effect: Effect, rival: float = np.inf) -> Fit:
     """Fit the hidden numbers of every record and the unknowns common to all.
 
     Blows' times are looked for blow by blow first, unless they are known in all of these records.
     Then all are moved at once, by Gauss and Newton's step, where that helps; else in turns. What
     stays far above the cost of a `rival` is given up.
+
+    Args:
+        problem: data and noise.
+        start: the fit that is begun with.
+        effect: one that draws numbers; it is found in the hypothesis by its label, or added.
+        rival: cost of what does as well.
     """
-    if kind.name == "mains_hum":
-        return _priced_hum(problem, start, target)
+    latent = effect.latent
+    assert latent is not None
+    if latent.linear:
+        return _priced_solved(problem, start, effect)
     here = start
-    jitter = kind.name == "pulse_jitter"
-    known_in = set(current_hidden(start.hypothesis, kind.name))
-    if jitter and not {r.name for r in start.records} <= known_in:
-        begun = blow_by_blow(problem, start, lambda old, late: with_hidden(old, kind, dict(late)))
+    known_in = set(current_hidden(start.hypothesis, effect.label))
+    if latent.times and not {r.name for r in start.records} <= known_in:
+        begun = blow_by_blow(problem, start, lambda old, late: with_hidden(old, effect, late))
         here = fit(problem, begun, start.records, start.end, iterations=2)
     for turn in range(_ROUNDS):
         before = here.cost
         if turn > 1 and before > HOPELESS * rival:
             break
-        columns = hidden_columns(problem, here, kind)
-        together = _together(problem, here, kind, columns) if jitter else None
-        here = together or _in_turns(problem, here, kind, columns)
+        columns = hidden_columns(problem, here, effect)
+        together = None if latent.whole else _together(problem, here, effect, columns)
+        here = together or _in_turns(problem, here, effect, columns)
         if (turn or together) and before - here.cost < _CONVERGED * here.cost:
             break
-    return _with_width(here, kind, columns) if jitter else _with_fraction(here, kind)
+    return _with_fraction(here, effect) if latent.whole else _with_width(here, effect, columns)
 
 
-def _with_width(here: Fit, kind: type[Effect], columns: Sequence[FloatArray]) -> Fit:
-    """With the width of the blows' times, without what noise adds to it, and what they cost."""
-    known = _numbers(here, kind)
+def _with_width(here: Fit, effect: Effect, columns: Sequence[FloatArray]) -> Fit:
+    """With the width of the numbers' spread, without what noise adds to it, and what they cost."""
+    known, latent = hidden_numbers(here, effect), effect.latent
+    assert latent is not None
     moved, fall, count = 0.0, 0.0, 0
     for record, own in zip(here.records, columns, strict=True):
-        numbers = known[record.name][1 : 1 + own.shape[1]]
+        numbers = known[record.name][latent.first :]
         moved += float(numbers @ numbers)
         fall += float(((own @ numbers) ** 2).sum())
         count += own.shape[1]
     std = math.sqrt(moved / max(count, 1) * max(1.0 - count / max(fall, 1e-300), 0.0))
-    return _priced(_with_own(here, kind, std=std), f"{kind.name}:tool", fall, count)
+    return _priced(_with_own(here, effect, std), effect.label, fall, count)
 
 
-def _with_fraction(here: Fit, kind: type[Effect]) -> Fit:
-    """With the share of the blows that are missing."""
-    hidden = current_hidden(here.hypothesis, kind.name)
-    numbers = np.concatenate([np.array(v)[1:] for v in hidden.values()])
-    return _with_own(here, kind, fraction=float(numbers.mean()))
+def _with_fraction(here: Fit, effect: Effect) -> Fit:
+    """With the share of the numbers that are 1."""
+    hidden = current_hidden(here.hypothesis, effect.label)
+    assert effect.latent is not None
+    numbers = np.concatenate([np.array(v)[effect.latent.first :] for v in hidden.values()])
+    return _with_own(here, effect, float(numbers.mean()))
 
 
-def _with_own(here: Fit, kind: type[Effect], **values: float) -> Fit:
+def _with_own(here: Fit, effect: Effect, spread: float) -> Fit:
     """With the effect's own parameter as its hidden numbers have it."""
+    assert effect.latent is not None
+    values = {effect.latent.spread: spread}
     effects = tuple(
-        e.with_values(**values) if e.name == kind.name else e for e in here.hypothesis.effects
+        e.with_values(**values) if e.label == effect.label else e for e in here.hypothesis.effects
     )
     return replace(here, hypothesis=replace(here.hypothesis, effects=effects))
 
 
-def _priced_hum(problem: Problem, here: Fit, target: str) -> Fit:
-    """With what the lines' sines and cosines cost, by how much chi-square falls by them."""
-    label = f"mains_hum:{target}"
-    effects = tuple(e for e in here.hypothesis.effects if e.label != label)
+def _priced_solved(problem: Problem, here: Fit, effect: Effect) -> Fit:
+    """With what numbers cost that are solved for, by how much chi-square falls by them."""
+    assert effect.latent is not None
+    effects = tuple(e for e in here.hypothesis.effects if e.label != effect.label)
     without = problem.residuals(effects, here.records, here.end)
     fall = sum(float((r * r).sum()) for r in without) - here.chi_square
-    return _priced(here, label, fall, 2 * len(here.records))
+    return _priced(here, effect.label, fall, effect.latent.size(0) * len(here.records))
 
 
 def _priced(here: Fit, label: str, fall: float, count: int) -> Fit:
     return replace(here, hypothesis=with_drawn(here.hypothesis, label, fall, count))
 
 
-def _in_turns(
-    problem: Problem, here: Fit, kind: type[Effect], columns: Sequence[FloatArray]
-) -> Fit:
-    """Hidden numbers first, record by record; then what is common to all."""
-    known = _numbers(here, kind)
+def _bounds(here: Fit, latent: Latent) -> tuple[float, float]:
+    """Of a hidden number."""
     largest = 0.45 * here.records[0].setup.blows.interval
+    return (-largest, largest) if latent.times else (latent.lower, latent.upper)
+
+
+def _in_turns(problem: Problem, here: Fit, effect: Effect, columns: Sequence[FloatArray]) -> Fit:
+    """Hidden numbers first, record by record; then what is common to all."""
+    known, latent = hidden_numbers(here, effect), effect.latent
+    assert latent is not None
     wanted = {}
     for record, residual, slopes in zip(here.records, here.residuals, columns, strict=True):
         numbers = known[record.name].copy()
         if slopes.shape[1]:
-            numbers[1 : 1 + slopes.shape[1]] += np.linalg.lstsq(
-                slopes, -residual.ravel(), rcond=_SMALLEST
-            )[0]
-        if kind.name == "pulse_jitter":
-            wanted[record.name] = np.clip(numbers, -largest, largest)
-        else:
-            wanted[record.name] = np.round(np.clip(numbers, 0.0, 1.0))
+            numbers[latent.first :] += np.linalg.lstsq(slopes, -residual.ravel(), rcond=_SMALLEST)[
+                0
+            ]
+        numbers = np.clip(numbers, *_bounds(here, latent))
+        wanted[record.name] = np.round(numbers) if latent.whole else numbers
     hidden = {name: tuple(numbers) for name, numbers in wanted.items()}
-    if kind.name == "pulse_jitter":
-        hidden = _shortened(problem, here, kind, known, wanted)
-    hypothesis = with_hidden(here.hypothesis, kind, hidden)
+    if not latent.whole:
+        hidden = _shortened(problem, here, effect, known, wanted)
+    hypothesis = with_hidden(here.hypothesis, effect, hidden)
     return fit(problem, hypothesis, here.records, here.end, iterations=2)
 
 
 def _together(
-    problem: Problem, here: Fit, kind: type[Effect], columns: Sequence[FloatArray]
+    problem: Problem, here: Fit, effect: Effect, columns: Sequence[FloatArray]
 ) -> Fit | None:
     """One step of hidden and common numbers at once; None where it does not help.
 
@@ -435,8 +453,8 @@ def _together(
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-12 * np.diag(normal).max() + 1e-300))
     lower, upper = np.array([u.lower for u in unknowns]), np.array([u.upper for u in unknowns])
     step = bounded_step(normal, gradient, scale, 1e-6, vector, lower, upper)
-    known = _numbers(here, kind)
-    largest = 0.45 * here.records[0].setup.blows.interval
+    known, latent = hidden_numbers(here, effect), effect.latent
+    assert latent is not None
     for share in _SHARES:
         hidden = {}
         for record, residual, common, own in zip(
@@ -446,9 +464,9 @@ def _together(
             if own.shape[1]:
                 right = -(residual.ravel() + common @ step)
                 moved = np.linalg.lstsq(own, right, rcond=_SMALLEST)[0]
-                numbers[1 : 1 + own.shape[1]] += share * moved
-            hidden[record.name] = tuple(np.clip(numbers, -largest, largest))
-        hypothesis = with_hidden(here.hypothesis.at(vector + share * step), kind, hidden)
+                numbers[latent.first :] += share * moved
+            hidden[record.name] = tuple(np.clip(numbers, *_bounds(here, latent)))
+        hypothesis = with_hidden(here.hypothesis.at(vector + share * step), effect, hidden)
         try:
             there = problem.residuals(hypothesis.effects, here.records, here.end)
         except InputError:
@@ -459,21 +477,10 @@ def _together(
     return None
 
 
-def _numbers(here: Fit, kind: type[Effect]) -> dict[str, FloatArray]:
-    """Every record's hidden numbers, 0 where none are known."""
-    current = current_hidden(here.hypothesis, kind.name)
-    return {
-        r.name: np.array(
-            current.get(r.name, np.zeros(int(r.setup.blows.hit.max()) + 1)), dtype=float
-        )
-        for r in here.records
-    }
-
-
 def _shortened(
     problem: Problem,
     here: Fit,
-    kind: type[Effect],
+    effect: Effect,
     known: dict[str, FloatArray],
     wanted: dict[str, FloatArray],
 ) -> dict[str, tuple[float, ...]]:
@@ -487,7 +494,7 @@ def _shortened(
         trial = {
             r.name: tuple(known[r.name] + share * (wanted[r.name] - known[r.name])) for r in left
         }
-        effects = with_hidden(here.hypothesis, kind, {**best, **trial}).effects
+        effects = with_hidden(here.hypothesis, effect, {**best, **trial}).effects
         there = problem.residuals(effects, left, here.end)
         worse = []
         for record, residual in zip(left, there, strict=True):
@@ -503,15 +510,14 @@ def _shortened(
 
 def refit(problem: Problem, hypothesis: Hypothesis, records: Sequence[MeasuredRecord]) -> Fit:
     """A hypothesis refitted to some records, from where it stands, with its Jacobian."""
-    hidden = [e.name for e in hypothesis.effects if e.name in LATENT and e.name != "mains_hum"]
+    drawing = [e for e in hypothesis.effects if e.latent is not None]
+    hidden = [e for e in drawing if e.latent and not e.latent.linear]
     # Blows' times in records that were held out are not known yet: nothing can be fitted to them.
-    turns = 0 if "pulse_jitter" in hidden else 4
+    turns = 0 if any(e.latent and e.latent.times for e in hidden) else 4
     found = fit(problem, hypothesis, records, None, iterations=turns, with_jacobian=not hidden)
-    for name in hidden:
-        found = fit_latent(problem, found, effect_class(name), "tool")
-    for effect in hypothesis.effects:
-        if effect.name == "mains_hum":  # its lines are another number in more records
-            found = fit_latent(problem, found, type(effect), effect.target)
+    # What is solved for is another number in more records.
+    for effect in (*hidden, *(e for e in drawing if e not in hidden)):
+        found = fit_latent(problem, found, effect)
     if hidden:
         found = fit(problem, found.hypothesis, records, None, iterations=1, with_jacobian=True)
     return found

@@ -11,7 +11,8 @@ import numpy as np
 from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
 from picchio.model.effects.effect import Effect
-from picchio.model.effects.registry import effect_class
+from picchio.model.effects.evidence import Evidence
+from picchio.model.effects.registry import catalogue
 from picchio.robot.flexible_robot import FlexibleRobot
 
 # Nominal values within so many standard deviations are nuisances, not causes.
@@ -59,20 +60,15 @@ class Unknown:
         return _STEP_LOG if self.logarithmic else _STEP_LINEAR
 
 
-NUISANCE_KEYS = {
-    "joint_stiffness": "stiffness",
-    "modal_damping": "damping_ratio",
-    "force_amplitude": "force",
-}
-
-
 def nuisances(robot: FlexibleRobot) -> tuple[Effect, ...]:
-    """Stiffness of every joint, damping and force: never quite as stated."""
-    stiffness = effect_class("joint_stiffness")
-    return (
-        *(stiffness(name) for name in robot.flexible_names),
-        effect_class("modal_damping")("robot"),
-        effect_class("force_amplitude")("tool"),
+    """What is never quite as stated, in the order of `[tolerance]`: stiffness of joints, ..."""
+    tolerated = {kind.tolerance: kind for kind in catalogue().values() if kind.tolerance}
+    evidence = Evidence(robot)
+    return tuple(
+        kind(target)
+        for key in Tolerance.model_fields
+        if (kind := tolerated.get(key)) is not None
+        for target in kind.targets(evidence)
     )
 
 
@@ -174,7 +170,7 @@ class Hypothesis:
         return nuisance.with_values(scale=min(max(nuisance.values["scale"], lower), upper))
 
     def _tolerance(self, nuisance: Effect) -> tuple[float, float]:
-        sigma = getattr(self.tolerance, NUISANCE_KEYS[nuisance.name])
+        sigma = getattr(self.tolerance, nuisance.tolerance)
         return max(1.0 - TOLERATED * sigma, 0.05), 1.0 + TOLERATED * sigma
 
     def unknowns(self) -> list[Unknown]:
@@ -190,7 +186,7 @@ class Hypothesis:
                 prior = None
                 lower, upper = p.lower, p.upper
                 if nuisance:
-                    sigma = getattr(self.tolerance, NUISANCE_KEYS[effect.name])
+                    sigma = getattr(self.tolerance, effect.tolerance)
                     if sigma == 0.0:
                         continue
                     if effect.label not in self.freed:

@@ -9,62 +9,33 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.model.effects.effect import Effect
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.registry import catalogue
 from picchio.model.effects.scales import Scales
-from picchio.model.expansion import BASE_AXES
-
-# What a group of channels must be for a sensor effect to make sense there.
-_AXES_ONLY = ("sensor_axes", "sensor_misalignment")
-_VECTOR = ("acceleration", "accelerometer", "velocity", "displacement")
-_MOUNTED = ("accelerometer", "acceleration")
 
 
-def candidate_targets(problem: Problem, effect: type[Effect]) -> list[str]:
-    """The targets that an effect can have on this robot, in these records."""
-    robot = problem.robot
-    kind = effect.target_kind
-    if effect.where == "motion":
-        return []
-    if effect.name == "stiffness_drift" and _spread(problem, "days") <= 0.0:
-        return []
-    if effect.name == "thermal_stiffness" and _spread(problem, "temperature") <= 0.0:
-        return []
-    if effect.name in ("force_drift", "pulse_jitter", "missed_hits") and not _bursts(problem):
-        return []
-    if kind in ("joint", "joint or link"):
-        names = list(robot.flexible_names)
-        if effect.name == "transverse_compliance":
-            names = [j.name for j in robot.flexible_joints if j.kind == "revolute"]
-        return names
-    if kind == "link":
-        links = [
-            robot.tree.joints[name].child for name in robot.joint_names if name in robot.tree.joints
-        ]
-        if effect.name == "link_mass":
-            return [link for link in links if robot.tree.links.get(link) is not None]
-        return links
-    if kind == "axis":
-        return list(BASE_AXES)
-    if kind == "channel group":
-        groups = [g for g in problem.groups if g != "force"]
-        if effect.name in _AXES_ONLY:
-            groups = [g for g in groups if g.split(".")[0] in _VECTOR]
-        if effect.name == "mount_resonance":
-            groups = [g for g in groups if g.split(".")[0] in _MOUNTED]
-        if effect.name in ("sensor_gain", "sensor_delay") and "force" in problem.groups:
-            groups.append("force")
-        return groups
-    return ["robot"] if kind == "robot" else ["tool"]
+def evidence_of(problem: Problem) -> Evidence:
+    """What a campaign's percussion records can show."""
+    channels = {c.group: c.kind for r in problem.records for c in r.setup.channels}
+    blows = [r.setup.blows for r in problem.records]
+    return Evidence(
+        robot=problem.robot,
+        groups=tuple(g for g in problem.groups if not channels[g].of_force),
+        vectors=frozenset(g for g, kind in channels.items() if kind.axes),
+        accelerations=frozenset(g for g, kind in channels.items() if kind.accelerates),
+        forces=tuple(g for g in problem.groups if channels[g].of_force),
+        bursts=any(b.start.size > 1 and b.period is None for b in blows),
+        recorded=all(b.recorded for b in blows),
+        reshaped=any(b.other is not None for b in blows),
+        days=_spread(problem, "days"),
+        kelvin=_spread(problem, "temperature"),
+    )
 
 
 def _spread(problem: Problem, name: str) -> float:
     values = [getattr(r.setup.conditions, name) for r in problem.records]
     known = [v for v in values if v is not None]
     return float(np.ptp(known)) if len(known) == len(values) else 0.0
-
-
-def _bursts(problem: Problem) -> bool:
-    return any(r.setup.blows.start.size > 1 and not r.setup.steady for r in problem.records)
 
 
 def all_candidates(problem: Problem, without: Iterable[str] = ()) -> list[tuple[type[Effect], str]]:
@@ -74,13 +45,30 @@ def all_candidates(problem: Problem, without: Iterable[str] = ()) -> list[tuple[
         problem: robot and records.
         without: names of effects to leave out.
     """
-    left_out = set(without)
+    left_out, evidence = set(without), evidence_of(problem)
     return [
         (effect, target)
         for name, effect in catalogue().items()
         if name not in left_out
-        for target in candidate_targets(problem, effect)
+        for target in effect.applies(evidence)
     ]
+
+
+def not_looked_for(problem: Problem) -> dict[str, str]:
+    """Effects that these records cannot show, and why.
+
+    Args:
+        problem: robot and records.
+
+    Returns:
+        name -> one clause.
+    """
+    evidence = evidence_of(problem)
+    return {
+        name: why
+        for name, effect in catalogue().items()
+        if effect.shows(motion=False) and (why := effect.why_not(evidence))
+    }
 
 
 def measure_scales(

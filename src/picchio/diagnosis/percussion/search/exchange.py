@@ -6,7 +6,7 @@ from collections.abc import Set
 from dataclasses import replace
 
 from picchio.diagnosis.percussion.criteria.bic import bic
-from picchio.diagnosis.percussion.fit.drawn import LATENT, fit_latent, with_hidden
+from picchio.diagnosis.percussion.fit.drawn import fit_latent, with_hidden
 from picchio.diagnosis.percussion.fit.least_squares import HOPELESS, Fit, fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.state import Search, Trial
@@ -16,6 +16,7 @@ from picchio.diagnosis.percussion.search.trials import (
     records_of_every_pose,
     try_candidates,
 )
+from picchio.model.effects.registry import effect_class
 
 
 def prune(search: Search, found: Fit, *, alone: bool = True) -> Fit:
@@ -41,11 +42,10 @@ def prune(search: Search, found: Fit, *, alone: bool = True) -> Fit:
 def refit_latent(search: Search, best: Fit, newest: str) -> Fit:
     """What earlier causes draw anew in every record, looked for again beside the newest cause."""
     for cause in best.hypothesis.causes:
-        if cause.label != newest and cause.name in LATENT and cause.name != "mains_hum":
-            kind = type(cause)
+        if cause.label != newest and cause.latent is not None and not cause.latent.linear:
             # From the start: without the newest cause some numbers may have been far off.
-            start = replace(best, hypothesis=with_hidden(best.hypothesis, kind, {}))
-            again = fit_latent(search.problem, start, kind, cause.target)
+            start = replace(best, hypothesis=with_hidden(best.hypothesis, cause, {}))
+            again = fit_latent(search.problem, start, cause)
             best = again if again.cost < best.cost else best
     return best
 
@@ -61,7 +61,7 @@ def exchange(search: Search) -> Fit:
             chosen = step[0].label
             if chosen not in best.hypothesis.labels or not rival.finished(search.records):
                 continue
-            if rival.label in best.hypothesis.labels or rival.label.split(":")[0] in LATENT:
+            if rival.label in best.hypothesis.labels or _draws(rival.label):
                 continue
             joined = rival.fit.hypothesis
             for cause in best.hypothesis.causes:
@@ -74,6 +74,11 @@ def exchange(search: Search) -> Fit:
             if bic(other) < bic(best) - search.least:
                 best = other
     return best
+
+
+def _draws(label: str) -> bool:
+    """Whether an effect draws numbers anew in every record."""
+    return effect_class(label.partition(":")[0]).latent is not None
 
 
 def _come_near(search: Search, hypothesis: Hypothesis, best: Fit) -> Hypothesis | None:

@@ -17,7 +17,6 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.drawn import (
-    LATENT,
     blow_by_blow,
     drawn_cost,
     hidden_columns,
@@ -87,7 +86,6 @@ def bounded(trial: Effect, values: dict[str, float]) -> Effect:
     return type(trial)(trial.target, **inside)
 
 
-_MAINS = (50.0, 60.0)
 # Late blows that the screening tries.
 _LOOKED_AT = 1.8
 
@@ -95,34 +93,42 @@ _LOOKED_AT = 1.8
 def latent_gain(
     problem: Problem,
     known: Fit,
-    kind: type[Effect],
-    target: str,
+    starts: Sequence[Effect],
     project: Projector,
     left: FloatArray,
 ) -> Suspect:
-    """How much of the residual the effect's hidden numbers could explain."""
-    if kind.name == "mains_hum":
-        best, gain = kind(target, amplitude=0.0, frequency=_MAINS[0]), 0.0
-        for frequency in _MAINS:
-            hum = kind(target, amplitude=0.0, frequency=frequency)
-            there = problem.residuals(known.hypothesis.plus(hum).effects, known.records, known.end)
+    """How much of the residual an effect's hidden numbers could explain.
+
+    Args:
+        problem: data and noise.
+        known: what is known so far.
+        starts: the effect, as its trials have it.
+        project: takes out what is known.
+        left: what is left of the residual.
+    """
+    start, latent = starts[0], starts[0].latent
+    assert latent is not None
+    if latent.linear:
+        gain = 0.0
+        for each in starts:
+            there = problem.residuals(known.hypothesis.plus(each).effects, known.records, known.end)
             fall = known.chi_square - sum(float((r * r).sum()) for r in there)
             if fall > gain:
-                best, gain = hum, fall
-        return _promise(best, gain, 2 * len(known.records), known.samples)
-    start = kind(target)
+                start, gain = each, fall
+        count = latent.size(0) * len(known.records)
+        return _promise(start, gain, count, known.samples)
     fall, numbers = 0.0, 0
     for residual, columns in zip(
-        known.residuals, hidden_columns(problem, known, kind), strict=True
+        known.residuals, hidden_columns(problem, known, start), strict=True
     ):
         if columns.shape[1] == 0:
             continue
         weights = np.linalg.lstsq(columns, -residual.ravel(), rcond=1e-6)[0]
         fall += float((residual**2).sum() - ((residual.ravel() + columns @ weights) ** 2).sum())
         numbers += columns.shape[1]
-    if kind.name == "pulse_jitter" and known.end is not None:
-        fall = max(fall, _late_share(problem, known, kind) * float(left @ left))
-    if kind.discrete:
+    if latent.times and known.end is not None:
+        fall = max(fall, _late_share(problem, known, start) * float(left @ left))
+    if start.discrete:
         return Suspect(start, fall, numbers, (start,))
     return _promise(start, fall, numbers, known.samples)
 
@@ -133,7 +139,7 @@ def _promise(start: Effect, fall: float, count: int, samples: int) -> Suspect:
     return Suspect(start, fall, 1 + cost / math.log(max(samples, 2)), (start,))
 
 
-def _late_share(problem: Problem, known: Fit, kind: type[Effect]) -> float:
+def _late_share(problem: Problem, known: Fit, start: Effect) -> float:
     """What share of the residual the times of the first late blows explain.
 
     A blow that comes late by more than its own edges' width is not seen in any slope.
@@ -143,7 +149,7 @@ def _late_share(problem: Problem, known: Fit, kind: type[Effect]) -> float:
     try:
         first = fit(problem, known.hypothesis, known.records, end, iterations=3)
         early = replace(first, end=end)
-        begun = blow_by_blow(problem, early, lambda old, late: with_hidden(old, kind, dict(late)))
+        begun = blow_by_blow(problem, early, lambda old, late: with_hidden(old, start, late))
         late = fit(problem, begun, known.records, end, iterations=2)
     except InputError:  # led to where there is no model
         return 0.0
@@ -264,8 +270,9 @@ class Screen:
         kind, target = candidate
         if f"{kind.name}:{target}" in self.fit.hypothesis.labels:
             return None
-        if kind.name in LATENT:
-            return latent_gain(self.problem, self.fit, kind, target, self.project, self.left)
+        if kind.latent is not None:
+            starts = [kind(target, **values) for values in kind(target).trials(self.scales)]
+            return latent_gain(self.problem, self.fit, starts, self.project, self.left)
         if kind.discrete and self.faint:
             return None  # what has no small size would have been seen before
         if self.first is not None:

@@ -10,7 +10,6 @@ from picchio.diagnosis.percussion.criteria.bic import bic
 from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem, signal_power
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
-from picchio.diagnosis.percussion.fit.drawn import LATENT
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.model.effects.effect import Effect
@@ -94,7 +93,7 @@ class Search:
 
     def held_out_gain(self, before: Fit, after: Fit) -> float | None:
         """Fall of chi-square in the records held out; None where they can't tell."""
-        if not self.kept or {e.name for e in after.hypothesis.causes} & set(LATENT):
+        if not self.kept or any(e.latent is not None for e in after.hypothesis.causes):
             return None
 
         def chi_square(found: Fit) -> float:

@@ -40,9 +40,9 @@ def fit_short(
     try:
         hypothesis = known.hypothesis.plus(start)
         if start.latent is not None:
-            turns = 0 if start.name == "pulse_jitter" else 1
+            turns = 0 if start.latent.times else 1
             first = fit(problem, hypothesis, records, window, iterations=turns)
-            return fit_latent(problem, first, type(start), start.target)
+            return fit_latent(problem, first, start)
         if window is None:
             return fit(problem, hypothesis, records, None, iterations=3, near=near)
         windows = (0.06, 0.16, window)
@@ -60,9 +60,9 @@ def fit_long(
 ) -> Fit:
     """A candidate fitted to all of the records."""
     if effect.latent is not None:
-        turns = 0 if effect.name == "pulse_jitter" else 3
+        turns = 0 if effect.latent.times else 3
         long = fit(problem, short, records, None, iterations=turns)
-        return fit_latent(problem, long, type(effect), effect.target, rival)
+        return fit_latent(problem, long, effect, rival)
     if is_nonsmooth(short):  # a small error early is a large one late: not all at once
         short = fit_growing(problem, short, records, windows=_ON_THE_WAY, iterations=3).hypothesis
     return fit(problem, short, records, None, iterations=6, rival=rival)

@@ -10,7 +10,6 @@ from picchio.measurement.quality.check import Check, Context, Finding
 from picchio.measurement.quality.scan import RecordScan
 
 _SAMPLES_A_BLOW = 3.0
-_JUMPS = ("force", "acceleration", "accelerometer")
 
 
 class AliasingCheck(Check):
@@ -30,8 +29,7 @@ class AliasingCheck(Check):
         blows = window.blows
         jumps = False
         for name, values in window.arrays.items():
-            kind = window.record.channel(name).kind.name
-            jumps = jumps or kind in _JUMPS
+            jumps = jumps or window.record.channel(name).kind.jumps
             if window.record.kind != "percussion" or values.size < 128 or name == "force":
                 continue
             x = (values - values.mean()) * np.hanning(values.size)

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator
 
-from picchio.campaign.channels import AXES
+from picchio.campaign.channels import AXES, ChannelKind
+from picchio.campaign.channels import kinds as known_kinds
 from picchio.core.errors import InputError, describe_choices
 from picchio.measurement.quality.check import Check, Context, Finding
 from picchio.measurement.quality.scan import RecordScan
 
-_RESPONSES = ("deflection", "acceleration", "accelerometer", "velocity", "displacement")
+
+def _answers(kind: ChannelKind) -> bool:
+    """Whether it shows how the robot answers to the tool."""
+    return kind.reader is not None and not kind.of_force
 
 
 class ChannelsCheck(Check):
@@ -30,9 +34,12 @@ class ChannelsCheck(Check):
         names = set(record.channels)
         self._names[record.kind][record.file] = names
         kinds = {record.channel(name).kind.name for name in names}
-        if record.kind == "percussion" and not kinds.intersection(_RESPONSES):
+        if record.kind == "percussion" and not any(
+            _answers(record.channel(name).kind) for name in names
+        ):
+            choices = dict.fromkeys(kind.name for kind in known_kinds() if _answers(kind))
             yield self.found("error", "no channel shows how the robot answered",
-                             f"record one of {', '.join(_RESPONSES)}",
+                             f"record one of {', '.join(choices)}",
                              record=record.file)  # fmt: skip
         if record.kind == "motion":
             if not kinds & {"position", "motor_position"}:

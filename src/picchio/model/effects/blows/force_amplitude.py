@@ -25,6 +25,7 @@ class ForceAmplitude(Effect):
         ),
     )
     meaning = "the tool hits harder or softer than programmed"
+    tolerance = "force"
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Scale the heights."""

@@ -20,6 +20,7 @@ class ForceDirection(Effect):
         for axis in "xyz"
     )
     meaning = "the tool does not hit along the stated direction"
+    mark = "turned arrow"
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Turn the direction."""

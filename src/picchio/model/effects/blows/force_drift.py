@@ -8,6 +8,7 @@ from typing import ClassVar
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 
 
@@ -21,10 +22,14 @@ class ForceDrift(Effect):
         parameter("per_hit", lower=-0.5, upper=0.5, meaning="relative change from blow to blow"),
     )
     meaning = "the blows fade or build up within a burst (air supply, heating)"
-
     refused: ClassVar[Mapping[str, str]] = {
         "steady state": "blows that grow or fade within a burst have no steady state"
     }
+
+    @classmethod
+    def why_not(cls, evidence: Evidence) -> str:
+        """As of any effect; it takes several blows in a row."""
+        return "" if evidence.bursts else "no record has a burst of several blows"
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Scale each by its place in the burst."""

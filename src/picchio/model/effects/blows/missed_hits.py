@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from picchio.core.arrays import FloatArray
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
+from picchio.model.effects.latent import Latent
 from picchio.model.effects.scales import Scales
 
 
@@ -18,7 +21,15 @@ class MissedHits(Effect):
     target_kind = "tool"
     parameters = (parameter("fraction", lower=0.0, upper=1.0, meaning="of the blows, missing"),)
     meaning = "the tool misfires now and then"
-    latent = "missing"
+    latent = Latent(
+        "1 for each blow that is missing", spread="fraction", step=0.2, lower=0.0, upper=1.0,
+        whole=True,
+    )  # fmt: skip
+
+    @classmethod
+    def why_not(cls, evidence: Evidence) -> str:
+        """As of any effect; it takes several blows in a row."""
+        return "" if evidence.bursts else "no record has a burst of several blows"
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Weaken (0 to 1) each blow of this record by its own amount."""
@@ -28,6 +39,12 @@ class MissedHits(Effect):
         index = blows.hit.astype(int)
         return blows.change(height=blows.height * (1.0 - np.asarray(missing)[index]))
 
+    def draw(self, rng: np.random.Generator, hits: int) -> FloatArray:
+        """A record's first blow is its t = 0, so it is there."""
+        values = (rng.random(hits) < self.values["fraction"]).astype(float)
+        values[0] = 0.0
+        return np.asarray(values)
+
     def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """The blows are screened one by one, not here."""
-        return []
+        """None missing: the blows are looked at one by one."""
+        return [{}]

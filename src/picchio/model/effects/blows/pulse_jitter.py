@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from picchio.core.arrays import FloatArray
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
+from picchio.model.effects.latent import Latent
 from picchio.model.effects.scales import Scales
 
 
@@ -21,7 +24,12 @@ class PulseJitter(Effect):
     target_kind = "tool"
     parameters = (parameter("std", "s", lower=0.0, upper=1.0, meaning="spread of the times"),)
     meaning = "the blows come irregularly"
-    latent = "shift"
+    latent = Latent("shift of each blow, s", spread="std", step=2e-4, times=True)
+
+    @classmethod
+    def why_not(cls, evidence: Evidence) -> str:
+        """As of any effect; it takes several blows in a row."""
+        return "" if evidence.bursts else "no record has a burst of several blows"
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Shift each blow of this record by its own amount."""
@@ -31,6 +39,12 @@ class PulseJitter(Effect):
         index = blows.hit.astype(int)
         return blows.change(start=blows.start + np.asarray(shift)[index])
 
+    def draw(self, rng: np.random.Generator, hits: int) -> FloatArray:
+        """A record's first blow is its t = 0, so it is not shifted."""
+        values = self.values["std"] * rng.standard_normal(hits)
+        values[0] = 0.0
+        return np.asarray(values)
+
     def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """The amounts are screened blow by blow, not here."""
-        return []
+        """On time: the amounts are looked for blow by blow."""
+        return [{}]

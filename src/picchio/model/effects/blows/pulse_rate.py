@@ -5,6 +5,7 @@ from __future__ import annotations
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 
 
@@ -25,6 +26,11 @@ class PulseRate(Effect):
         ),
     )
     meaning = "the tool hits faster or slower than programmed"
+
+    @classmethod
+    def why_not(cls, evidence: Evidence) -> str:
+        """As of any effect; what was recorded is as it came, whatever was programmed."""
+        return "the force was recorded in every record" if evidence.recorded else ""
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Stretch the times of the blows."""

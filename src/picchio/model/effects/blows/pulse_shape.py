@@ -6,6 +6,7 @@ from picchio.core.errors import InputError
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 
 NO_SHAPE = "blows of a force that was measured have no other shape to turn into"
@@ -25,6 +26,11 @@ class PulseShape(Effect):
         parameter("blend", lower=-0.2, upper=1.2, meaning="0 as programmed, 1 the other shape"),
     )
     meaning = "the blows have another shape than programmed"
+
+    @classmethod
+    def why_not(cls, evidence: Evidence) -> str:
+        """As of any effect; the programmed blows must have another shape beside them."""
+        return "" if evidence.reshaped else NO_SHAPE
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Blend the shapes.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 
 
@@ -28,6 +29,11 @@ class PulseWidth(Effect):
         ),
     )
     meaning = "the blows last longer or shorter than programmed"
+
+    @classmethod
+    def why_not(cls, evidence: Evidence) -> str:
+        """As of any effect; what was recorded is as it came, whatever was programmed."""
+        return "the force was recorded in every record" if evidence.recorded else ""
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Scale the width."""

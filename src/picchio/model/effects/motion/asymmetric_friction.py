@@ -22,6 +22,8 @@ class AsymmetricFriction(Effect):
     )  # fmt: skip
     linear = ("torque", "coefficient")
     meaning = "gear and seals resist more in one direction than in the other"
+    needs = "coulomb_friction"  # it says how dry friction varies
+    usual = 4
     source = "Janot, Gautier, Brunot, EMPS benchmark, 2019"
 
     def motion(self, motion: Motion) -> None:

@@ -19,6 +19,9 @@ class EncoderDelay(Effect):
     target_kind = "channel group"
     parameters = (parameter("delay", "s", lower=0.0, upper=0.2, meaning="late by this"),)
     meaning = "readings arrive late: sampling, filtering or the bus takes its time"
+    told_by = "slowly under load, then fast: a delay grows with speed, a spring does not"
+    late = True
+    usual = 0
 
     def motion(self, motion: Motion) -> None:
         """Delay the group."""

@@ -19,6 +19,8 @@ class LoadFriction(Effect):
     )
     linear = ("coefficient",)
     meaning = "teeth and bearings rub more under load: the gear's efficiency"
+    needs = "coulomb_friction"  # it says how dry friction varies
+    usual = 5
     source = "Hamon, Gautier, Garrec, IROS 2010"
 
     def motion(self, motion: Motion) -> None:

@@ -21,6 +21,8 @@ class StribeckFriction(Effect):
     )  # fmt: skip
     linear = ("torque",)
     meaning = "the lubricant's film builds up with speed: friction falls first"
+    needs = "coulomb_friction"  # it says how dry friction varies
+    usual = 6
     source = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994"
 
     def motion(self, motion: Motion) -> None:

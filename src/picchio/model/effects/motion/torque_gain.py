@@ -16,6 +16,8 @@ class TorqueGain(Effect):
         parameter("gain", neutral=1.0, lower=0.5, upper=2.0, meaning="reported over true"),
     )
     meaning = "the constant from current to torque is wrong"
+    told_by = "once with a known mass at the tool and once without"
+    usual = 9
 
     def motion(self, motion: Motion) -> None:
         """Scale what the drive reports."""

@@ -17,6 +17,7 @@ class TorqueOffset(Effect):
     parameters = (parameter("torque", "N*m", lower=-1e6, upper=1e6, meaning="added"),)
     linear = ("torque",)
     meaning = "the current sensor's zero is off, or a constant load pulls at the joint"
+    usual = 8
 
     def motion(self, motion: Motion) -> None:
         """Add it."""

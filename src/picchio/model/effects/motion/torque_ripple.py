@@ -24,6 +24,8 @@ class TorqueRipple(Effect):
     )
     linear = ("cosine", "sine")
     meaning = "magnets, slots, bearings or the wave generator pulse once or several times a turn"
+    periodic = True
+    usual = 12
     source = "Tuttle, Seering, IEEE Trans. Robotics and Automation 12(3), 1996"
 
     def motion(self, motion: Motion) -> None:

@@ -17,6 +17,7 @@ class ViscousFriction(Effect):
     )
     linear = ("coefficient",)
     meaning = "lubricant and seals resist in proportion to the speed"
+    usual = 3
     source = "Swevers, Verdonck, De Schutter, IEEE Control Systems 27(5), 2007"
 
     def motion(self, motion: Motion) -> None:

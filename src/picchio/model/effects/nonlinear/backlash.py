@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.elements import Element, ElementKind
 from picchio.model.motion import Motion
@@ -21,6 +22,14 @@ class Backlash(Effect):
     target_kind = "joint"
     parameters = (parameter("gap", "rad", lower=0.0, upper=0.2, meaning="full width of the play"),)
     meaning = "the gear has play: no torque within the gap"
+    told_by = "slowly under load, then fast: a delay grows with speed, a spring does not"
+    elastic = True
+    usual = 11
+
+    @classmethod
+    def targets(cls, evidence: Evidence) -> list[str]:
+        """Every flexible joint; in a motion every one with encoders on both sides of the gear."""
+        return list(evidence.wound) if evidence.motion else super().targets(evidence)
 
     def structure(self, plant: Plant) -> None:
         """Replace the spring's torque by the dead zone's."""

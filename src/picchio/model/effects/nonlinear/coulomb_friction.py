@@ -23,6 +23,10 @@ class CoulombFriction(Effect):
     )
     linear = ("torque",)
     meaning = "dry friction between link and motor side"
+    motion_meaning = (
+        "dry friction between motor and link; a motion does not tell on which side of the gear"
+    )
+    usual = 2
 
     def structure(self, plant: Plant) -> None:
         """Add the friction."""

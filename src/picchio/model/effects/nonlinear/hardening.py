@@ -20,6 +20,7 @@ class Hardening(Effect):
         ),
     )
     meaning = "the joint's spring is not linear"
+    mark = "spring"
 
     def structure(self, plant: Plant) -> None:
         """Add the cubic torque."""

@@ -20,6 +20,7 @@ class WorkpieceContact(Effect):
         parameter("damping", "N*s/m", lower=0.0, upper=1e6, meaning="of workpiece and tip"),
     )
     meaning = "the workpiece holds the tool as long as it touches"
+    mark = "plate"
 
     def structure(self, plant: Plant) -> None:
         """Add the contact."""

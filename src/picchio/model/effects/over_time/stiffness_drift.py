@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Plant
 
@@ -18,6 +19,12 @@ class StiffnessDrift(Effect):
         parameter("per_day", "1/day", lower=-10.0, upper=10.0, meaning="relative change a day"),
     )
     meaning = "the joint wears or loosens while the campaign lasts"
+    mark = "spring"
+
+    @classmethod
+    def why_not(cls, evidence: Evidence) -> str:
+        """As of any effect; it takes records of several dates."""
+        return "" if evidence.days > 0.0 else "the records are not of several known dates"
 
     def structure(self, plant: Plant) -> None:
         """Scale the spring by the date."""

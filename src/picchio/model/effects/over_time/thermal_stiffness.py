@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Plant
 
@@ -18,6 +19,12 @@ class ThermalStiffness(Effect):
         parameter("per_kelvin", "1/K", lower=-1.0, upper=1.0, meaning="relative change a kelvin"),
     )
     meaning = "the joint softens (or stiffens) when warm"
+    mark = "spring"
+
+    @classmethod
+    def why_not(cls, evidence: Evidence) -> str:
+        """As of any effect; it takes records at several temperatures."""
+        return "" if evidence.kelvin > 0.0 else "the records are not of several known temperatures"
 
     def structure(self, plant: Plant) -> None:
         """Scale the spring by the temperature."""

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from picchio.core.arrays import FloatArray
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import CHANNEL_UNIT, Effect, parameter
+from picchio.model.effects.latent import Latent
 from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
@@ -24,7 +28,10 @@ class MainsHum(Effect):
         parameter("frequency", "Hz", neutral=50.0, lower=40.0, upper=70.0, meaning="of the mains"),
     )
     meaning = "the mains leak into the cable"
-    latent = "cosine and sine"
+    latent = Latent(
+        "cosine and sine of the line, in the channel's unit", spread="amplitude", count=2,
+        linear=True,
+    )  # fmt: skip
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:
         """Add this record's line."""
@@ -32,6 +39,18 @@ class MainsHum(Effect):
         if line is not None:
             sensors.chain(self.target).hum.append((self.values["frequency"], line[0], line[1]))
 
+    def draw(self, rng: np.random.Generator, hits: int) -> FloatArray:
+        """A line of any phase."""
+        phase = rng.uniform(0.0, 2.0 * np.pi)
+        return self.values["amplitude"] * np.array([np.cos(phase), np.sin(phase)])
+
+    def take_out(self, rows: FloatArray, time: FloatArray) -> tuple[FloatArray, tuple[float, ...]]:
+        """The best line, the same in all channels, is taken out."""
+        phase = 2.0 * np.pi * self.values["frequency"] * time
+        basis = np.stack([np.cos(phase), np.sin(phase)])
+        found = np.linalg.lstsq(basis.T, np.mean(rows, axis=0), rcond=None)[0]
+        return rows - found @ basis, (float(found[0]), float(found[1]))
+
     def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """The lines are fitted record by record, not here."""
-        return []
+        """The mains of both halves of the world; the lines are solved for in every record."""
+        return [{"frequency": 50.0}, {"frequency": 60.0}]

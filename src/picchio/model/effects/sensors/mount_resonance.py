@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
@@ -34,6 +35,11 @@ class MountResonance(Effect):
         ),
     )
     meaning = "the sensor swings on its magnet, wax or bracket"
+
+    @classmethod
+    def targets(cls, evidence: Evidence) -> list[str]:
+        """The groups that read accelerations: their sensors are mounted on the robot."""
+        return [group for group in evidence.groups if group in evidence.accelerations]
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:
         """Change the group's chain."""

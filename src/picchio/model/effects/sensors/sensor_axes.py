@@ -8,6 +8,7 @@ import numpy as np
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
@@ -27,6 +28,11 @@ class SensorAxes(Effect):
     )
     meaning = "cables are swapped or a sensor is mounted the wrong way round"
     discrete = True
+
+    @classmethod
+    def targets(cls, evidence: Evidence) -> list[str]:
+        """The groups that read three axes."""
+        return [group for group in evidence.groups if group in evidence.vectors]
 
     @property
     def axes(self) -> str:

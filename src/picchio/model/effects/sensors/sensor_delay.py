@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
@@ -16,6 +17,11 @@ class SensorDelay(Effect):
     target_kind = "channel group"
     parameters = (parameter("delay", "s", lower=-0.1, upper=0.1, meaning="late by"),)
     meaning = "the channel is late against the others"
+
+    @classmethod
+    def targets(cls, evidence: Evidence) -> list[str]:
+        """Every group, that of the force as well."""
+        return [*evidence.groups, *evidence.forces]
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:
         """Change the group's chain."""

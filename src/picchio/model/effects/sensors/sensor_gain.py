@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
@@ -20,6 +21,11 @@ class SensorGain(Effect):
         ),
     )
     meaning = "wrong sensitivity or calibration"
+
+    @classmethod
+    def targets(cls, evidence: Evidence) -> list[str]:
+        """Every group, that of the force as well."""
+        return [*evidence.groups, *evidence.forces]
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:
         """Change the group's chain."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.rotation import exp3
 from picchio.model.sensing import Sensors
@@ -20,6 +21,11 @@ class SensorMisalignment(Effect):
         for axis in "xyz"
     )
     meaning = "the sensor is mounted a little askew"
+
+    @classmethod
+    def targets(cls, evidence: Evidence) -> list[str]:
+        """The groups that read three axes."""
+        return [group for group in evidence.groups if group in evidence.vectors]
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:
         """Change the group's chain."""

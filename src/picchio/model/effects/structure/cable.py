@@ -20,6 +20,7 @@ class Cable(Effect):
         MODAL_SHARE,
     )
     meaning = "a cable or hose holds the link"
+    mark = "hose"
 
     def structure(self, plant: Plant) -> None:
         """Tie the link."""

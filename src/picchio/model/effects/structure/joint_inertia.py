@@ -21,6 +21,12 @@ class JointInertia(Effect):
     )
     linear = ("inertia",)
     meaning = "something unmodelled turns with the joint's link side"
+    motion_meaning = (
+        "something unmodelled turns with the joint: most often the motor's rotor, its inertia "
+        "times the ratio squared"
+    )
+    told_by = "once with a known mass at the tool and once without"
+    usual = 7
 
     def structure(self, plant: Plant) -> None:
         """Add it to the mass matrix's diagonal."""

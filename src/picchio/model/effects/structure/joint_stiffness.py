@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.motion import Motion
 from picchio.model.plant import Plant
@@ -25,7 +26,19 @@ class JointStiffness(Effect):
         ),
     )
     meaning = "the joint's spring is softer or stiffer than stated"
+    told_by = "slowly under load, then fast: a delay grows with speed, a spring does not"
+    inverse = ("scale",)
+    elastic = True
+    usual = 10
+    tolerance = "stiffness"
+    mark = "spring"
     source = "Nie et al. 2016, eq. 5: K"
+
+    @classmethod
+    def targets(cls, evidence: Evidence) -> list[str]:
+        """Every flexible joint; in a motion those with encoders on both sides of the gear."""
+        flexible = evidence.robot.flexible_names
+        return [j for j in (evidence.wound if evidence.motion else flexible) if j in flexible]
 
     def structure(self, plant: Plant) -> None:
         """Scale the spring."""

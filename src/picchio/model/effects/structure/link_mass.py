@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Plant
 
@@ -24,6 +25,13 @@ class LinkMass(Effect):
         ),
     )
     meaning = "the link's mass and inertia are not the URDF's"
+    mark = "link mass"
+
+    @classmethod
+    def targets(cls, evidence: Evidence) -> list[str]:
+        """The links that have a mass."""
+        links = evidence.robot.tree.links
+        return [link for link in super().targets(evidence) if links.get(link) is not None]
 
     def structure(self, plant: Plant) -> None:
         """Add the link's own inertia `scale` - 1 times."""

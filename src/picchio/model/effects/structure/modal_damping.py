@@ -24,6 +24,7 @@ class ModalDamping(Effect):
         ),
     )
     meaning = "all modes are damped more or less than stated"
+    tolerance = "damping_ratio"
     source = "Nie et al. 2016, eq. 11: zeta"
 
     def structure(self, plant: Plant) -> None:

@@ -38,6 +38,7 @@ class ServoCompliance(Effect):
         MODAL_SHARE,
     )
     meaning = "the drive does not hold its side of the spring: servo or brake yields"
+    mark = "spring"
     source = "Spong, J. Dyn. Sys. Meas. Control 109 (1987) 310, doi:10.1115/1.3143860"
 
     def structure(self, plant: Plant) -> None:

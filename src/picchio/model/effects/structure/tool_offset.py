@@ -18,6 +18,7 @@ class ToolOffset(Effect):
         for axis in "xyz"
     )
     meaning = "the tool's tip is not where the model has it"
+    mark = "offset"
 
     def structure(self, plant: Plant) -> None:
         """Move the force's point."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from picchio.model.effects.effect import Effect
+from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.effects.structure.yielding import (
     MODAL_SHARE,
@@ -26,7 +27,13 @@ class TransverseCompliance(Effect):
         MODAL_SHARE,
     )
     meaning = "bearing or link bends across the joint's axis"
+    mark = "bending"
     source = "Klimchik et al., Robotics and CIM 30 (2014) 488 (models of more than axial springs)"
+
+    @classmethod
+    def targets(cls, evidence: Evidence) -> list[str]:
+        """The flexible joints that turn."""
+        return [j.name for j in evidence.robot.flexible_joints if j.kind == "revolute"]
 
     def structure(self, plant: Plant) -> None:
         """Let the two hinges at the joint move."""

@@ -1,4 +1,4 @@
-"""How each kind of cause is drawn: one table from effect and target to a shape."""
+"""How each kind of cause is drawn: one table from the mark that an effect declares to a shape."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
 from picchio.model.effects.registry import effect_class
 from picchio.model.rotation import exp3
 from picchio.visuals.plots.style import BLUE
@@ -25,17 +26,18 @@ from picchio.visuals.scene.robot.mesh import Mesh, box, moved, ring, turned_to
 
 
 def draw(site: Site) -> list[Drawn]:
-    """A cause's drawing: its own where it has one, else that of its target's kind.
+    """A cause's drawing: the mark that its effect declares, else that of its target's kind.
 
     Raises:
-        InputError: an effect that is not known, or a target that this robot does not have.
+        InputError: an effect or a mark that is not known, or a target that this robot does not
+            have.
     """
     check_place(site.robot, site.effect, site.target)
     kind = effect_class(site.effect)
-    own = BY_EFFECT.get(site.effect)
-    if own is None and kind.where == "blows":
-        own = _blow
-    return (own or BY_KIND.get(kind.target_kind, _whole))(site)
+    mark = kind.mark or ("arrow" if kind.where == "blows" else kind.target_kind)
+    if mark not in MARKS:
+        raise InputError("no such mark", key=f"{kind.name}.mark", value=mark, choices=MARKS)
+    return MARKS[mark](site)
 
 
 def _ring(site: Site) -> list[Drawn]:
@@ -163,10 +165,10 @@ def _offset_scale(site: Site) -> float:
 
 def note(site: Site) -> str:
     """What must be said of a drawing beside the cause's name."""
-    scale = _offset_scale(site) if site.effect == "tool_offset" else 1.0
-    if scale > 1.0:
+    mark = effect_class(site.effect).mark
+    if mark == "offset" and (scale := _offset_scale(site)) > 1.0:
         return f" (drawn {scale:g} times as long)"
-    return " (blue: as stated)" if site.effect == "force_direction" else ""
+    return " (blue: as stated)" if mark == "turned arrow" else ""
 
 
 def _workpiece(site: Site) -> list[Drawn]:
@@ -222,8 +224,8 @@ def _sensor(site: Site) -> list[Drawn]:
     return found
 
 
-# By the target's kind, so that an effect from elsewhere is drawn too.
-BY_KIND: Mapping[str, Callable[[Site], list[Drawn]]] = {
+# What an effect may declare as its mark; one that declares none is drawn by its target's kind.
+MARKS: Mapping[str, Callable[[Site], list[Drawn]]] = {
     "joint": _ring,
     "link": _link,
     "joint or link": _joint_or_link,
@@ -231,19 +233,13 @@ BY_KIND: Mapping[str, Callable[[Site], list[Drawn]]] = {
     "robot": _whole,
     "axis": _base,
     "channel group": _sensor,
-}
-# Where a better picture is known.
-BY_EFFECT: Mapping[str, Callable[[Site], list[Drawn]]] = {
-    "joint_stiffness": _spring,
-    "hardening": _spring,
-    "servo_compliance": _spring,
-    "stiffness_drift": _spring,
-    "thermal_stiffness": _spring,
-    "transverse_compliance": _bending,
-    "link_mass": _link_mass,
-    "cable": _cable,
-    "payload": _payload,
-    "tool_offset": _tool_offset,
-    "workpiece_contact": _workpiece,
-    "force_direction": _force_direction,
+    "arrow": _blow,
+    "turned arrow": _force_direction,
+    "spring": _spring,
+    "bending": _bending,
+    "link mass": _link_mass,
+    "added mass": _payload,
+    "hose": _cable,
+    "offset": _tool_offset,
+    "plate": _workpiece,
 }
