@@ -27,11 +27,13 @@ from picchio.core.errors import InputError
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.table import ExcitationTable
 from picchio.excitation.table import catalogue as excitations
+from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import catalogue as effects
 from picchio.model.effects.scales import Scales
 from picchio.model.model import Model
 from picchio.studies.maps.places import Listed
+from picchio.studies.tasks import Operation, Task
 from picchio.visuals.worst_rivet import worst_rivet
 
 POSE = [0.3, 0.9, -0.7]
@@ -44,7 +46,7 @@ SMALL = {
     "samples": 8, "poses": 1, "placements": 2, "move": [0.0, 0.0, 0.0, 0.0],
     "self_collision": False, "hits": HITS, "steady_check": False,
     # A line without an endurance limit, so that every life is a number.
-    "sn_curve": picchio.SNCurve(name="straight", strength=60e6, cycles=1e6, slopes=(5.0,)),
+    "sn_curve": SNCurve(name="straight", strength=60e6, cycles=1e6, slopes=(5.0,)),
 }  # fmt: skip
 
 
@@ -81,13 +83,11 @@ def an_effect(name: str, robot) -> Effect:
         "robot": "robot", "axis": "ry", "channel group": "accelerometer.tool",
     }[kind.target_kind]  # fmt: skip
     tried = kind(target).trials(scales(robot))
-    values = tried[0] if tried else {}
-    for parameter in kind.parameters:
-        if not tried:
-            low, high = (
-                bound if np.isfinite(bound) else 0.1 for bound in (parameter.lower, parameter.upper)
-            )
-            values[parameter.name] = low + 0.1 * (high - low)
+    values = dict(tried[0]) if tried else {}
+    if not values:
+        for parameter in kind.parameters:
+            low, high = np.nan_to_num([parameter.lower, parameter.upper], posinf=0.1, neginf=-0.1)
+            values[parameter.name] = low + (0.002 if parameter.unit == "s" else 0.2) * (high - low)
     effect = kind(target, **values)
     if kind.latent is not None:
         drawn = effect.draw(np.random.default_rng(3), HITS)
@@ -152,10 +152,9 @@ def _flatten(value, path: str, out: dict) -> None:
         out[path] = float(value)
 
 
-def a_task(excitation: Excitation) -> picchio.Task:
-    from picchio.studies.tasks import Operation
+def a_task(excitation: Excitation) -> Task:
 
-    return picchio.Task((Operation("one", DIRECTION, excitation, HITS, np.array([POSE])),))
+    return Task((Operation("one", DIRECTION, excitation, HITS, np.array([POSE])),))
 
 
 def differs(one: dict, other: dict) -> bool:
