@@ -79,7 +79,7 @@ class MeanStress:
 
         Raises:
             InputError: a mean at or above the static strength that the rule divides by, or a
-                constant that the rule needs and nobody gave.
+                missing constant that the rule needs.
         """
         a, m = np.broadcast_arrays(
             as_floats(amplitude, "amplitude"), np.abs(as_floats(mean, "mean"))

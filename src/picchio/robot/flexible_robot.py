@@ -186,7 +186,7 @@ class FlexibleRobot:
         return self.rigid.placement(pose, self.rigid.frame(self.tool_point))[0]
 
     def gravity_torque(self, pose: ArrayLike) -> Array:
-        """Torque (n,) that the springs carry at rest, N m (N), balancers taken off."""
+        """Torque (n,) that the springs carry at rest, N m (N), less that of the balancers."""
         full = self.pose(pose)
         index = self.flexible_index
         balanced, _ = balancing(self.flexible_joints, self.tree, full[index])

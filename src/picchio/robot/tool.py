@@ -52,7 +52,7 @@ class Gun:
 
 @dataclass(frozen=True)
 class Mounting:
-    """How the robot stands in the world.
+    """How the robot is mounted in the world.
 
     Args:
         xyz: m, of the URDF's root link.

@@ -36,7 +36,7 @@ class Piece:
         values: (m,) in the channel's unit, of the noise's own variance.
         samples: how many independent numbers were left after what was fitted.
         gain: what a sine's amplitude was divided by on the way.
-        mean_removed: the mean of `values` was taken off.
+        mean_removed: the mean of `values` was subtracted.
     """
 
     method: str

@@ -27,7 +27,7 @@ def fixed_direction(study: Study) -> Finding:
     return across(
         study.worlds, turns,
         "sum of the joints' largest deflections in a rivet of 12 hits: the most the gun can turn",
-        "{base}° in the base world, {most}° at the most over {worlds} worlds; up to 1°, which "
+        "{base}° in the base world, {most}° at most over {worlds} worlds; up to 1°, which "
         "turns 1.7 % of the force aside, may be ignored",
         PANEL,
     )  # fmt: skip
@@ -50,7 +50,7 @@ def transient(study: Study) -> Finding:
     return across(
         study.worlds, settled,
         f"a joint's largest peak over the task, {hits} hits from rest, over that of the steady "
-        "state; below 1.1 the steady state may stand in",
+        "state; below 1.1 the steady state may replace it",
         "{base} in the base world, {least} to {most} over {worlds} worlds",
         PANEL,
     )  # fmt: skip
@@ -70,7 +70,7 @@ def decoupled(study: Study) -> Finding:
     return decided(
         worst < 1e-9,
         "off-diagonal over diagonal of SᵀMS, SᵀKS and SᵀCS at the 15 rivets",
-        f"{worst:.1g} at the most; for the damping that is what a damping ratio of each mode means",
+        f"{worst:.1g} at most; for the damping that is what a damping ratio of each mode means",
         worst,
     )
 
