@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-Vector = tuple[float, float, float]
+from picchio.core.arrays import Vector
+
 RECOIL_JOINT = "gun_recoil"
 
 
