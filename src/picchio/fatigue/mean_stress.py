@@ -155,5 +155,5 @@ def _fkm(a: FloatArray, m: FloatArray, sensitivity: float) -> FloatArray:
 
 
 def as_rule(mean_stress: MeanStress | Rule) -> MeanStress:
-    """A rule from its name, or as it is."""
+    """A rule, from its name if need be."""
     return mean_stress if isinstance(mean_stress, MeanStress) else MeanStress(mean_stress)

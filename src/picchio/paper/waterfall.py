@@ -50,7 +50,7 @@ class Step:
     without_limit: float
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON; a life without end is None."""
+        """For JSON; an infinite life is None."""
         return {
             "name": self.name,
             "corrections": self.corrections,
