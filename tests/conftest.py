@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,17 @@ def measured_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"{NO_DATA}{folder} is missing; set PICCHIO_DATA")
     return folder
+
+
+@pytest.fixture(scope="session")
+def worlds():
+    """The independent simulators' campaigns: `worlds.campaign` of this folder."""
+    sys.path.insert(0, str(ROOT / "tests"))
+    try:
+        from worlds import campaign
+    finally:
+        sys.path.pop(0)
+    return campaign
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:

@@ -4,8 +4,6 @@ Causes inside the robot (friction, backlash, a payload) are no fault of the data
 one for a swapped axis, a delay or a clipped sensor.
 """
 
-import sys
-
 import numpy as np
 import pytest
 
@@ -13,16 +11,6 @@ import picchio
 from picchio.robot.loading.load import load_robot
 
 SENSOR = "accelerometer.tool"
-
-
-@pytest.fixture(scope="module")
-def worlds(repository):
-    sys.path.insert(0, str(repository / "tests"))
-    try:
-        from worlds import campaign
-    finally:
-        sys.path.pop(0)
-    return campaign
 
 
 @pytest.fixture(scope="module")

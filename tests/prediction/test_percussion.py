@@ -1,7 +1,6 @@
 """The prediction against an independent nonlinear simulator of the arm (`tests/worlds`)."""
 
 import dataclasses
-import sys
 import warnings
 
 import numpy as np
@@ -22,16 +21,6 @@ GROUPS = ("force", "deflection", "acceleration.tool", "accelerometer.tool", "vel
           "displacement.tool")  # fmt: skip
 # N: the largest deflection is below 0.1 mrad, so third-order terms are out of sight.
 SMALL = 30.0
-
-
-@pytest.fixture(scope="module")
-def worlds(repository):
-    sys.path.insert(0, str(repository / "tests"))
-    try:
-        from worlds import campaign
-    finally:
-        sys.path.pop(0)
-    return campaign
 
 
 def made(worlds, **options):

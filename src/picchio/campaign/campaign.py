@@ -27,6 +27,7 @@ from picchio.campaign.tables import (
     Tolerance,
 )
 from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.files import umask
 from picchio.core.toml import parse_toml, validate
 
 MAPPING_FILE = "mapping.toml"
@@ -253,7 +254,7 @@ def write_campaign(
     except OSError as error:
         raise InputError(f"cannot write here: {error.strerror}", file=target) from None
     try:
-        os.chmod(temporary, 0o777 & ~_umask())
+        os.chmod(temporary, 0o777 & ~umask())
         _fill(campaign, temporary, target, suffix, extra_files or {})
         load_campaign(temporary)
         _put_in_place(temporary, target)
@@ -293,12 +294,6 @@ def _put_in_place(temporary: Path, target: Path) -> None:
             raise
     finally:
         shutil.rmtree(aside, ignore_errors=True)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _fill(campaign: Campaign, folder: Path, target: Path, suffix: str | None,

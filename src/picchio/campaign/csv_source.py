@@ -25,7 +25,7 @@ class CsvSource(Source):
     """A CSV file with the header `channel [unit]`; one line a sample, commas, points.
 
     Args:
-        path: the file; its header is read at once, its samples when asked for.
+        path: the file; its header is read at once, its samples when needed.
         key: the record's name in messages.
 
     Raises:

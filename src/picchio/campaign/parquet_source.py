@@ -28,7 +28,7 @@ class ParquetSource(Source):
     """A Parquet file whose columns are named `channel [unit]`; integers and floats.
 
     Args:
-        path: the file; its schema is read at once, its samples when asked for.
+        path: the file; its schema is read at once, its samples when needed.
         key: the record's name in messages.
 
     Raises:
@@ -66,7 +66,7 @@ class ParquetSource(Source):
             raise self.error(f"is not a readable Parquet file: {reason}") from None
 
     def blocks(self, names: Sequence[str], size: int) -> Iterator[Block]:
-        """As `Source`; only the columns asked for leave the disk, one row group at a time."""
+        """As `Source`; reads only the columns needed, one row group at a time."""
         arrow, _ = _pyarrow()
         wanted = [self.columns[name] for name in names]
         headers = [self._headers[column.index] for column in wanted]

@@ -80,7 +80,7 @@ class Record:
         units: Mapping[str, str] | None = None,
         **table: Any,
     ) -> Record:
-        """A record whose arrays, "time" among them, are made when they are first asked for.
+        """A record whose arrays, "time" among them, are made when first needed.
 
         Args and errors: as `from_arrays`; `names` are the channels that `read` returns.
         """

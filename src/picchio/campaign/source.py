@@ -71,7 +71,7 @@ def parse_columns(source: Source, cells: Sequence[str]) -> dict[str, Column]:
     """The columns of a file by channel name, the time first.
 
     Raises:
-        InputError: a header that is none, an unknown channel, a wrong unit, a duplicate, the
+        InputError: a bad header, an unknown channel, a wrong unit, a duplicate, the
             time missing or not first, or nothing beside it.
     """
     columns: dict[str, Column] = {}
@@ -98,7 +98,7 @@ def parse_columns(source: Source, cells: Sequence[str]) -> dict[str, Column]:
 
 
 class MemorySource(Source):
-    """Arrays in memory, or a function that makes them when they are first asked for.
+    """Arrays in memory, or a function that makes them when first needed.
 
     Args:
         channels: those of the record, without the time.

@@ -86,7 +86,7 @@ def _registry() -> Any:
 
 @cache
 def _parse(text: str) -> Any:
-    """The pint unit, or None where the text is none."""
+    """The pint unit, or None if the text is not one."""
     # "m/s2" and "m s^-2" are what acquisition systems write.
     spelt = re.sub(r"(?<=[a-zA-Z])([23])\b", r"**\1", text.strip()).replace("**", "^")
     if len(spelt) > _LONGEST or not _UNIT_LIKE.fullmatch(spelt) or _TOWER.search(spelt):

@@ -14,6 +14,7 @@ FloatArray: TypeAlias = npt.NDArray[Any]
 ComplexArray: TypeAlias = npt.NDArray[Any]
 IndexArray: TypeAlias = npt.NDArray[Any]
 BoolArray: TypeAlias = npt.NDArray[Any]
+Vector: TypeAlias = tuple[float, float, float]
 
 
 def as_floats(values: Any, key: str, *, finite: bool = True) -> FloatArray:

@@ -33,7 +33,7 @@ def atomic_write(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
         raise InputError(f"cannot write here: {error.strerror}", file=target) from None
     temporary = Path(name)
     try:
-        os.chmod(temporary, 0o666 & ~_umask())
+        os.chmod(temporary, 0o666 & ~umask())
         with os.fdopen(handle, mode, encoding=None if "b" in mode else "utf-8") as stream:
             yield stream
         if target.is_dir():
@@ -44,8 +44,8 @@ def atomic_write(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
         raise
 
 
-def _umask() -> int:
-    # mkstemp makes files private; give the user's own default permissions back.
+def umask() -> int:
+    """The user's default permissions, which `tempfile` does not give its files."""
     mask = os.umask(0)
     os.umask(mask)
     return mask

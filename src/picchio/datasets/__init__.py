@@ -6,7 +6,7 @@
 | `emps` | a ball-screw axis driven by a DC motor | 2 motions of 25 s |
 | `kinova-gen3` | Kinova Gen3, harmonic drives, motor currents | 10 motions of 2 to 7 s |
 
-Each data set's own module tells what its traps are and how they are handled:
+Each data set's own module documents its pitfalls and how they are handled:
 `picchio.datasets.kuka_kr300`, `.emps`, `.kinova_gen3`.
 """
 

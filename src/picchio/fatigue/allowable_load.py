@@ -14,7 +14,7 @@ def largest_factor(spent: Callable[[float], float], limit: float, tolerance: flo
         spent: damage at a factor, never falling; an InputError (above the static strength)
             counts as endless damage.
         limit: what may be spent.
-        tolerance: relative, of the factor; 0 goes on to the last bit.
+        tolerance: relative, of the factor; 0: to the last bit.
 
     Raises:
         InputError: even a vanishing factor spends more, so what does not scale breaks the part.

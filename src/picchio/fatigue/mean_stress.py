@@ -79,7 +79,7 @@ class MeanStress:
 
         Raises:
             InputError: a mean at or above the static strength that the rule divides by, or a
-                constant that the rule needs and nobody gave.
+                missing constant that the rule needs.
         """
         a, m = np.broadcast_arrays(
             as_floats(amplitude, "amplitude"), np.abs(as_floats(mean, "mean"))
@@ -155,5 +155,5 @@ def _fkm(a: FloatArray, m: FloatArray, sensitivity: float) -> FloatArray:
 
 
 def as_rule(mean_stress: MeanStress | Rule) -> MeanStress:
-    """A rule from its name, or as it is."""
+    """A rule, from its name if need be."""
     return mean_stress if isinstance(mean_stress, MeanStress) else MeanStress(mean_stress)

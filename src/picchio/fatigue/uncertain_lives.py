@@ -60,13 +60,13 @@ class Uncertain:
 
 @dataclass(frozen=True)
 class LifeSpread:
-    """What is known of an uncertain life.
+    """Summary of an uncertain life.
 
     Attributes:
-        p10: the life that 90 % of the samples exceed; inf where they have no end.
+        p10: the life that 90 % of the samples exceed; inf where infinite.
         p50: the median.
         p90: the life that 10 % exceed.
-        endless: share of samples whose life has no end.
+        endless: share of samples with infinite life.
         shares: first-order Sobol index of each input: the share of the variance of ln measure
             that it explains alone.
         totals: total-order index: with its interactions.
@@ -82,7 +82,7 @@ class LifeSpread:
     samples: int
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON; a life without end is None."""
+        """For JSON; an infinite life is None."""
         lives = {
             k: (v if math.isfinite(v) else None)
             for k, v in (("p10", self.p10), ("p50", self.p50), ("p90", self.p90))
@@ -108,7 +108,7 @@ class Design:
 
         Args:
             lives: (m,) one for each run, inf allowed.
-            measure: (m,) positive and finite: utilisation, since lives may have no end.
+            measure: (m,) positive and finite: utilisation, since lives may be infinite.
 
         Raises:
             InputError: a wrong number of them, NaN, or a measure that is not positive.

@@ -56,7 +56,7 @@ def urdf(values: PrintedArm, inertia_about: str = "cg") -> str:
     Args:
         values: as printed.
         inertia_about: what Table 1's inertias are taken about: "cg", or "joint", whose share
-            m c^2 is then taken off.
+            m c^2 is then subtracted.
     """
     lines = ['<robot name="paper_arm" xmlns:picchio="urn:picchio:1"><link name="base"/>']
     place, parent = "0 0 0", "base"
@@ -88,7 +88,7 @@ def urdf(values: PrintedArm, inertia_about: str = "cg") -> str:
 
 
 def poses_at(points: ArrayLike, elbow: str = "down") -> FloatArray:
-    """Poses that put the tool on points; joint limits are left aside.
+    """Poses that put the tool on points; joint limits are ignored.
 
     Args:
         points: (..., 3) m.

@@ -1,4 +1,4 @@
-"""What the paper does not report and a reproduction must assume: each input, its range, and why."""
+"""Inputs that the paper does not report and a reproduction must assume: their ranges, and why."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Input:
 
     Attributes:
         name: the field of `Assumptions`.
-        unit: for people.
+        unit: as shown.
         why: what is known of it.
         low: the least value that is tried; None for a choice.
         high: the largest.
@@ -100,7 +100,7 @@ def parse_assumptions(given: Iterable[str], base: Assumptions | None = None) -> 
     """Assumptions changed by words such as "period=0.1".
 
     Raises:
-        InputError: an unknown name, or a value that is none.
+        InputError: an unknown name, or a bad value.
     """
     values: dict[str, Any] = {}
     fields = {f.name: f for f in dataclasses.fields(Assumptions)}

@@ -1,4 +1,4 @@
-"""What does not fit together in the paper: each with its number and the figure that shows it."""
+"""Contradictions in the paper: each with the number that decides and the figure that shows it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from picchio.paper.verdict import plainly
 
 @dataclass(frozen=True)
 class Conflict:
-    """Two things in the paper that cannot both be.
+    """Two statements of the paper that cannot both be true.
 
     Attributes:
         name: unique.
@@ -57,7 +57,7 @@ def _actuators(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
     need, have = data["largest"][1], data["actuators"][1]
     return Conflict(
         "actuators",
-        f"Joint 2's actuator gives {have:.0f} N m at the most (p. 297).",
+        f"Joint 2's actuator gives {have:.0f} N m at most (p. 297).",
         f"To hold the arm of Table 1 stretched out takes {need:.0f} N m, {need / have:.2g} times "
         "that, before any tool or payload.",
         need, "gravity",
@@ -70,7 +70,7 @@ def _mean_stress(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
     steady, largest = data["gravity"][1], float(np.max(study.printed.stress[:, 1]))
     return Conflict(
         "mean-stress",
-        f"Joint 2's fatigue stress is {largest:g} MPa at the most (Table 2).",
+        f"Joint 2's fatigue stress is {largest:g} MPa at most (Table 2).",
         f"Gravity puts {steady:.0f} MPa into the same shaft, {steady / largest:.2g} times as much, "
         "as a steady stress that the life does not know.",
         steady, "gravity-stress",

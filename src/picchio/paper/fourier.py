@@ -125,7 +125,7 @@ def worst_of(world: World) -> tuple[int, int, int]:
 def worst_responses(world: World, hits: int) -> tuple[Response, Response, FloatArray, int]:
     """A rivet from rest and the steady state, the force's direction, and the joint, at the worst.
 
-    Fig. 8, and what becomes of the steady state.
+    For Fig. 8 and the transient.
     """
     direction, rivet, joint = worst_of(world)
     modes = modal_analysis(world.model.linear_system(world.rivet_poses[rivet]))

@@ -22,7 +22,7 @@ class Influence:
     """One input over its range.
 
     Attributes:
-        name: of the input; words: with its range and unit, for people.
+        name: of the input; words: with its range and unit.
         value: in the base world; tried: the values.
         base_life: rivets to failure by the paper's method in the base world.
         lives: at the values that can be reached.

@@ -1,4 +1,4 @@
-"""What every claim, conflict and figure looks at: the base world, and others like it."""
+"""What every claim, conflict and figure is computed from: the base world and random others."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ WORLDS = 160
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """One run of the reproduction; everything is computed when it is first asked for.
+    """One run of the reproduction; everything is computed when first needed.
 
     Attributes:
         given: the base world's assumptions.

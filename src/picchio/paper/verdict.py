@@ -1,4 +1,4 @@
-"""Verdicts: what may be said of a claim, and the number that decides."""
+"""Verdicts on a claim, and the number that decides."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ REACH = BLOWS
 
 
 _TELLING, _RARE = 0.75, 8
-"""From this share of worlds told right an input counts as deciding; fewer worlds are rare."""
+"""Share of worlds that an input must get right to decide; fewer worlds than this are rare."""
 
 
 class Verdict(StrEnum):
@@ -34,7 +34,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """What became of a claim.
+    """The result of testing a claim.
 
     Attributes:
         verdict: one of four.
@@ -75,7 +75,7 @@ def decided(
 
 
 def unknown(test: str, decides: str) -> Finding:
-    """A claim that what the paper prints cannot decide."""
+    """A claim that the printed data cannot decide."""
     return Finding(Verdict.UNKNOWN, test, decides)
 
 
@@ -115,26 +115,26 @@ def across(
     spoken = f"true in {count} of {len(worlds)} worlds"
     if count < _RARE:
         condition = (
-            f"several inputs suit each other as they rarely do: {spoken}, too few for a rule "
+            f"several inputs must match, which is rare: {spoken}, too few for a rule "
             f"(nearest to one: {words})"
         )
     elif right >= _TELLING:
-        condition = f"{words} (tells {100 * right:.0f} % of the worlds right; {spoken})"
+        condition = f"{words} (right for {100 * right:.0f} % of the worlds; {spoken})"
     else:
         condition = (
-            f"several inputs suit each other: {spoken}, and no single input decides "
+            f"several inputs must match: {spoken}, and no single input decides "
             f"(best: {words}, {100 * right:.0f} %)"
         )
     return Finding(Verdict.CONDITIONAL, test, decides, float(numbers[0]), condition)
 
 
 def plainly(value: float) -> str:
-    """Three digits; what is but rounding is nothing."""
+    """Three digits; rounding errors become 0."""
     return "0" if abs(value) < 1e-12 else f"{value:.3g}"
 
 
 def best_split(worlds: Sequence[World], true: Any, among: Sequence[str] = ()) -> tuple[str, float]:
-    """The one assumption that best tells where a claim holds.
+    """The one assumption that best separates where a claim holds.
 
     Returns:
         the condition in words, and the mean of the shares of true and of false worlds that it

@@ -33,10 +33,10 @@ WORDS = {
 
 @dataclass(frozen=True)
 class Step:
-    """A life under some corrections.
+    """The life with some of the corrections.
 
     Attributes:
-        name: for people.
+        name: in words.
         corrections: which.
         rivets: to failure; inf where nothing fails.
         joint: index of the joint that fails first; -1 where none does.
@@ -50,7 +50,7 @@ class Step:
     without_limit: float
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON; a life without end is None."""
+        """For JSON; an infinite life is None."""
         return {
             "name": self.name,
             "corrections": self.corrections,
@@ -83,7 +83,7 @@ def _loads(world: World) -> _Loads:
 
 
 def waterfall(world: World) -> tuple[Step, ...]:
-    """The paper's method, each correction alone, all together."""
+    """The life by the paper's method, by each correction alone, and by all together."""
     loads = _loads(world)
     steel = load_sn_curve(STEEL, quiet=True)
     paper = world.printed.sn_curve.sn_curve(steel.tensile_strength)

@@ -1,4 +1,4 @@
-"""A world: what the paper prints, with a value assumed for everything that it does not."""
+"""A world: the printed data, with a value assumed for everything that the paper leaves out."""
 
 from __future__ import annotations
 

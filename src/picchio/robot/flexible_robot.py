@@ -186,7 +186,7 @@ class FlexibleRobot:
         return self.rigid.placement(pose, self.rigid.frame(self.tool_point))[0]
 
     def gravity_torque(self, pose: ArrayLike) -> Array:
-        """Torque (n,) that the springs carry at rest, N m (N), balancers taken off."""
+        """Torque (n,) that the springs carry at rest, N m (N), less that of the balancers."""
         full = self.pose(pose)
         index = self.flexible_index
         balanced, _ = balancing(self.flexible_joints, self.tree, full[index])
@@ -199,10 +199,6 @@ class FlexibleRobot:
         gradient = self.rigid.gravity_gradient(full)[np.ix_(index, index)]
         _, balanced = balancing(self.flexible_joints, self.tree, full[index])
         return gradient + np.diag(balanced)
-
-    def stiffness_at(self, pose: ArrayLike) -> Array:
-        """Stiffness (n,) at a pose: curves give their slope at the gravity torque there."""
-        return stiffness_at_torque(self.flexible_joints, self.gravity_torque(pose))
 
     def link_of(self, frame: str) -> str:
         """The link whose frame this is: a link's name, or a joint's for the link it carries.
@@ -252,7 +248,7 @@ class FlexibleRobot:
         branch: str | Sequence[str] = "any",
         seed: int = 0,
     ) -> Array:
-        """A pose (nv,) that puts the tool on a point: of the asked branch the one least bent.
+        """A pose (nv,) that puts the tool on a point: the least bent one of the branch.
 
         Args:
             point: (3,) m, world.
@@ -263,7 +259,7 @@ class FlexibleRobot:
             seed: moves the starts of the search.
 
         Raises:
-            InputError: out of reach (how far is said), or not on this branch.
+            InputError: out of reach (with the distance), or not on this branch.
         """
         from picchio.robot.ik.branch import branch_words, choose_branch
 

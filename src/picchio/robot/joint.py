@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from picchio.core.arrays import Vector
 from picchio.core.errors import InputError
-
-Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-Vector = tuple[float, float, float]
+from picchio.core.arrays import Vector
+
 RECOIL_JOINT = "gun_recoil"
 
 
@@ -52,7 +53,7 @@ class Gun:
 
 @dataclass(frozen=True)
 class Mounting:
-    """How the robot stands in the world.
+    """How the robot is mounted in the world.
 
     Args:
         xyz: m, of the URDF's root link.

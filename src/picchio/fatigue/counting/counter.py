@@ -1,14 +1,14 @@
 """Rainflow counting, whole or in chunks, with an explicit rule for the residue.
 
 Closed cycles are found by the four-point rule. What is left, the residue, diverges and then
-converges, and what becomes of it is a choice that the caller makes:
+converges, and the caller chooses what to count of it:
 
 - `half-cycles`: each range of the residue is half a cycle. The counts are those of ASTM E1049-85
   (2017), section 5.4.4. The default.
 - `repeated`: the history is taken to repeat for ever, so the residue closes upon itself and every
   cycle is whole (ASTM E1049-85, section 5.4.5).
 - `discarded`: the residue is dropped. Unsafe: the largest range is always in the residue, and a
-  lone decaying blow has nothing else.
+  single decaying blow consists of nothing else.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def rainflow(history: npt.ArrayLike, residue: Residue = "half-cycles") -> Cycles
 
     Args:
         history: (n,) finite samples or turning points, any unit; no binning is done.
-        residue: what becomes of the cycles that do not close; see the module.
+        residue: how cycles that do not close are counted; see the module.
 
     Returns:
         the cycles: closed ones first, in the order in which they close. A constant has none.
@@ -98,7 +98,7 @@ class RainflowCounter:
         """The cycles counted so far, as if the history ended here. More may be added after.
 
         Args:
-            residue: what becomes of the cycles that do not close; see the module.
+            residue: how cycles that do not close are counted; see the module.
 
         Raises:
             InputError: an unknown residue rule.

@@ -77,7 +77,7 @@ class Cycles:
 
     @classmethod
     def trusted(cls, range: FloatArray, mean: FloatArray, count: FloatArray) -> Cycles:
-        """Cycles of arrays that nobody else holds and that need no check (a million of them)."""
+        """Cycles of arrays that are not shared and need no check, which saves time for millions."""
         new = object.__new__(cls)
         for name, array in (("range", range), ("mean", mean), ("count", count)):
             array.flags.writeable = False

@@ -74,7 +74,7 @@ class SNFit(TableResult):
         log_likelihood: at the maximum, natural, density in ln cycles, penalty included.
         assumptions: what was assumed, in words.
         covariance: (3, 3) of ln endurance limit, ln knee and ln slope, widened for small samples
-            as the intervals are; zeros for a knee that is none.
+            as the intervals are; zeros where there is no knee.
     """
 
     tests: SNTests
@@ -342,7 +342,7 @@ def _best(tests: Likelihood, free: list[int]) -> FloatArray:
     """The maximum, from several starts: the likelihood can have more than one."""
     stress, life = tests.stress[tests.failed], tests.cycles[tests.failed]
     slope = float(np.clip(-np.polyfit(stress, life, 1)[0], 1.0, 60.0))
-    # Without a knee the strength is told at a round number of cycles amid the failures.
+    # Without a knee the strength is given at a round number of cycles amid the failures.
     decade = np.log(10.0) * np.round(np.mean(life) / np.log(10.0))
     knees = np.quantile(life, [0.4, 0.7, 0.95]) if 1 in free else [decade]
     best: tuple[float, FloatArray] | None = None

@@ -90,7 +90,7 @@ def log_likelihood(
 ) -> float:
     """See `picchio.fatigue.sn.likelihood`; the gradient (5,) is added up in place, from zero.
 
-    `limited`: whether there is an endurance limit; else the line goes on for ever.
+    `limited`: whether there is an endurance limit; else the line has no end.
     """
     t, k = math.exp(theta[3]), math.exp(theta[2])
     share = 1.0 / (1.0 + math.exp(-theta[4]))

@@ -15,7 +15,7 @@ _FARTHEST = 12.0
 
 _LINE = 2
 """Degrees of freedom that the line through the failures takes, as in a linear regression. The limit
-takes next to none: which specimens break tells it, not how their lives scatter."""
+takes next to none: it follows from which specimens break, not from how their lives scatter."""
 
 _NEVER = -1e12
 """A log-likelihood that no data have; finite, so that searches can compute with it."""

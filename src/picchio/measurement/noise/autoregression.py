@@ -140,7 +140,7 @@ def fit_autoregression(
     Args:
         pieces: (m_i,) each.
         max_order: the most samples back; fewer where the pieces are short.
-        mean_removed: which pieces had their mean taken off: the variance that went with it, which
+        mean_removed: which pieces had their mean removed: the variance that went with it, which
             is large where noise is slow, is given back.
 
     Raises:

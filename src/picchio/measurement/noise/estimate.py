@@ -40,7 +40,7 @@ _SLACK = 1.08
 
 
 def repeat_key(record: Record) -> tuple[object, ...] | None:
-    """What records that repeat each other have in common; None where nothing tells."""
+    """What repeats of a record have in common; None for records that cannot be compared."""
     if record.kind == "motion" or record.pose is None or record.direction is None:
         return None
     pose = record.pose

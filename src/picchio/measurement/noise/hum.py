@@ -81,7 +81,7 @@ def _search(pieces: Sequence[Piece], nominal: float, rate: float, *,
     frequency = float(trials[best])
     weights = [p.values.size for p in used]
     squares = [2.0 * np.mean(_fitted(p, frequency, noise) ** 2) * p.gain**2 for p in used]
-    # What noise alone would give is taken off the squares.
+    # What noise alone would give is subtracted from the squares.
     extra = [4.0 * noise.psd(frequency, rate) * rate / 2.0 / p.values.size for p in used]
     amplitude = np.sqrt(max(float(np.average(np.subtract(squares, extra), weights=weights)), 0.0))
     return Line(frequency, float(amplitude), min(1.0, probability))

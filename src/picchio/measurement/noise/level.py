@@ -1,4 +1,4 @@
-"""The noise of one channel, as it was estimated."""
+"""The estimated noise of one channel."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from picchio.measurement.noise.hum import Line
 
 @dataclass(frozen=True)
 class NoiseSource:
-    """What one way of looking at the noise says.
+    """One estimate of the noise.
 
     Attributes:
         method: a key of `picchio.measurement.noise.pieces.METHODS`.
-        std: in the channel's unit, hum taken out.
+        std: in the channel's unit, hum removed.
         error: relative standard error of `std`.
-        records: how many gave a piece.
+        records: how many records contributed.
         used: whether the level and the spectrum were taken from it; a source that sees clearly
             more than a surer one is not (repeats that differ, a ring-down that is not linear).
     """
@@ -41,7 +41,7 @@ class Noise:
         channel: its name.
         unit: SI.
         rate: samples a second, Hz, that `model` and the spectrum are for.
-        std: standard deviation, hum not in it.
+        std: standard deviation, without hum.
         error: relative standard error of `std`.
         model: the noise as an autoregression.
         hum: the mains and its harmonics, where found.
@@ -75,7 +75,7 @@ class Noise:
 
     @property
     def psd(self) -> FloatArray:
-        """(129,) one-sided power spectral density, unit^2/Hz, hum not in it."""
+        """(129,) one-sided power spectral density, unit^2/Hz, without hum."""
         return self.model.psd(self.frequency, self.rate)
 
     def at(self, rate: float) -> Noise:
@@ -95,7 +95,7 @@ class Noise:
         """A residual divided by the noise: white and of unit variance if it is this noise.
 
         Args:
-            residual: (..., m) at `rate`, in the channel's unit, hum taken out.
+            residual: (..., m) at `rate`, in the channel's unit, hum removed.
 
         Raises:
             InputError: the channel has no noise.

@@ -69,7 +69,7 @@ def not_periodic(time: FloatArray, series: FloatArray, period: float) -> NotPeri
     found = np.isfinite(np.take_along_axis(distance, nearest, axis=1))
     index = np.take_along_axis(index, nearest, axis=1) % m
     values = sorted_series[index]
-    # Samples unlike the middle of their neighbours stand beside a jump: they predict nothing.
+    # Samples unlike the mean of their neighbours are next to a jump: they predict nothing.
     rough = sorted_series - np.nanmedian(np.where(found, values, np.nan), axis=1)
     limit = _SIGMAS * 1.4826 * float(np.nanmedian(np.abs(rough)))
     odd = np.abs(rough) > limit if limit > 0.0 else np.zeros(m, bool)

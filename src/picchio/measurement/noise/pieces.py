@@ -36,7 +36,7 @@ class Piece:
         values: (m,) in the channel's unit, of the noise's own variance.
         samples: how many independent numbers were left after what was fitted.
         gain: what a sine's amplitude was divided by on the way.
-        mean_removed: the mean of `values` was taken off.
+        mean_removed: the mean of `values` was subtracted.
     """
 
     method: str
@@ -67,7 +67,7 @@ def _without_mean(method: str, window: Window, where: slice, part: FloatArray) -
 
 
 def _rung_down(values: FloatArray) -> int | None:
-    """Where the end begins in which the power does not fall any more; None if it still does."""
+    """Where the last part begins, over which the power no longer falls; None if it still falls."""
     size = values.size // _BLOCKS
     if size < 64:
         return None
@@ -129,7 +129,7 @@ def steady_period(window: Window) -> tuple[float, float] | None:
 
 
 def _largest(window: Window, most: int = 3) -> list[FloatArray]:
-    """The channels that stand out of their own fast changes most."""
+    """The channels whose signal is largest against their own fast changes."""
 
     def strength(values: FloatArray) -> float:
         fast = float(np.std(np.diff(values, n=2)))
@@ -154,7 +154,7 @@ def steady_pieces(window: Window, period: float) -> Iterator[tuple[str, Piece]]:
 
 
 def ring_down_pieces(window: Window) -> Iterator[tuple[str, Piece]]:
-    """What damped waves do not explain after a burst."""
+    """What fitted damped sines leave after a burst."""
     after = window.after()
     names = [name for name in window.arrays if not name.startswith("force")]
     if after.stop - after.start < 200 or not names:

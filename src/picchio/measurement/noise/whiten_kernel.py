@@ -8,10 +8,10 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def whiten(series, predictors, deviation, out):
-    """Subtract from each of `series` (m,) what its past foretells, over what that leaves.
+    """The one-step prediction error of `series` (m,) over its standard deviation, into `out` (m,).
 
-    predictors (p + 1, p): row k foretells from k samples back; deviation (p + 1,) is what each
-    row leaves. Into `out` (m,).
+    predictors (p + 1, p): row k predicts from k samples back; deviation (p + 1,) is the standard
+    deviation of its error.
     """
     order = predictors.shape[1]
     for i in range(series.size):

@@ -25,7 +25,7 @@ class Window:
         record: whose.
         time: (m,) s.
         arrays: {channel: (m,)} SI.
-        complete: False where the record goes on.
+        complete: False where the record is longer.
         rate: samples a second, Hz.
     """
 

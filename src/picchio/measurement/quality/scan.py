@@ -132,7 +132,7 @@ class RecordScan:
         return self.record.file
 
     def line(self, sample: int) -> str:
-        """Where a sample stands, for people."""
+        """Where a sample is, in words."""
         source = self.record.source
         return f"{source.row_word} {sample + source.first_row}"
 

@@ -145,7 +145,7 @@ def direction_joint_1(study: Study) -> Finding:
     return across(
         study.worlds, steady,
         "angle between joint 1's worst direction and y at the four poses",
-        "{most}° at the most over {worlds} worlds",
+        "{most}° at most over {worlds} worlds",
         PATH,
     )  # fmt: skip
 

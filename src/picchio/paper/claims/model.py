@@ -1,4 +1,4 @@
-"""Claims about the equations."""
+"""Claims about the arm and the equations."""
 
 from __future__ import annotations
 
@@ -7,9 +7,26 @@ import numpy as np
 from picchio.model.linear_system import undamped_modes
 from picchio.paper.claims.registry import claim
 from picchio.paper.fourier import amplitude_and_phase, printed_series
+from picchio.paper.statics import holding_torque
 from picchio.paper.study import Study
 from picchio.paper.verdict import PANEL, Finding, across, decided
 from picchio.paper.world import World
+
+
+@claim("mimics", "gravity")
+def mimics(study: Study) -> Finding:
+    """Whether the actuators could hold the arm up."""
+    found = holding_torque(study.base)
+    limits = study.printed.arm.actuator_torques
+    return decided(
+        bool(found.largest[1] <= limits[1] and found.largest[2] <= limits[2]),
+        "torque to hold the unloaded arm against gravity, at full horizontal reach, against the "
+        "stated actuators",
+        f"joint 2: {found.largest[1]:.0f} N m against {limits[1]:.0f} N m, joint 3: "
+        f"{found.largest[2]:.0f} N m against {limits[2]:.0f} N m; joint 2 can hold the arm in "
+        f"{100 * found.share_held:.0f} % of its range with joint 3 straight",
+        float(found.largest[1]),
+    )
 
 
 @claim("fixed_direction")
@@ -27,7 +44,7 @@ def fixed_direction(study: Study) -> Finding:
     return across(
         study.worlds, turns,
         "sum of the joints' largest deflections in a rivet of 12 hits: the most the gun can turn",
-        "{base}° in the base world, {most}° at the most over {worlds} worlds; up to 1°, which "
+        "{base}° in the base world, {most}° at most over {worlds} worlds; up to 1°, which "
         "turns 1.7 % of the force aside, may be ignored",
         PANEL,
     )  # fmt: skip
@@ -50,7 +67,7 @@ def transient(study: Study) -> Finding:
     return across(
         study.worlds, settled,
         f"a joint's largest peak over the task, {hits} hits from rest, over that of the steady "
-        "state; below 1.1 the steady state may stand in",
+        "state; below 1.1 the steady state may replace it",
         "{base} in the base world, {least} to {most} over {worlds} worlds",
         PANEL,
     )  # fmt: skip
@@ -70,7 +87,7 @@ def decoupled(study: Study) -> Finding:
     return decided(
         worst < 1e-9,
         "off-diagonal over diagonal of SᵀMS, SᵀKS and SᵀCS at the 15 rivets",
-        f"{worst:.1g} at the most; for the damping that is what a damping ratio of each mode means",
+        f"{worst:.1g} at most; for the damping that is what a damping ratio of each mode means",
         worst,
     )
 

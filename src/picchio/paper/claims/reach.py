@@ -45,7 +45,7 @@ def x_force_joint_1(study: Study) -> Finding:
         study.worlds, loads,
         "joint 1's largest deflection under a force along x, anywhere in the x–z plane, over that "
         "under the worst direction (which is y)",
-        "{most} at the most over {worlds} worlds: the force points at the joint's axis",
+        "{most} at most over {worlds} worlds: the force points at the joint's axis",
         REACH,
     )  # fmt: skip
 
@@ -96,7 +96,7 @@ def z_force_joint_2(study: Study) -> Finding:
     return across(
         study.worlds, loads,
         "joint 2's deflection under a force along z, arm straight up, over the largest anywhere",
-        "{most} at the most over {worlds} worlds: the force passes through the joint's axis",
+        "{most} at most over {worlds} worlds: the force passes through the joint's axis",
         REACH,
     )  # fmt: skip
 

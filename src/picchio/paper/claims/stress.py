@@ -101,7 +101,7 @@ def upward_joint_1(study: Study) -> Finding:
         study.worlds, rests,
         "joint 1's stress under a vertical force over the largest stress; the arm's plane holds "
         "the force, and nothing couples joint 1 to the others",
-        "{most} at the most, over {worlds} worlds",
+        "{most} at most, over {worlds} worlds",
     )  # fmt: skip
 
 
@@ -124,7 +124,7 @@ def most_stressed(study: Study) -> Finding:
 
 @claim("peak_stress", "corrections")
 def peak_stress(study: Study) -> Finding:
-    """Whether the peak stands in for the amplitude without harm."""
+    """Whether the peak may replace the amplitude without harm."""
     ratio = peak_over_amplitude(study.base)
     factor = ratio**study.printed.sn_curve.exponent
     return decided(

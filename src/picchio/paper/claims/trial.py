@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 # Importing the subjects registers their claims.
-from picchio.paper.claims import envelope, life, model, reach, robot, stress  # noqa: F401
+from picchio.paper.claims import envelope, life, model, reach, stress  # noqa: F401
 from picchio.paper.claims.registry import CLAIMS, Claim
 from picchio.paper.printed import Sentence
 from picchio.paper.study import Study

@@ -21,8 +21,8 @@ class PaperFigure:
     Attributes:
         name: unique on the page: "fig-9".
         title: of the figure; "Fig. 9: ..." where the paper has it.
-        caption: what is to be seen.
-        alt: the same for who cannot see it.
+        caption: what it shows.
+        alt: the same for readers who cannot see it.
         data: the numbers behind it, for JSON.
         draw: makes it and returns one of its axes.
         wide: whether it takes the page's whole width.

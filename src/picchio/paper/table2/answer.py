@@ -1,4 +1,4 @@
-"""What explains Table 2, how surely, and what cannot be known."""
+"""What explains Table 2, how certainly, and what remains unknown."""
 
 from __future__ import annotations
 

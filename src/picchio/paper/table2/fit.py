@@ -131,7 +131,7 @@ def refine(rule: Rule, place: Place, start: FloatArray, target: Target, steps: i
 
 
 def described(fit: Fit) -> dict[str, float | str | int]:
-    """The fitted world, for people."""
+    """The fitted world, by name."""
     base = fit.place.base
     return {
         **decode(fit.vector[: len(FREE)]),

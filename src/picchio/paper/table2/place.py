@@ -27,7 +27,7 @@ _SAMPLES = 128
 
 @dataclass(frozen=True)
 class Place:
-    """What is not a number: the panel's rows, the elbow, the inertias' point, peak or range.
+    """The choices that are not numbers: rows, elbow, the inertias' point, peak or range.
 
     Attributes:
         base: gives rows, columns, elbow and `inertia_about`, and what is not fitted.

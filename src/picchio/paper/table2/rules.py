@@ -34,7 +34,7 @@ class Rule:
     """One hypothesis.
 
     Attributes:
-        name: for people.
+        name: in words.
         average: how 15 rivets become one damage.
         counts: what N is divided by: 1 (hits), the hits of a rivet, or None for any factor.
         free_exponent: whether the curve's exponent is fitted, and its level with it.

@@ -23,7 +23,7 @@ class RobotState:
         mass_matrix: (n, n) kg m^2, link side.
         jacobian: (3, n) m, of the point where the force acts, world axes.
         stiffness: (n,) N m/rad or N/m; with a stiffness curve, the slope at `gravity_torque`.
-        gravity_torque: (n,) N m or N, that the springs carry at rest, balancers taken off.
+        gravity_torque: (n,) N m or N, that the springs carry at rest, less the balancers'.
         tool_position: (3,) m, the point where the force acts, world.
         tool_rotation: (3, 3), the tool frame's axes in the world.
     """

@@ -25,7 +25,7 @@ ELBOW = ("elbow-up", "elbow-down")
 def choose_branch(
     robot: FlexibleRobot, poses: list[Array], branch: str | Sequence[str], point: Any = None
 ) -> Array:
-    """The first pose on the asked branch.
+    """The first pose on a branch.
 
     Args:
         robot: the robot.

@@ -28,7 +28,7 @@ class Chain:
         slides: (m,) true for prismatic joints.
         follow: (m, k), joint positions = follow @ q + shift; the identity without mimic joints.
         shift: (m,).
-        index: (k,) where the coordinates stand in the pose.
+        index: (k,) of the coordinates in the pose.
         lower: (k,) rad or m, -inf where there is no limit.
         upper: (k,).
         tool_axis: (3,), unit, in the tool point's frame.

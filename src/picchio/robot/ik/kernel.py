@@ -168,7 +168,7 @@ def solve_points(  # type: ignore[no-untyped-def]
         weight: m; zero leaves the axis free.
         redundant: move solutions along their self-motion towards the centre.
         found: (p, s, k) out: where each start ended.
-        errors: (p, s) out: what is left there, m.
+        errors: (p, s) out: distance left, m.
     """
     q = np.empty(starts.shape[1])
     for p in range(targets.shape[0]):

@@ -22,7 +22,7 @@ class FoundRobot:
     """A robot's files.
 
     Args:
-        name: as it can be asked for; None when it was given as a path.
+        name: by which it can be loaded; None if it was given as a path.
         urdf: the URDF.
         flex: the folder's own flex.toml, or None.
         task: the folder's own task.toml, or None.

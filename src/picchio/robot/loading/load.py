@@ -128,7 +128,7 @@ def _sources(
     """Everything that speaks about the joints, the strongest first, and the sidecar used."""
     annotation = read_annotations(root, found.urdf)
     flex_file = Path(flex) if flex is not None else None
-    # A robot folder's own sidecar stands in for an annotation, never beside one.
+    # A robot folder's own sidecar replaces annotations; the two are never combined.
     if flex_file is None and annotation is None:
         flex_file = found.flex
     sources = []

@@ -61,7 +61,7 @@ def _check_mass_matrix(robot: FlexibleRobot) -> None:
         return
     lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
     upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
-    # Zero is often a special pose: a general one inside the limits tells structure from chance.
+    # Zero is often a special pose: a general one within the limits tells structure from chance.
     general = lower + (upper - lower) * (0.38 + 0.21 * np.sin(1.0 + np.arange(robot.rigid.nv)))
     mass = robot.mass_and_jacobian(general[None])[0][0]
     names = robot.flexible_names

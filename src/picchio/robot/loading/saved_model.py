@@ -63,7 +63,7 @@ def is_saved_model(robot: str | Path) -> bool:
 
 
 def read_saved_model(path: Path) -> SavedModel:
-    """Read a saved model; robot and sidecar come back as paths where they stand beside it.
+    """Read a saved model; robot and sidecar become paths where they lie beside it.
 
     Raises:
         InputError: syntax, an unknown format, misspelt keys.
@@ -94,7 +94,7 @@ def saved_model_text(
         effects: tables with effect, target, parameters and, where needed, hidden.
         flex: sidecar.
         tool: frame that carries the tool.
-        notes: for people.
+        notes: free text.
         folder: where the file will stand; paths are written relative to it.
         provenance: where it comes from.
     """

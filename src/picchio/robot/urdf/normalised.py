@@ -1,4 +1,4 @@
-"""The URDF that Pinocchio gets: the robot's tree and nothing else, every choice made explicit.
+"""The URDF that Pinocchio gets: only the robot's tree, every default made explicit.
 
 Only names, placements, axes and inertials are written. A continuous joint becomes a revolute
 one, so that every movable joint has one number and nq = nv; joints of several degrees of

@@ -13,13 +13,13 @@ from pathlib import Path
 
 from lxml import etree
 
+from picchio.core.arrays import Vector
 from picchio.core.errors import InputError
 from picchio.robot.urdf.xml import children, local_name
 
 MOVABLE = ("revolute", "continuous", "prismatic")
 LOCKED = ("floating", "planar")
 JOINT_TYPES = (*MOVABLE, *LOCKED, "fixed")
-Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 # Above this a sum of squares in the dynamics is on its way to overflow.
 LARGEST = 1e12

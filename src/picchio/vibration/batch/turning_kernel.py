@@ -182,7 +182,7 @@ def turning_values(
 def _nothing_larger(  # type: ignore[no-untyped-def]
     z, rows, p, weights, inverse, top, bottom, enough
 ):
-    """Whether what is left of the modes can neither pass an extreme nor do damage."""
+    """Whether the rest of the ring-down can neither exceed an extreme nor do damage."""
     n, m = weights.shape
     for i in range(m):
         if rows[i, p, 1] != 0.0 or rows[i, p, 2] != 0.0:

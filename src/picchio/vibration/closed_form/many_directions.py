@@ -14,7 +14,7 @@ from picchio.vibration.closed_form.extrema import Grid, refine_roots
 from picchio.vibration.closed_form.response import Response
 
 _CELLS = 2_000_000
-"""Directions times samples that are looked at together: 16 MB."""
+"""Directions times samples that are evaluated together: 16 MB."""
 
 
 def peak_deflections(response: Response, directions: ArrayLike) -> FloatArray:

@@ -5,9 +5,9 @@ exponential; bF and p are taken as straight lines over a step (exponential predi
 Hochbruck and Ostermann, Acta Numerica 19 (2010) 209, doi:10.1017/S0962492910000048). Steps that
 a force edge cuts short are advanced by the Taylor series of the same exponential.
 
-Over a step p is first taken to go on as it did over the last one, looked at where that leads, and
-the step corrected. About a jump of the force, and where something touches or lets go, it is looked
-at twice. All is in units of acceleration, M^-1 times the forces.
+Over a step p is first extrapolated from the last one, evaluated where that leads, and the step
+corrected. At a jump of the force, and where something touches or lets go, it is evaluated twice.
+All is in units of acceleration, M^-1 times the forces.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -209,7 +209,7 @@ def integrate(
             at_first[i] = p1[i]
             at_last[i] = p1[i] + share * (p1[i] - p0[i])
             p0[i] = p1[i]
-        # Two looks after a jump, where nothing is known of how it goes on, and about a kink.
+        # Two evaluations after a jump, from which nothing can be extrapolated, and about a kink.
         for _look in range(2):
             for i in range(n):
                 f0[i] = own[i] * force0[k] + at_first[i]

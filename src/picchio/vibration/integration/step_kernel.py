@@ -163,7 +163,7 @@ def force_beside(points, offset, start, end, constant, slope, amplitude, omega, 
 
 @njit(cache=True, nogil=True)
 def sample_numbers(points, times, tolerance, first, out):
-    """Which sample stands at each point, -1 where none does, into `out` (points,)."""
+    """Which sample lies at each point, -1 where none does, into `out` (points,)."""
     place = 0
     for k in range(out.size):
         out[k] = -1

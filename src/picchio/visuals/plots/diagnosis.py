@@ -292,7 +292,7 @@ def plot_scores(
             chi_square_per_sample; an infinite bic is one that was dropped early.
         without: BIC, and chi-square per sample, without any of them.
         ax: where to draw.
-        chosen: (effect, target) of those that stand at the end.
+        chosen: (effect, target) of the final causes.
     """
     ax = axes_or_new(ax)
     rows = sorted(scores, key=lambda row: (row["bic"], row["chi_square_per_sample"]))

@@ -50,7 +50,7 @@ class Scene(Page, Result):
         motion: the vibration, see `picchio.visuals.scene.motion`.
         tracks: recorded motions to play as ghosts in its place: {"layer", "text", "colour",
             "samples" (n, k) rad}, see `picchio.visuals.scene.compare`.
-        diagnosis: what the panel tells: {"verdict", "lines": [{"text", "layer"}]}, or None.
+        diagnosis: what the panel shows: {"verdict", "lines": [{"text", "layer"}]}, or None.
         playing: whether the vibration is shown at once.
         camera: position and target, (2, 3) m.
         floor: "cell" m, "squares" along a side, "at" the middle (3,) m.

@@ -24,7 +24,7 @@ class AliasingCheck(Check):
         self._thin: list[tuple[float, str]] = []
 
     def record(self, scan: RecordScan) -> Iterator[Finding]:
-        """Power in the upper fifth of the spectrum, noise taken off."""
+        """Power in the upper fifth of the spectrum, less that of the noise."""
         window = scan.window
         blows = window.blows
         jumps = False

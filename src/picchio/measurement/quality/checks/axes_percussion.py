@@ -206,7 +206,7 @@ class _Start:
 
 
 def _first(window: Window, kind: str, width: float) -> tuple[FloatArray, FloatArray]:
-    """Which samples are looked at, and their times; accelerations while the force is on."""
+    """Which samples are used, and their times; accelerations while the force is on."""
     until = min(0.95 * width, _LOOK) if _KINDS[kind] == 2 else _LOOK
     inside = (window.time > 0.02 * width) & (window.time < until)
     return inside, window.time[inside]

@@ -226,7 +226,7 @@ def _fit(points: FloatArray) -> tuple[float, float, float, float] | None:
     from scipy.optimize import least_squares
 
     omega, phase, weight = points.T
-    # Half a turn is a flipped axis, which another check tells.
+    # Half a turn is a flipped axis, which another check reports.
     phase = np.mod(phase + 0.5 * np.pi, np.pi) - 0.5 * np.pi
 
     def miss(p: FloatArray) -> FloatArray:
