@@ -21,9 +21,11 @@ from picchio.fatigue.sn.test_table import SNTests
 from picchio.studies.maps.places import joint_grid
 
 FUNCTIONS = {
-    "allowable", "annotate", "assess", "check", "envelope", "fit_sn", "import_record", "place",
-    "report", "reproduce", "robots", "simulate", "uncertain_life", "view", "workspace_map",
+    "allowable", "annotate", "assess", "check", "diagnose", "effects", "envelope", "fit_sn",
+    "formats", "identify", "import_record", "place", "report", "reproduce", "robots", "simulate",
+    "uncertain_life", "view", "workspace_map",
 }  # fmt: skip
+SLOW = {"diagnose", "identify", "reproduce"}
 # What they return stands within the JSON of `picchio assess`.
 PARTS_OF_ASSESS = {"allowable", "uncertain_life"}
 LOADERS = {"load_campaign", "load_robot", "load_sn_curve", "load_task"}
@@ -34,11 +36,11 @@ TASK = {
     "operation": [{"name": "up", "direction": [0.0, 0.0, 1.0], "poses": [POSE]}],
 }
 PLAN = """format = "picchio-plan/1"
-poses = [[0.3, 0.5, -0.8]]
-directions = [[1.0, 0.0, 0.0]]
-hits = 2
+poses = [[0.3, 0.5, -0.8], [-0.4, 0.9, -1.1], [0.6, 0.2, -0.5]]
+directions = [[0.6, 0.5, 0.62]]
+hits = 3
 sample_rate = 500.0
-length = 0.2
+length = 0.4
 excitation = { kind = "pulse_train", force = 300.0, period = 0.040, width = 0.004 }
 sensor = [{ channels = "deflection", noise = 1e-6 }]
 """
@@ -108,8 +110,16 @@ def calls(folder: Path) -> dict[str, Any]:
         "annotate": lambda: picchio.annotate("fanuc_like_3dof"),
         "assess": lambda: picchio.assess(robot, task),
         "check": lambda: picchio.check(picchio.simulate(robot, folder / "plan.toml").campaign),
+        "diagnose": lambda: picchio.diagnose(
+            robot, picchio.simulate(robot, folder / "plan.toml").campaign, workers=1
+        ),
+        "effects": lambda: picchio.effects("payload"),
         "envelope": lambda: picchio.envelope(robot, POSE, BLOWS),
         "fit_sn": lambda: picchio.fit_sn(SNTests(stress, cycles, np.ones(16, bool)), knee=False),
+        "formats": lambda: picchio.formats("task"),
+        "identify": lambda: picchio.identify(
+            robot, picchio.simulate(robot, folder / "plan.toml").campaign, workers=1
+        ),
         "import_record": lambda: picchio.import_record(
             folder / "hit.csv", mapping=folder / "mapping.toml"
         ),
@@ -132,7 +142,7 @@ def test_every_function_is_called_here(tmp_path: Path) -> None:
 
 @pytest.mark.filterwarnings("ignore::picchio.PicchioWarning")
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow) if n == "reproduce" else n
+    "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n
              for n in sorted(FUNCTIONS)],
 )  # fmt: skip
 def test_what_a_function_returns(name: str, tmp_path: Path) -> None:
@@ -141,10 +151,6 @@ def test_what_a_function_returns(name: str, tmp_path: Path) -> None:
     text = repr(found)
     shown = found._repr_html_()
     assert shown.startswith("<") and "object at 0x" not in text + shown
-    if name == "workspace_map":  # a table of many dimensions, whose own repr has many lines
-        assert found.sizes["point"] >= 1
-        found.close()
-        return
     assert "\n" not in text and len(text) < 300
     if isinstance(found, Page):
         page = found.save(tmp_path / "page.html").read_text()
@@ -158,8 +164,12 @@ def test_what_a_function_returns(name: str, tmp_path: Path) -> None:
         assert re.fullmatch(r"picchio-[a-z-]+/\d+", content["format"])
     if isinstance(found, TableResult):
         frame, table = found.to_frame(), found.to_xarray()
-        assert len(frame) > 0 and set(frame.attrs["units"]) <= set(frame.columns)
-        assert all(table[c].attrs["units"] == unit for c, unit in frame.attrs["units"].items())
+        units = frame.attrs.get("units", {})
+        assert len(frame) > 0 and set(units) <= set(frame.columns)
+        assert all(table[column].attrs["units"] == unit for column, unit in units.items())
+    if name == "workspace_map":
+        assert found.to_xarray().sizes["point"] >= 1
+        found.close()
 
 
 def test_a_report_says_what_its_page_needs() -> None:

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from picchio.model.model import Model as Model
     from picchio.paper.run import reproduce as reproduce
     from picchio.prediction.simulation import simulate as simulate
+    from picchio.reference.effects import effects as effects
+    from picchio.reference.formats import formats as formats
     from picchio.robot.loading.annotated import annotate as annotate
     from picchio.robot.loading.catalogue import robots as robots
     from picchio.robot.loading.load import load_robot as load_robot
@@ -58,9 +60,11 @@ _HOME = {
     "assess": "studies.assessment.run",
     "check": "measurement.quality.report",
     "diagnose": "diagnosis.diagnose",
+    "effects": "reference.effects",
     "envelope": "studies.envelopes",
     "fit_sn": "fatigue.sn.fit",
     "identify": "diagnosis.identify",
+    "formats": "reference.formats",
     "import_record": "campaign.importing.importer",
     "place": "studies.placement.run",
     "report": "visuals.report.page",

@@ -9,18 +9,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+import typer
 
 import picchio
-from picchio.cli.main import run
+from picchio.cli.main import app, run
+from picchio.studies.maps.places import joint_grid
 
-SLOW = {"place", "reproduce"}
+SLOW = {"diagnose", "identify", "place", "reproduce"}
 POSE = "0.3,1.1,-1.0"
 PLAN = """format = "picchio-plan/1"
-poses = [[0.3, 0.5, -0.8]]
-directions = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
-hits = 2
+poses = [[0.3, 0.5, -0.8], [-0.4, 0.9, -1.1], [0.6, 0.2, -0.5]]
+directions = [[0.6, 0.5, 0.62]]
+hits = 3
 sample_rate = 500.0
-length = 0.2
+length = 0.4
 seed = 4
 excitation = { kind = "pulse_train", force = 300.0, period = 0.040, width = 0.004 }
 sensor = [{ channels = "deflection", noise = 1e-6 }]
@@ -79,6 +81,11 @@ COMMANDS: dict[str, tuple[str, Any]] = {
     "annotate": ("annotate fanuc_like_3dof --out a.urdf", annotated),
     "assess": ("assess fanuc_like_3dof", lambda: picchio.assess(*arm())),
     "check": ("check measured", lambda: picchio.check("measured")),
+    "diagnose": (
+        "diagnose fanuc_like_3dof --data measured",
+        lambda: picchio.diagnose("fanuc_like_3dof", "measured"),
+    ),
+    "effects": ("effects", picchio.effects),
     "envelope": (
         f"envelope fanuc_like_3dof --pose={POSE} --hits 3",
         lambda: picchio.envelope(
@@ -89,9 +96,20 @@ COMMANDS: dict[str, tuple[str, Any]] = {
         "fit-sn tests.csv --kind normal --survival 0.9",
         lambda: picchio.fit_sn("tests.csv", kind="normal", survival=0.9),
     ),
+    "formats": ("formats campaign", lambda: picchio.formats("campaign")),
+    "identify": (
+        "identify fanuc_like_3dof --data measured --out found.toml",
+        lambda: picchio.identify("fanuc_like_3dof", "measured"),
+    ),
     "import": (
         "import hit.csv --mapping mapping.toml --to imported",
         imported,
+    ),
+    "map": (
+        "map fanuc_like_3dof --joint-grid 2 --out map.nc",
+        lambda: picchio.workspace_map(
+            arm()[0], joint_grid(arm()[0], 2), arm()[1].operations[0].excitation, "map.nc"
+        ),
     ),
     "place": (
         "place fanuc_like_3dof --placements 8 --no-self-collision",
@@ -121,3 +139,8 @@ def test_json_is_to_dict(name: str, folder: Path, capsys: pytest.CaptureFixture[
     returned = function().to_dict()
     assert json.dumps(written) == json.dumps(returned)
     assert written["format"].startswith("picchio-")
+
+
+def test_every_command_is_here() -> None:
+    commands: Any = typer.main.get_command(app)
+    assert set(commands.commands) == set(COMMANDS)

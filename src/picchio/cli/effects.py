@@ -34,10 +34,10 @@ def effects(
     json: JsonOption = None,
 ) -> None:
     """List the effects that can be put into a model, or show one with its parameters."""
+    import picchio
     from picchio.cli.output import write_json
-    from picchio.reference import effects as reference
 
-    found = reference.effects(name)
+    found = picchio.effects(name)
     if json is not None:
         write_json(found.to_dict(), json)
     if json == "-":

@@ -26,10 +26,10 @@ def formats(
     json: JsonOption = None,
 ) -> None:
     """List the files that picchio reads and writes, or show one with every key."""
+    import picchio
     from picchio.cli.output import write_json
-    from picchio.reference import formats as reference
 
-    found = reference.formats(name)
+    found = picchio.formats(name)
     if json is not None:
         write_json(found.to_dict(), json)
     if json == "-":

@@ -50,6 +50,18 @@ class Compared:
         return self.fit.rule.name
 
     @property
+    def mean_rms(self) -> float:
+        """Of the mean stresses, ln; shown on the page."""
+        return float(np.sqrt((self.fit.mean_errors**2).mean()))
+
+    @property
+    def life_rms(self) -> float:
+        """Of the lives but the one aside, ln; shown on the page."""
+        errors = self.fit.life_errors
+        kept = errors if self.aside is None else np.delete(errors, self.aside)
+        return float(np.sqrt((kept**2).mean()))
+
+    @property
     def left_out(self) -> float:
         """Median error of a life predicted from the other entries, ln."""
         return float(np.nanmedian(np.abs(self.left_out_life)))

@@ -192,7 +192,7 @@ def report(
         return Report(result.title, result.html())
     if not isinstance(result, Result):
         raise InputError("is no result of picchio", key="result", value=result)
-    title = repr(result).strip("<>")
+    title = result._headline()
     module, _, name = result.PAGE.partition(":")
     page = getattr(import_module(f"picchio.{module}"), name)
     try:
@@ -206,7 +206,7 @@ def plain_page(result: Result, *, command: str | None = None, warnings: Sequence
     """The page of a result that has none of its own: what a notebook shows, and its inputs."""
     return render(
         "plain.html.j2",
-        title=repr(result).strip("<>"),
+        title=result._headline(),
         body=Markup(result._repr_html_()),
         command=command,
         warnings=warnings,
