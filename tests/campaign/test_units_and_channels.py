@@ -4,14 +4,21 @@ import numpy as np
 import pytest
 
 from picchio.campaign import channels as channels_module
+from picchio.campaign.campaign import Campaign
 from picchio.campaign.channels import (
     ChannelKind,
     parse_channel,
     parse_header,
     register_channel_kind,
 )
+from picchio.campaign.readers import velocity
+from picchio.campaign.record import Record
 from picchio.campaign.units import conversion
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, PicchioWarning
+from picchio.model.effects.registry import effect_class
+from picchio.model.model import Model
+from picchio.prediction.percussion import percussion_setups
+from picchio.robot.loading.load import load_robot
 
 # NIST SP 811 (2008), appendix B: exact factors, or to the digits printed there.
 FACTORS = [
@@ -112,6 +119,41 @@ def test_a_stranger_adds_a_kind_in_one_place(monkeypatch):
     with pytest.raises(InputError, match="known already"):
         register_channel_kind(kind)
     channels_module._parse.cache_clear()
+
+
+def struck(**channels):
+    """What is needed to predict one percussion record that holds such channels."""
+    time = np.arange(-50, 250) * 1e-3
+    record = Record.from_arrays(
+        "r01.csv", time, {name: np.zeros(time.size) for name in channels},
+        pose=[0.1, 0.2, 0.3], direction=[0.0, 1.0, 0.0],
+    )  # fmt: skip
+    blows = {"force": 300.0, "period": 0.04, "width": 0.004, "hits": 3}
+    robot = load_robot("fanuc_like_3dof")
+    campaign = Campaign.from_records([record], robot=robot.name, excitation=blows)
+    return robot, percussion_setups(robot, campaign)[0]
+
+
+def test_a_channel_that_nothing_predicts_is_told_by_name():
+    with pytest.warns(PicchioWarning, match=r"r01.csv: torque.joint_1 is not used"):
+        _, setup = struck(**{"torque.joint_1": 0, "deflection.joint_1": 0})
+    assert setup.groups == ("deflection",)
+
+
+def test_a_kind_that_is_ac_coupled_reads_through_its_corner(monkeypatch):
+    """As the same reading behind a high-pass, whose corner a sensor of its own may move."""
+    monkeypatch.setattr(channels_module, "KINDS", list(channels_module.KINDS))
+    kind = ChannelKind("geophone", "frame", ("m/s",), True, reader=velocity, ac_corner=4.5)
+    register_channel_kind(kind)
+    robot, setup = struck(**{"geophone.tool.x": 0, "velocity.tool.x": 0})
+    channels_module._parse.cache_clear()
+    highpass = effect_class("sensor_highpass")
+    behind = setup.predict(Model(robot).with_effects([highpass("velocity.tool", frequency=4.5)]))
+    found = setup.predict(Model(robot))
+    assert np.array_equal(found["geophone.tool.x"], behind["velocity.tool.x"])
+    assert not np.allclose(found["geophone.tool.x"], found["velocity.tool.x"])
+    lower = setup.predict(Model(robot).with_effects([highpass("geophone.tool", frequency=1.0)]))
+    assert not np.allclose(lower["geophone.tool.x"], found["geophone.tool.x"])
 
 
 def test_values_in_si_keep_their_bits():

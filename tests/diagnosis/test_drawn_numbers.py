@@ -8,7 +8,7 @@ from scipy.integrate import trapezoid
 from scipy.optimize import minimize_scalar
 from scipy.stats import norm
 
-from picchio.diagnosis.percussion.conclude.causes import with_hum
+from picchio.diagnosis.percussion.conclude.causes import with_solved
 from picchio.diagnosis.percussion.fit.drawn import drawn_cost, width_spread
 from picchio.diagnosis.result import Cause, Value
 from picchio.model.effects.registry import effect_class
@@ -76,7 +76,7 @@ def test_a_hum_is_as_strong_as_it_is_without_noise():
         seen = float(np.sqrt((lines**2).sum() / records))
         label = ("mains_hum:deflection", float((lines**2).sum()), 2 * records)
         found = SimpleNamespace(effects=(hum("deflection", amplitude=seen),), drawn=(label,))
-        told.append(with_hum([cause], found)[0].parameters["amplitude"])
+        told.append(with_solved([cause], found)[0].parameters["amplitude"])
     values = np.array([t.value for t in told])
     assert values.mean() == pytest.approx(amplitude, rel=0.01)
     assert np.median([t.std for t in told]) == pytest.approx(values.std(), rel=0.1)

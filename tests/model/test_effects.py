@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
@@ -10,10 +11,15 @@ from scipy.integrate import solve_ivp
 
 import picchio
 from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.search.candidates import evidence_of, measure_scales
 from picchio.model.blows import Blows
+from picchio.model.conditions import Conditions
 from picchio.model.effects.registry import catalogue, effect_class, from_dict
 from picchio.model.geometry import Geometry
 from picchio.model.model import Model
+from picchio.prediction.plan import Plan
+from picchio.prediction.simulation import simulated_campaign
 from picchio.vibration.integration.integrate import Samples, integrate
 
 BLOWS = picchio.PulseTrain(force=300.0, period=0.040, width=0.004)
@@ -362,10 +368,90 @@ def test_a_wrong_model_file_is_one_clear_error(tmp_path, arm, text, said):
     assert "\n" not in str(error.value)
 
 
-def test_every_effect_has_a_size_to_try():
-    for name, kind in catalogue().items():
-        assert kind.parameters, name
-        assert kind.target_kind in TARGETS, name
+@pytest.fixture(scope="module")
+def problem(arm):
+    """Two records of other days and temperatures, with every kind of channel."""
+    start = datetime(2026, 3, 1, 8, tzinfo=UTC)
+    plan = Plan(
+        poses=[[0.3, 0.5, -0.8], [-0.4, 0.2, 0.3]],
+        directions=[DIRECTION.tolist()],
+        sample_rate=1000.0,
+        quiet=0.2,
+        length=0.4,
+        times=[start, start + timedelta(days=30)],
+        temperatures=[18.0, 30.0],
+        excitation={"force": 300.0, "period": 0.04, "width": 0.004, "hits": 6},
+        sensor=[{"channels": "accelerometer", "noise": 0.01}, {"channels": "deflection",
+                "noise": 1e-7}, {"channels": "force", "noise": 0.1}],
+    )  # fmt: skip
+    return Problem(arm, simulated_campaign(arm, plan))
+
+
+@pytest.fixture(scope="module")
+def scales(problem):
+    return measure_scales(problem, (), problem.predictions(()))
+
+
+@pytest.mark.parametrize("name", [n for n, kind in catalogue().items() if kind.shows(motion=False)])
+def test_what_is_tried_of_an_effect_changes_what_is_read(problem, scales, name):
+    """At one target at least, by more than noise: a cable holds no link that never moves.
+
+    Of what is drawn anew in every record, one step of its last number.
+    """
+    kind = effect_class(name)
+    plain = problem.residuals(())
+
+    def change(effect):
+        if kind.latent is not None:
+            numbers = np.zeros(kind.latent.size(6))
+            numbers[-1] = kind.latent.step
+            effect = effect.with_hidden({r.name: tuple(numbers) for r in problem.records})
+        moved = problem.residuals((effect,))
+        return sum(float(((a - b) ** 2).sum()) for a, b in zip(moved, plain, strict=True))
+
+    targets = kind.applies(evidence_of(problem))
+    tried = {target: kind(target).trials(scales) for target in targets}
+    assert all(tried.values())
+    assert any(
+        min(change(kind(target, **values)) for values in tried[target]) > 0.1 for target in targets
+    )
+
+
+HISTORY = picchio.MeasuredForce(
+    np.array([0.0, 0.001, 0.003, 0.004]), np.array([0.0, 310.0, 80.0, 0.0]), 0.04
+)
+
+
+@pytest.mark.parametrize("hits", [3, None])
+def test_a_measured_force_rebounds_and_lasts_longer(hits):
+    """As interpolating its samples says, echoes over the blow itself included."""
+    blows = Blows.of(HISTORY, hits, DIRECTION)
+    time = np.linspace(0.0, 0.0399, 1331)
+
+    def once(t):
+        return np.interp(t, HISTORY.time, HISTORY.samples, left=0.0, right=0.0)
+
+    bounced = effect_class("rebound")("tool", ratio=0.3, delay=0.002).blows(blows, Conditions())
+    np.testing.assert_allclose(
+        bounced.force()(time), once(time) + 0.3 * once(time - 0.002), atol=1e-6
+    )
+    longer = effect_class("pulse_width")("tool", scale=1.5).blows(blows, Conditions())
+    np.testing.assert_allclose(longer.force()(time), once(time / 1.5), atol=1e-6)
+    plain = effect_class("pulse_shape")("tool", blend=0.5)
+    with pytest.raises(InputError, match=r"pulse_shape: .* no other shape"):
+        plain.blows(blows, Conditions())
+
+
+def test_blows_longer_than_their_period_add_up():
+    """Each of the last two periods' blows is still there while the next one strikes."""
+    longer = effect_class("pulse_width")("tool", scale=8.0)
+    blows = longer.blows(Blows.of(HISTORY, None, DIRECTION).change(period=0.012), Conditions())
+    time = np.linspace(0.0, 0.0119, 331)
+    parts = [
+        np.interp((time + shift) / 8.0, HISTORY.time, HISTORY.samples, left=0.0, right=0.0)
+        for shift in (0.0, 0.012, 0.024)
+    ]
+    np.testing.assert_allclose(blows.force()(time), np.sum(parts, axis=0), atol=1e-5)
 
 
 def test_a_loaded_joint_rests_at_the_edge_of_its_play(arm, geometry):

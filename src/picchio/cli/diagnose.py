@@ -60,6 +60,9 @@ def show_diagnosis(found: Diagnosis) -> None:
     )
     for effect, target in found.leads:
         out.print(f"  {helped}: {effect} of {target}")
+    for why in dict.fromkeys(found.not_looked_for.values()):
+        names = ", ".join(name for name, reason in found.not_looked_for.items() if reason == why)
+        out.print(f"  not looked for: {names} ({why})")
     gain = found.gain
     if gain is not None:
         count = len(gain.held_out_records)

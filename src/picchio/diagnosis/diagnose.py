@@ -21,6 +21,7 @@ from picchio.diagnosis.motion.conclude.during_blows import (
 )
 from picchio.diagnosis.motion.diagnosis import diagnose_motion
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis, diagnose_percussion
+from picchio.diagnosis.percussion.search.candidates import not_looked_for
 from picchio.diagnosis.result import Diagnosis
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import effect_class
@@ -108,6 +109,7 @@ def diagnose(
                 loaded, records, without=without, progress=progress, **options
             )
             answer, details = hit.diagnosis, {"percussion": hit}
+        answer = replace(answer, not_looked_for=not_looked_for(hit.problem))
         effects = hit.extended.hypothesis.effects
         answer = replace(answer, life=_percussion_life(hit, answer, work), details=details)
     files = [*loaded.files, *records.files]

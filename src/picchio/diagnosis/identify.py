@@ -15,6 +15,7 @@ from picchio.core.errors import InputError
 from picchio.core.results import TableResult
 from picchio.diagnosis.diagnose import diagnose
 from picchio.diagnosis.result import Cause, Diagnosis, Value
+from picchio.model.effects.registry import effect_class
 from picchio.robot.annotations.sidecar import FORMAT as SIDECAR
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
@@ -111,7 +112,7 @@ class Identification(TableResult):
             **self.diagnosis.to_dict(),
             "format": FORMAT,
             "joints": [asdict(joint) for joint in self.joints],
-            "also": [c.to_dict() for c in self.diagnosis.causes if c.effect != "joint_stiffness"],
+            "also": [c.to_dict() for c in self.diagnosis.causes if not _is_of(c, "stiffness")],
             "residual": {
                 "before": gain.baseline_nrmse if gain else None,
                 "after": gain.extended_nrmse if gain else None,
@@ -173,11 +174,16 @@ def identify(
     return Identification(loaded, found, source, joints)
 
 
+def _is_of(cause: Cause, tolerance: str) -> bool:
+    """Whether a cause is about what a key of `[tolerance]` is about."""
+    return effect_class(cause.effect).tolerance == tolerance
+
+
 def _stiffness_of(
     robot: FlexibleRobot, joint: Joint, found: Diagnosis, tolerance: Tolerance
 ) -> Identified:
     for cause in found.causes:
-        if (cause.effect, cause.target) == ("joint_stiffness", joint.name):
+        if _is_of(cause, "stiffness") and cause.target == joint.name:
             value = _stiffness(robot, cause)
             why = "differs from the nominal value by more than the tolerance"
             return Identified.of(value.value, value.std, True, why)
@@ -196,7 +202,7 @@ def _damping_of(
 ) -> Identified:
     ratio = joint.damping_ratio
     for cause in found.causes:
-        if cause.effect == "modal_damping":
+        if _is_of(cause, "damping_ratio"):
             scale = cause.parameters["scale"]
             why = "the robot's modal damping differs from the nominal one, by one factor"
             return Identified.of(scale.value * ratio, scale.std * ratio, True, why)
@@ -235,18 +241,19 @@ def identified_sidecar(
     remarks: list[str] = []
     tool = _tool(robot)
     for cause in diagnosis.causes:
-        if cause.effect == "joint_stiffness" and cause.target in joints:
+        key = effect_class(cause.effect).sidecar
+        if key == "stiffness" and cause.target in joints:
             value = _stiffness(robot, cause)
             entry = joints[cause.target]
             entry.pop("stiffness_curve", None)
             entry.pop("estimated", None)
             entry |= {"stiffness": value.value, "source": _said(source, "stiffness", value)}
-        elif cause.effect == "joint_inertia" and _ratio(robot, cause.target):
+        elif key == "rotor_inertia" and _ratio(robot, cause.target):
             ratio = _ratio(robot, cause.target)
             value = cause.parameters["inertia"]
             joints[cause.target]["rotor_inertia"] = max(value.value, 0.0) / ratio**2
             remarks.append(_remark(cause) + f" (written as rotor_inertia, over {ratio:g}^2)")
-        elif cause.effect == "payload" and tool["mass"] + cause.parameters["mass"].value >= 0.0:
+        elif key == "mass" and tool["mass"] + cause.parameters["mass"].value >= 0.0:
             value = cause.parameters["mass"]
             tool["mass"] += value.value
             tool["source"] = _said(source, "mass", value)

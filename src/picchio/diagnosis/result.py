@@ -165,6 +165,7 @@ class Diagnosis(Result):
         life_note: what the life takes into account, or why there is none; empty where it is plain.
         next_measurement: what to measure to know more; None where there is nothing to ask.
         note: why, where it is not what `VERDICTS` says; empty otherwise.
+        not_looked_for: effect -> why these records cannot show it; of percussion records.
         scores: every candidate's score, for the report: dicts with effect, target, numbers.
         kinds: of a campaign with percussion and motion records, each kind's verdict and gain.
         shared: of such a campaign, what both kinds say of the causes that both could show.
@@ -185,6 +186,7 @@ class Diagnosis(Result):
     life_note: str = ""
     next_measurement: Mapping[str, Any] | None = None
     note: str = ""
+    not_looked_for: Mapping[str, str] = field(default_factory=dict)
     scores: tuple[Mapping[str, Any], ...] = ()
     kinds: Mapping[str, Any] = field(default_factory=dict)
     shared: tuple[Mapping[str, Any], ...] = ()
@@ -226,6 +228,7 @@ class Diagnosis(Result):
             "note": self.note or None,
             **more,
             **({"life_note": self.life_note} if self.life_note else {}),
+            "not_looked_for": dict(self.not_looked_for),
             "scores": self.scores,
             **self.extra,
         }

@@ -81,6 +81,9 @@ class Effect(ABC):
             empty.
         tolerance: the key of `[tolerance]` that says how far its `scale` may be from 1 without
             being a cause; empty where nothing is tolerated.
+        sidecar: the key of a sidecar that its value belongs to: "stiffness" or "rotor_inertia" of
+            a joint, "mass" of the tool; empty where a sidecar has no place for it.
+        urdf: attribute of URDF's <dynamics> -> the parameter that it states.
         needs: the effect without which, at the same target, this one has no meaning.
         usual: where effects explain a motion equally well, the smallest comes first.
         elastic: in a motion, it winds the gear up, which is looked for once loads are known.
@@ -109,6 +112,8 @@ class Effect(ABC):
     discrete: ClassVar[bool] = False
     mark: ClassVar[str] = ""
     tolerance: ClassVar[str] = ""
+    sidecar: ClassVar[str] = ""
+    urdf: ClassVar[Mapping[str, str]] = {}
     needs: ClassVar[str] = ""
     usual: ClassVar[int] = 99
     elastic: ClassVar[bool] = False
@@ -250,6 +255,18 @@ class Effect(ABC):
         if not cls.shows(evidence.motion) or cls.why_not(evidence):
             return []
         return cls.targets(evidence)
+
+    @classmethod
+    def yields_along(cls, target: str) -> str:
+        """The coordinate along which a spring of its own yields under the robot's load.
+
+        Args:
+            target: of the effect.
+
+        Returns:
+            a name of `WideChain`, such as a joint's; empty where there is none.
+        """
+        return ""
 
     # Hooks: an effect overrides those that concern it ----------------------------------------
 

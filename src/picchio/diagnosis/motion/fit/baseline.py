@@ -7,16 +7,10 @@ from lxml import etree
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.state import State
 from picchio.model.effects.effect import Effect
-from picchio.model.effects.registry import effect_class
+from picchio.model.effects.registry import catalogue
 from picchio.model.motion import TORQUE
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.urdf.xml import parse_urdf, read_urdf_bytes
-
-# URDF's <dynamics> attributes, and the effects that are then in the model, of unknown size.
-_DYNAMICS = {
-    "damping": ("viscous_friction", "coefficient"),
-    "friction": ("coulomb_friction", "torque"),
-}
 
 
 def baseline(system: System, tolerance: float) -> State:
@@ -51,11 +45,12 @@ def stated_friction(robot: FlexibleRobot, joints: list[str]) -> tuple[Effect, ..
 
 def _stated(joint: str, dynamics: etree._Element) -> list[Effect]:
     found = []
-    for attribute, (name, parameter) in _DYNAMICS.items():
+    stated = [(*each, kind) for kind in catalogue().values() for each in kind.urdf.items()]
+    for attribute, parameter, kind in sorted(stated, key=lambda each: each[:2]):
         try:
             value = float(dynamics.get(attribute) or 0.0)
         except ValueError:
             continue
         if value > 0.0:
-            found.append(effect_class(name)(joint, **{parameter: value}))
+            found.append(kind(joint, **{parameter: value}))
     return found

@@ -16,6 +16,7 @@ from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
+from picchio.model.effects.registry import effect_class
 
 _PARALLEL = 1.0 - 1e-9
 # What is known of a cause's number beforehand, in typical sizes or e-folds: hardly anything.
@@ -43,11 +44,11 @@ def bic_difference(problem: Problem, best: Fit, other: Fit) -> float:
 
 def _in_series(labels: Set[str], records: Sequence[MeasuredRecord]) -> bool:
     """Whether these are a joint's stiffness and a base that moves the tool as the joint does."""
-    targets = dict(label.split(":", 1) for label in labels)
-    if len(labels) != 2 or set(targets) != {"joint_stiffness", "base_compliance"}:
+    pairs = [label.split(":", 1) for label in labels]
+    springs = [effect_class(name).yields_along(target) for name, target in pairs]
+    if len(springs) != 2 or not all(springs):
         return False
-    names = targets["joint_stiffness"], f"base.{targets['base_compliance']}"
-    return all(_moves_alike(record, *names) for record in records)
+    return all(_moves_alike(record, *springs) for record in records)
 
 
 def _moves_alike(record: MeasuredRecord, joint: str, axis: str) -> bool:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.motion import Motion
 
@@ -17,6 +20,7 @@ class ViscousFriction(Effect):
     )
     linear = ("coefficient",)
     meaning = "lubricant and seals resist in proportion to the speed"
+    urdf: ClassVar[Mapping[str, str]] = {"damping": "coefficient"}
     usual = 3
     source = "Swevers, Verdonck, De Schutter, IEEE Control Systems 27(5), 2007"
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.elements import Element, ElementKind
@@ -23,6 +26,7 @@ class CoulombFriction(Effect):
     )
     linear = ("torque",)
     meaning = "dry friction between link and motor side"
+    urdf: ClassVar[Mapping[str, str]] = {"friction": "torque"}
     motion_meaning = (
         "dry friction between motor and link; a motion does not tell on which side of the gear"
     )

@@ -29,6 +29,11 @@ class BaseCompliance(Effect):
     )
     meaning = "pedestal, floor or bolts yield under the whole robot"
 
+    @classmethod
+    def yields_along(cls, target: str) -> str:
+        """The base's coordinate."""
+        return f"base.{target}"
+
     def unit(self, parameter: str) -> str:
         """As of any effect; along an axis per metre, where about it per radian."""
         unit = super().unit(parameter)

@@ -21,6 +21,7 @@ class JointInertia(Effect):
     )
     linear = ("inertia",)
     meaning = "something unmodelled turns with the joint's link side"
+    sidecar = "rotor_inertia"
     motion_meaning = (
         "something unmodelled turns with the joint: most often the motor's rotor, its inertia "
         "times the ratio squared"

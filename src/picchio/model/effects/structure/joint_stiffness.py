@@ -26,6 +26,7 @@ class JointStiffness(Effect):
         ),
     )
     meaning = "the joint's spring is softer or stiffer than stated"
+    sidecar = "stiffness"
     told_by = "slowly under load, then fast: a delay grows with speed, a spring does not"
     inverse = ("scale",)
     elastic = True
@@ -33,6 +34,11 @@ class JointStiffness(Effect):
     tolerance = "stiffness"
     mark = "spring"
     source = "Nie et al. 2016, eq. 5: K"
+
+    @classmethod
+    def yields_along(cls, target: str) -> str:
+        """The joint."""
+        return target
 
     @classmethod
     def targets(cls, evidence: Evidence) -> list[str]:

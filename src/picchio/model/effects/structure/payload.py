@@ -16,6 +16,7 @@ class Payload(Effect):
     target_kind = "tool"
     parameters = (parameter("mass", "kg", lower=-500.0, upper=5000.0, meaning="added mass"),)
     meaning = "the tool is heavier (or lighter) than stated"
+    sidecar = "mass"
     told_by = "once with a known mass at the tool and once without"
     usual = 1
     mark = "added mass"
