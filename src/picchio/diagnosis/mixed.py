@@ -35,7 +35,7 @@ from picchio.diagnosis.motion.fit.least_squares import fit as fit_motion
 from picchio.diagnosis.motion.fit.least_squares import len_of
 from picchio.diagnosis.motion.fit.state import State
 from picchio.diagnosis.motion.search.candidates import evidence_of
-from picchio.diagnosis.percussion.conclude.causes import fitted_values
+from picchio.diagnosis.percussion.conclude.causes import fitted_nuisances, fitted_values
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis, diagnose_percussion
 from picchio.diagnosis.percussion.fit.drawn import refit
@@ -362,22 +362,33 @@ def _joined(
     problem, said = percussion.problem, percussion.diagnosis
     start = percussion.extended if said.verdict != "unexplained" else percussion.baseline
     hypothesis = replace(start.hypothesis, priors=())
-    for label in (both | carried) & candidates:
+    for label in sorted((both | carried) & candidates):
         hypothesis = hypothesis.informed(moves[label].effect, moves[label].std)
     if hypothesis.priors:
         whole = refit(problem, hypothesis, problem.records)
-        values = {e.label: fitted_values(problem, whole, e) for e in whole.hypothesis.causes}
-        causes = tuple(
-            replace(c, parameters=_widened(values[label], blows.get(label), moves.get(label)))
-            for c in said.causes for label in (f"{c.effect}:{c.target}",)
-        )  # fmt: skip
-        others = tuple(_informed(h, [moves[x] for x in both | carried]) for h in percussion.others)
+        effects = {e.label: e for e in whole.hypothesis.causes}
+
+        def valued(cause: Cause) -> Cause:
+            label = f"{cause.effect}:{cause.target}"
+            if effects[label].latent is not None:
+                return cause  # its numbers are each record's own
+            values = fitted_values(problem, whole, effects[label])
+            return replace(cause, parameters=_widened(values, blows.get(label), moves.get(label)))
+
+        known = [moves[label] for label in sorted(both | carried)]
         percussion = replace(
-            percussion, extended=whole, after=fit_evidence(problem, whole), others=others,
-            diagnosis=replace(said, causes=causes),
-        )  # fmt: skip
+            percussion,
+            extended=whole,
+            after=fit_evidence(problem, whole),
+            others=tuple(_informed(other, known) for other in percussion.others),
+            diagnosis=replace(
+                said,
+                causes=tuple(valued(cause) for cause in said.causes),
+                nuisances=fitted_nuisances(whole),
+            ),
+        )
     if both:
-        motion = refitted(motion, [blows[label] for label in both])
+        motion = refitted(motion, [blows[label] for label in sorted(both)])
     return percussion, motion
 
 
