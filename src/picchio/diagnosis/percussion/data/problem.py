@@ -22,8 +22,6 @@ from picchio.prediction.percussion import PercussionSetup, percussion_setups
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.vibration.integration.integrate import Samples
 
-# Samples that stand so near a jump of the force that either side of it may be meant.
-
 # A sample this near a jump of the force, but not on it, holds neither side for sure: a sensor of
 # finite bandwidth smears a jump, and what keeps it from aliasing by about half a sample.
 _NEAR_EDGE = 1.8e-4
