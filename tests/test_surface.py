@@ -21,8 +21,9 @@ from picchio.fatigue.sn.test_table import SNTests
 from picchio.studies.maps.places import joint_grid
 
 FUNCTIONS = {
-    "allowable", "annotate", "assess", "check", "envelope", "fit_sn", "import_record", "place",
-    "report", "reproduce", "robots", "simulate", "uncertain_life", "view", "workspace_map",
+    "allowable", "annotate", "assess", "check", "diagnose", "envelope", "fit_sn", "identify",
+    "import_record", "place", "report", "reproduce", "robots", "simulate", "uncertain_life", "view",
+    "workspace_map",
 }  # fmt: skip
 # What they return stands within the JSON of `picchio assess`.
 PARTS_OF_ASSESS = {"allowable", "uncertain_life"}
@@ -93,6 +94,16 @@ def test_no_module_stands_in_the_way_of_a_name() -> None:
         assert value.__doc__, name
 
 
+def rubbing(robot: picchio.FlexibleRobot) -> picchio.Campaign:
+    """Motion records of an arm whose second joint has dry friction."""
+    sys.path.insert(0, str(Path(__file__).parent / "diagnosis"))
+    try:
+        import motion_records
+    finally:
+        sys.path.pop(0)
+    return motion_records.campaign(robot, {("coulomb", 1): 30.0}, 1)
+
+
 def calls(folder: Path) -> dict[str, Any]:
     """Every public function, called on something small."""
     robot = picchio.load_robot("fanuc_like_3dof")
@@ -108,8 +119,10 @@ def calls(folder: Path) -> dict[str, Any]:
         "annotate": lambda: picchio.annotate("fanuc_like_3dof"),
         "assess": lambda: picchio.assess(robot, task),
         "check": lambda: picchio.check(picchio.simulate(robot, folder / "plan.toml").campaign),
+        "diagnose": lambda: picchio.diagnose(robot, rubbing(robot)),
         "envelope": lambda: picchio.envelope(robot, POSE, BLOWS),
         "fit_sn": lambda: picchio.fit_sn(SNTests(stress, cycles, np.ones(16, bool)), knee=False),
+        "identify": lambda: picchio.identify(robot, rubbing(robot)),
         "import_record": lambda: picchio.import_record(
             folder / "hit.csv", mapping=folder / "mapping.toml"
         ),
