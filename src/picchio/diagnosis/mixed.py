@@ -21,8 +21,9 @@ side of the gear from percussion records: a motion may show more of these than b
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any, Literal
 
 from picchio.campaign.campaign import Campaign
@@ -195,23 +196,16 @@ def _motion_estimates(motion: Diagnosis) -> dict[str, Estimate]:
     return found
 
 
-def _percussion_estimates(
-    percussion: PercussionDiagnosis, hypothesis: Hypothesis | None = None
-) -> dict[str, Estimate]:
+def _percussion_estimates(percussion: PercussionDiagnosis) -> dict[str, Estimate]:
     """Label -> a shared cause that the percussion records claim, by these records alone."""
-    if hypothesis is None:
-        if not percussion.diagnosis.causes:
-            return {}
-        hypothesis = percussion.extended.hypothesis
-    problem = percussion.problem
-    shared = [e for e in hypothesis.causes if _shared(type(e))]
-    if not shared:
+    problem, hypothesis = percussion.problem, percussion.extended.hypothesis
+    claimed = hypothesis.causes if percussion.diagnosis.causes else ()
+    if not any(_shared(type(effect)) for effect in claimed):
         return {}
     alone = refit(problem, replace(hypothesis, priors=()), problem.records)
-    labels = {effect.label for effect in shared}
     found = {}
     for effect in alone.hypothesis.causes:
-        if effect.label in labels:
+        if _shared(type(effect)):
             values = fitted_values(problem, alone, effect)
             found[effect.label] = Estimate(effect, _std(effect, values), values)
     return found
@@ -246,12 +240,18 @@ def _fall(system: System, before: MotionFit, after: MotionFit) -> float:
 
 
 def _helps_motion(percussion: PercussionDiagnosis, motion: Diagnosis) -> list[Estimate]:
-    """Causes that percussion claims and the motion search lacks, though they help there."""
+    """Causes that percussion claims and the motion search lacks, though they help there.
+
+    So does what motion records cannot tell from a cause of theirs: it may stand in its place.
+    """
     claimed = {f"{c.effect}:{c.target}" for c in motion.causes}
+    equivalent = {f"{name}:{target}" for each in motion.alternatives for name, target in each}
     return [
-        cause for label, cause in _percussion_estimates(percussion).items()
-        if label not in claimed and _motion_gain(motion, cause) > _RULED_OUT
-    ]  # fmt: skip
+        cause
+        for label, cause in _percussion_estimates(percussion).items()
+        if label not in claimed
+        and (label in equivalent or _motion_gain(motion, cause) > _RULED_OUT)
+    ]
 
 
 def _compared(
@@ -259,7 +259,7 @@ def _compared(
 ) -> tuple[PercussionDiagnosis, list[Comparison]]:
     """Comparisons with the first of percussion's equivalent sets that no motion contradicts."""
     first: tuple[PercussionDiagnosis, list[Comparison]] | None = None
-    for candidate in (percussion, *_with_alternatives(percussion)):
+    for candidate in chain([percussion], _with_alternatives(percussion)):
         found = candidate, _comparisons(candidate, motion)
         first = first or found
         if not any(c.status == "contradiction" for c in found[1]):
@@ -268,10 +268,9 @@ def _compared(
     return first
 
 
-def _with_alternatives(percussion: PercussionDiagnosis) -> list[PercussionDiagnosis]:
+def _with_alternatives(percussion: PercussionDiagnosis) -> Iterator[PercussionDiagnosis]:
     """The diagnosis with each of the alternative sets in place of the one that is claimed."""
-    found, problem = [], percussion.problem
-    said = percussion.diagnosis
+    problem, said = percussion.problem, percussion.diagnosis
     mine = tuple((c.effect, c.target) for c in said.causes)
     for hypothesis, pairs in zip(percussion.others, said.alternatives, strict=True):
         whole = refit(problem, hypothesis, problem.records)
@@ -280,14 +279,15 @@ def _with_alternatives(percussion: PercussionDiagnosis) -> list[PercussionDiagno
             Cause(e.name, e.target, sure, fitted_values(problem, whole, e))
             for e in whole.hypothesis.causes
         )
-        others = [percussion.extended.hypothesis, *(h for h in percussion.others
-                                                     if h is not hypothesis)]  # fmt: skip
+        others = (
+            percussion.extended.hypothesis,
+            *(h for h in percussion.others if h != hypothesis),
+        )
         sets = (mine, *(p for p in said.alternatives if p != pairs))
-        found.append(replace(
-            percussion, extended=whole, after=fit_evidence(problem, whole), others=tuple(others),
+        yield replace(
+            percussion, extended=whole, after=fit_evidence(problem, whole), others=others,
             diagnosis=replace(said, causes=causes, alternatives=sets),
-        ))  # fmt: skip
-    return found
+        )  # fmt: skip
 
 
 def _comparisons(percussion: PercussionDiagnosis, motion: Diagnosis) -> list[Comparison]:
