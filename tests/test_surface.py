@@ -95,6 +95,16 @@ def test_no_module_stands_in_the_way_of_a_name() -> None:
         assert value.__doc__, name
 
 
+def rubbing(robot: picchio.FlexibleRobot) -> picchio.Campaign:
+    """Motion records of an arm whose second joint has dry friction."""
+    sys.path.insert(0, str(Path(__file__).parent / "diagnosis"))
+    try:
+        import motion_records
+    finally:
+        sys.path.pop(0)
+    return motion_records.campaign(robot, {("coulomb", 1): 30.0}, 1)
+
+
 def calls(folder: Path) -> dict[str, Any]:
     """Every public function, called on something small."""
     robot = picchio.load_robot("fanuc_like_3dof")
@@ -110,16 +120,12 @@ def calls(folder: Path) -> dict[str, Any]:
         "annotate": lambda: picchio.annotate("fanuc_like_3dof"),
         "assess": lambda: picchio.assess(robot, task),
         "check": lambda: picchio.check(picchio.simulate(robot, folder / "plan.toml").campaign),
-        "diagnose": lambda: picchio.diagnose(
-            robot, picchio.simulate(robot, folder / "plan.toml").campaign, workers=1
-        ),
+        "diagnose": lambda: picchio.diagnose(robot, rubbing(robot)),
         "effects": lambda: picchio.effects("payload"),
         "envelope": lambda: picchio.envelope(robot, POSE, BLOWS),
         "fit_sn": lambda: picchio.fit_sn(SNTests(stress, cycles, np.ones(16, bool)), knee=False),
         "formats": lambda: picchio.formats("task"),
-        "identify": lambda: picchio.identify(
-            robot, picchio.simulate(robot, folder / "plan.toml").campaign, workers=1
-        ),
+        "identify": lambda: picchio.identify(robot, rubbing(robot)),
         "import_record": lambda: picchio.import_record(
             folder / "hit.csv", mapping=folder / "mapping.toml"
         ),

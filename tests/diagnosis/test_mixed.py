@@ -8,12 +8,17 @@ from __future__ import annotations
 
 import json
 import math
+import tomllib
 
 import motion_records
+import numpy as np
+import pinocchio as pin
 import pytest
 
 import picchio
 from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
+from picchio.diagnosis.identify import identification
 from picchio.diagnosis.mixed import _agreement, joint_verdict
 from picchio.diagnosis.result import Estimate, Gain, Value
 from picchio.model.effects.registry import effect_class
@@ -63,7 +68,7 @@ def test_both_kinds_of_records_are_used(case, found):
     }  # fmt: skip
     assert gain.explained > 0.99
     assert any(name.startswith("stiffness.") for name in found.nuisances)
-    assert any(name.startswith("inertia.") for name in found.nuisances)
+    assert set(found.details["motion"].nuisances) <= set(found.nuisances)
 
 
 def test_what_both_show_has_one_value_that_both_determine(found):
@@ -103,10 +108,9 @@ def test_the_extended_model_and_the_json_are_whole(found, tmp_path):
     assert repr(found).startswith("<Diagnosis: named, ") and "payload" in found._repr_html_()
 
 
-def test_identified_joints_hold_what_both_kinds_say(case, monkeypatch, found):
+def test_identified_joints_hold_what_both_kinds_say(case, found):
     robot, campaign, truth = case
-    monkeypatch.setattr("picchio.diagnosis.identify.diagnose", lambda *_, **__: found)
-    told = picchio.identify(robot, campaign)
+    told = identification(campaign, found)
     said = json.loads(json.dumps(told.to_dict(), allow_nan=False))
     assert said["format"] == "picchio-identification/1"
     joints = {j["name"]: j for j in said["joints"]}
@@ -119,7 +123,9 @@ def test_identified_joints_hold_what_both_kinds_say(case, monkeypatch, found):
         assert stiffness["told"] and stiffness["value"] == pytest.approx(true, rel=0.01)
     assert {c["effect"] for c in said["also"]} == {"payload", "viscous_friction"}
     assert said["residual"]["after"] < 0.2 * said["residual"]["before"]
-    assert "payload" not in told.sidecar_text() or "mass" in told.sidecar_text()
+    sidecar = tomllib.loads(told.sidecar_text())
+    assert sidecar["joint"]["joint_1"]["stiffness"] == joints["joint_1"]["stiffness"]["value"]
+    assert sidecar["tool"]["mass"] == pytest.approx(robot.tool.mass + 5.0, rel=0.01)
     assert "viscous_friction of joint_3" in told.sidecar_text()
     assert list(told.to_frame().index) == list(robot.flexible_names)
 
@@ -146,6 +152,49 @@ def test_friction_that_only_a_motion_shows_is_in_the_drive():
     }  # fmt: skip
     scale = next(c for c in found.causes if c.effect == "joint_stiffness").parameters["scale"]
     assert scale.value == pytest.approx(0.75 * truth["nuisances"]["stiffness"]["joint_2"], rel=0.01)
+
+
+def turning(robot, mass, seed):
+    """Only the first joint moves: a payload, an inertia of that joint and a gain are one."""
+    rng = np.random.default_rng(seed)
+    model = robot.rigid._model.copy()
+    frame = model.frames[model.getFrameId(robot.tool_frame)]
+    point = pin.Inertia(mass, np.zeros(3), np.zeros((3, 3)))
+    model.appendBodyToJoint(frame.parentJoint, point, frame.placement)
+    time = np.arange(5000) / motion_records.RATE
+    records = []
+    for number in range(2):
+        first = motion_records.wave(rng, time)
+        q = np.array([first, np.full(time.size, 0.4), np.full(time.size, -0.6)])
+        v = np.gradient(q, 1.0 / motion_records.RATE, axis=1)
+        a = np.gradient(v, 1.0 / motion_records.RATE, axis=1)
+        data = model.createData()
+        states = zip(q.T, v.T, a.T, strict=True)
+        torque = np.array([pin.rnea(model, data, *state)[0] for state in states])
+        torque += 0.02 * torque.std() * rng.normal(size=time.size)
+        channels = {f"motor_position.{name}": x
+                    for name, x in zip(robot.joint_names, q, strict=True)}  # fmt: skip
+        channels["torque.joint_1"] = torque
+        records.append(Record.from_arrays(f"m{number}.csv", time, channels, kind="motion"))
+    return records
+
+
+def test_blows_tell_apart_what_a_motion_cannot():
+    robot, campaign, _ = mixed([("payload", "tool", {"mass": 12.0})], {})
+    moving = turning(robot, 12.0, 1)
+    alone = picchio.diagnose(robot, Campaign.from_records(moving))
+    assert alone.verdict == "ambiguous"
+    every = pairs(alone) | {pair for each in alone.alternatives for pair in each}
+    assert {("payload", "tool"), ("joint_inertia", "joint_1")} <= every
+    hit = [record for record in campaign if record.kind == "percussion"]
+    table = campaign.table.model_dump(exclude_none=True)
+    kept = {key: value for key, value in table.items() if key not in ("format", "record")}
+    found = picchio.diagnose(robot, Campaign.from_records([*hit, *moving], **kept), workers=1)
+    assert (found.verdict, pairs(found)) == ("named", {("payload", "tool")})
+    assert not found.alternatives
+    assert found.kinds["motion"]["verdict"] == "named"
+    mass = found.causes[0].parameters["mass"]
+    assert mass.value == pytest.approx(12.0, rel=0.01)
 
 
 def test_nothing_wrong_in_either_kind_is_nothing_wrong():

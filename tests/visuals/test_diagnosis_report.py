@@ -28,7 +28,8 @@ from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.diagnosis.result import Cause, Diagnosis, Value
 from picchio.model.effects.registry import effect_class
 from picchio.robot.loading.load import load_robot
-from picchio.visuals.report.diagnosis import _ask, diagnosis_report, headline
+from picchio.visuals.report.diagnosis import _ask, diagnosis_report
+from picchio.visuals.report.headline import headline
 from picchio.visuals.report.page import number, spread
 from picchio.visuals.report.residual import residual_report
 from picchio.visuals.scene.diagnosed import diagnosis_scene

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -72,6 +72,7 @@ class Identification(TableResult):
     """
 
     INDEX = "joint"
+    UNITS: ClassVar = {f"stiffness_{part}": "N*m/rad" for part in ("value", "low", "high")}
 
     robot: FlexibleRobot
     diagnosis: Diagnosis
@@ -160,18 +161,28 @@ def identify(
     records = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
     moves = any(record.kind == "motion" for record in records)
     loaded = load_robot(robot, flex=flex, tool=tool, allow_rigid=moves)
-    found = diagnose(loaded, records, workers=workers, progress=progress)
-    folder = records.folder
-    source = "memory" if folder is None else folder.resolve().name
+    return identification(records, diagnose(loaded, records, workers=workers, progress=progress))
+
+
+def identification(campaign: Campaign, found: Diagnosis) -> Identification:
+    """What a diagnosis of these records says of every joint.
+
+    Args:
+        campaign: the records.
+        found: the answer of `picchio.diagnose`.
+    """
+    assert found.model is not None
+    robot, tolerance = found.model.robot, campaign.tolerance
+    source = "memory" if campaign.folder is None else campaign.folder.resolve().name
     joints = tuple(
         IdentifiedJoint(
             joint.name,
-            _stiffness_of(loaded, joint, found, records.tolerance),
-            _damping_of(loaded, joint, found, records.tolerance),
+            _stiffness_of(robot, joint, found, tolerance),
+            _damping_of(robot, joint, found, tolerance),
         )
-        for joint in loaded.flexible_joints
+        for joint in robot.flexible_joints
     )
-    return Identification(loaded, found, source, joints)
+    return Identification(robot, found, source, joints)
 
 
 def _is_of(cause: Cause, tolerance: str) -> bool:

@@ -21,8 +21,9 @@ side of the gear from percussion records: a motion may show more of these than b
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any, Literal
 
 from picchio.campaign.campaign import Campaign
@@ -35,7 +36,7 @@ from picchio.diagnosis.motion.fit.least_squares import fit as fit_motion
 from picchio.diagnosis.motion.fit.least_squares import len_of
 from picchio.diagnosis.motion.fit.state import State
 from picchio.diagnosis.motion.search.candidates import evidence_of
-from picchio.diagnosis.percussion.conclude.causes import fitted_values
+from picchio.diagnosis.percussion.conclude.causes import fitted_nuisances, fitted_values
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis, diagnose_percussion
 from picchio.diagnosis.percussion.fit.drawn import refit
@@ -195,23 +196,16 @@ def _motion_estimates(motion: Diagnosis) -> dict[str, Estimate]:
     return found
 
 
-def _percussion_estimates(
-    percussion: PercussionDiagnosis, hypothesis: Hypothesis | None = None
-) -> dict[str, Estimate]:
+def _percussion_estimates(percussion: PercussionDiagnosis) -> dict[str, Estimate]:
     """Label -> a shared cause that the percussion records claim, by these records alone."""
-    if hypothesis is None:
-        if not percussion.diagnosis.causes:
-            return {}
-        hypothesis = percussion.extended.hypothesis
-    problem = percussion.problem
-    shared = [e for e in hypothesis.causes if _shared(type(e))]
-    if not shared:
+    problem, hypothesis = percussion.problem, percussion.extended.hypothesis
+    claimed = hypothesis.causes if percussion.diagnosis.causes else ()
+    if not any(_shared(type(effect)) for effect in claimed):
         return {}
     alone = refit(problem, replace(hypothesis, priors=()), problem.records)
-    labels = {effect.label for effect in shared}
     found = {}
     for effect in alone.hypothesis.causes:
-        if effect.label in labels:
+        if _shared(type(effect)):
             values = fitted_values(problem, alone, effect)
             found[effect.label] = Estimate(effect, _std(effect, values), values)
     return found
@@ -246,12 +240,18 @@ def _fall(system: System, before: MotionFit, after: MotionFit) -> float:
 
 
 def _helps_motion(percussion: PercussionDiagnosis, motion: Diagnosis) -> list[Estimate]:
-    """Causes that percussion claims and the motion search lacks, though they help there."""
+    """Causes that percussion claims and the motion search lacks, though they help there.
+
+    So does what motion records cannot tell from a cause of theirs: it may stand in its place.
+    """
     claimed = {f"{c.effect}:{c.target}" for c in motion.causes}
+    equivalent = {f"{name}:{target}" for each in motion.alternatives for name, target in each}
     return [
-        cause for label, cause in _percussion_estimates(percussion).items()
-        if label not in claimed and _motion_gain(motion, cause) > _RULED_OUT
-    ]  # fmt: skip
+        cause
+        for label, cause in _percussion_estimates(percussion).items()
+        if label not in claimed
+        and (label in equivalent or _motion_gain(motion, cause) > _RULED_OUT)
+    ]
 
 
 def _compared(
@@ -259,7 +259,7 @@ def _compared(
 ) -> tuple[PercussionDiagnosis, list[Comparison]]:
     """Comparisons with the first of percussion's equivalent sets that no motion contradicts."""
     first: tuple[PercussionDiagnosis, list[Comparison]] | None = None
-    for candidate in (percussion, *_with_alternatives(percussion)):
+    for candidate in chain([percussion], _with_alternatives(percussion)):
         found = candidate, _comparisons(candidate, motion)
         first = first or found
         if not any(c.status == "contradiction" for c in found[1]):
@@ -268,10 +268,9 @@ def _compared(
     return first
 
 
-def _with_alternatives(percussion: PercussionDiagnosis) -> list[PercussionDiagnosis]:
+def _with_alternatives(percussion: PercussionDiagnosis) -> Iterator[PercussionDiagnosis]:
     """The diagnosis with each of the alternative sets in place of the one that is claimed."""
-    found, problem = [], percussion.problem
-    said = percussion.diagnosis
+    problem, said = percussion.problem, percussion.diagnosis
     mine = tuple((c.effect, c.target) for c in said.causes)
     for hypothesis, pairs in zip(percussion.others, said.alternatives, strict=True):
         whole = refit(problem, hypothesis, problem.records)
@@ -280,14 +279,15 @@ def _with_alternatives(percussion: PercussionDiagnosis) -> list[PercussionDiagno
             Cause(e.name, e.target, sure, fitted_values(problem, whole, e))
             for e in whole.hypothesis.causes
         )
-        others = [percussion.extended.hypothesis, *(h for h in percussion.others
-                                                     if h is not hypothesis)]  # fmt: skip
+        others = (
+            percussion.extended.hypothesis,
+            *(h for h in percussion.others if h != hypothesis),
+        )
         sets = (mine, *(p for p in said.alternatives if p != pairs))
-        found.append(replace(
-            percussion, extended=whole, after=fit_evidence(problem, whole), others=tuple(others),
+        yield replace(
+            percussion, extended=whole, after=fit_evidence(problem, whole), others=others,
             diagnosis=replace(said, causes=causes, alternatives=sets),
-        ))  # fmt: skip
-    return found
+        )  # fmt: skip
 
 
 def _comparisons(percussion: PercussionDiagnosis, motion: Diagnosis) -> list[Comparison]:
@@ -362,22 +362,33 @@ def _joined(
     problem, said = percussion.problem, percussion.diagnosis
     start = percussion.extended if said.verdict != "unexplained" else percussion.baseline
     hypothesis = replace(start.hypothesis, priors=())
-    for label in (both | carried) & candidates:
+    for label in sorted((both | carried) & candidates):
         hypothesis = hypothesis.informed(moves[label].effect, moves[label].std)
     if hypothesis.priors:
         whole = refit(problem, hypothesis, problem.records)
-        values = {e.label: fitted_values(problem, whole, e) for e in whole.hypothesis.causes}
-        causes = tuple(
-            replace(c, parameters=_widened(values[label], blows.get(label), moves.get(label)))
-            for c in said.causes for label in (f"{c.effect}:{c.target}",)
-        )  # fmt: skip
-        others = tuple(_informed(h, [moves[x] for x in both | carried]) for h in percussion.others)
+        effects = {e.label: e for e in whole.hypothesis.causes}
+
+        def valued(cause: Cause) -> Cause:
+            label = f"{cause.effect}:{cause.target}"
+            if effects[label].latent is not None:
+                return cause  # its numbers are each record's own
+            values = fitted_values(problem, whole, effects[label])
+            return replace(cause, parameters=_widened(values, blows.get(label), moves.get(label)))
+
+        known = [moves[label] for label in sorted(both | carried)]
         percussion = replace(
-            percussion, extended=whole, after=fit_evidence(problem, whole), others=others,
-            diagnosis=replace(said, causes=causes),
-        )  # fmt: skip
+            percussion,
+            extended=whole,
+            after=fit_evidence(problem, whole),
+            others=tuple(_informed(other, known) for other in percussion.others),
+            diagnosis=replace(
+                said,
+                causes=tuple(valued(cause) for cause in said.causes),
+                nuisances=fitted_nuisances(whole),
+            ),
+        )
     if both:
-        motion = refitted(motion, [blows[label] for label in both])
+        motion = refitted(motion, [blows[label] for label in sorted(both)])
     return percussion, motion
 
 

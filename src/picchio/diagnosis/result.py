@@ -29,6 +29,7 @@ hardly ever are without being told as a set.
 """
 
 FORMAT = "picchio-diagnosis/1"
+_SHOWN = 3  # causes that one line names
 Verdict = Literal["nothing-wrong", "named", "ambiguous", "partial", "unexplained"]
 VERDICTS: dict[str, str] = {
     "nothing-wrong": "the residual is noise",
@@ -234,8 +235,11 @@ class Diagnosis(Result):
         }
 
     def _headline(self) -> str:
-        causes = " and ".join(f"{c.effect.replace('_', ' ')} of {c.target}" for c in self.causes)
+        named = dict.fromkeys(f"{c.effect.replace('_', ' ')} of {c.target}" for c in self.causes)
+        causes = " and ".join(list(named)[:_SHOWN])
         text = self.verdict + (f", {causes}" if causes else "")
+        if len(named) > _SHOWN:
+            text += f" and {len(named) - _SHOWN} more"
         if self.gain is not None and self.gain.explained is not None and self.causes:
             text += f"; {100.0 * self.gain.explained:.1f} % of the error explained"
         return text

@@ -96,7 +96,9 @@ class Spectra:
 def spectra(problem: Problem, fit: Fit) -> Spectra:
     """By frequency, all records together; records of the first one's clock."""
     step = fit.records[0].setup.samples.step
-    modes = _modes(problem)
+    found = problem.natural_frequencies
+    ends = zip(found.min(axis=0), found.max(axis=0), strict=True)
+    modes = [(float(low), float(high)) for low, high in ends]
     longest = max(r.setup.samples.count for r in fit.records) * step
     high = min(0.5 / step, _HIGHEST * max(m[1] for m in modes))
     edges = np.geomspace(1.0 / longest, high, _BANDS + 1)
@@ -283,17 +285,3 @@ def transfers(
 
 def _group(record: MeasuredRecord, name: str) -> str:
     return next(c.group for c in record.setup.channels if c.name == name)
-
-
-def _modes(problem: Problem) -> list[tuple[float, float]]:
-    """Natural frequencies' range over the poses, Hz; of the nominal robot."""
-    every, seen = [], set()
-    for record in problem.records:
-        if record.pose in seen:
-            continue
-        seen.add(record.pose)
-        system = problem.model.plant(record.setup.geometry).build(np.array([0.0, 0.0, 1.0]))
-        squared = np.linalg.eigvals(np.linalg.solve(system.mass, system.stiffness)).real
-        every.append(np.sort(np.sqrt(np.maximum(squared, 0.0))) / (2.0 * np.pi))
-    low, high = np.min(every, axis=0), np.max(every, axis=0)
-    return [(float(a), float(b)) for a, b in zip(low, high, strict=True)]

@@ -19,6 +19,7 @@ from picchio.studies.assessment.result import format_count
 from picchio.visuals.plots.diagnosis import place_in_words
 from picchio.visuals.plots.style import direction_label
 from picchio.visuals.report.diagnosis_figures import DiagnosisFigures
+from picchio.visuals.report.headline import headline
 from picchio.visuals.report.page import number, percent, render, spread, words
 
 # The life that a diagnosis tells, as rows of a report's tables.
@@ -288,56 +289,6 @@ class _Card:
     confidence: str
     rows: list[tuple[str, str, str]]
     source: str
-
-
-def headline(diagnosis: Diagnosis) -> str:
-    """The verdict in a sentence or two."""
-    named = "; and ".join(_phrase(cause) for cause in diagnosis.causes)
-    gain = diagnosis.gain
-    effect = ""
-    if gain is not None and diagnosis.causes:
-        effect = (
-            f" On records held out the error falls from {percent(gain.baseline_nrmse)} % of the "
-            f"signal to {percent(gain.extended_nrmse)} %; noise alone leaves "
-            f"{percent(gain.noise_floor_nrmse)} %."
-        )
-    match diagnosis.verdict:
-        case "nothing-wrong":
-            return (
-                "Nothing wrong: within its stated tolerance the simulation leaves nothing but "
-                "noise."
-            )
-        case "named":
-            return f"What is wrong: {named}.{effect}"
-        case "ambiguous":
-            return (
-                f"What is wrong: {named}; or something that these data cannot tell from it.{effect}"
-            )
-        case "partial":
-            share = gain.explained if gain is not None else None
-            most = "most" if share is None else f"{percent(share)} %"
-            return (
-                f"Part of what is wrong: {named}; or something that acts much like it. It explains "
-                f"{most} of the error; more than noise is left, and nothing known explains "
-                f"that.{effect}"
-            )
-    if diagnosis.note:
-        return f"The simulation is wrong. {diagnosis.note[:1].upper()}{diagnosis.note[1:]}."
-    lead = f" What helped a little stands below: {len(diagnosis.leads)} leads, no more."
-    return (
-        "The simulation is wrong, and no known cause explains it: none is claimed."
-        + (lead if len(diagnosis.leads) > 1 else "")
-    )  # fmt: skip
-
-
-def _phrase(cause: Cause) -> str:
-    values = ", ".join(
-        f"{name.replace('_', ' ')} {spread(v.value, v.std, v.unit)}"
-        for name, v in cause.parameters.items()
-    )
-    where = "" if cause.target in ("robot", "tool") else f" of {cause.target}"
-    text = f"{words(cause.effect)}{where}"
-    return f"{text}, {values}" if values else text
 
 
 def _card(found: PercussionDiagnosis, cause: Cause) -> _Card:

@@ -9,13 +9,13 @@ import numpy as np
 from picchio.core.provenance import provenance
 from picchio.diagnosis.motion.conclude.during_blows import BlowEffects, MotionLife
 from picchio.diagnosis.motion.data.system import System
-from picchio.diagnosis.result import Cause, Diagnosis, Value, differences, in_words
+from picchio.diagnosis.result import Cause, Diagnosis, differences, in_words
 from picchio.model.effects.registry import catalogue
 from picchio.visuals.plots.diagnosis import place_in_words
+from picchio.visuals.report.headline import by_kind, headline, shown, value_text
 from picchio.visuals.report.motion_diagnosis_figures import MotionFigures
-from picchio.visuals.report.page import number, percent, render, spread, words
+from picchio.visuals.report.page import number, percent, render, words
 
-_DETAILED = 3  # causes of one kind whose numbers a headline gives
 _DERIVED = {"amplitude": "of the wave", "stiffness": "of the joint"}
 
 
@@ -55,7 +55,7 @@ def motion_diagnosis_report(
         "motion_diagnosis.html.j2",
         robot=robot.name,
         d=diagnosis,
-        headline=motion_headline(diagnosis),
+        headline=headline(diagnosis),
         tone={"nothing-wrong": "good", "unexplained": "bad", "partial": "bad"}.get(
             diagnosis.verdict, ""
         ),
@@ -65,7 +65,7 @@ def motion_diagnosis_report(
         claimed=claimed,
         channels=_channels(diagnosis),
         held_out=judged is not system,
-        nuisances=[(_said(k), _spread(v)) for k, v in diagnosis.nuisances.items()],
+        nuisances=[(_said(k), value_text(v)) for k, v in diagnosis.nuisances.items()],
         instruments=_instruments(diagnosis),
         stiffness=_stiffness(diagnosis),
         life=_life(life),
@@ -84,91 +84,13 @@ def motion_diagnosis_report(
     )
 
 
-def motion_headline(diagnosis: Diagnosis) -> str:
-    """The verdict in a sentence or two; many causes of a kind are counted."""
-    named = "; ".join(_phrase(kind, causes) for kind, causes in _by_kind(diagnosis).items())
-    gain = diagnosis.gain
-    effect = ""
-    if gain is not None and diagnosis.causes:
-        seen = "held out" if gain.held_out_records != gain.train_records else "fitted"
-        effect = (
-            f" On records {seen} the error falls from {percent(gain.baseline_nrmse)} % of the "
-            f"signal to {percent(gain.extended_nrmse)} %; noise alone leaves "
-            f"{percent(gain.noise_floor_nrmse)} %."
-        )
-    match diagnosis.verdict:
-        case "nothing-wrong":
-            return (
-                "Nothing wrong: within its stated tolerance the simulation leaves nothing but "
-                "noise."
-            )
-        case "named":
-            return f"What is wrong: {named}.{effect}"
-        case "ambiguous":
-            return (
-                f"What is wrong: {named}; or something that these data cannot tell from it.{effect}"
-            )
-        case "partial":
-            share = gain.explained if gain is not None else None
-            most = "most" if share is None else f"{percent(min(share, 1.0))} %"
-            return (
-                f"Part of what is wrong: {named}. That explains {most} of the error; more than "
-                f"noise is left, and nothing known explains the rest.{effect}"
-            )
-    lead = f" What helped stands below: {len(diagnosis.leads)} leads, no more."
-    return "The simulation is wrong, and no known cause explains most of it: none is claimed." + (
-        lead if len(diagnosis.leads) > 1 else ""
-    )
-
-
-def _by_kind(diagnosis: Diagnosis) -> dict[str, list[Cause]]:
-    found: dict[str, list[Cause]] = {}
-    for cause in diagnosis.causes:
-        found.setdefault(cause.effect, []).append(cause)
-    return found
-
-
-def _phrase(kind: str, causes: Sequence[Cause]) -> str:
-    if len(causes) >= _DETAILED:
-        places = len({c.target for c in causes})
-        what = f"{words(kind)} in {places} joint{'s' if places > 1 else ''}"
-        if catalogue()[kind].periodic:
-            return f"{what}, {len(causes)} harmonics"
-        return what
-    said = []
-    for cause in causes:
-        parts = ", ".join(_named(name, v) for name, v in _shown(cause).items())
-        where = "" if cause.target in ("robot", "tool") else f" of {cause.target}"
-        said.append(f"{words(kind)}{where}, {parts}" if parts else f"{words(kind)}{where}")
-    return "; ".join(said)
-
-
-def _shown(cause: Cause) -> dict[str, Value]:
-    """Without the two parts of a wave, whose amplitude is given."""
-    parts = dict(cause.parameters)
-    if "amplitude" in parts:
-        parts = {k: v for k, v in parts.items() if k not in ("cosine", "sine")}
-    return parts
-
-
-def _named(name: str, v: Value) -> str:
-    return f"{words(name)} {_spread(v)}"
-
-
-def _spread(v: Value) -> str:
-    # Delays are told in milliseconds.
-    if v.unit == "s":
-        return spread(1e3 * v.value, 1e3 * v.std, "ms")
-    return spread(v.value, v.std, v.unit)
-
-
 def _kinds(diagnosis: Diagnosis, system: System) -> list[dict[str, object]]:
     """Each kind of cause: what it means, where it sits, and a row for each place."""
     made: list[dict[str, object]] = []
-    for name, causes in _by_kind(diagnosis).items():
+    for name, causes in by_kind(diagnosis).items():
         kind = catalogue().get(name)
         meaning = (kind.motion_meaning or kind.meaning) if kind is not None else ""
-        columns = list(dict.fromkeys(key for cause in causes for key in _shown(cause)))
+        columns = list(dict.fromkeys(key for cause in causes for key in shown(cause)))
         meanings = {p.name: p.meaning for p in kind.parameters} if kind is not None else {}
         made.append({
             "title": words(name),
@@ -178,7 +100,7 @@ def _kinds(diagnosis: Diagnosis, system: System) -> list[dict[str, object]]:
             "columns": [(words(key), meanings.get(key, _DERIVED.get(key, ""))) for key in columns],
             "rows": [
                 (cause.target,
-                 [_spread(cause.parameters[key]) if key in cause.parameters else "\N{EN DASH}"
+                 [value_text(cause.parameters[key]) if key in cause.parameters else "\N{EN DASH}"
                   for key in columns],
                  "over 99.9" if cause.confidence > 0.999 else percent(cause.confidence))
                 for cause in sorted(causes, key=_place)

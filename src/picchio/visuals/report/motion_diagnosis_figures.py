@@ -10,6 +10,7 @@ from markupsafe import Markup
 from matplotlib.axes import Axes
 
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.motion.conclude.holdout import residual_of
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.orders import order_spectrum
 from picchio.diagnosis.motion.fit.state import State
@@ -325,7 +326,7 @@ class MotionFigures:
         still = tuple(e for e in state.effects if not e.periodic)
         bare = State(state.nuisances, still, state.scales, state.tolerance, state.fixed)
         before, after = (
-            order_spectrum(system, _left(system, s), joint, state) for s in (bare, state)
+            order_spectrum(system, residual_of(system, s), joint, state) for s in (bare, state)
         )  # fmt: skip
         if before is None or after is None:
             return []
@@ -425,7 +426,3 @@ def _window(view: View) -> tuple[float, float] | None:
 def _start(text: str) -> str:
     """With a capital, and names as they are."""
     return text[:1].upper() + text[1:]
-
-
-def _left(system: System, state: State) -> FloatArray:
-    return system.measured - system.predict(state.every, state.scales)

@@ -9,8 +9,9 @@ import numpy as np
 
 from picchio.campaign.channels import Channel, parse_channel
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.motion.conclude.holdout import residual_of
 from picchio.diagnosis.motion.data.system import Group, Segment, System
-from picchio.diagnosis.motion.fit.state import State
+from picchio.diagnosis.motion.residual import rms
 from picchio.diagnosis.result import Diagnosis
 from picchio.model.motion import TORQUE, WINDUP
 
@@ -96,22 +97,13 @@ def views(diagnosis: Diagnosis, which: str) -> list[View]:
     """
     details = diagnosis.details
     system: System = details["systems"][which]
-    before, after = (_left(system, details[key]) for key in ("baseline", "extended"))
+    before, after = (residual_of(system, details[key]) for key in ("baseline", "extended"))
     noise = {(row["record"], row["channel"]): row["noise"] for row in details[which]}
     return [
         View(system, s, before[s.rows], after[s.rows],
              noise[system.logs[s.record].file, ".".join(s.group)])
         for s in system.segments if s.group[0] in _WORDS
     ]  # fmt: skip
-
-
-def _left(system: System, state: State) -> FloatArray:
-    return system.measured - system.predict(state.every, state.scales)
-
-
-def rms(values: FloatArray) -> float:
-    """Root of the mean square."""
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def worst(found: Sequence[View], kind: str, explained: Collection[str] = ()) -> View | None:

@@ -1,1 +1,1 @@
-"""When something may be said: noise, equivalence, identifiability, consistency between poses."""
+"""When a cause may be claimed: whiteness, equivalence, identifiability, pose consistency."""

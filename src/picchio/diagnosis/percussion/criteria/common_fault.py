@@ -1,4 +1,4 @@
-"""Sensors that all read wrong in the same way: then what is wrong lies before them."""
+"""Faults that all sensors have alike: their origin lies before the sensors, not in them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What may be claimed where more than noise is left: causes that tower above what is left."""
+"""Which causes dominate the residual: only those are claimed where more than noise is left."""
 
 from __future__ import annotations
 

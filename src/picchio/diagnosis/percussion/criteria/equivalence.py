@@ -1,4 +1,4 @@
-"""By how much one explanation is behind another, where few records leave several alike.
+"""Equivalence: by how much one explanation is worse than another, where few records leave several.
 
 BIC takes every number to be known the better, the more samples there are. Numbers that these
 records say nothing of cost nothing: what they leave open is no reason to drop a cause.

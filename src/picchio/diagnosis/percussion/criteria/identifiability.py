@@ -1,4 +1,4 @@
-"""How far a number may go before anybody sees it: where slopes say nothing."""
+"""Identifiability: how far a parameter may move before the data show it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Are the unknowns the same at every pose? What a pose's own values would imitate shows here."""
+"""Pose consistency: whether the fitted unknowns are the same at every pose."""
 
 from __future__ import annotations
 

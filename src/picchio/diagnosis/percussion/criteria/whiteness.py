@@ -87,7 +87,7 @@ def whiteness_test(problem: Problem, found: Fit) -> Evidence:
     Periodogram ordinates of white noise of unit variance have mean 1 and variance 1; to the
     scatter of their mean comes that of the noise level itself, which was estimated.
     """
-    top = _highest_frequency(problem) * _ANSWERS
+    top = float(problem.natural_frequencies.max()) * _ANSWERS
     powers: dict[str, list[tuple[int, FloatArray, FloatArray]]] = {}
     errors: dict[str, list[float]] = {}
     total, count = 0.0, 0
@@ -172,17 +172,3 @@ def _channels_of(problem: Problem, group: str) -> int:
     return max(
         1, len({c.name for r in problem.records for c in r.setup.channels if c.group == group})
     )
-
-
-def _highest_frequency(problem: Problem) -> float:
-    """Hz, over the poses; of the nominal robot."""
-    highest = 0.0
-    seen: set[int] = set()
-    for record in problem.records:
-        if record.pose in seen:
-            continue
-        seen.add(record.pose)
-        system = problem.model.plant(record.setup.geometry).build(np.array([0.0, 0.0, 1.0]))
-        squared = np.linalg.eigvals(np.linalg.solve(system.mass, system.stiffness)).real
-        highest = max(highest, float(np.sqrt(squared.max())) / (2.0 * np.pi))
-    return highest

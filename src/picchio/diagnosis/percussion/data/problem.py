@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import partial
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
@@ -21,8 +21,6 @@ from picchio.model.model import Model
 from picchio.prediction.percussion import PercussionSetup, percussion_setups
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.vibration.integration.integrate import Samples
-
-# Samples that stand so near a jump of the force that either side of it may be meant.
 
 # A sample this near a jump of the force, but not on it, holds neither side for sure: a sensor of
 # finite bandwidth smears a jump, and what keeps it from aliasing by about half a sample.
@@ -144,6 +142,17 @@ class Problem:
     def groups(self) -> tuple[str, ...]:
         """All channel groups."""
         return tuple(dict.fromkeys(g for r in self.records for g in r.setup.groups))
+
+    @cached_property
+    def natural_frequencies(self) -> FloatArray:
+        """(poses, modes) Hz, ascending; of the nominal robot."""
+        geometries = {record.pose: record.setup.geometry for record in self.records}
+        found = []
+        for geometry in geometries.values():
+            system = self.model.plant(geometry).build(np.array([0.0, 0.0, 1.0]))
+            squared = np.linalg.eigvals(np.linalg.solve(system.mass, system.stiffness)).real
+            found.append(np.sort(np.sqrt(np.maximum(squared, 0.0))) / (2.0 * np.pi))
+        return np.array(found)
 
     def residuals(
         self,

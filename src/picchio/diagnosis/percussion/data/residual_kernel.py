@@ -8,7 +8,7 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def whitened(measured, predicted, offset, unknown, filler, predictors, deviation, room, out):
-    """What the colour of the noise does not foretell of measured less predicted, in its units.
+    """What the colour of the noise does not predict of measured less predicted, in its units.
 
     measured and predicted are (m,) or longer; `offset` is subtracted, too. Where unknown (m,) or
     (0,) holds, the difference counts as none before the filter, and `filler` stands after it.

@@ -1,4 +1,4 @@
-"""Records shared out among the cores, where one step of a search needs the last one's result."""
+"""Records predicted on several cores, where a search's steps depend on each other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How residuals change with the unknowns: by differences, borrowed, carried along."""
+"""Jacobians of residuals: by differences, from a fit nearby, or updated from step to step."""
 
 from __future__ import annotations
 

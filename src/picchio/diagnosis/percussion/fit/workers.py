@@ -1,4 +1,4 @@
-"""Independent pieces of work on all cores, by processes that share what this one has in memory."""
+"""Independent work on all cores, by processes that share this one's memory."""
 
 from __future__ import annotations
 

@@ -121,11 +121,7 @@ def next_measurement(
                 "causes": [label.split(":", 1) for label in sorted(other.hypothesis.labels)],
                 "chi_square": float(least),
                 "chi_square_at_best": float(most),
-                "told": "either way"
-                if least >= _ENOUGH
-                else "one way"
-                if most >= _ENOUGH
-                else "no",
+                "told": _how_told(least, most),
             }
             for other, least, most in zip(chosen, shot.surely, shot.perhaps, strict=True)
         ],

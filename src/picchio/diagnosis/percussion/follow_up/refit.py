@@ -27,7 +27,7 @@ def expected_rise(
 ) -> float:
     """How far chi-square would rise by a record in which one model is true, the other refitted.
 
-    Slopes foretell that as long as nothing moves far. What the records so far leave open may.
+    Slopes say so as long as nothing moves far; what the records so far leave open may move far.
 
     Args:
         problem: what was measured.

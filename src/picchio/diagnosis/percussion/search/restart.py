@@ -1,4 +1,4 @@
-"""Parameters that a fit has pushed to where they do nothing are put back, and fitted again."""
+"""Restarts: parameters that a fit has pushed to where they do nothing start again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is loaded when it is first used, loaded before processes are forked that would all do so."""
+"""Kernels and libraries loaded once, before processes are forked that would each load them."""
 
 from __future__ import annotations
 
