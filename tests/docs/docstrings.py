@@ -27,10 +27,12 @@ SOURCE = ROOT / "src" / "picchio"
 TO_DO = Path(__file__).with_name("to_do.json")
 
 # Words with which a summary names a thing, rather than telling to do something.
-THINGS = frozenset(
-    "a all an and any as at both by each every everything for from half how if in its largest least "
-    "most no none nothing number numbers of on one only other others same several so some such that "
-    "the these this those two three what when where whether which who whose why with".split()
+THINGS = set(
+    """
+    a all an and any as at both by each every everything for from half how if in its largest least
+    most no none nothing number numbers of on one only other others same several so some such that
+    the these this those two three what when where whether which who whose why with
+    """.split()  # noqa: SIM905
 )
 _ENTRY = re.compile(r"^ {4}((?:\*{0,2}\w+(?:, )?)+)(?: \([^)]*\))?:", re.MULTILINE)
 _SECTION = re.compile(r"^(Args|Attributes|Returns|Yields|Raises):\s*$", re.MULTILINE)
