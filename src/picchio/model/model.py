@@ -185,7 +185,7 @@ class Model:
     def force(
         self, excitation: Excitation, hits: int | None, conditions: Conditions | None = None
     ) -> PiecewiseForce:
-        """F(t) with the effects in it: a burst and silence, or one period of the steady train.
+        """The force F(t) with the effects in it: a burst, or one period of the steady train.
 
         Args:
             excitation: the blows as programmed.
