@@ -23,7 +23,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from picchio.campaign import tables as campaign
-from picchio.campaign.channels import KINDS
+from picchio.campaign.channels import kinds
 from picchio.campaign.importing import mapping
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
@@ -197,7 +197,7 @@ def _record() -> FileFormat:
     keys = [Key("time", "column", "s", "", True, "uniform; 0 is the first edge of the first blow")]
     keys += [
         Key(kind.pattern, "column", " or ".join(kind.units), "", False, kind.meaning)
-        for kind in KINDS
+        for kind in kinds()
     ]
     return FileFormat(
         "record", "", "CSV or Parquet", "input",
