@@ -172,6 +172,8 @@ def effects_page() -> str:
                 f"{sentence(entry.meaning)} {entry.detail}\n",
                 f"- Target: {target_meaning(entry.target)}",
             ]
+            if entry.drawn:
+                lines.append(f"- Drawn anew in every record: {entry.drawn}")
             if entry.source:
                 lines.append(f"- Source: {entry.source}")
             lines.append("")

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import pkgutil
 import re
+from importlib import import_module
 
 from docutils import nodes
 from docutils.utils.math import latex2mathml
 
 import picchio
+
+# Autodoc changes annotations of base classes: classes made after that fail to build on them.
+for info in pkgutil.walk_packages(picchio.__path__, "picchio."):
+    import_module(info.name)
 
 project = "picchio"
 author = "The picchio developers"

@@ -121,6 +121,7 @@ SLOW = {
     "assessment": "assess fanuc_like_3dof --for-life 1e6 --uncertainty --compare-methods "
     "--sn-curve nie-2016",
     "diagnosis": "diagnose fanuc_like_3dof --data made",
+    "identification": "identify fanuc_like_3dof --data made --out found.toml",
     "placement": "place fanuc_like_3dof --placements 3",
     "scene": "view fanuc_like_3dof --out scene.html",
     "reproduction": "reproduce --worlds 8",

@@ -145,7 +145,16 @@ class Campaign:
 
     def save(self, folder: str | Path, *, suffix: str | None = None,
              overwrite: bool = False) -> Campaign:  # fmt: skip
-        """Write the campaign to a folder; see `write_campaign`."""
+        """Write the campaign to a folder, as `write_campaign` does.
+
+        Args:
+            folder: where to; its parent must exist.
+            suffix: ".csv" or ".parquet" for every record; None keeps each record's own.
+            overwrite: replace a campaign that stands there.
+
+        Returns:
+            the campaign as it was written, read from the folder.
+        """
         return write_campaign(self, folder, suffix=suffix, overwrite=overwrite)
 
     def _check(self) -> None:
@@ -186,6 +195,9 @@ def load_campaign(path: str | Path | Campaign, *, clock_tolerance: float = TOLER
             it is.
         clock_tolerance: how uneven a record's clock may be, in steps; infinite to take any
             clock that ascends (to look at a bad record).
+
+    Returns:
+        the campaign; samples are read when they are asked for.
 
     Raises:
         InputError: a wrong table, a missing file, a wrong header.

@@ -82,7 +82,15 @@ class Record:
     ) -> Record:
         """A record whose arrays, "time" among them, are made when first needed.
 
-        Args and errors: as `from_arrays`; `names` are the channels that `read` returns.
+        Args:
+            file: its name, relative to a campaign's folder.
+            names: the channels that `read` returns.
+            read: gives the arrays by channel, "time" among them.
+            units: by channel; SI where left out.
+            **table: keys of `[[record]]`.
+
+        Raises:
+            InputError: as `from_arrays`.
         """
         found = [parse_channel(name, (units or {}).get(name))[0] for name in names]
         return cls(_table(file, table), MemorySource(found, read, file))
@@ -157,6 +165,9 @@ class Record:
     def channel(self, name: str) -> Channel:
         """What a channel measures.
 
+        Args:
+            name: such as "deflection.joint_1".
+
         Raises:
             InputError: this record has no such channel.
         """
@@ -196,7 +207,11 @@ class Record:
         self.__dict__.setdefault("clock", clock)
 
     def read(self, channels: Iterable[str] | None = None) -> dict[str, FloatArray]:
-        """The record, or some of its channels, at once; as one block of `chunks`."""
+        """The record, or some of its channels, at once; as one block of `chunks`.
+
+        Args:
+            channels: names; None for all.
+        """
         blocks = list(self.chunks(channels))
         return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
@@ -218,7 +233,10 @@ class Record:
         return check.finish()
 
     def check_samples(self) -> Clock:
-        """Read everything once, in constant memory, and return the clock.
+        """Read everything once, in constant memory.
+
+        Returns:
+            the clock.
 
         Raises:
             InputError: as `chunks`.
@@ -228,7 +246,11 @@ class Record:
         return self.clock
 
     def within(self, excitation: CampaignExcitation) -> Record:
-        """The same record in a campaign with this `[excitation]`."""
+        """The same record in a campaign with this `[excitation]`.
+
+        Args:
+            excitation: the blows as programmed.
+        """
         return replace(self, base_excitation=excitation)
 
 

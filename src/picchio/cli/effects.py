@@ -72,6 +72,8 @@ def _show(entry: EffectDescription) -> None:
     screen.print(f"[bold]{entry.name}[/bold]: {entry.meaning}")
     screen.print(escape(entry.detail))
     facts = [("where", entry.where), ("target", target_meaning(entry.target))]
+    if entry.drawn:
+        facts.append(("drawn", f"{entry.drawn}; another in every record"))
     if entry.source:
         facts.append(("source", entry.source))
     screen.print(definitions(facts))

@@ -54,7 +54,12 @@ class InputError(PicchioError):
         super().__init__(self._line(value))
 
     def placed(self, *, file: str | Path | None = None, key: str | None = None) -> InputError:
-        """The same error, told with the file or key that only the caller knows."""
+        """The same error, told with the file or key that only the caller knows.
+
+        Args:
+            file: that holds what is wrong.
+            key: that is wrong.
+        """
         value: dict[str, Any] = {} if self.value is None else {"value": self.value}
         return InputError(self.problem, file=file or self.file, key=key or self.key,
                           choices=self.choices, hint=self.hint, **value)  # fmt: skip

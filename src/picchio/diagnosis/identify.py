@@ -145,7 +145,7 @@ def identify(
     workers: int | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Identification:
-    """Stiffness and damping of every joint, from percussion records, motion records, or both.
+    """The stiffness and damping of every joint, from percussion or motion records, or both.
 
     Args:
         robot: the nominal robot, its name or its file.

@@ -91,6 +91,9 @@ class MeasuredForce(Excitation):
             period: s, as in the class.
             preload: N.
 
+        Returns:
+            the force, repeated every period.
+
         Raises:
             InputError: missing file, header or number, with its line.
         """

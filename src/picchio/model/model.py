@@ -88,7 +88,11 @@ class Model:
         return model
 
     def with_effects(self, effects: Iterable[Effect]) -> Model:
-        """The same robot, and the effects it was saved with, with these effects."""
+        """The same robot, and the effects it was saved with, with these effects.
+
+        Args:
+            effects: beside those the robot was saved with; they replace any added since.
+        """
         return replace(self, effects=(*self.own, *effects))
 
     def _repr_html_(self) -> str:
@@ -102,13 +106,21 @@ class Model:
         return sheet(f"Model of {self.robot.name}", facts) + self.robot._repr_html_()
 
     def holding_torque(self, state: RobotState) -> FloatArray:
-        """Torque (n,) that the joints hold against gravity at a state, N m (N)."""
+        """The torque (n,) that the joints hold against gravity, N m (N).
+
+        Args:
+            state: of the robot at a pose.
+        """
         return (
             np.zeros_like(state.gravity_torque) if self.gravity_balanced else state.gravity_torque
         )
 
     def key(self, *where: Where) -> tuple[object, ...]:
-        """What the effects of some kinds are: models with the same key do the same there."""
+        """What the effects of some kinds are: models with the same key do the same there.
+
+        Args:
+            *where: kinds of effects, such as "structure".
+        """
         found = self._keys.get(where)
         if found is None:
             found = self._keys[where] = tuple(e.key for e in self.effects if e.where in where)
@@ -132,6 +144,10 @@ class Model:
     def plant(self, geometry: Geometry, conditions: Conditions | None = None) -> Plant:
         """The equations of motion about a pose, with the effects in them.
 
+        Args:
+            geometry: of the robot at the pose.
+            conditions: when and how warm, and in which record.
+
         Raises:
             InputError: an effect whose target the robot does not have.
         """
@@ -143,13 +159,22 @@ class Model:
         return plant
 
     def blows(self, blows: Blows, conditions: Conditions | None = None) -> Blows:
-        """The blows with the effects in them."""
+        """The blows with the effects in them.
+
+        Args:
+            blows: as programmed.
+            conditions: when and how warm, and in which record.
+        """
         for effect in self.ordered:
             blows = effect.blows(blows, conditions or Conditions())
         return blows
 
     def sensors(self, conditions: Conditions | None = None) -> Sensors:
-        """The sensors with the effects in them."""
+        """The sensors with the effects in them.
+
+        Args:
+            conditions: when and how warm, and in which record.
+        """
         from picchio.model.sensing import Sensors
 
         sensors = Sensors()
@@ -160,7 +185,7 @@ class Model:
     def force(
         self, excitation: Excitation, hits: int | None, conditions: Conditions | None = None
     ) -> PiecewiseForce:
-        """F(t) with the effects in it: a burst and silence, or one period of the steady train.
+        """The force F(t) with the effects in it: a burst, or one period of the steady train.
 
         Args:
             excitation: the blows as programmed.
@@ -208,6 +233,9 @@ class Model:
     def refuse(self, question: str) -> None:
         """Raise if an effect declares that a question has no answer.
 
+        Args:
+            question: a study or view, such as "map".
+
         Raises:
             InputError: with the effect and its reason.
         """
@@ -216,7 +244,11 @@ class Model:
                 raise InputError(f"no {question}: {effect.refused[question]}", value=effect.label)
 
     def without_load(self, conditions: Conditions | None = None) -> tuple[str, ...]:
-        """The effects that leave the loads under the tool alone, a sentence each."""
+        """The effects that leave the loads under the tool alone, a sentence each.
+
+        Args:
+            conditions: when and how warm, and in which record.
+        """
         reasons = [(e.label, e.without_load(conditions or Conditions())) for e in self.effects]
         return tuple(f"{label} {reason}" for label, reason in reasons if reason is not None)
 

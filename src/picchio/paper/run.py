@@ -138,6 +138,9 @@ def reproduce(
         seed: of their draw.
         progress: called with (steps done, steps in all).
 
+    Returns:
+        every claim with its verdict, the tables and the figures.
+
     Raises:
         InputError: an unknown assumption, or assumptions that put the rivets out of reach.
     """

@@ -99,6 +99,9 @@ def simulate(
         overwrite: replace a campaign that stands at `to`.
         progress: called with (done, total) records.
 
+    Returns:
+        the campaign, and what was put into it.
+
     Raises:
         InputError: a robot or a plan that cannot be read or do not fit each other.
     """

@@ -64,6 +64,7 @@ class EffectDescription:
         meaning: what it stands for in the real robot.
         detail: what it does to the model.
         parameters: its numbers, with unit, bounds, neutral value and meaning.
+        drawn: what differs from record to record, and is found with the effect; empty if nothing.
         source: publication or data it rests on; empty if none.
         example: a table of a `picchio-model/1` or `picchio-plan/1` file.
     """
@@ -74,6 +75,7 @@ class EffectDescription:
     meaning: str
     detail: str
     parameters: tuple[Parameter, ...]
+    drawn: str
     source: str
     example: str
 
@@ -101,6 +103,7 @@ class EffectDescription:
                 }
                 for p in self.parameters
             ],
+            "drawn": self.drawn or None,
             "source": self.source or None,
             "example": self.example,
         }
@@ -206,6 +209,7 @@ def _describe(effect: type[Effect]) -> EffectDescription:
         effect.meaning,
         inspect.cleandoc(effect.__doc__ or "").partition("\n\n")[0].replace("\n", " "),
         effect.parameters,
+        effect.latent.what if effect.latent is not None else "",
         effect.source,
         _example(effect),
     )
@@ -229,12 +233,13 @@ def _typical(effect: type[Effect], target: str) -> dict[str, float]:
         found = next(iter(effect(target).trials(_SCALES)), {})
     except KeyError:  # it needs a size that the example arm does not have
         found = {}
-    if found:
+    neutral = {p.name: p.neutral for p in effect.parameters}
+    if any(value != neutral[name] for name, value in found.items()):
         return found
     steps = {p.name: p.neutral + _STEPS.get(p.unit, 0.1) for p in effect.parameters}
     inside = {p.name: min(max(steps[p.name], p.lower), p.upper) for p in effect.parameters}
     amounts = {p.name: inside[p.name] for p in effect.parameters if p.unit != "1"}
-    return amounts or inside
+    return (amounts or inside) | found
 
 
 def _finite(value: float) -> float | None:

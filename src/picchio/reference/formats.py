@@ -23,7 +23,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from picchio.campaign import tables as campaign
-from picchio.campaign.channels import KINDS
+from picchio.campaign.channels import kinds
 from picchio.campaign.importing import mapping
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
@@ -197,7 +197,7 @@ def _record() -> FileFormat:
     keys = [Key("time", "column", "s", "", True, "uniform; 0 is the first edge of the first blow")]
     keys += [
         Key(kind.pattern, "column", " or ".join(kind.units), "", False, kind.meaning)
-        for kind in KINDS
+        for kind in kinds()
     ]
     return FileFormat(
         "record", "", "CSV or Parquet", "input",
@@ -227,10 +227,18 @@ def _contracts() -> Iterator[FileFormat]:
         if entry["kind"] == "JSON":
             keys.append(_format_key(entry["format"]))
         for path, line in entry["keys"].items():
-            group = shared[line[1:]] if line.startswith("@") else {"": line}
-            keys += [_contract_key((path + tail).lstrip("."), text) for tail, text in group.items()]
+            keys += [_contract_key(*found) for found in _expanded(path, line, shared)]
         yield FileFormat(name, entry.get("format", ""), entry["kind"], entry["role"],
                          entry["meaning"], entry["command"], tuple(keys))  # fmt: skip
+
+
+def _expanded(path: str, line: str, shared: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """A described path, or the paths of the group that its line names."""
+    if not line.startswith("@"):
+        yield path.lstrip("."), line
+        return
+    for tail, inner in shared[line[1:]].items():
+        yield from _expanded(path + tail, inner, shared)
 
 
 def _contract_key(path: str, line: str) -> Key:

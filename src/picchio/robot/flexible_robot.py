@@ -134,6 +134,9 @@ class FlexibleRobot:
     def pose(self, values: str | Sequence[float] | Mapping[str, float] | ArrayLike) -> Array:
         """A checked pose (nv,) from a list, from joint names (the rest at zero), or a name.
 
+        Args:
+            values: rad or m; by joint name, in the robot's joint order, or a named pose.
+
         Raises:
             InputError: wrong length, unknown joint or pose name, not a finite number.
         """
@@ -145,7 +148,11 @@ class FlexibleRobot:
         return tuple(name for name in self.joint_names if name in self.tree.joints)
 
     def limit_violations(self, pose: ArrayLike) -> list[str]:
-        """Names of the joints that stand beyond their limits at this pose."""
+        """Names of the joints that stand beyond their limits at this pose.
+
+        Args:
+            pose: (nv,) rad or m.
+        """
         checked = self.pose(pose)
         # Angles typed in are rounded: a limit of pi must accept 3.1416.
         slack = 1e-4
@@ -153,7 +160,10 @@ class FlexibleRobot:
         return [name for name, out in zip(self.joint_names, beyond, strict=True) if out]
 
     def state(self, pose: ArrayLike) -> RobotState:
-        """Mass matrix, Jacobian, stiffness, gravity and the tool's place at a pose.
+        """The mass matrix, Jacobian, stiffness, gravity and tool position at a pose.
+
+        Args:
+            pose: (nv,) rad or m.
 
         Raises:
             InputError: as `pose`.
@@ -175,25 +185,41 @@ class FlexibleRobot:
         )
 
     def mass_and_jacobian(self, poses: Array) -> tuple[Array, Array]:
-        """Only M (p, n, n) and J (p, 3, n) at many poses (p, nv), which are taken unchecked."""
+        """Only M (p, n, n) and J (p, 3, n) at many poses.
+
+        Args:
+            poses: (p, nv) rad or m, not checked.
+        """
         index = self.flexible_index
         point = self.rigid.frame(self.tool_point)
         mass, jacobian = self.rigid.mass_and_jacobian(poses, point, index)
         return np.ascontiguousarray(mass), np.ascontiguousarray(jacobian)
 
     def tool_position(self, pose: Array) -> Array:
-        """Only the point (3,) in m where the force acts; the pose is taken unchecked."""
+        """Only the point (3,) in m, world, where the force acts.
+
+        Args:
+            pose: (nv,) rad or m, not checked.
+        """
         return self.rigid.placement(pose, self.rigid.frame(self.tool_point))[0]
 
     def gravity_torque(self, pose: ArrayLike) -> Array:
-        """Torque (n,) that the springs carry at rest, N m (N), less that of the balancers."""
+        """The torque (n,) that the springs carry at rest, N m (N), without the balancers' part.
+
+        Args:
+            pose: (nv,) rad or m.
+        """
         full = self.pose(pose)
         index = self.flexible_index
         balanced, _ = balancing(self.flexible_joints, self.tree, full[index])
         return self.rigid.gravity_torque(full)[index] + balanced
 
     def gravity_stiffness(self, pose: ArrayLike) -> Array:
-        """dg/dq (n, n) of the flexible joints, N m/rad, balancers included."""
+        """The gravity stiffness dg/dq (n, n) of the flexible joints, N m/rad, with balancers.
+
+        Args:
+            pose: (nv,) rad or m.
+        """
         full = self.pose(pose)
         index = self.flexible_index
         gradient = self.rigid.gravity_gradient(full)[np.ix_(index, index)]
@@ -202,6 +228,9 @@ class FlexibleRobot:
 
     def link_of(self, frame: str) -> str:
         """The link whose frame this is: a link's name, or a joint's for the link it carries.
+
+        Args:
+            frame: of the URDF.
 
         Raises:
             InputError: no such frame.
@@ -213,7 +242,11 @@ class FlexibleRobot:
         raise InputError("no such frame", key="frame", value=frame, choices=self.tree.links)
 
     def frame_placement(self, pose: ArrayLike, frame: str) -> tuple[Array, Array]:
-        """World position (3,) in m and rotation (3, 3) of a frame.
+        """The world position (3,) in m and rotation (3, 3) of a frame.
+
+        Args:
+            pose: (nv,) rad or m.
+            frame: of the URDF.
 
         Raises:
             InputError: no such frame; as `pose`.
@@ -221,7 +254,11 @@ class FlexibleRobot:
         return self.rigid.placement(self.pose(pose), self.rigid.frame(self.link_of(frame)))
 
     def frame_jacobian(self, pose: ArrayLike, frame: str) -> Array:
-        """Jacobian (6, n) of a frame's origin, world axes: linear [m], then angular [1].
+        """The Jacobian (6, n) of a frame's origin, world axes: linear [m], then angular [1].
+
+        Args:
+            pose: (nv,) rad or m.
+            frame: of the URDF.
 
         Raises:
             InputError: no such frame; as `pose`.
@@ -237,6 +274,11 @@ class FlexibleRobot:
         """Every branch of poses (nv,) found that puts the tool on a point.
 
         See `picchio.robot.ik.inverse_kinematics.solve`.
+
+        Args:
+            point: (3,) m, world.
+            axis: (3,) world, along which the tool shall point; None: any way.
+            seed: of the first guesses.
         """
         return list(self._solve(point, axis, seed).poses)
 

@@ -131,6 +131,13 @@ class Task:
 def load_task(path: str | Path, robot: FlexibleRobot) -> Task:
     """Read a `picchio-task/1` file for a robot; points become poses.
 
+    Args:
+        path: the file.
+        robot: that does the task.
+
+    Returns:
+        the task.
+
     Raises:
         InputError: anything wrong in the file, with its key; an unreachable point.
     """
@@ -139,7 +146,15 @@ def load_task(path: str | Path, robot: FlexibleRobot) -> Task:
 
 
 def task_from_dict(data: Mapping[str, Any], robot: FlexibleRobot) -> Task:
-    """The task that a file with this content would give; `format` may be left out."""
+    """The task that a file with this content would give.
+
+    Args:
+        data: keys and values of the file; `format` may be left out.
+        robot: that does the task.
+
+    Raises:
+        InputError: as `load_task`.
+    """
     content = {"format": FORMAT, **data}
     return _build(validate(content, TaskTable, format=FORMAT), robot, None)
 

@@ -208,6 +208,9 @@ def import_record(
         name: the record's name (.csv or .parquet); the file's own with .csv if None.
         append: add the record to the campaign that stands at `to`.
 
+    Returns:
+        the new record, and the campaign that it is in.
+
     Raises:
         InputError: the file or the mapping cannot be read, they do not fit each other, or the
             campaign at `to` says otherwise than the mapping.

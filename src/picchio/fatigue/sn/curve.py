@@ -133,7 +133,11 @@ class SNCurve:
         return np.asarray(amplitudes[line] * _power(life / anchors[line], -1.0 / slopes[line]))
 
     def with_miner(self, rule: MinerRule) -> SNCurve:
-        """The same curve with another rule for cycles below the endurance limit."""
+        """The same curve with another rule for cycles below the endurance limit.
+
+        Args:
+            rule: "original", "elementary" or "haibach".
+        """
         return dataclasses.replace(self, miner=rule)
 
     def scaled(self, factor: float, why: str) -> SNCurve:
@@ -142,6 +146,9 @@ class SNCurve:
         Args:
             factor: positive.
             why: what the factor stands for; it joins `assumptions`.
+
+        Raises:
+            InputError: a factor that is not positive.
         """
         number = float(as_floats(factor, "factor"))
         if number <= 0:

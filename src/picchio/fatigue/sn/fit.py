@@ -233,6 +233,9 @@ def fit_sn(
             tests have run-outs.
         run_out_cycles: in a table without outcomes, tests that reached this are run-outs.
 
+    Returns:
+        each value with its interval; `curve` makes an S-N curve of it.
+
     Raises:
         InputError: a table that cannot be read, arrays that do not match, values that are not
             positive, a `level` or `survival` that is no probability, an unknown `kind`, or tests

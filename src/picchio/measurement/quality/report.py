@@ -190,6 +190,10 @@ def check(
         keep_going: a record that cannot be read becomes a finding instead of an error.
         progress: called with (done, total) records.
 
+    Returns:
+        the findings, the gravest first, with a summary of every record and the noise of every
+        channel.
+
     Raises:
         InputError: a campaign, a robot or a record that cannot be read.
     """

@@ -50,6 +50,9 @@ def load_robot(
             `{"joint_1": {"stiffness": 1e5}}`.
         allow_rigid: accept a robot none of whose joints is flexible.
 
+    Returns:
+        the robot, with the origin of every value.
+
     Raises:
         InputError: with the file, the key, the value and the valid choices.
     """
