@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.model.conditions import Conditions
 from picchio.model.expansion import link_inertia
 from picchio.model.model import Model
-from picchio.model.plant import Changes, Plant
+from picchio.model.plant import Changes
 from picchio.robot.dynamics.rigid_model import Body, RigidModel
 from picchio.robot.dynamics.statics import balancing
 
@@ -61,7 +59,7 @@ class ManyPoses:
                 self.compiled = False
                 return
             for effect in self._model.ordered:
-                effect.structure(cast(Plant, changes))
+                effect.structure(changes)
             self.stiffness[k] = list(changes.springs.values())
             first = changes if first is None else first
         if first is None:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from picchio.model.effects.latent import Latent
     from picchio.model.effects.scales import Scales
     from picchio.model.motion import Motion
-    from picchio.model.plant import Plant
+    from picchio.model.plant import Changes
     from picchio.model.sensing import Sensors
 
 Where = Literal["structure", "nonlinear", "blows", "over-time", "sensor", "motion"]
@@ -270,7 +270,7 @@ class Effect(ABC):
 
     # Hooks: an effect overrides those that concern it ----------------------------------------
 
-    def structure(self, plant: Plant) -> None:  # noqa: B027
+    def structure(self, plant: Changes) -> None:  # noqa: B027
         """Change the robot's equations of motion."""
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:

@@ -11,7 +11,7 @@ from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.elements import Element, ElementKind
 from picchio.model.motion import Motion
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class Backlash(Effect):
@@ -31,7 +31,7 @@ class Backlash(Effect):
         """Every flexible joint; in a motion every one with encoders on both sides of the gear."""
         return list(evidence.wound) if evidence.motion else super().targets(evidence)
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Replace the spring's torque by the dead zone's."""
         stiffness, torque = plant.springs[plant.check_joint(self.target)], 0.0
         if abs(load := plant.gravity_torque[self.target]) > 1e-9:

@@ -9,7 +9,7 @@ from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.elements import Element, ElementKind
 from picchio.model.motion import Motion
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class CoulombFriction(Effect):
@@ -32,7 +32,7 @@ class CoulombFriction(Effect):
     )
     usual = 2
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Add the friction."""
         plant.add_element(
             self.target,

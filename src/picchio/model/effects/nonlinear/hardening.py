@@ -5,7 +5,7 @@ from __future__ import annotations
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.elements import Element, ElementKind
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class Hardening(Effect):
@@ -22,7 +22,7 @@ class Hardening(Effect):
     meaning = "the joint's spring is not linear"
     mark = "spring"
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Add the cubic torque."""
         plant.add_element(self.target, Element(ElementKind.CUBIC, (self.values["cubic"],)))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.elements import Element, ElementKind
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class Hysteresis(Effect):
@@ -31,7 +31,7 @@ class Hysteresis(Effect):
         "Bouc-Wen with n = 1: Ismail, Ikhouane, Rodellar, Arch. Comput. Methods Eng. 16 (2009) 161"
     )
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Add the element."""
         plant.add_element(
             self.target,

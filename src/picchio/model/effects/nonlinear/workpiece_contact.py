@@ -5,7 +5,7 @@ from __future__ import annotations
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.elements import Element, ElementKind
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class WorkpieceContact(Effect):
@@ -22,7 +22,7 @@ class WorkpieceContact(Effect):
     meaning = "the workpiece holds the tool as long as it touches"
     mark = "plate"
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Add the contact."""
         values = self.values
         plant.add_contact(

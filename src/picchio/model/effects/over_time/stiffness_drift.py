@@ -6,7 +6,7 @@ from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class StiffnessDrift(Effect):
@@ -26,7 +26,7 @@ class StiffnessDrift(Effect):
         """As of any effect; it takes records of several dates."""
         return "" if evidence.days > 0.0 else "the records are not of several known dates"
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Scale the spring by the date."""
         days = plant.conditions.days
         if days is not None:

@@ -6,7 +6,7 @@ from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class ThermalStiffness(Effect):
@@ -26,7 +26,7 @@ class ThermalStiffness(Effect):
         """As of any effect; it takes records at several temperatures."""
         return "" if evidence.kelvin > 0.0 else "the records are not of several known temperatures"
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Scale the spring by the temperature."""
         kelvin = plant.conditions.temperature
         if kelvin is not None:

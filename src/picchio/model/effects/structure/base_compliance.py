@@ -13,7 +13,7 @@ from picchio.model.effects.structure.yielding import (
     yielding_stiffness,
 )
 from picchio.model.expansion import BASE_AXES
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class BaseCompliance(Effect):
@@ -39,7 +39,7 @@ class BaseCompliance(Effect):
         unit = super().unit(parameter)
         return unit if self.target.startswith("r") else unit.replace("N*m", "N").replace("rad", "m")
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Let the base's coordinate move.
 
         Raises:

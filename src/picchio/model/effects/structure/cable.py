@@ -5,7 +5,7 @@ from __future__ import annotations
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.effects.structure.yielding import MODAL_SHARE
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class Cable(Effect):
@@ -22,7 +22,7 @@ class Cable(Effect):
     meaning = "a cable or hose holds the link"
     mark = "hose"
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Tie the link."""
         plant.modal_share = self.values["modal_share"]
         plant.add_anchor(self.target, self.values["stiffness"], self.values["damping"])

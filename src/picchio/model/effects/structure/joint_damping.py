@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class JointDamping(Effect):
@@ -20,7 +20,7 @@ class JointDamping(Effect):
     )
     meaning = "this joint alone is damped more (or less) than its share"
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Add the damper."""
         plant.add_damper(self.target, self.values["damping"])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.motion import Motion
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class JointInertia(Effect):
@@ -29,7 +29,7 @@ class JointInertia(Effect):
     told_by = "once with a known mass at the tool and once without"
     usual = 7
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Add it to the mass matrix's diagonal."""
         plant.add_inertia(self.target, self.values["inertia"])
 

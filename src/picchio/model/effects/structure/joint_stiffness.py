@@ -6,7 +6,7 @@ from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.motion import Motion
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class JointStiffness(Effect):
@@ -46,7 +46,7 @@ class JointStiffness(Effect):
         flexible = evidence.robot.flexible_names
         return [j for j in (evidence.wound if evidence.motion else flexible) if j in flexible]
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Scale the spring."""
         plant.springs[plant.check_joint(self.target)] *= self.values["scale"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class LinkMass(Effect):
@@ -33,7 +33,7 @@ class LinkMass(Effect):
         links = evidence.robot.tree.links
         return [link for link in super().targets(evidence) if links.get(link) is not None]
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Add the link's own inertia `scale` - 1 times."""
         plant.add_mass(self.values["scale"] - 1.0, self.target)
 

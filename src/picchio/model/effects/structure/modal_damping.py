@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class ModalDamping(Effect):
@@ -27,7 +27,7 @@ class ModalDamping(Effect):
     tolerance = "damping_ratio"
     source = "Nie et al. 2016, eq. 11: zeta"
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Scale all ratios."""
         plant.damping_scale *= self.values["scale"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.motion import Motion
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class Payload(Effect):
@@ -21,7 +21,7 @@ class Payload(Effect):
     usual = 1
     mark = "added mass"
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Add the mass; the pose is given, so its weight loads the springs but bends nothing."""
         plant.add_mass(self.values["mass"], plant.robot.tool_frame, (0.0, 0.0, 0.0))
 

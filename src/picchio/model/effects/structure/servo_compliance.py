@@ -11,7 +11,7 @@ from picchio.model.effects.structure.yielding import (
     yielding_damping,
     yielding_stiffness,
 )
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class ServoCompliance(Effect):
@@ -41,7 +41,7 @@ class ServoCompliance(Effect):
     mark = "spring"
     source = "Spong, J. Dyn. Sys. Meas. Control 109 (1987) 310, doi:10.1115/1.3143860"
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Add the motor side as a coordinate."""
         plant.modal_share = self.values["modal_share"]
         values = self.values

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class ToolOffset(Effect):
@@ -20,7 +20,7 @@ class ToolOffset(Effect):
     meaning = "the tool's tip is not where the model has it"
     mark = "offset"
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Move the force's point."""
         plant.force_offset = plant.force_offset + [self.values[axis] for axis in "xyz"]
 

@@ -12,7 +12,7 @@ from picchio.model.effects.structure.yielding import (
     yielding_damping,
     yielding_stiffness,
 )
-from picchio.model.plant import Plant
+from picchio.model.plant import Changes
 
 
 class TransverseCompliance(Effect):
@@ -35,7 +35,7 @@ class TransverseCompliance(Effect):
         """The flexible joints that turn."""
         return [j.name for j in evidence.robot.flexible_joints if j.kind == "revolute"]
 
-    def structure(self, plant: Plant) -> None:
+    def structure(self, plant: Changes) -> None:
         """Let the two hinges at the joint move."""
         plant.modal_share = self.values["modal_share"]
         joint = plant.check_joint(self.target)
