@@ -132,7 +132,7 @@ def test_catalogue_entry(full, flex):
         ("stiffness_curve = { k1 = 1, k2 = 2, k3 = 3, t1 = 2, t2 = 1 }", "t2 must be above t1"),
         ("stiffness = 1\nstiffness_curve = { k1 = 1, k2 = 2, k3 = 3, t1 = 1, t2 = 2 }", "not both"),
         ("stiffness = 1\ngear_ratio = 0", "gear_ratio must not be zero"),
-        ("balancer = { parent_point = [1,0,0], child_point = [0,1,0] }", "beside a rigid joint"),
+        ("balancer = { parent_point = [1,0,0], child_point = [0,1,0] }", "on a rigid joint"),
     ],
 )
 def test_bad_joint_entries(arm, write, joint, says):
