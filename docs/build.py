@@ -23,9 +23,9 @@ HTML = HERE / "_build" / "html"
 GUIDES = {
     "diagnosis": "Diagnosis",
     "motion": "Motion records",
-    "placement": "Where to put the work",
+    "placement": "Placement",
     "paper": "The paper, reproduced",
-    "performance": "What it costs",
+    "performance": "Performance",
     "blind_trial": "The blind trial",
 }
 STAGES = (
@@ -46,6 +46,7 @@ STAGES = (
     "core",
     "cli",
 )
+_CODE = re.compile(r"(`[^`]*`)")
 _LINK = re.compile(r"\[([^\]]*)\]\(([^)#\s:]+)(#[^)\s]*)?\)")
 
 
@@ -156,7 +157,13 @@ def notebook_page(notebooks: list[Path]) -> str:
 
 def effects_page() -> str:
     """The catalogue of effects."""
-    from picchio.reference.effects import effects, shown_bounds, shown_unit, target_meaning
+    from picchio.reference.effects import (
+        by_place,
+        effects,
+        shown_bounds,
+        shown_unit,
+        target_meaning,
+    )
 
     found = effects().effects
     lines = [
@@ -164,9 +171,9 @@ def effects_page() -> str:
         f"The {len(found)} effects that can be put into a model. `picchio effects` prints "
         "them, those of installed extensions included.\n",
     ]
-    for place in dict.fromkeys(entry.where for entry in found):
-        lines.append(f"## {place.capitalize()}\n")
-        for entry in (e for e in found if e.where == place):
+    for heading, group in by_place(found).items():
+        lines.append(f"## {heading}\n")
+        for entry in group:
             lines += [
                 f"### {entry.name}\n",
                 f"{sentence(entry.meaning)} {entry.detail}\n",
@@ -209,10 +216,17 @@ def formats_page() -> str:
                 rows = []
                 for key in keys:
                     own = key.path.rpartition(".")[2] if name else key.path
+                    default = f"default {key.default}" if key.default else ""
                     needed = "required" if key.required and role == "input" else ""
-                    default = key.default or needed
-                    rows.append((f"`{own}`", key.type, key.unit, default, key.meaning))
-                lines += table(("key", "type", "unit", "default", "meaning"), rows)
+                    facts = (
+                        key.type,
+                        "pure number" if key.unit == "1" else key.unit,
+                        default,
+                        needed,
+                    )
+                    kind = "; ".join(fact for fact in facts if fact)
+                    rows.append((f"`{own}`", f"{sentence(key.meaning)} ({kind})"))
+                lines += table(("key", "meaning (type; unit; default)"), rows)
     return "\n".join(lines)
 
 
@@ -225,9 +239,16 @@ def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
     """A Markdown table."""
     lines = [f"| {' | '.join(head)} |", f"|{'---|' * len(head)}"]
     for row in rows:
-        cells = (" ".join(cell.split()).replace("|", "\\|") for cell in row)
+        cells = (_plain(" ".join(cell.split())) for cell in row)
         lines.append(f"| {' | '.join(cells)} |")
     return [*lines, ""]
+
+
+def _plain(text: str) -> str:
+    """Text for a cell of a table: only `code` means something."""
+    parts = _CODE.split(text)
+    parts[::2] = [re.sub(r"[*_<>\[\]]", r"\\\g<0>", part) for part in parts[::2]]
+    return "".join(parts).replace("|", "\\|")
 
 
 def api_pages() -> None:

@@ -26,6 +26,7 @@ html_theme_options = {"top_of_page_buttons": []}
 html_math_renderer = "mathml"  # drawn by the browser: no script, no network
 html_show_sphinx = False
 html_copy_source = False
+smartquotes = False
 
 nb_execution_mode = "off"  # the tests execute the notebooks
 myst_enable_extensions = ["dollarmath"]

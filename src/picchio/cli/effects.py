@@ -12,14 +12,6 @@ if TYPE_CHECKING:
     from picchio.reference.effects import EffectDescription
 
 EPILOG = "Example: picchio effects base_compliance"
-_PLACES = {
-    "structure": "Structure: the robot's equations of motion",
-    "nonlinear": "Nonlinear: joints and contact whose force is not in proportion",
-    "blows": "Blows: what the tool really does",
-    "over-time": "Over time: what changes while a campaign lasts",
-    "sensor": "Sensors: how channels read",
-    "motion": "Motion records: drives and encoders of a moving robot",
-}
 
 
 def register(app: typer.Typer) -> None:
@@ -50,15 +42,13 @@ def effects(
 
 def _list(entries: tuple[EffectDescription, ...]) -> None:
     from picchio.cli.output import console, definitions
+    from picchio.reference.effects import by_place
 
     screen = console()
-    places = dict.fromkeys([*_PLACES, *(entry.where for entry in entries)])
-    for place in places:
-        rows = [(entry.name, f"{entry.meaning} [dim]({entry.target})[/dim]")
-                for entry in entries if entry.where == place]  # fmt: skip
-        if rows:
-            screen.print(f"[bold]{_PLACES.get(place, place)}[/bold]")
-            screen.print(definitions(rows))
+    for heading, group in by_place(entries).items():
+        screen.print(f"[bold]{heading}[/bold]")
+        rows = [(entry.name, f"{entry.meaning} [dim]({entry.target})[/dim]") for entry in group]
+        screen.print(definitions(rows))
     screen.print("In brackets: what the effect acts on. `picchio effects NAME` shows one in full.")
 
 

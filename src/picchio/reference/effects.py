@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,16 @@ from picchio.model.effects.registry import catalogue, effect_class
 from picchio.model.effects.scales import Scales
 
 FORMAT = "picchio-effects/1"
+
+PLACES: Mapping[str, str] = {
+    "structure": "Structure: the robot's equations of motion",
+    "nonlinear": "Nonlinear: joints and contact whose force is not in proportion",
+    "blows": "Blows: what the tool really does",
+    "over-time": "Over time: what changes while a campaign lasts",
+    "sensor": "Sensors: how channels read",
+    "motion": "Motion records: drives and encoders of a moving robot",
+}
+"""What an effect changes, with a heading."""
 
 TARGETS: Mapping[str, tuple[str, str]] = {
     "joint": ("a flexible joint", "joint_1"),
@@ -156,8 +166,23 @@ def effects(name: str | None = None) -> EffectList:
     Raises:
         InputError: no such effect.
     """
-    chosen = catalogue().values() if name is None else [effect_class(name)]
+    chosen = list(catalogue().values()) if name is None else [effect_class(name)]
     return EffectList(tuple(_describe(effect) for effect in chosen))
+
+
+def by_place(entries: Iterable[EffectDescription]) -> dict[str, list[EffectDescription]]:
+    """Effects by what they change.
+
+    Args:
+        entries: to be sorted.
+
+    Returns:
+        heading -> effects, the robot's structure first; places without effects are left out.
+    """
+    found: dict[str, list[EffectDescription]] = {place: [] for place in PLACES}
+    for entry in entries:
+        found.setdefault(entry.where, []).append(entry)
+    return {PLACES.get(place, place): group for place, group in found.items() if group}
 
 
 def target_meaning(kind: str) -> str:
