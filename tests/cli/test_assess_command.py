@@ -191,10 +191,10 @@ def test_a_pose_beyond_the_limits_is_a_warning(tmp_path):
 
 
 def test_import_is_light_and_the_example_is_quick():
-    """Neither pinocchio nor scipy, numba or yourdfpy may load with `import picchio`."""
+    """Neither pinocchio nor scipy, numba or xarray may load with `import picchio`."""
     code = (
         "import sys, picchio\n"
-        "heavy = {'pinocchio', 'scipy', 'numba', 'yourdfpy', 'meshcat', 'pydantic', 'xarray'}\n"
+        "heavy = {'pinocchio', 'scipy', 'numba', 'meshcat', 'pydantic', 'xarray', 'pandas'}\n"
         "print(sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
