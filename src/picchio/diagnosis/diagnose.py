@@ -130,7 +130,7 @@ def diagnose(
 
 def _mixed_details(mixed: MixedDiagnosis) -> dict[str, Any]:
     acting = effects_during_blows(mixed.motion)
-    why = "the life is told of the percussion part"
+    why = "the life above takes the causes of both kinds of records into account"
     return {
         "percussion": mixed.percussion, "motion": mixed.motion, "during_blows": acting,
         "motion_life": MotionLife(None, why),
