@@ -75,7 +75,7 @@ def damage_at(
         InputError: no hits, or a mode without damping.
     """
     force = model.force(excitation, hits)
-    along = np.ascontiguousarray(np.broadcast_to(direction, (len(poses), 3)), dtype=float)
+    along = np.require(np.broadcast_to(direction, (len(poses), 3)), float, ("C", "W"))
     many = ManyPoses(model, poses)
     shape = many.stiffness.shape
     found = BatchDamage(
