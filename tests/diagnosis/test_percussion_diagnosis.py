@@ -110,13 +110,13 @@ def test_bad_input_is_one_line_before_anything_is_done(tmp_path, capsys, monkeyp
 
     monkeypatch.setattr("picchio.diagnosis.diagnose.diagnose_percussion", too_late)
     time = np.arange(-50, 200) * 1e-3
-    record = picchio.campaign.Record.from_arrays(
+    record = picchio.Record.from_arrays(
         "r01.csv", time, {"deflection.joint_1": np.zeros(time.size)},
         pose={"joint_1": 0.1}, direction=[0.0, 1.0, 0.0],
     )  # fmt: skip
     folder = tmp_path / "measured"
     blows = {"force": 300.0, "period": 0.04, "width": 0.004, "hits": 3}
-    picchio.campaign.Campaign.from_records([record], robot=ARM, excitation=blows).save(folder)
+    picchio.Campaign.from_records([record], robot=ARM, excitation=blows).save(folder)
     arguments = [part.format(data=folder) for part in change]
     assert command(["diagnose", ARM, *arguments]) == 2
     lines = capsys.readouterr().err.strip().splitlines()
