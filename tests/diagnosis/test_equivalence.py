@@ -49,6 +49,7 @@ def test_a_softer_first_joint_may_be_the_base_that_turns_under_it(first):
     assert follow_up.told_sets(first) == {frozenset([JOINT]), frozenset([BASE])}
 
 
+@pytest.mark.slow
 def test_the_joints_own_deflection_is_asked_for_and_tells_them_apart(arm, soft_joint, first):
     """In a blow that moves joint 1: one in the arm's plane says nothing of it."""
     campaign, truth = soft_joint
@@ -61,6 +62,7 @@ def test_the_joints_own_deflection_is_asked_for_and_tells_them_apart(arm, soft_j
     assert after.verdict == "named" and follow_up.told_sets(after) == {frozenset([JOINT])}
 
 
+@pytest.mark.slow
 def test_what_slopes_foretell_is_held_against_a_refit(arm):
     """By slopes another record of the accelerometer tells; the base's own damping hides it."""
     case = {"robot": "fanuc_like_3dof", "kind": "sets", "snr": 40, "draw": 1}
@@ -74,6 +76,7 @@ def test_what_slopes_foretell_is_held_against_a_refit(arm):
 
 
 @pytest.mark.parametrize("sensors", [(ACCELEROMETER,), (ACCELEROMETER, "deflection")])
+@pytest.mark.slow
 def test_a_base_that_turns_is_found_and_may_be_the_servo_of_the_joint_above(sensors, arm):
     """Nothing resists joint 1 and such a base turning against each other: it has no mass."""
     true = {"stiffness": 9e5, "damping": 400.0}

@@ -24,9 +24,9 @@ def arm():
         # Its damping ran off to nothing, from where no slope led back.
         ("servo_compliance", 0, {"stiffness": 0.05, "rotor_inertia": 0.05, "damping": 0.2}),
         # Some blows' times were found only once a second cause stood beside.
-        ("pulse_jitter", 0, {}),
+        pytest.param("pulse_jitter", 0, {}, marks=pytest.mark.slow),
         # The blows' shape came with it, by what the model is not exact to.
-        ("mount_resonance", 0, {"frequency": 0.002}),
+        pytest.param("mount_resonance", 0, {"frequency": 0.002}, marks=pytest.mark.slow),
         # The blow is missing late in one record: the first part of both showed nothing.
         ("missed_hits", 1, {}),
         # Two records that were fitted say drift as well; the one held out knows better.

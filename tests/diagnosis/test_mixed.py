@@ -58,6 +58,7 @@ def found(case):
     return picchio.diagnose(robot, campaign, workers=1)
 
 
+@pytest.mark.slow
 def test_both_kinds_of_records_are_used(case, found):
     _, campaign, _ = case
     gain = found.gain
@@ -71,6 +72,7 @@ def test_both_kinds_of_records_are_used(case, found):
     assert set(found.details["motion"].nuisances) <= set(found.nuisances)
 
 
+@pytest.mark.slow
 def test_what_both_show_has_one_value_that_both_determine(found):
     (told,) = (s for s in found.shared if s["effect"] == "payload")
     assert told["status"] == "both"
@@ -86,6 +88,7 @@ def test_what_both_show_has_one_value_that_both_determine(found):
     assert apart["joint_stiffness"] == "percussion"
 
 
+@pytest.mark.slow
 def test_the_extended_model_and_the_json_are_whole(found, tmp_path):
     said = json.loads(json.dumps(found.to_dict(), allow_nan=False))
     assert said["format"] == "picchio-diagnosis/1"
@@ -108,6 +111,7 @@ def test_the_extended_model_and_the_json_are_whole(found, tmp_path):
     assert repr(found).startswith("<Diagnosis: named, ") and "payload" in found._repr_html_()
 
 
+@pytest.mark.slow
 def test_identified_joints_hold_what_both_kinds_say(case, found):
     robot, campaign, truth = case
     told = identification(campaign, found)
@@ -130,6 +134,7 @@ def test_identified_joints_hold_what_both_kinds_say(case, found):
     assert list(told.to_frame().index) == list(robot.flexible_names)
 
 
+@pytest.mark.slow
 def test_records_that_contradict_each_other_claim_nothing():
     """The arm carried something while it moved that it did not carry when it was hit."""
     robot, campaign, _ = mixed([], {"payload": 8.0})
@@ -140,6 +145,7 @@ def test_records_that_contradict_each_other_claim_nothing():
     assert found.life is None
 
 
+@pytest.mark.slow
 def test_friction_that_only_a_motion_shows_is_in_the_drive():
     robot, campaign, truth = mixed(
         [("joint_stiffness", "joint_2", {"scale": 0.75})], {("coulomb", 1): 30.0}
@@ -179,6 +185,7 @@ def turning(robot, mass, seed):
     return records
 
 
+@pytest.mark.slow
 def test_blows_tell_apart_what_a_motion_cannot():
     robot, campaign, _ = mixed([("payload", "tool", {"mass": 12.0})], {})
     moving = turning(robot, 12.0, 1)
@@ -197,6 +204,7 @@ def test_blows_tell_apart_what_a_motion_cannot():
     assert mass.value == pytest.approx(12.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_nothing_wrong_in_either_kind_is_nothing_wrong():
     robot, campaign, _ = mixed([], {})
     found = picchio.diagnose(robot, campaign, workers=1)

@@ -21,6 +21,7 @@ def arm():
 
 
 @pytest.mark.parametrize("effect", ["force_amplitude", "sensor_gain"])
+@pytest.mark.slow
 def test_what_is_asked_for_tells_force_from_gain(effect, arm, tmp_path):
     """One accelerometer cannot tell a harder blow from a sensor that reads too much."""
     campaign, truth = trial.make({**FEW, "effect": effect})
@@ -49,6 +50,7 @@ def test_what_is_asked_for_tells_force_from_gain(effect, arm, tmp_path):
     assert record.excitation.force == pytest.approx(ask["force"])
 
 
+@pytest.mark.slow
 def test_what_differs_by_the_day_or_by_the_weather_is_asked_for_on_such_a_day(arm):
     """Between two records of one day it grew warmer as time went by."""
     campaign, truth = trial.make({**FEW, "effect": "stiffness_drift", "records": 2}, 1)

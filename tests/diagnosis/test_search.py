@@ -278,6 +278,7 @@ def test_of_what_does_as_well_the_records_held_out_choose(gains, chosen):
     assert holdout_choice(tied) == (None if chosen is None else str(chosen))
 
 
+@pytest.mark.slow
 def test_warmth_is_not_chosen_where_a_record_held_out_says_it_was_the_day(arm):
     """In the records that are fitted both explain as much, to one in chi-square."""
     campaign, truth = trial.make(
@@ -312,6 +313,7 @@ def test_a_tilting_bearing_is_found_though_others_promise_more(draw, arm):
     assert stiffness.value == pytest.approx(true["parameters"]["stiffness"], rel=0.005)
 
 
+@pytest.mark.slow
 def test_a_contact_that_a_fit_holds_shut_for_ever_is_opened_again(arm):
     """With a preload far beyond the force it is a spring: no slope leads back to less."""
     contact = ("workpiece_contact", "tool", {"stiffness": 1e5, "damping": 290.0, "preload": 34.0})

@@ -118,7 +118,8 @@ def test_a_varied_rivet_is_the_varied_robot(robot: FlexibleRobot, task: Task) ->
         for (a, steady), (b, expected) in cycles:
             assert steady == pytest.approx(expected, rel=1e-12)
             big = b.range > 1.0  # Pa; an upward force does not move joint_1
-            np.testing.assert_allclose(a.range[: len(b)][big], b.range[big], rtol=1e-6)
+            close = 1e-5 * b.range.max(initial=0.0) if compiled else 0.0  # of the ring-down's end
+            np.testing.assert_allclose(a.range[: len(b)][big], b.range[big], rtol=1e-6, atol=close)
 
 
 @pytest.mark.parametrize("factors", [(1.0, 1.0, 1.0), (0.8, 1.6, 1.3), (1.3, 0.4, 0.7)])
