@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
+import numpy as np
+
 from picchio.core.errors import InputError
 from picchio.model.conditions import Conditions
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from picchio.core.arrays import FloatArray
     from picchio.model.blows import Blows
     from picchio.model.effects.evidence import Evidence
@@ -182,6 +182,16 @@ class Effect(ABC):
         other.target, other.values = self.target, self.values
         other.hidden = {k: tuple(float(x) for x in v) for k, v in hidden.items()}
         return other
+
+    def drawn(self, blows: Blows, conditions: Conditions) -> FloatArray | None:
+        """The numbers (h,) of a record's blows; zero beyond those drawn, None for other records."""
+        numbers = self.hidden.get(conditions.record)
+        if numbers is None:
+            return None
+        index = blows.hit.astype(int)
+        every = np.zeros(max(len(numbers), index.max(initial=0) + 1))
+        every[: len(numbers)] = numbers
+        return np.asarray(every[index])
 
     def to_dict(self) -> dict[str, Any]:
         """As in a model file."""

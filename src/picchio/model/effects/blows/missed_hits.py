@@ -33,11 +33,8 @@ class MissedHits(Effect):
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Weaken (0 to 1) each blow of this record by its own amount."""
-        missing = self.hidden.get(conditions.record)
-        if missing is None:
-            return blows
-        index = blows.hit.astype(int)
-        return blows.change(height=blows.height * (1.0 - np.asarray(missing)[index]))
+        missing = self.drawn(blows, conditions)
+        return blows if missing is None else blows.change(height=blows.height * (1.0 - missing))
 
     def draw(self, rng: np.random.Generator, hits: int) -> FloatArray:
         """A record's first blow is its t = 0, so it is there."""

@@ -33,11 +33,8 @@ class PulseJitter(Effect):
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Shift each blow of this record by its own amount."""
-        shift = self.hidden.get(conditions.record)
-        if shift is None:
-            return blows
-        index = blows.hit.astype(int)
-        return blows.change(start=blows.start + np.asarray(shift)[index])
+        shift = self.drawn(blows, conditions)
+        return blows if shift is None else blows.change(start=blows.start + shift)
 
     def draw(self, rng: np.random.Generator, hits: int) -> FloatArray:
         """A record's first blow is its t = 0, so it is not shifted."""
