@@ -302,6 +302,9 @@ class Effect(ABC):
 
         Returns:
             `latent.size(hits)` numbers.
+
+        Raises:
+            InputError: an effect without such numbers.
         """
         raise InputError("draws no numbers", key=self.label)
 
