@@ -3,7 +3,8 @@
 A function is public if neither its name nor that of its class or module begins with "_". Then
 - every parameter (but self, cls and those that begin with "_") is named under "Args:";
 - there is a "Returns:" (or "Yields:"), unless nothing is returned or the summary line says what is:
-  it begins with a word that introduces a thing ("The", "A", "Whether", ...), not with a verb;
+  it begins with a word that introduces a thing ("The", "A", "Whether", ...), not with a verb, or
+  it gives the thing's shape: "Torque (nv,) that ...";
 - there is a "Raises:" where the function itself raises an error that it makes.
 Of a class, "Args:" or "Attributes:" may name the parameters of `__init__`. Methods that implement
 one of a base class in this package need not repeat what is said there, and properties return what
@@ -19,7 +20,7 @@ import ast
 import json
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,17 +36,55 @@ THINGS = set(
     """.split()  # noqa: SIM905
 )
 _ENTRY = re.compile(r"^ {4}((?:\*{0,2}\w+(?:, )?)+)(?: \([^)]*\))?:", re.MULTILINE)
+_SHAPE = re.compile(r"^(\w+(, \w+)*,? )?\(\w+( \+ 1)?(,|(, \w+)+)\)")
 _SECTION = re.compile(r"^(Args|Attributes|Returns|Yields|Raises):\s*$", re.MULTILINE)
 
 
-def missing(source: Path = SOURCE) -> dict[str, list[str]]:
-    """What is missing, by module: lines such as "load_task: Args task, Returns"."""
-    modules = {
+def _modules(source: Path) -> dict[str, ast.Module]:
+    return {
         ".".join(("picchio", *path.relative_to(source).with_suffix("").parts)): ast.parse(
             path.read_text(encoding="utf-8")
         )
         for path in sorted(source.rglob("*.py"))
     }
+
+
+def reached(start: Iterable[tuple[str, str]], source: Path = SOURCE) -> set[tuple[str, str]]:
+    """(module, name) of all functions and classes that somebody meets who calls these.
+
+    That is what they return, and what the attributes and methods of those classes return in turn.
+    """
+    every = {
+        (module, node.name): node
+        for module, tree in _modules(source).items()
+        for node in tree.body
+        if isinstance(node, ast.FunctionDef | ast.ClassDef)
+    }
+    classes: dict[str, list[tuple[str, str]]] = {}
+    for key, node in every.items():
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            classes.setdefault(node.name, []).append(key)
+    found: set[tuple[str, str]] = set()
+    waiting = [key for key in start if key in every]
+    while waiting:
+        key = waiting.pop()
+        if key in found:
+            continue
+        found.add(key)
+        node = every[key]
+        inner = [node] if isinstance(node, ast.FunctionDef) else node.body
+        types = [n.annotation for n in inner if isinstance(n, ast.AnnAssign)]
+        types += [n.returns for n in inner
+                  if isinstance(n, ast.FunctionDef) and n.returns
+                  and (n is node or not n.name.startswith("_"))]  # fmt: skip
+        for name in {word for t in types for word in re.findall(r"\w+", ast.unparse(t))}:
+            waiting += classes.get(name, [])
+    return found
+
+
+def missing(source: Path = SOURCE) -> dict[str, list[str]]:
+    """What is missing, by module: lines such as "load_task: Args task, Returns"."""
+    modules = _modules(source)
     bases = _bases(modules.values())
     found = {}
     for name, tree in modules.items():
@@ -121,6 +160,7 @@ def _function(node: ast.FunctionDef, label: str, of_class: str = "") -> str:
         and not decorators & properties
         and not sections.keys() & {"Returns", "Yields"}
         and re.split(r"\W", text.lower(), maxsplit=1)[0] not in THINGS
+        and not _SHAPE.match(text)
     ):
         lacking.append("Returns")
     if "Raises" not in sections and any(_raises(node)):

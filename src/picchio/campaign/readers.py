@@ -70,7 +70,11 @@ def displacement(reading: Reading) -> FloatArray:
 
 
 def velocity(reading: Reading) -> FloatArray:
-    """Of the frame's origin, world axes, m/s."""
+    """Of the frame's origin, world axes, m/s.
+
+    Args:
+        reading: the record's motion at a frame.
+    """
     frame, x, v, _ = reading.frame()
     return _linear(frame, v) + _bilinear(frame, x, v)
 

@@ -47,11 +47,25 @@ class Source(ABC):
         """Blocks of about `size` samples in the record's order: first index, {name: (m,) SI}.
 
         `names` may hold "time" and any of `channels`; every value given is finite.
+
+        Args:
+            names: channels wanted.
+            size: samples a block, about.
+
+        Returns:
+            pairs of first index and {name: (m,) SI}.
         """
 
     def error(self, problem: str, *, channel: str | None = None, sample: int | None = None,
               **more: object) -> InputError:  # fmt: skip
-        """An InputError that names file, record, channel and line."""
+        """An InputError that names file, record, channel and line.
+
+        Args:
+            problem: what is wrong, in words.
+            channel: where it is wrong.
+            sample: its index, from 0.
+            more: as InputError takes it.
+        """
         parts = [self.key]
         if channel is not None:
             parts.append(f"channel {channel}")
@@ -60,7 +74,16 @@ class Source(ABC):
         return InputError(problem, file=self.path, key=", ".join(parts), **more)  # type: ignore[arg-type]
 
     def require_finite(self, name: str, values: FloatArray, first: int) -> None:
-        """Raise for the first NaN or infinity of a column."""
+        """Raise for the first NaN or infinity of a column.
+
+        Args:
+            name: the channel.
+            values: (m,) of it.
+            first: index of the first of them in the record.
+
+        Raises:
+            InputError: a value is not finite; names file, line and value.
+        """
         if not np.isfinite(values).all():
             bad = int(np.flatnonzero(~np.isfinite(values))[0])
             raise self.error("is not a finite number", channel=name, sample=first + bad,

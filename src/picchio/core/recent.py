@@ -20,7 +20,12 @@ class Recent(Generic[T]):
         self._made: dict[Hashable, T] = {}
 
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
-        """The result under a key, computed by `make` if it is not there."""
+        """The result under a key, computed by `make` if it is not there.
+
+        Args:
+            key: what tells one result from another.
+            make: computes it.
+        """
         try:
             return self._made[key]
         except KeyError:

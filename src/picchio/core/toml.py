@@ -62,7 +62,20 @@ def parse_toml(path: str | Path, model: type[T], *, format: str) -> T:
 def validate(
     data: dict[str, Any], model: type[T], *, format: str, file: str | Path | None = None
 ) -> T:
-    """Validate a dictionary as `parse_toml` does."""
+    """Validate a dictionary as `parse_toml` does.
+
+    Args:
+        data: the file's content.
+        model: the pydantic class it must fit.
+        format: the version to accept.
+        file: named in errors.
+
+    Returns:
+        an instance of `model`.
+
+    Raises:
+        InputError: missing or unknown format, misspelt keys, wrong values.
+    """
     content = dict(data)
     found = content.pop("format", None)
     if found is None:

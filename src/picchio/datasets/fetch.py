@@ -50,7 +50,11 @@ class Dataset:
     files: Mapping[str, RemoteFile]
 
     def address(self, name: str) -> str:
-        """Where a file is downloaded from."""
+        """Where a file is downloaded from.
+
+        Args:
+            name: of the file in this data set.
+        """
         path = quote(self.files[name].path)
         return f"https://raw.githubusercontent.com/{self.repository}/{self.commit}/{path}"
 

@@ -47,7 +47,14 @@ class Identified:
 
     @classmethod
     def of(cls, value: float, std: float, told: bool, why: str) -> Identified:
-        """From a standard deviation."""
+        """From a standard deviation.
+
+        Args:
+            value: in SI.
+            std: standard deviation, same unit.
+            told: whether the data constrain it.
+            why: the reason where they don't.
+        """
         return cls(value, max(value - _HALF * std, 0.0), value + _HALF * std, told, why)
 
 

@@ -49,7 +49,11 @@ class Uncertain:
     upper: FloatArray | None = None
 
     def room(self, step: FloatArray) -> float:
-        """How many such steps there are to the nearest bound."""
+        """How many such steps there are to the nearest bound.
+
+        Args:
+            step: (parameters,) in the unit of each.
+        """
         if self.lower is None or self.upper is None:
             return math.inf
         ends = np.where(step > 0.0, self.upper - self.centre, self.centre - self.lower)

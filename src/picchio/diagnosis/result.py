@@ -115,7 +115,11 @@ class Gain:
     channels: int = 0
 
     def plus(self, other: Gain) -> Gain:
-        """On the records of both, each channel counting alike."""
+        """On the records of both, each channel counting alike.
+
+        Args:
+            other: the gain on other records.
+        """
         signal = [g.channels / g.noise_floor_nrmse**2 for g in (self, other)]
 
         def together(name: str) -> float:

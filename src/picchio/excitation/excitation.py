@@ -82,7 +82,14 @@ class Excitation(ABC):
         return self.blow().padded(self.period)
 
     def burst(self, hits: int) -> PiecewiseForce:
-        """`hits` blows one period apart, then silence for ever."""
+        """`hits` blows one period apart, then silence for ever.
+
+        Args:
+            hits: number of blows.
+
+        Returns:
+            the force from t = 0 on.
+        """
         return self.one_period().repeat(hits, then_silence=True)
 
     @property

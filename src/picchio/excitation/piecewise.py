@@ -102,15 +102,30 @@ class PiecewiseForce:
         return np.where((t >= 0.0) & (t < self.end), value, 0.0)
 
     def scaled(self, factor: float) -> PiecewiseForce:
-        """So many times as large."""
+        """So many times as large.
+
+        Args:
+            factor: of the force.
+        """
         return replace(self, **{name: factor * getattr(self, name) for name in _FORCES})
 
     def over(self, height: float) -> PiecewiseForce:
-        """Divided by a height: a force of that height becomes one of exactly 1."""
+        """Divided by a height: a force of that height becomes one of exactly 1.
+
+        Args:
+            height: N.
+
+        Returns:
+            the force without its unit.
+        """
         return replace(self, **{name: getattr(self, name) / height for name in _FORCES})
 
     def stretched(self, factor: float) -> PiecewiseForce:
-        """So many times as long, as high as before."""
+        """So many times as long, as high as before.
+
+        Args:
+            factor: of time.
+        """
         if factor == 1.0:
             return self
         return replace(
@@ -128,7 +143,14 @@ class PiecewiseForce:
         return arrays + float(self.end).hex().encode()
 
     def padded(self, end: float) -> PiecewiseForce:
-        """Followed by silence until `end`, s."""
+        """Followed by silence until `end`, s.
+
+        Args:
+            end: s; nothing changes where the history ends later.
+
+        Returns:
+            the longer history.
+        """
         if end <= self.end:
             return self
         pieces = {name: np.append(getattr(self, name), 0.0) for name in _PER_PIECE}
@@ -136,7 +158,12 @@ class PiecewiseForce:
         return PiecewiseForce(end=end, **pieces)
 
     def in_piece(self, index: ArrayLike, u: ArrayLike) -> FloatArray:
-        """The force (N) of piece `index` at `u` seconds after that piece's start."""
+        """The force (N) of piece `index` at `u` seconds after that piece's start.
+
+        Args:
+            index: of the piece.
+            u: s, same shape as `index` or one that broadcasts.
+        """
         i = np.asarray(index)
         u = np.asarray(u, dtype=float)
         line = self.constant[i] + self.slope[i] * u
@@ -199,7 +226,15 @@ class PiecewiseForce:
         return float(self.fourier_coefficients(0)[0].real)
 
     def repeat(self, count: int, *, then_silence: bool = False) -> PiecewiseForce:
-        """The history `count` times in a row, then silence for ever if asked."""
+        """The history `count` times in a row, then silence for ever if asked.
+
+        Args:
+            count: at least 1.
+            then_silence: no force ever after, instead of a period.
+
+        Raises:
+            InputError: a count below 1.
+        """
         if count < 1:
             raise InputError("a burst needs at least one hit", key="hits", value=count)
         offset = np.repeat(np.arange(count) * self.end, self.start.size)

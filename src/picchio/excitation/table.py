@@ -92,7 +92,11 @@ class ExcitationTable(StrictModel):
         return self
 
     def overridden_by(self, other: ExcitationTable | None) -> Self:
-        """This table with every key that `other` gives taken from it."""
+        """This table with every key that `other` gives taken from it.
+
+        Args:
+            other: another table of the same kind; None changes nothing.
+        """
         return self if other is None else type(self)(**{**self.given(), **other.given()})
 
     def given(self) -> dict[str, Any]:

@@ -85,6 +85,9 @@ class Reducer:
                 together.
             holding_torque: N m, gravity's alone.
 
+        Returns:
+            utilisations and what is beyond its limit.
+
         Raises:
             InputError: torques that are not finite.
         """

@@ -47,7 +47,11 @@ class Uncertain:
             raise InputError("must not be negative", key="spread", value=self.spread)
 
     def at(self, probability: FloatArray) -> FloatArray:
-        """Its quantiles at probabilities in (0, 1)."""
+        """Its quantiles at probabilities in (0, 1).
+
+        Args:
+            probability: any shape.
+        """
         if self.shape == "uniform":
             return self.median * (1.0 + self.spread * (2.0 * probability - 1.0))
         from scipy.special import ndtri

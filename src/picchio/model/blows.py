@@ -50,7 +50,13 @@ class Blows:
 
     @classmethod
     def of(cls, excitation: Excitation, hits: int | None, direction: FloatArray) -> Blows:
-        """The blows as programmed: `hits` of them, or a steady train."""
+        """The blows as programmed: `hits` of them, or a steady train.
+
+        Args:
+            excitation: the tool's blows.
+            hits: of a burst; None for a steady train.
+            direction: (3,) unit vector, world axes.
+        """
         count = hits or 1
         height = excitation.peak_force or 1.0
         other = excitation.other_blow()
@@ -79,11 +85,20 @@ class Blows:
         return float(np.abs(self.height).max(initial=0.0)) or 1.0
 
     def change(self, **changes: object) -> Blows:
-        """The same blows with some attributes replaced."""
+        """The same blows with some attributes replaced.
+
+        Args:
+            changes: attribute = value.
+        """
         return replace(self, **changes)  # type: ignore[arg-type]
 
     def with_echo(self, delay: float, ratio: float) -> Blows:
-        """Each blow followed by another, `delay` s after its start, `ratio` as high."""
+        """Each blow followed by another, `delay` s after its start, `ratio` as high.
+
+        Args:
+            delay: s.
+            ratio: of the heights.
+        """
         return replace(
             self,
             start=np.concatenate([self.start, self.start + delay]),
@@ -92,7 +107,7 @@ class Blows:
         )
 
     def force(self) -> PiecewiseForce:
-        """F(t): the burst from t = 0 on, endless; or one period of a steady train.
+        """The force over time: of a burst from t = 0 on, endless; or one period of a steady train.
 
         Raises:
             InputError: a stretch that is not positive.

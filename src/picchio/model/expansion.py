@@ -129,7 +129,11 @@ class Motion:
     rotation: FloatArray
 
     def at(self, offset: FloatArray) -> Motion:
-        """The motion of a point (3,) m fixed in the frame."""
+        """The motion of a point (3,) m fixed in the frame.
+
+        Args:
+            offset: (3,) m, from the frame's origin, in its axes.
+        """
         lever = self.rotation @ offset
         linear, angular = self.jacobian[:3], self.jacobian[3:]
         jacobian = self.jacobian.copy()
@@ -141,7 +145,11 @@ class Motion:
         return Motion(jacobian, gradient, self.rotation)
 
     def take(self, columns: list[int]) -> Motion:
-        """The motion with some of the coordinates."""
+        """The motion with some of the coordinates.
+
+        Args:
+            columns: indices of the coordinates that are kept.
+        """
         return Motion(
             self.jacobian[:, columns],
             np.ascontiguousarray(self.gradient[np.ix_(columns, range(6), columns)]),

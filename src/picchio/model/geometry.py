@@ -43,7 +43,12 @@ class Geometry:
 
     @classmethod
     def of(cls, robot: FlexibleRobot, pose: FloatArray) -> Geometry:
-        """The geometry of a robot at a pose."""
+        """The geometry of a robot at a pose.
+
+        Args:
+            robot: the robot.
+            pose: (nv,) rad or m.
+        """
         return cls(WideChain(robot), robot.pose(pose))
 
     @property
@@ -52,7 +57,12 @@ class Geometry:
         return self.chain.robot
 
     def inertia(self, what: str = "robot", point: tuple[float, ...] | None = None) -> Inertia:
-        """As `WideChain.inertia`."""
+        """As `WideChain.inertia`.
+
+        Args:
+            what: "robot", or a link.
+            point: (3,) m in the link's axes: of 1 kg there instead of the link.
+        """
         key = (what, point)
         if key not in self._inertias:
             given = what if point is None else (what, np.asarray(point, dtype=float))
@@ -83,7 +93,12 @@ class Geometry:
         return self._totals.get((masses, taken), make)
 
     def plant(self, key: Hashable, make: Callable[[], Plant]) -> Plant:
-        """The plant of a key, made where it is not known: records of one pose share theirs."""
+        """The plant of a key, made where it is not known: records of one pose share theirs.
+
+        Args:
+            key: what tells one plant from another.
+            make: computes it where it is not kept.
+        """
         return self._plants.get(key, make)
 
     def motion(self, frame: str, taken: tuple[int, ...] | None = None) -> Motion:

@@ -52,13 +52,20 @@ class Motion:
     signs: dict[str, FloatArray] = field(default_factory=dict)
 
     def has(self, joint: str) -> bool:
-        """Whether the joint's motion was recorded."""
+        """Whether the joint's motion was recorded.
+
+        Args:
+            joint: its name.
+        """
         return joint in self.angle
 
     def direction(self, joint: str) -> FloatArray:
         """The sign of the velocity, 1 or -1; 0 while the joint stands.
 
         A joint that only passes through zero speed does not stand.
+
+        Args:
+            joint: its name.
         """
         if joint not in self.signs:
             v = self.velocity[joint]
@@ -74,29 +81,64 @@ class Motion:
     # What effects may do ---------------------------------------------------------------------
 
     def add_body_torque(self, joint: str, torque: FloatArray) -> None:
-        """Add a torque that follows from the motion of masses, N m: the gear transmits it."""
+        """Add a torque that follows from the motion of masses, N m: the gear transmits it.
+
+        Args:
+            joint: its name.
+            torque: (m,) N m or N.
+        """
         self.body[joint] = self.body[joint] + torque
 
     def add_rotor_torque(self, joint: str, torque: FloatArray) -> None:
-        """Add a torque that follows from the motion of a rotor, N m: before the gear."""
+        """Add a torque that follows from the motion of a rotor, N m: before the gear.
+
+        Args:
+            joint: its name.
+            torque: (m,) N m or N.
+        """
         self.added.append((ROTOR, joint, torque))
 
     def add_drive_torque(self, joint: str, torque: FloatArray) -> None:
-        """Add a torque on the motor's side of the gear, N m: friction, or an offset."""
+        """Add a torque on the motor's side of the gear, N m: friction, or an offset.
+
+        Args:
+            joint: its name.
+            torque: (m,) N m or N.
+        """
         self.added.append((TORQUE, joint, torque))
 
     def add_ripple(self, joint: str, torque: FloatArray) -> None:
-        """Add a torque that may be faster than the band in which the rest is judged, N m."""
+        """Add a torque that may be faster than the band in which the rest is judged, N m.
+
+        Args:
+            joint: its name.
+            torque: (m,) N m or N.
+        """
         self.added.append((RIPPLE, joint, torque))
 
     def add_windup(self, joint: str, angle: FloatArray) -> None:
-        """Add to the link side's angle less the motor side's, rad or m."""
+        """Add to the link side's angle less the motor side's, rad or m.
+
+        Args:
+            joint: its name.
+            angle: (m,) rad or m.
+        """
         self.added.append((WINDUP, joint, angle))
 
     def scale_torque(self, joint: str, gain: float) -> None:
-        """Let the drive report `gain` times its torque."""
+        """Let the drive report `gain` times its torque.
+
+        Args:
+            joint: its name.
+            gain: of the torque sensor.
+        """
         self.gains[joint] = self.gains.get(joint, 1.0) * gain
 
     def delay(self, group: str, seconds: float) -> None:
-        """Let the channels of a group ("position", "motor_position", "torque") be late."""
+        """Let the channels of a group ("position", "motor_position", "torque") be late.
+
+        Args:
+            group: of channels.
+            seconds: how late.
+        """
         self.delays[group] = self.delays.get(group, 0.0) + seconds

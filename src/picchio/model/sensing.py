@@ -64,9 +64,17 @@ class Sensors:
         self._chains: dict[str, SensorChain] = {}
 
     def chain(self, group: str) -> SensorChain:
-        """The chain of a group, to be changed."""
+        """The chain of a group, to be changed.
+
+        Args:
+            group: of channels, such as "accelerometer.tool".
+        """
         return self._chains.setdefault(group, SensorChain())
 
     def get(self, group: str) -> SensorChain:
-        """The chain of a group, to be read."""
+        """The chain of a group, to be read.
+
+        Args:
+            group: of channels, such as "accelerometer.tool".
+        """
         return self._chains.get(group, _IDEAL)

@@ -63,7 +63,11 @@ class Assumptions:
         return self.duty * self.period
 
     def but(self, **changes: Any) -> Assumptions:
-        """The same with some values changed."""
+        """The same with some values changed.
+
+        Args:
+            changes: attribute = value.
+        """
         return dataclasses.replace(self, **changes)
 
     def to_dict(self) -> dict[str, Any]:

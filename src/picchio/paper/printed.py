@@ -54,7 +54,14 @@ class PrintedCurve(StrictModel):
     b: float
 
     def cycles(self, stress: FloatArray) -> FloatArray:
-        """Life at stresses in MPa; inf at none."""
+        """Life at stresses in MPa; inf at none.
+
+        Args:
+            stress: (k,) MPa.
+
+        Returns:
+            (k,) cycles to failure.
+        """
         with np.errstate(divide="ignore"):
             return np.asarray((self.a / np.asarray(stress, dtype=float)) ** (-1.0 / self.b))
 
@@ -64,7 +71,11 @@ class PrintedCurve(StrictModel):
         return -1.0 / self.b
 
     def sn_curve(self, tensile_strength: float | None = None) -> SNCurve:
-        """The same as picchio's own type; Pa."""
+        """The same as picchio's own type; Pa.
+
+        Args:
+            tensile_strength: Pa, for a mean-stress correction.
+        """
         return SNCurve(
             name="paper",
             strength=self.a * 1e6,

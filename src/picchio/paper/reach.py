@@ -41,7 +41,12 @@ class ReachMap:
         return float(self.place[self.place.shape[0] // 2, 0, 2])
 
     def top(self, peaks: FloatArray, joint: int) -> FloatArray:
-        """(3,) m, where the joint's peak is largest."""
+        """The place (3,) m where the joint's peak is largest.
+
+        Args:
+            peaks: (..., joints) over the map.
+            joint: its index.
+        """
         flat = int(peaks[..., joint].argmax())
         return np.asarray(self.place.reshape(-1, 3)[flat])
 

@@ -49,7 +49,14 @@ class Study:
         return (self.base, *random_worlds(self.count, self.seed, self.given))
 
     def reach(self, world: World) -> ReachMap:
-        """Fig. 10's maps in a world; kept."""
+        """Fig. 10's maps in a world; kept.
+
+        Args:
+            world: whose maps.
+
+        Returns:
+            the map, computed once.
+        """
         known = self.__dict__.setdefault("_maps", {})
         if id(world) not in known:
             fine = world is self.base

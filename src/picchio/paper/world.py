@@ -50,7 +50,16 @@ class World:
     def peaks(
         self, poses: ArrayLike, direction: ArrayLike | None = None, hits: int | None = None
     ) -> BatchPeaks:
-        """Peaks at poses (p, 3): the worst direction's, or along one; steady, or of a burst."""
+        """Peaks at poses (p, 3): the worst direction's, or along one; steady, or of a burst.
+
+        Args:
+            poses: (p, 3) rad.
+            direction: (3,) of the force; the worst one where None.
+            hits: of a burst; None for a steady train.
+
+        Returns:
+            deflections and torques, (p, 3) each.
+        """
         rows = np.ascontiguousarray(poses, dtype=float)
         mass, jacobian = self.robot.mass_and_jacobian(rows)
         return batch_peaks(
@@ -59,7 +68,11 @@ class World:
         )  # fmt: skip
 
     def stress(self, deflection: FloatArray) -> FloatArray:
-        """Eqs. 14-17: MPa from rad."""
+        """The shear stress in MPa of deflections in rad, by Eqs. 14-17.
+
+        Args:
+            deflection: rad, any shape.
+        """
         return np.asarray(deflection) * (self.given.stress_per_twist / 1e6)
 
     @cached_property

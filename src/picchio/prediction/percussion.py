@@ -130,7 +130,11 @@ class PercussionSetup:
         return found
 
     def cut(self, end: float) -> PercussionSetup:
-        """The same record up to a time, s."""
+        """The same record up to a time, s.
+
+        Args:
+            end: s.
+        """
         count = int(np.searchsorted(self.samples.times, end + 1e-9))
         mine = self.samples
         return replace(self, samples=Samples(mine.start, mine.step, min(count, mine.count)))
@@ -200,7 +204,11 @@ class PercussionSetup:
         return rows
 
     def struck(self, model: Model) -> Struck:
-        """The blows with the model's effects in them, and the force they make."""
+        """The blows with the model's effects in them, and the force they make.
+
+        Args:
+            model: whose effects change the blows.
+        """
 
         def make() -> Struck:
             blows = model.blows(self.blows, self.conditions)
@@ -379,6 +387,12 @@ def predict(
     gravity_stiffness: bool = True,
 ) -> Mapping[str, dict[str, FloatArray]]:
     """What every percussion record would have read: {file: {channel: (samples,)}}, SI.
+
+    Args:
+        robot: the robot.
+        campaign: its percussion records are predicted.
+        effects: that extend the nominal model.
+        gravity_stiffness: include the change of gravity's torque with deflection.
 
     Raises:
         InputError: as `percussion_setups`.

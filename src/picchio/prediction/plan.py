@@ -51,6 +51,9 @@ class SensorTable(StrictModel):
     def expand(self, robot: FlexibleRobot) -> list[tuple[Channel, float]]:
         """Its channels on this robot, with their noise in SI.
 
+        Args:
+            robot: the robot.
+
         Raises:
             InputError: no such channel, joint or frame, or one that cannot be predicted.
         """

@@ -148,7 +148,7 @@ class FlexibleRobot:
         return tuple(name for name in self.joint_names if name in self.tree.joints)
 
     def limit_violations(self, pose: ArrayLike) -> list[str]:
-        """Names of the joints that stand beyond their limits at this pose.
+        """The names of the joints that stand beyond their limits at this pose.
 
         Args:
             pose: (nv,) rad or m.

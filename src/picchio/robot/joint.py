@@ -35,7 +35,11 @@ class StiffnessCurve:
     t2: float
 
     def tangent(self, torque: ArrayLike) -> NDArray[np.float64]:
-        """Slope at a torque, N m/rad; at a corner the line below it. Same shape as `torque`."""
+        """The slope at a torque, N m/rad; at a corner that of the line below it.
+
+        Args:
+            torque: N m, any shape.
+        """
         size = np.abs(np.asarray(torque, dtype=float))
         return np.where(size <= self.t1, self.k1, np.where(size <= self.t2, self.k2, self.k3))
 

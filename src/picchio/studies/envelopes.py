@@ -70,7 +70,11 @@ class DirectionEnvelope(TableResult):
     origin: Mapping[str, Any] = field(default_factory=dict)
 
     def peak(self, quantity: Quantity = "deflection") -> FloatArray:
-        """(n,) largest value over all directions: rad, N m or Pa; along `worst_direction`."""
+        """(n,) largest value over all directions: rad, N m or Pa; along `worst_direction`.
+
+        Args:
+            quantity: "deflection", "torque" or "stress".
+        """
         return self.peak_deflection * self._factor(quantity)
 
     def _factor(self, quantity: Quantity) -> FloatArray:

@@ -73,7 +73,7 @@ class WorstRivet:
         return found
 
     def stress_turning_points(self) -> tuple[FloatArray, FloatArray]:
-        """Time (k,) s and shear stress (k,) Pa of the vibration's turning points.
+        """The time (k,) s and shear stress (k,) Pa of the vibration's turning points.
 
         Raises:
             InputError: the joint has no shaft.
@@ -84,7 +84,7 @@ class WorstRivet:
         return time, shear_stress(self.stiffness * value, self.joint.shaft)
 
     def cycles(self) -> Cycles:
-        """Cycles of the shear stress, Pa, counted with half cycles for the residue."""
+        """The cycles of the shear stress, Pa, counted with half cycles for the residue."""
         return rainflow(self.stress_turning_points()[1])
 
 
@@ -102,6 +102,9 @@ def worst_rivet(
         robot: the robot, or a model of it.
         task: the task.
         gravity_stiffness: as in the assessment.
+
+    Returns:
+        the rivet's response at the joint that limits the life.
 
     Raises:
         InputError: as `assess`.

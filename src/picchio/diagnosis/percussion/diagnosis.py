@@ -78,6 +78,9 @@ class PercussionDiagnosis:
     def life(self, task: Task) -> dict[str, Any]:
         """A task's life before and after, with intervals, and with every alternative set.
 
+        Args:
+            task: whose life is wanted.
+
         Raises:
             InputError: as `picchio.diagnosis.life.life_before_and_after`.
         """

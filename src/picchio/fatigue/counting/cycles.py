@@ -60,24 +60,42 @@ class Cycles:
         )
 
     def repeated(self, times: float) -> Cycles:
-        """The same cycles `times` over: counts are multiplied."""
+        """The same cycles `times` over: counts are multiplied.
+
+        Args:
+            times: how often.
+        """
         return Cycles(self.range, self.mean, self.count * float(times))
 
     def shifted(self, mean: float) -> Cycles:
-        """The same cycles about a mean that is higher by `mean` (gravity's share, say)."""
+        """The same cycles about a mean that is higher by `mean` (gravity's share, say).
+
+        Args:
+            mean: in the unit of the history.
+        """
         return Cycles(self.range, self.mean + float(mean), self.count)
 
     def scaled(self, factor: float) -> Cycles:
-        """The cycles of the history times `factor`; a negative one turns the means over."""
+        """The cycles of the history times `factor`; a negative one turns the means over.
+
+        Args:
+            factor: of the history.
+        """
         return Cycles(self.range * abs(float(factor)), self.mean * float(factor), self.count)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain lists, for JSON."""
+        """The three arrays as plain lists, for JSON."""
         return {name: getattr(self, name).tolist() for name in ("range", "mean", "count")}
 
     @classmethod
     def trusted(cls, range: FloatArray, mean: FloatArray, count: FloatArray) -> Cycles:
-        """Cycles of arrays that are not shared and need no check, which saves time for millions."""
+        """The cycles of arrays that are not shared and need no check: this saves time for millions.
+
+        Args:
+            range: (k,) largest less smallest value.
+            mean: (k,) of each.
+            count: (k,) 1 or 0.5 each.
+        """
         new = object.__new__(cls)
         for name, array in (("range", range), ("mean", mean), ("count", count)):
             array.flags.writeable = False

@@ -59,6 +59,9 @@ class AutoRegression:
 
         Args:
             series: (..., m).
+
+        Raises:
+            InputError: noise without variance.
         """
         from picchio.measurement.noise.whiten_kernel import whiten as kernel
 
@@ -82,7 +85,12 @@ class AutoRegression:
         return table, np.sqrt(self.variances)
 
     def sample(self, samples: int, rng: np.random.Generator) -> FloatArray:
-        """(samples,) noise like it, stationary from the first sample on."""
+        """(samples,) noise like it, stationary from the first sample on.
+
+        Args:
+            samples: how many.
+            rng: source of random numbers.
+        """
         from scipy.signal import lfilter, lfiltic
 
         white = rng.normal(size=samples)
@@ -101,7 +109,15 @@ class AutoRegression:
         return x
 
     def psd(self, frequency: ArrayLike, rate: float) -> FloatArray:
-        """One-sided power spectral density, unit^2/Hz, at frequencies in Hz."""
+        """One-sided power spectral density, unit^2/Hz, at frequencies in Hz.
+
+        Args:
+            frequency: (k,) Hz.
+            rate: samples a second, Hz.
+
+        Returns:
+            (k,) of it.
+        """
         f = np.asarray(frequency, dtype=np.float64)
         lags = np.arange(1, self.order + 1)
         wave = np.exp(-2j * np.pi * f[..., None] * lags / rate)
@@ -109,7 +125,11 @@ class AutoRegression:
         return 2.0 * self.variances[-1] / rate / np.abs(gain) ** 2
 
     def autocorrelation(self, lags: int) -> FloatArray:
-        """(lags + 1,) from 1 at lag zero on."""
+        """The autocorrelation (lags + 1,), from 1 at lag zero on.
+
+        Args:
+            lags: the last one.
+        """
         rho = np.zeros(lags + 1)
         rho[0] = 1.0
         if not self.order:

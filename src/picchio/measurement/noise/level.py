@@ -103,7 +103,12 @@ class Noise:
         return self.model.whiten(residual)
 
     def sample(self, samples: int, rng: np.random.Generator) -> FloatArray:
-        """(samples,) noise like it at `rate`, without hum."""
+        """(samples,) noise like it at `rate`, without hum.
+
+        Args:
+            samples: how many.
+            rng: source of random numbers.
+        """
         return self.model.sample(samples, rng)
 
     def to_dict(self) -> dict[str, Any]:

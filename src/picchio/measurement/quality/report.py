@@ -127,7 +127,11 @@ class QualityReport(TableResult):
     checks: Mapping[str, str]
 
     def count(self, severity: str) -> int:
-        """How many findings of this severity."""
+        """How many findings of this severity.
+
+        Args:
+            severity: "error", "warning" or "note".
+        """
         return sum(finding.severity == severity for finding in self.findings)
 
     def _headline(self) -> str:

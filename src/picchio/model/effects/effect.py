@@ -167,24 +167,41 @@ class Effect(ABC):
         return f"{self.name}:{self.target}"
 
     def unit(self, parameter: str) -> str:
-        """The unit of a parameter at this effect's target, SI."""
+        """The unit of a parameter at this effect's target, SI.
+
+        Args:
+            parameter: its name.
+        """
         return next(p.unit for p in self.parameters if p.name == parameter)
 
     def with_values(self, **values: float) -> Self:
-        """The same effect with other values."""
+        """The same effect with other values.
+
+        Args:
+            values: parameter = value in SI; others stay.
+        """
         neutral = {p.name: p.neutral for p in self.parameters}
         kept = {k: v for k, v in self.values.items() if v != neutral[k]}
         return type(self)(self.target, **{**kept, **values}).with_hidden(self.hidden)
 
     def with_hidden(self, hidden: Mapping[str, tuple[float, ...]]) -> Self:
-        """The same effect with other numbers drawn anew in every record."""
+        """The same effect with other numbers drawn anew in every record.
+
+        Args:
+            hidden: record -> its numbers.
+        """
         other = type(self).__new__(type(self))
         other.target, other.values = self.target, self.values
         other.hidden = {k: tuple(float(x) for x in v) for k, v in hidden.items()}
         return other
 
     def drawn(self, blows: Blows, conditions: Conditions) -> FloatArray | None:
-        """The numbers (h,) of a record's blows; zero beyond those drawn, None for other records."""
+        """The numbers (h,) of a record's blows; zero beyond those drawn, None for other records.
+
+        Args:
+            blows: of the record.
+            conditions: of the record.
+        """
         numbers = self.hidden.get(conditions.record)
         if numbers is None:
             return None
@@ -219,6 +236,9 @@ class Effect(ABC):
 
         Args:
             scales: sizes of deflections, torques and readings in the campaign.
+
+        Returns:
+            a dictionary of values a trial.
         """
         return []
 
@@ -234,7 +254,11 @@ class Effect(ABC):
 
     @classmethod
     def shows(cls, motion: bool) -> bool:
-        """Whether it changes anything in motion records, or else in percussion records."""
+        """Whether it changes anything in motion records, or else in percussion records.
+
+        Args:
+            motion: of the record.
+        """
         return cls.motion is not Effect.motion if motion else cls.where != "motion"
 
     @classmethod
@@ -281,17 +305,38 @@ class Effect(ABC):
     # Hooks: an effect overrides those that concern it ----------------------------------------
 
     def structure(self, plant: Changes) -> None:  # noqa: B027
-        """Change the robot's equations of motion."""
+        """Change the robot's equations of motion.
+
+        Args:
+            plant: what may be changed.
+        """
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
-        """Change the blows."""
+        """Change the blows.
+
+        Args:
+            blows: as programmed, or as other effects left them.
+            conditions: of the record.
+
+        Returns:
+            the changed blows.
+        """
         return blows
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:  # noqa: B027
-        """Change how channels read."""
+        """Change how channels read.
+
+        Args:
+            sensors: the chains that may be changed.
+            conditions: of the record.
+        """
 
     def motion(self, motion: Motion) -> None:  # noqa: B027
-        """Change what drives and encoders read while the robot moves."""
+        """Change what drives and encoders read while the robot moves.
+
+        Args:
+            motion: of the record, to be changed.
+        """
 
     def draw(self, rng: np.random.Generator, hits: int) -> FloatArray:
         """The numbers of one more record, drawn at random; see `latent`.
@@ -317,11 +362,21 @@ class Effect(ABC):
 
         Returns:
             (channels, m), and the numbers.
+
+        Raises:
+            InputError: an effect without such numbers.
         """
         raise InputError("has no numbers that readings are linear in", key=self.label)
 
     def motion_trials(self, motion: Motion) -> list[dict[str, float]]:
-        """Values to try of what enters a motion record nonlinearly; the rest is solved for."""
+        """Values to try of what enters a motion record nonlinearly; the rest is solved for.
+
+        Args:
+            motion: of the record.
+
+        Returns:
+            a dictionary of values a trial.
+        """
         return [{}]
 
 
@@ -339,5 +394,15 @@ def parameter(
     log: bool = False,
     meaning: str = "",
 ) -> Parameter:
-    """A parameter, in few words."""
+    """A parameter, in few words.
+
+    Args:
+        name: as in a model file.
+        unit: SI, in words that pint reads; empty for a ratio.
+        neutral: the value without effect.
+        lower: least value, or None.
+        upper: largest value, or None.
+        log: search its logarithm.
+        meaning: one line for people.
+    """
     return Parameter(name, unit, neutral, lower, upper, log, meaning)

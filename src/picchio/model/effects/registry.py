@@ -30,6 +30,9 @@ def catalogue() -> dict[str, type[Effect]]:
 def effect_class(name: str) -> type[Effect]:
     """The effect of a name.
 
+    Args:
+        name: as in a model file.
+
     Raises:
         InputError: there is none.
     """

@@ -83,7 +83,12 @@ class CurveOfTable:
         return self.fits[0]
 
     def fit(self, name: str, aside: bool = False) -> CurveFit:
-        """A hypothesis by its name, with or without an entry aside."""
+        """A hypothesis by its name, with or without an entry aside.
+
+        Args:
+            name: of the hypothesis.
+            aside: whether an entry of the table is left out.
+        """
         return next(f for f in self.fits if f.name == name and (f.aside is not None) == aside)
 
 

@@ -43,11 +43,20 @@ class Place:
         return arm(self.base)
 
     def assumptions(self, v: FloatArray) -> Assumptions:
-        """The world that a vector stands for."""
+        """The world that a vector stands for.
+
+        Args:
+            v: (unknowns,) of the fit.
+        """
         return self.base.but(**decode(v))
 
     def deflections(self, v: FloatArray, printed: Printed) -> FloatArray | None:
-        """(3 directions, k rivets, 3 joints) rad; None where a rivet is out of reach."""
+        """The deflections (3 directions, k rivets, 3 joints) rad; None where one is out of reach.
+
+        Args:
+            v: (unknowns,) of the fit.
+            printed: what the paper prints.
+        """
         given = self.assumptions(v)
         poses = poses_at(rivet_points(given), given.elbow)
         if np.isnan(poses).any():

@@ -43,6 +43,9 @@ class CascadeLaw:
     def from_controller(cls, controller: Mapping[str, Any] | None) -> CascadeLaw:
         """From a campaign's `[controller]`: kp, kv, gtau and, optionally, voltage_limit.
 
+        Args:
+            controller: the campaign's table.
+
         Raises:
             InputError: a key is missing or no number.
         """
@@ -58,7 +61,14 @@ class CascadeLaw:
 
     def force(self, reference: FloatArray, position: FloatArray, velocity: FloatArray,
               extra: FloatArray | float = 0.0) -> FloatArray:  # fmt: skip
-        """What the law commands, N (N m); `extra` volts are added before the limit."""
+        """What the law commands, N (N m); `extra` volts are added before the limit.
+
+        Args:
+            reference: (m,) m or rad.
+            position: (m,) m or rad.
+            velocity: (m,) m/s or rad/s.
+            extra: (m,) V.
+        """
         volts = self.kp * self.kv * (reference - position) - self.kv * velocity + extra
         found: FloatArray = self.gtau * np.clip(volts, -self.limit, self.limit)
         return found
@@ -101,6 +111,9 @@ def simulate_closed_loop(
         friction: velocity -> N or N m against positive motion; its jump at zero is dry friction.
         extra: (m,) V, added to the command.
         start: position and velocity.
+
+    Returns:
+        position, velocity and the drive's torque.
     """
     samples = reference.size
     step = 1.0 / (rate * _SUBSTEPS)
@@ -133,6 +146,9 @@ def friction_curve(effects: Sequence[Effect], joint: str, fastest: float) -> Cal
         effects: other effects are passed over.
         joint: whose.
         fastest: m/s or rad/s, up to which it is wanted.
+
+    Returns:
+        a function from velocity to N or N m.
     """
     half = np.geomspace(1e-6 * fastest, 1.5 * fastest, _GRID)
     grid = np.concatenate([-half[::-1], half])

@@ -51,7 +51,11 @@ class Place:
     old: list[tuple[int, int]] = field(default_factory=list)
 
     def see_child(self, blank: str) -> None:
-        """Take the lead over from a child that has a line of its own, else from the first."""
+        """Take the lead over from a child that has a line of its own, else from the first.
+
+        Args:
+            blank: the white space before the child.
+        """
         if self.lead is None or ("\n" in blank and "\n" not in self.lead):
             line = blank.rpartition("\n")
             self.lead = line[1] + line[2]

@@ -39,7 +39,11 @@ class Source:
     strict: bool = True
 
     def origin(self, source: str | None) -> str:
-        """The label, with the value's own source where it has one."""
+        """The label, with the value's own source where it has one.
+
+        Args:
+            source: of the value itself, if stated.
+        """
         return f"{self.label}: {source}" if source else self.label
 
 

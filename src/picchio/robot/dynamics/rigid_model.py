@@ -76,6 +76,9 @@ class RigidModel:
     def with_bodies(self, bodies: Sequence[Body]) -> RigidModel:
         """The same robot with bodies added to its links; not picklable, unlike the original.
 
+        Args:
+            bodies: what is fixed to which link.
+
         Raises:
             InputError: no such link.
         """
@@ -125,12 +128,19 @@ class RigidModel:
         return full if self._plain else self._follow.T @ full @ self._follow
 
     def followed(self, joint: str) -> tuple[Array, float]:
-        """A joint's position as row (nv,) @ pose + shift: more than a one where it mimics."""
+        """A joint's position as row (nv,) @ pose + shift: more than a one where it mimics.
+
+        Args:
+            joint: its name.
+        """
         row = list(self._model.names).index(joint) - 1
         return self._follow[row], float(self._offset[row])
 
     def frame(self, link: str) -> int:
-        """Pinocchio's index of a link's frame.
+        """The index, Pinocchio's, of a link's frame.
+
+        Args:
+            link: its name.
 
         Raises:
             InputError: no such link.
@@ -145,12 +155,21 @@ class RigidModel:
             raise InputError("no such frame", key="frame", value=frame)
 
     def mass_matrix(self, pose: Array) -> Array:
-        """Joint-space mass matrix (nv, nv), kg m^2, kg m, kg."""
+        """The mass matrix (nv, nv) in joint space, kg m^2, kg m, kg.
+
+        Args:
+            pose: (nv,) rad or m.
+        """
         matrix = pin.crba(self._model, self._data(), self._q(pose))
         return self._reduce(matrix)
 
     def jacobian(self, pose: Array, frame: int) -> Array:
-        """Jacobian (6, nv) of a frame's origin, world axes: linear m/rad, then angular."""
+        """Jacobian (6, nv) of a frame's origin, world axes: linear m/rad, then angular.
+
+        Args:
+            pose: (nv,) rad or m.
+            frame: of `frame`.
+        """
         self._check_frame(frame)
         matrix = pin.computeFrameJacobian(
             self._model, self._data(), self._q(pose), frame, pin.LOCAL_WORLD_ALIGNED
@@ -161,7 +180,7 @@ class RigidModel:
     def mass_and_jacobian(
         self, poses: Array, frame: int, index: NDArray[np.intp] | None = None
     ) -> tuple[Array, Array]:
-        """Mass matrices (p, n, n) and a frame's linear Jacobians (p, 3, n) at many poses.
+        """The mass matrices (p, n, n) and a frame's linear Jacobians (p, 3, n) at many poses.
 
         Two Pinocchio calls a pose and nothing else: the floor under the cost of a map.
 
@@ -169,6 +188,9 @@ class RigidModel:
             poses: (p, nv).
             frame: of `frame`.
             index: (n,) which coordinates are wanted; all if not given.
+
+        Raises:
+            InputError: poses of another shape, or no such frame.
         """
         self._check_frame(frame)
         if poses.ndim != 2 or poses.shape[1] != self.nv:
@@ -195,18 +217,32 @@ class RigidModel:
         return follow.T @ mass @ follow, jacobian @ follow
 
     def gravity_torque(self, pose: Array) -> Array:
-        """Torque (nv,) that holds the arm against gravity, N m (N)."""
+        """Torque (nv,) that holds the arm against gravity, N m (N).
+
+        Args:
+            pose: (nv,) rad or m.
+        """
         torque = pin.computeGeneralizedGravity(self._model, self._data(), self._q(pose))
         full = np.array(torque).reshape(self._all)
         return full if self._plain else self._follow.T @ full
 
     def gravity_gradient(self, pose: Array) -> Array:
-        """Its derivative (nv, nv) by the pose, N m/rad."""
+        """The derivative (nv, nv) of gravity's torque by the pose, N m/rad.
+
+        Args:
+            pose: (nv,) rad or m.
+        """
         matrix = pin.computeGeneralizedGravityDerivatives(self._model, self._data(), self._q(pose))
         return self._reduce(matrix)
 
     def inverse_dynamics(self, poses: Array, velocities: Array, accelerations: Array) -> Array:
-        """Torques (m, nv) that the bodies' motion takes, N m (N); arguments (m, nv) each."""
+        """Torques (m, nv) that the bodies' motion takes, N m (N); arguments (m, nv) each.
+
+        Args:
+            poses: (m, nv) rad or m.
+            velocities: (m, nv) a second.
+            accelerations: (m, nv) a second squared.
+        """
         model, data = self._model, self._data()
         offset, zero = self._offset, np.zeros(self._all)
         full = [
@@ -220,7 +256,14 @@ class RigidModel:
     def point_load(
         self, poses: Array, velocities: Array, accelerations: Array, frame: int
     ) -> Array:
-        """Torques (m, nv) for each kg at a frame's origin: J^T (acceleration less gravity)."""
+        """Torques (m, nv) for each kg at a frame's origin: J^T (acceleration less gravity).
+
+        Args:
+            poses: (m, nv) rad or m.
+            velocities: (m, nv) a second.
+            accelerations: (m, nv) a second squared.
+            frame: of `frame`.
+        """
         self._check_frame(frame)
         model, data = self._model, self._data()
         world, gravity = pin.LOCAL_WORLD_ALIGNED, self._model.gravity.linear
@@ -238,7 +281,12 @@ class RigidModel:
         return found
 
     def placement(self, pose: Array, frame: int) -> tuple[Array, Array]:
-        """World position (3,) in m and rotation (3, 3) of a frame."""
+        """The world position (3,) in m and rotation (3, 3) of a frame.
+
+        Args:
+            pose: (nv,) rad or m.
+            frame: of `frame`.
+        """
         self._check_frame(frame)
         data = self._data()
         pin.forwardKinematics(self._model, data, self._q(pose))
@@ -246,7 +294,7 @@ class RigidModel:
         return np.array(placement.translation), np.array(placement.rotation)
 
     def total_mass(self) -> float:
-        """Mass of all bodies that can move, kg."""
+        """The mass of all bodies that can move, kg."""
         return float(sum(body.mass for body in list(self._model.inertias)[1:]))
 
 

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 def self_motion_basis(
     robot: FlexibleRobot, pose: ArrayLike, *, keep_axis: bool = True, tolerance: float = 1e-6
 ) -> Array:
-    """Orthonormal directions (nv, r) in which the joints can move, the tool standing still.
+    """The orthonormal directions (nv, r) in which the joints can move, the tool standing still.
 
     Args:
         robot: the robot.

@@ -32,7 +32,13 @@ class AnnotatedUrdf(Result):
     file: Path | None = None
 
     def save(self, path: str | Path) -> Path:
-        """Write the URDF to a file, whole or not at all, and return the path.
+        """Write the URDF to a file, whole or not at all.
+
+        Args:
+            path: of the file.
+
+        Returns:
+            the path.
 
         Raises:
             InputError: it cannot be written there.

@@ -78,20 +78,24 @@ class UrdfTree:
     remarks: tuple[str, ...] = ()
 
     def movable(self) -> list[str]:
-        """Joints that can be flexible: revolute, continuous and prismatic, and no mimics."""
+        """The joints that can be flexible: revolute, continuous and prismatic, and no mimics."""
         return [j.name for j in self.joints.values() if j.type in MOVABLE and j.mimic is None]
 
     def locked(self) -> list[str]:
-        """Joints of several degrees of freedom, which stand still."""
+        """The joints of several degrees of freedom, which stand still."""
         return [j.name for j in self.joints.values() if j.type in LOCKED]
 
     def leaves(self) -> list[str]:
-        """Links that carry no joint."""
+        """The links that carry no joint."""
         parents = {joint.parent for joint in self.joints.values()}
         return [name for name in self.links if name not in parents]
 
     def chain(self, link: str) -> list[UrdfJoint]:
-        """The joints from the root to a link, in that order."""
+        """The joints from the root to a link, in that order.
+
+        Args:
+            link: its name.
+        """
         above = {joint.child: joint for joint in self.joints.values()}
         path = []
         while link in above:
@@ -100,7 +104,11 @@ class UrdfTree:
         return path[::-1]
 
     def beyond(self, joint: str) -> list[str]:
-        """The links that a joint carries, nearest first."""
+        """The links that a joint carries, nearest first.
+
+        Args:
+            joint: its name.
+        """
         below: dict[str, list[str]] = {}
         for other in self.joints.values():
             below.setdefault(other.parent, []).append(other.child)

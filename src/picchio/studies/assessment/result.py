@@ -67,7 +67,7 @@ class OperationResult:
     damage_per_rivet: FloatArray
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, arrays as (pose, joint)."""
+        """The operation's results as plain values, arrays as (pose, joint)."""
         names = list(self.__dataclass_fields__)
         return {name: getattr(self, name) for name in names}
 
@@ -130,7 +130,7 @@ class JointLife:
         return float(np.nanmax([self.utilisation, self.reducer_utilisation, 0.0]))
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values."""
+        """The joint's results as plain values."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
@@ -165,7 +165,7 @@ class SteadyStateCheck:
         return self.counted_life / self.paper_life
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, the ratios included."""
+        """The check's results as plain values, the ratios included."""
         own = {name: getattr(self, name) for name in self.__dataclass_fields__}
         return own | {"peak_ratio": self.peak_ratio, "life_ratio": self.life_ratio}
 
@@ -214,7 +214,11 @@ class Assessment(TableResult):
     provenance: Mapping[str, Any]
 
     def joint(self, name: str) -> JointLife:
-        """The entry of one joint."""
+        """The entry of one joint.
+
+        Args:
+            name: of the joint.
+        """
         return next(joint for joint in self.joints if joint.name == name)
 
     @property

@@ -37,7 +37,15 @@ class Grid:
         return math.prod(len(axis) for axis in self.axes)
 
     def rows(self, first: int, last: int) -> FloatArray:
-        """Rows first to last - 1 as (k, columns)."""
+        """Rows first to last - 1 as (k, columns).
+
+        Args:
+            first: index.
+            last: index after the last.
+
+        Returns:
+            coordinates in m, or joint positions in rad or m.
+        """
         index = np.unravel_index(np.arange(first, last), [len(axis) for axis in self.axes])
         return np.stack([axis[i] for axis, i in zip(self.axes, index, strict=True)], axis=1)
 
@@ -84,7 +92,7 @@ def plane(
     spacing: float | None = None,
     bounds: ArrayLike | None = None,
 ) -> Grid:
-    """Points on a plane through the workspace.
+    """The points on a plane through the workspace.
 
     Args:
         robot: whose reach gives the bounds where none are given.

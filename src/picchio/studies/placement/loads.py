@@ -45,6 +45,15 @@ class Loads:
     ) -> Loads:
         """The same, checked.
 
+        Args:
+            model: the robot with its effects.
+            task: what it does.
+            curves: an S-N curve a joint, or None.
+            reducers: a reducer a joint, or None.
+
+        Returns:
+            the loads of this task.
+
         Raises:
             InputError: nothing by which joints could be ranked.
         """
@@ -68,7 +77,7 @@ class Loads:
         *,
         compiled: bool = True,
     ) -> tuple[FloatArray, FloatArray]:
-        """Damage of a rivet, and utilisation, each (p, n); damage of unknown joints is zero.
+        """The damage of a rivet, and utilisation, (p, n) each; damage of unknown joints is zero.
 
         Args:
             operation: its index in the task.

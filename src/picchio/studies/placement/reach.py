@@ -77,7 +77,12 @@ class Reach:
         return len(self.chain.index) > (3 if self.work.axis is None else 5)
 
     def everywhere(self, times: int = 1, seed: int = 0) -> FloatArray:
-        """First guesses (s, joints) all over the joints' ranges; angles at most once round."""
+        """The first guesses (s, joints) all over the joints' ranges; angles at most once round.
+
+        Args:
+            times: so many times as many.
+            seed: of the random numbers.
+        """
         chain, middle = self.chain, self._middle
         starts = times * (8 if len(chain.index) <= 3 else 24)
         reach = np.where(chain.wraps, np.pi, 1.0)
@@ -86,7 +91,7 @@ class Reach:
         return lower + spread_evenly(starts, len(lower), seed) * (upper - lower)
 
     def candidates(self, moves: FloatArray, seeds: Sequence[FloatArray]) -> Candidates:
-        """Poses within the limits, of the placements where every rivet can be reached.
+        """The poses within the limits, of the placements where every rivet can be reached.
 
         Args:
             moves: (b, 4) m, rad.

@@ -63,7 +63,11 @@ class Standing:
         return max(joint.utilisation for joint in self.joints)
 
     def to_dict(self, centre: FloatArray) -> dict[str, Any]:
-        """Plain values; an infinite life is left as inf."""
+        """The standing as plain values; an infinite life is left as inf.
+
+        Args:
+            centre: (3,) m, about which the work turns.
+        """
         x, y, z, heading = (float(c) for c in self.spot.move)
         return {
             "rivets_to_failure": self.rivets_to_failure,

@@ -35,7 +35,12 @@ class Spot:
     utilisation: float
 
     def better_than(self, other: Spot | None, by: float = 0.0) -> bool:
-        """Whether the life is longer; or, where it is the same, the utilisation lower."""
+        """Whether the life is longer; or, where it is the same, the utilisation lower.
+
+        Args:
+            other: another spot; any is better than None.
+            by: least gain, as a share.
+        """
         if other is None:
             return True
         if self.damage != other.damage:
@@ -179,10 +184,17 @@ class Search:
         seed: int,
         tell: Callable[[int], object],
     ) -> list[Spot]:
-        """Placements all over, with poses from all over; those within reach, best first.
+        """The placements within reach, best first, drawn all over with poses from all over.
 
         Half of what is allowed is often out of reach, or nearly all of it: placements are drawn
         on four scales about the start, until enough of them are within reach.
+
+        Args:
+            half: (4,) half widths of what is allowed: m, m, m, rad.
+            periods: s, of the blows; None for the task's own.
+            wanted: how many placements within reach.
+            seed: of the random numbers.
+            tell: called with the number found so far.
         """
         everywhere = self.reach.everywhere(seed=seed)
         own = self.work.pose[:, self.reach.chain.index]
@@ -210,6 +222,11 @@ class Search:
 
         With `beat`, a placement that looks better is checked for self-collisions, and poses that
         collide are struck out until it is free or no better; without the margin it is dropped.
+
+        Args:
+            candidates: poses of placements.
+            period: s, of the blows; None for the task's own.
+            beat: the spot to be bettered.
         """
         damage, used = cost_tables(self.work, self.loads, candidates, period)
         share = self.work.share
@@ -230,7 +247,11 @@ class Search:
         return result
 
     def colliding(self, poses: FloatArray) -> list[int]:
-        """Which of the poses have links that touch."""
+        """Which of the poses have links that touch.
+
+        Args:
+            poses: (p, nv) rad or m.
+        """
         check = self.collision
         return [] if check is None else [k for k, q in enumerate(poses) if check.collides(q)]
 
@@ -241,7 +262,12 @@ class Search:
         return len(self.reach.candidates(moves, seeds).moves) == len(moves)
 
     def beside(self, spot: Spot, off: float) -> list[Spot | None]:
-        """The work `off` m beside a spot along each of `SHIFTS`, the robot on the same branch."""
+        """The spots where the work lies `off` m beside a spot, along each of `SHIFTS`; same branch.
+
+        Args:
+            spot: in the middle.
+            off: m.
+        """
         moves = spot.move + np.pad(off * SHIFTS, ((0, 0), (0, 1)))
         seeds = [pose[None, self.reach.chain.index] for pose in spot.poses]
         found: list[Spot | None] = []

@@ -68,7 +68,11 @@ class SelfCollision:
         return cls(len(geometry.collisionPairs), model, geometry, columns)
 
     def collides(self, pose: FloatArray) -> bool:
-        """Whether two links touch at a pose (nv,)."""
+        """Whether two links touch at a pose (nv,).
+
+        Args:
+            pose: (nv,) rad or m.
+        """
         import pinocchio as pin
 
         data, shapes = self._model.createData(), self._geometry.createData()

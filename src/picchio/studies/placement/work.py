@@ -44,7 +44,12 @@ class Work:
 
     @classmethod
     def of(cls, robot: FlexibleRobot, task: Task) -> Work:
-        """A task's work, read off its poses: points and poses are treated alike."""
+        """A task's work, read off its poses: points and poses are treated alike.
+
+        Args:
+            robot: the robot.
+            task: what it does.
+        """
         states = [robot.state(pose) for op in task.operations for pose in op.poses]
         position = np.array([state.tool_position for state in states])
         aims = len(tool_chain(robot).index) >= LEAST_JOINTS_FOR_AXIS
@@ -66,7 +71,11 @@ class Work:
         )
 
     def turn(self, heading: float) -> FloatArray:
-        """Rotation (3, 3) by `heading` rad about `up`."""
+        """The rotation (3, 3) by `heading` about `up`.
+
+        Args:
+            heading: rad.
+        """
         return np.asarray(self._turns(np.array([heading]))[0])
 
     def _turns(self, heading: FloatArray) -> FloatArray:
@@ -77,15 +86,30 @@ class Work:
         return np.asarray(np.eye(3) + sine * cross + rest * (cross @ cross))
 
     def positions(self, moves: FloatArray, place: int) -> FloatArray:
-        """(b, 3) m, where a place ends up after moves (b, 4): dx, dy, dz in m, heading in rad."""
+        """The positions (b, 3) m where a place ends up after moves.
+
+        Args:
+            moves: (b, 4) dx, dy, dz in m, heading in rad.
+            place: its index.
+        """
         arm = self.position[place] - self.centre
         return np.asarray(self._turns(moves[:, 3]) @ arm + self.centre + moves[:, :3])
 
     def directions(self, moves: FloatArray, vector: FloatArray) -> FloatArray:
-        """(b, 3), a vector turned with the work."""
+        """The vectors (b, 3) that turn with the work.
+
+        Args:
+            moves: (b, 4) dx, dy, dz in m, heading in rad.
+            vector: (3,).
+        """
         return np.asarray(self._turns(moves[:, 3]) @ vector)
 
     def base_move(self, move: FloatArray, xyz: FloatArray) -> tuple[FloatArray, float]:
-        """The same move done by the base instead: its new position (3,) m, and its turn in rad."""
+        """The same move done by the base instead: its new position (3,) m, and its turn in rad.
+
+        Args:
+            move: (4,) dx, dy, dz in m, heading in rad.
+            xyz: (3,) m, the base's position.
+        """
         back = self.turn(-move[3])
         return back @ (xyz - self.centre - move[:3]) + self.centre, -float(move[3])

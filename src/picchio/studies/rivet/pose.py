@@ -67,7 +67,11 @@ class SampledResponse:
     periodic: bool
 
     def deflection(self, time: ArrayLike, direction: ArrayLike) -> FloatArray:
-        """(n, k) rad at times (k,) s.
+        """The deflection (n, k) rad at times.
+
+        Args:
+            time: (k,) s.
+            direction: (3,) of the force.
 
         Raises:
             InputError: another direction than the one that was integrated.
@@ -79,7 +83,10 @@ class SampledResponse:
         return np.array([np.interp(wanted, self.time, row) for row in self.values])
 
     def turning_points(self, direction: ArrayLike) -> list[tuple[FloatArray, FloatArray]]:
-        """Of every joint, time (k,) s and value (k,) rad: first, last and every turn between.
+        """The first, last and turning points of every joint: time (k,) s, value (k,) rad.
+
+        Args:
+            direction: (3,) of the force.
 
         Raises:
             InputError: as `deflection`.
@@ -95,7 +102,10 @@ class SampledResponse:
         return found
 
     def peaks(self, direction: ArrayLike) -> list[Peak]:
-        """Largest absolute deflection of every joint.
+        """The largest absolute deflection of every joint.
+
+        Args:
+            direction: (3,) of the force.
 
         Raises:
             InputError: as `deflection`.
@@ -359,12 +369,21 @@ class JointLoad:
         return float(np.abs(self.stiffness * (self.static + self.rest)).max())
 
     def static_stress(self, joint: Joint) -> float:
-        """Pa, shear stress before the first blow; the joint has a shaft."""
+        """The shear stress before the first blow, Pa.
+
+        Args:
+            joint: with a shaft.
+        """
         assert joint.shaft is not None
         return float(shear_stress(self.stiffness * self.static, joint.shaft))
 
     def stress_cycles(self, joint: Joint, residue: Residue) -> Cycles:
-        """Cycles of the vibration's shear stress, Pa, about zero; the joint has a shaft."""
+        """The cycles of the vibration's shear stress about zero, Pa.
+
+        Args:
+            joint: with a shaft.
+            residue: how what rainflow leaves is counted.
+        """
         assert joint.shaft is not None
         assert self.rest is not None
         return rainflow(shear_stress(self.stiffness * self.rest, joint.shaft), residue=residue)
@@ -421,7 +440,12 @@ class Rivet(ModelAtPose):
     def joint_loads(
         self, rest: list[FloatArray] | None, steady: list[FloatArray] | None = None
     ) -> tuple[JointLoad, ...]:
-        """The joints' loads from their turning points, n arrays (k,) rad each."""
+        """The joints' loads from their turning points, n arrays (k,) rad each.
+
+        Args:
+            rest: of a burst, from rest.
+            steady: of the steady train, where it is wanted.
+        """
         static = self.static_torque(self.operation.excitation, self.operation.direction)
         return tuple(
             JointLoad(

@@ -42,7 +42,14 @@ class Grid:
         *,
         density: int = 1,
     ) -> Grid:
-        """Samples fine enough for every pole while it lives, and for the force's own waves."""
+        """The samples fine enough for every pole while it lives, and for the force's own waves.
+
+        Args:
+            poles: (k,) 1/s.
+            force: over one period, or a burst.
+            horizon: s, up to which they are wanted.
+            density: so many times as many.
+        """
         speed = np.abs(poles)
         decay = np.maximum(-poles.real, 1e-300)
         lengths = np.minimum(force.start + force.duration, horizon) - force.start

@@ -56,7 +56,11 @@ class Modes:
         return sheet(f"Modes of {', '.join(self.output_names)}", None, columns, rows)
 
     def frequency_response(self, angular_frequency: FloatArray) -> ComplexArray:
-        """Deflection per newton at angular frequencies (k,) rad/s: (m, 3, k) complex, rad/N."""
+        """The deflection per newton (m, 3, k), complex, rad/N.
+
+        Args:
+            angular_frequency: (k,) rad/s.
+        """
         s = 1j * np.asarray(angular_frequency, dtype=float)
         below = 0.5 * self.residues.conj()
         above = 0.5 * self.residues

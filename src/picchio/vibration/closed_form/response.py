@@ -116,12 +116,22 @@ class Response:
         return (self._along(direction) @ modal).real
 
     def velocity(self, time: ArrayLike, direction: ArrayLike) -> FloatArray:
-        """Deflection rate of every joint, (m, k) rad/s."""
+        """The rate (m, k) of every joint's deflection, rad/s.
+
+        Args:
+            time: (k,) s.
+            direction: (3,) of the force.
+        """
         modal = self._modal(*self._locate(np.atleast_1d(time)))
         return ((self._along(direction) * self.modes.poles) @ modal).real
 
     def acceleration(self, time: ArrayLike, direction: ArrayLike) -> FloatArray:
-        """Second derivative of every joint's deflection, (m, k) rad/s^2; jumps with the force."""
+        """The second derivative (m, k) of every joint's deflection, rad/s^2; jumps with the force.
+
+        Args:
+            time: (k,) s.
+            direction: (3,) of the force.
+        """
         index, u = self._locate(np.atleast_1d(time))
         weighted = self._along(direction) * self.modes.poles
         rate = self.modes.poles[:, None] * self._modal(index, u)
@@ -184,7 +194,11 @@ class Response:
         return np.concatenate([[0.0], time, [end]]), np.concatenate([[0.0], value, [last]])
 
     def peaks(self, direction: ArrayLike) -> list[Peak]:
-        """The largest absolute deflection of every joint for one direction, exact in time."""
+        """The largest absolute deflection of every joint for one direction, exact in time.
+
+        Args:
+            direction: (3,) of the force.
+        """
         result = []
         for time, value in self.turning_points(direction):
             k = int(np.abs(value).argmax())

@@ -72,7 +72,11 @@ class Plan:
     first: int
 
     def scaled(self, factor: float) -> Plan:
-        """The same steps under a force so many times as large."""
+        """The same steps under a force so many times as large.
+
+        Args:
+            factor: of the force.
+        """
         return replace(
             self,
             force0=factor * self.force0,

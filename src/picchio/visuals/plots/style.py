@@ -134,7 +134,11 @@ def save_figure(ax: Axes, path: Path) -> None:
 
 
 def look(index: int) -> dict[str, Any]:
-    """Colour and dashes of joint number `index`."""
+    """The colour and dashes of a joint.
+
+    Args:
+        index: of the joint.
+    """
     return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index % len(DASHES)]}
 
 

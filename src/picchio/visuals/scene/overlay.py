@@ -25,14 +25,22 @@ class Scale:
     top: float
 
     def colours(self, values: FloatArray) -> FloatArray:
-        """(k, 3) 0 to 255 for (k,) values."""
+        """The colours (k, 3), 0 to 255, of values.
+
+        Args:
+            values: (k,) in the scale's unit.
+        """
         from matplotlib import colormaps
 
         share = np.clip(np.asarray(values) / self.top if self.top > 0 else values, 0.0, 1.0)
         return np.asarray(colormaps[CMAP](share))[:, :3] * 255.0
 
     def colour(self, value: float) -> str:
-        """One value as "#rrggbb"; grey where there is none."""
+        """The colour "#rrggbb" of one value; grey where there is none.
+
+        Args:
+            value: in the scale's unit.
+        """
         if not np.isfinite(value):
             return "#9aa3ad"
         return "#" + "".join(f"{round(c):02x}" for c in self.colours(np.array([value]))[0])

@@ -87,7 +87,14 @@ class Scene(Page, Result):
         return scene_html(self)
 
     def show(self, viewer: Any = None) -> Any:
-        """Draw it in a live meshcat viewer, a new one if not given, and return the viewer."""
+        """Draw it in a live meshcat viewer.
+
+        Args:
+            viewer: a new one if not given.
+
+        Returns:
+            the viewer.
+        """
         if viewer is None:
             import meshcat
 
@@ -118,6 +125,13 @@ class Scene(Page, Result):
         }
 
     def add(self, mesh: Mesh) -> int:
-        """Put geometry in; its index."""
+        """Put geometry in.
+
+        Args:
+            mesh: to be drawn.
+
+        Returns:
+            its index.
+        """
         self.meshes.append(mesh)
         return len(self.meshes) - 1

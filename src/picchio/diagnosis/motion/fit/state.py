@@ -61,7 +61,11 @@ class State:
         return self.nuisances + self.effects
 
     def coordinates(self, rate: float) -> list[Coordinate]:
-        """What may be varied."""
+        """What may be varied.
+
+        Args:
+            rate: samples a second, Hz.
+        """
         found = [
             Coordinate(-1, joint, value, 1.0 - 2.0 * self.tolerance, 1.0 + 2.0 * self.tolerance,
                        0.01, self.tolerance, 1.0)
@@ -91,7 +95,12 @@ class State:
         return replace(self if there else self.with_effect(effect), priors=kept + told)
 
     def moved(self, coordinate: Coordinate, value: float) -> State:
-        """With another value of one coordinate."""
+        """With another value of one coordinate.
+
+        Args:
+            coordinate: which.
+            value: in its own unit.
+        """
         if coordinate.index < 0:
             return replace(self, scales={**self.scales, coordinate.name: value})
         effect = self.every[coordinate.index]
@@ -106,11 +115,22 @@ class State:
         return replace(self, effects=tuple(every))
 
     def with_effect(self, effect: Effect) -> State:
-        """With one effect more."""
+        """With one effect more.
+
+        Args:
+            effect: to be added.
+        """
         return replace(self, effects=(*self.effects, effect))
 
     def without(self, index: int) -> State:
-        """Without the effect of this number."""
+        """Without the effect of this number.
+
+        Args:
+            index: of the effect among those of this state.
+
+        Returns:
+            the state that is left.
+        """
         kept = tuple(e for i, e in enumerate(self.effects) if i != index)
         gone = self.effects[index].label
         priors = tuple(p for p in self.priors if p[0] != gone)

@@ -86,6 +86,13 @@ def whiteness_test(problem: Problem, found: Fit) -> Evidence:
 
     Periodogram ordinates of white noise of unit variance have mean 1 and variance 1; to the
     scatter of their mean comes that of the noise level itself, which was estimated.
+
+    Args:
+        problem: the data.
+        found: the fit whose residual is tested.
+
+    Returns:
+        the residual's power by band and by pose, and whether it is what noise leaves.
     """
     top = float(problem.natural_frequencies.max()) * _ANSWERS
     powers: dict[str, list[tuple[int, FloatArray, FloatArray]]] = {}

@@ -166,6 +166,9 @@ class Problem:
             effects: of the model.
             records: all where None.
             end: s, look no further.
+
+        Returns:
+            an array (channels, m) a record.
         """
         chosen = self.records if records is None else records
         wanted = tuple(effects)
@@ -175,7 +178,13 @@ class Problem:
     def own_residuals(
         self, effects: Iterable[Effect], records: Sequence[MeasuredRecord], end: float | None
     ) -> list[FloatArray]:
-        """As `residuals`, by this process alone."""
+        """As `residuals`, by this process alone.
+
+        Args:
+            effects: of the model.
+            records: to predict.
+            end: s, look no further; None for all.
+        """
         model = self.model.with_effects(effects)
         # A trial far off may diverge; its residual is then no number, and it is dropped.
         # One after the other: threads would wait for the interpreter most of the time.
@@ -189,6 +198,12 @@ class Problem:
         What moves edges changes which samples are known. A sample that is left out costs what
         noise does on average, one that is not costs what it happens to: by a choice among
         thousands of them a fit gains as much as a small cause does.
+
+        Args:
+            effects: of the model whose edges count.
+
+        Returns:
+            a context manager.
         """
         self.pin((next(_numbers), tuple(effects)))
         try:
@@ -197,7 +212,11 @@ class Problem:
             self.unpin()
 
     def pin(self, pin: Pin) -> None:
-        """As `pinned`, until `unpin`."""
+        """As `pinned`, until `unpin`.
+
+        Args:
+            pin: its number, and the effects of the model whose edges count.
+        """
         model = self.model.with_effects(pin[1])
         self.pins.append(pin)
         for record in self.records:
@@ -212,7 +231,12 @@ class Problem:
     def predictions(
         self, effects: Iterable[Effect], records: Sequence[MeasuredRecord] | None = None
     ) -> list[dict[str, FloatArray]]:
-        """What every channel would read."""
+        """What every channel would read.
+
+        Args:
+            effects: of the model.
+            records: all where None.
+        """
         model = self.model.with_effects(effects)
         chosen = self.records if records is None else records
         return [record.setup.predict(model) for record in chosen]

@@ -50,7 +50,11 @@ class MeasuredRecord:
         return [known[name] for name in self.values]
 
     def filler(self, channel: str) -> FloatArray:
-        """(m,) of +-1 without a pattern, always the same: in place of what is not known."""
+        """(m,) of +-1 without a pattern, always the same: in place of what is not known.
+
+        Args:
+            channel: its name.
+        """
         if channel not in self._fillers:
             seed = zlib.crc32(f"{self.name}/{channel}".encode())
             signs = np.random.default_rng(seed).integers(0, 2, self.setup.samples.count)
@@ -58,7 +62,11 @@ class MeasuredRecord:
         return self._fillers[channel]
 
     def until(self, end: float | None) -> PercussionSetup:
-        """The setup up to a time, s."""
+        """The setup up to a time, s.
+
+        Args:
+            end: s; None for all of the record.
+        """
         if end is None or end >= self.setup.samples.last:
             return self.setup
         if end not in self._cuts:

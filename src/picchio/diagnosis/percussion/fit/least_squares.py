@@ -57,7 +57,11 @@ class Fit:
         return int(sum(r.size for r in self.residuals))
 
     def normal_matrix(self) -> FloatArray:
-        """(unknowns, unknowns), priors included."""
+        """(unknowns, unknowns), priors included.
+
+        Raises:
+            InputError: the fit was made without its Jacobian.
+        """
         if self.jacobians is None:
             raise InputError("this fit has no Jacobian")
         total = sum(j.T @ j for j in self.jacobians)
@@ -222,7 +226,20 @@ def fit_growing(
     with_jacobian: bool = False,
     near: Fit | None = None,
 ) -> Fit:
-    """Fit up to one time after the other."""
+    """Fit up to one time after the other.
+
+    Args:
+        problem: the data.
+        hypothesis: where to start.
+        records: to fit; all where None.
+        windows: s, ends of the growing stretch that is fitted; None for the whole record.
+        iterations: of the last window; the others take 3.
+        with_jacobian: compute the Jacobian at the end.
+        near: a fit nearby, whose slopes may be used again.
+
+    Returns:
+        the fit to the last window.
+    """
     found: Fit | None = None
     for i, end in enumerate(windows):
         last = i == len(windows) - 1

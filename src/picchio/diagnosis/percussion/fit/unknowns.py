@@ -43,15 +43,27 @@ class Unknown:
     prior: tuple[float, float] | None = None
 
     def value(self, u: float) -> float:
-        """The parameter's value."""
+        """The parameter's value.
+
+        Args:
+            u: the transformed unknown.
+        """
         return math.exp(u) if self.logarithmic else u * self.scale
 
     def coordinate(self, value: float) -> float:
-        """U of a value."""
+        """The transformed unknown `u` of a value.
+
+        Args:
+            value: of the parameter.
+        """
         return math.log(value) if self.logarithmic else value / self.scale
 
     def slope(self, u: float) -> float:
-        """D value / d u."""
+        """The derivative of the parameter's value by `u`.
+
+        Args:
+            u: the transformed unknown.
+        """
         return math.exp(u) if self.logarithmic else self.scale
 
     @property
@@ -96,7 +108,12 @@ class Hypothesis:
 
     @classmethod
     def baseline(cls, robot: FlexibleRobot, tolerance: Tolerance) -> Hypothesis:
-        """The nominal model with its nuisances."""
+        """The nominal model with its nuisances.
+
+        Args:
+            robot: as its files say.
+            tolerance: how far stiffness and damping may be off.
+        """
         found = nuisances(robot)
         return cls(found, tolerance, len(found))
 
@@ -112,7 +129,11 @@ class Hypothesis:
         return frozenset(effect.label for effect in self.causes)
 
     def plus(self, effect: Effect) -> Hypothesis:
-        """With one more cause; a nuisance becomes one by being freed."""
+        """With one more cause; a nuisance becomes one by being freed.
+
+        Args:
+            effect: the cause.
+        """
         for i, known in enumerate(self.effects[: self.n_nuisances]):
             if known.label == effect.label:
                 effects = list(self.effects)
@@ -131,7 +152,11 @@ class Hypothesis:
         return replace(self, effects=(*self.effects, effect), scales=self.scales + own)
 
     def joined(self, cause: Effect) -> Hypothesis:
-        """With one more cause, at just the values that it has in another hypothesis."""
+        """With one more cause, at just the values that it has in another hypothesis.
+
+        Args:
+            cause: with the values to keep.
+        """
         more = self.plus(cause)
         effects = tuple(cause if e.label == cause.label else e for e in more.effects)
         return replace(more, effects=effects)
@@ -149,7 +174,14 @@ class Hypothesis:
         return replace(more, priors=kept + told)
 
     def minus(self, label: str) -> Hypothesis:
-        """Without one of the causes; a nuisance that was freed goes back into its tolerance."""
+        """Without one of the causes; a nuisance that was freed goes back into its tolerance.
+
+        Args:
+            label: of the cause.
+
+        Returns:
+            the hypothesis that is left.
+        """
         if label in self.freed:
             effects = tuple(
                 self._tolerated(effect) if effect.label == label else effect
@@ -213,7 +245,11 @@ class Hypothesis:
         )
 
     def at(self, vector: Sequence[float] | FloatArray) -> Hypothesis:
-        """With other values."""
+        """With other values.
+
+        Args:
+            vector: (unknowns,) transformed, as `vector` gives them.
+        """
         changes: dict[int, dict[str, float]] = {}
         for unknown, u in zip(self.unknowns(), vector, strict=True):
             clipped = min(max(float(u), unknown.lower), unknown.upper)

@@ -33,7 +33,11 @@ class Trial:
     promise: float
 
     def finished(self, records: Sequence[MeasuredRecord]) -> bool:
-        """Whether it was fitted to all of these records, to their ends."""
+        """Whether it was fitted to all of these records, to their ends.
+
+        Args:
+            records: all that are fitted.
+        """
         return len(self.fit.records) == len(records) and self.fit.end is None
 
 
@@ -84,15 +88,30 @@ class Search:
         return bic(self.baseline) - bic(self.best)
 
     def fit(self, hypothesis: Hypothesis, iterations: int, rival: float = float("inf")) -> Fit:
-        """A hypothesis fitted to all of the records that are fitted."""
+        """A hypothesis fitted to all of the records that are fitted.
+
+        Args:
+            hypothesis: where to start.
+            iterations: at most.
+            rival: cost of a fit that it must come near; one that stays far above is given up.
+        """
         return fit(self.problem, hypothesis, self.records, None, iterations=iterations, rival=rival)
 
     def leaves_noise(self, found: Fit) -> bool:
-        """Whether noise is all that a fit leaves."""
+        """Whether noise is all that a fit leaves.
+
+        Args:
+            found: the fit.
+        """
         return whiteness_test(self.problem, found).is_noise
 
     def held_out_gain(self, before: Fit, after: Fit) -> float | None:
-        """Fall of chi-square in the records held out; None where they can't tell."""
+        """The fall of chi-square in the records held out; None where they can't tell.
+
+        Args:
+            before: a fit.
+            after: a fit that should explain more.
+        """
         if not self.kept or any(e.latent is not None for e in after.hypothesis.causes):
             return None
 
@@ -103,6 +122,10 @@ class Search:
         return chi_square(before) - chi_square(after)
 
     def confirmed(self, other: Fit) -> bool:
-        """Whether the records held out do not speak against a fit in place of the best."""
+        """Whether the records held out do not speak against a fit in place of the best.
+
+        Args:
+            other: the fit that would replace the best.
+        """
         gain = self.held_out_gain(self.best, other)
         return gain is None or gain > 0.0
