@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from picchio.diagnosis.percussion.criteria.bic import bic
 from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
@@ -57,7 +56,6 @@ class Search:
         steps: per step the trials, the best first.
         pinned: whether noise was all that was left, and what is known is held fixed since.
         replacements: label of a cause -> the fit it was replaced in, and the trials.
-        log: told every candidate's screened gain, where somebody wants to know.
     """
 
     problem: Problem
@@ -71,7 +69,6 @@ class Search:
     steps: list[list[Trial]] = field(default_factory=list)
     pinned: bool = False
     replacements: dict[str, tuple[Fit, list[Trial]]] = field(default_factory=dict)
-    log: Callable[[dict[str, Any]], None] | None = None
     least: float = field(init=False)
 
     def __post_init__(self) -> None:
