@@ -92,20 +92,6 @@ class Blows:
         """
         return replace(self, **changes)  # type: ignore[arg-type]
 
-    def with_echo(self, delay: float, ratio: float) -> Blows:
-        """Each blow followed by another, `delay` s after its start, `ratio` as high.
-
-        Args:
-            delay: s.
-            ratio: of the heights.
-        """
-        return replace(
-            self,
-            start=np.concatenate([self.start, self.start + delay]),
-            height=np.concatenate([self.height, ratio * self.height]),
-            hit=np.concatenate([self.hit, self.hit]),
-        )
-
     def force(self) -> PiecewiseForce:
         """The force over time: of a burst from t = 0 on, endless; or one period of a steady train.
 

@@ -18,27 +18,22 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.robot.flexible_robot import FlexibleRobot
 
-# The robot's Pinocchio model on a base that moves, with two hinges beside every joint.
-#
-# The base's six joints and the hinges stand still in the robot as its URDF has it; an effect on the
-# model may let some of them yield.
-
 BASE_AXES = ("x", "y", "z", "rx", "ry", "rz")
+_STEP = 1e-4  # rad or m, of the central differences
 
 
-def widen(robot: FlexibleRobot, source: Any) -> tuple[Any, dict[int, int], list[str]]:
-    """The wide model, where each of the source's joints is in it, and who has hinges.
+def _widen(robot: FlexibleRobot, root: FloatArray) -> tuple[Any, dict[int, int], list[str]]:
+    """The wide model, where each of the robot's joints is in it, and who has hinges.
 
     Args:
         robot: whose flexible revolute joints get hinges, perpendicular to the joint's axis.
-        source: its Pinocchio model.
+        root: (3,) m, where the root link stands; the base turns about it.
 
     Returns:
-        the model; its joint's number by the source's; the names of the joints with hinges, whose
+        the model; its joint's number by the robot's; the names of the joints with hinges, whose
         joints are "hinge.<joint>.1" and ".2". The base's are "base.x" to "base.rz".
     """
-    root = root_position(robot)
-    model = pin.Model()
+    source, model = robot.rigid._model, pin.Model()
     model.gravity = source.gravity
     parent = 0
     kinds = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ,
@@ -68,18 +63,11 @@ def widen(robot: FlexibleRobot, source: Any) -> tuple[Any, dict[int, int], list[
     return model, where, hinges
 
 
-def root_position(robot: FlexibleRobot) -> FloatArray:
-    """(3,) m, where the root link stands; the base turns about it."""
-    model = robot.rigid._model
-    root = model.frames[robot.rigid.frame(robot.tree.root)]
-    return np.array(root.placement.translation)
-
-
 def _axis(joint: Any) -> tuple[bool, FloatArray]:
     """Whether a joint of one degree of freedom turns, and its axis in its own frame."""
     column = np.array(joint.createData().S).reshape(6)
-    angular = column[3:]
-    return bool(np.abs(angular).max() > 0.5), angular if np.abs(angular).max() > 0.5 else column[:3]
+    turns = bool(np.abs(column[3:]).max() > 0.5)
+    return turns, column[3:] if turns else column[:3]
 
 
 def _perpendicular(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -88,11 +76,6 @@ def _perpendicular(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
     first = np.cross(axis, helper)
     first /= np.linalg.norm(first)
     return first, np.cross(axis, first)
-
-
-__all__ = ["BASE_AXES", "Inertia", "Motion", "WideChain"]
-
-_STEP = 1e-4  # rad or m, of the central differences
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,9 +159,15 @@ class WideChain:
     def __init__(self, robot: FlexibleRobot) -> None:
         self.robot = robot
         source = robot.rigid._model
-        self._model, self._joint, hinges = widen(robot, source)
+        root = np.array(source.frames[robot.rigid.frame(robot.tree.root)].placement.translation)
+        self._model, joints, hinges = _widen(robot, root)
+        # The base's last joint stands where the root link does.
+        from_root = pin.SE3(np.eye(3), -root)
         self._frames = {
-            frame.name: (self._joint[frame.parentJoint], self._own_frame(frame))
+            frame.name: (
+                joints[frame.parentJoint],
+                frame.placement if frame.parentJoint else from_root * frame.placement,
+            )
             for frame in source.frames
             if frame.type == pin.FrameType.BODY
         }
@@ -187,34 +176,15 @@ class WideChain:
             *(f"base.{axis}" for axis in BASE_AXES),
             *(f"hinge.{name}.{i}" for name in hinges for i in (1, 2)),
         )
-        self._columns = self._selection(hinges)
-
-    def _own_frame(self, frame: Any) -> Any:
-        placement = frame.placement
-        return self._from_root * placement if frame.parentJoint == 0 else placement
-
-    @property
-    def _from_root(self) -> Any:
-        """From the last base joint to the world: undo where the root stands."""
-        return pin.SE3(np.eye(3), -root_position(self.robot))
-
-    def _selection(self, hinges: list[str]) -> FloatArray:
-        """(nv of the wide model, c): which joints a coordinate moves; mimics follow."""
-        robot, model = self.robot, self._model
-        follow = robot.rigid._follow
-        columns = np.zeros((model.nv, len(self.coordinates)))
-        source_names = list(robot.rigid._model.names)[1:]
-        for row, name in enumerate(source_names):
-            at = model.joints[self._joint[robot.rigid._model.getJointId(name)]].idx_v
-            columns[at, : len(robot.flexible_names)] = follow[row, robot.flexible_index]
+        # Where the robot's own joints are in the wide model, whose joints have one number each.
+        self._own = [self._model.joints[joints[i]].idx_v for i in range(1, source.njoints)]
+        # (nv of the wide model, c): which joints a coordinate moves; mimics follow.
+        self._columns = np.zeros((self._model.nv, len(self.coordinates)))
         n = len(robot.flexible_names)
-        for i in range(6):
-            columns[i, n + i] = 1.0
-        for h, name in enumerate(hinges):
-            for i in (0, 1):
-                joint = model.joints[model.getJointId(f"hinge.{name}.{i + 1}")]
-                columns[joint.idx_v, n + 6 + 2 * h + i] = 1.0
-        return columns
+        self._columns[self._own, :n] = robot.rigid._follow[:, robot.flexible_index]
+        for column, name in enumerate(self.coordinates[n:], start=n):
+            joint = self._model.joints[self._model.getJointId(name)]
+            self._columns[joint.idx_v, column] = 1.0
 
     def index(self, coordinate: str) -> int:
         """Where a coordinate stands in `coordinates`.
@@ -231,26 +201,22 @@ class WideChain:
 
     def _q(self, pose: FloatArray) -> FloatArray:
         rigid, q = self.robot.rigid, np.zeros(self._model.nq)
-        every = rigid._follow @ pose + rigid._offset
-        for row, name in enumerate(list(rigid._model.names)[1:]):
-            q[self._model.joints[self._joint[rigid._model.getJointId(name)]].idx_q] = every[row]
+        q[self._own] = rigid._follow @ pose + rigid._offset
         return q
 
-    def _with(self, inertias: str | tuple[str, FloatArray]) -> Any:
+    def _with(self, what: str, point: tuple[float, ...] | None) -> Any:
         """The wide model with other inertias: the robot's, one link's own, or a point mass."""
-        if inertias == "robot":
+        if what == "robot":
             return self._model
+        joint, placement = self._frame(what)
+        if point is None:
+            own = link_inertia(self.robot, what)
+        else:
+            own = pin.Inertia(1.0, np.array(point, dtype=float), np.zeros((3, 3)))
         model = self._model.copy()
         for i in range(model.njoints):
             model.inertias[i] = pin.Inertia.Zero()
-        if isinstance(inertias, tuple):
-            frame, offset = inertias
-            joint, placement = self._frame(frame)
-            point = placement.act(np.asarray(offset, dtype=float))
-            model.inertias[joint] = pin.Inertia(1.0, point, np.zeros((3, 3)))
-        else:
-            joint, placement = self._frame(inertias)
-            model.inertias[joint] = placement.act(link_inertia(self.robot, inertias))
+        model.inertias[joint] = placement.act(own)
         return model
 
     def has_frame(self, link: str) -> bool:
@@ -263,19 +229,19 @@ class WideChain:
         return self._frames[link]
 
     def inertia(
-        self, pose: FloatArray, inertias: str | tuple[str, FloatArray] = "robot"
+        self, pose: FloatArray, what: str = "robot", point: tuple[float, ...] | None = None
     ) -> Inertia:
         """Mass matrix and gravity about a pose (nv,), to second order.
 
         Args:
             pose: (nv,) rad or m.
-            inertias: "robot"; a link's name, for what that link alone adds; or a link's name
-                and a point (3,) m in it, for what 1 kg there adds.
+            what: "robot", or a link's name, for what that link alone adds.
+            point: (3,) m in the link, for what 1 kg there adds.
 
         Raises:
             InputError: no such link.
         """
-        model = self._with(inertias)
+        model = self._with(what, point)
         data, q, columns = model.createData(), self._q(pose), self._columns
 
         def mass(at: FloatArray) -> FloatArray:
@@ -292,7 +258,7 @@ class WideChain:
         d_mass = [(mass(q + s) - mass(q - s)) / (2 * _STEP) for s in steps]
         d_slope = [(gradient(q + s) - gradient(q - s)) / (2 * _STEP) for s in steps]
         here = mass(q)
-        if inertias == "robot":
+        if what == "robot":
             gravity, slope = self._balanced(pose, gravity, slope)
         return Inertia(here, np.array(d_mass), gravity, slope, np.array(d_slope))
 

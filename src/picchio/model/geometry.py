@@ -65,15 +65,10 @@ class Geometry:
         """
         key = (what, point)
         if key not in self._inertias:
-            given = what if point is None else (what, np.asarray(point, dtype=float))
-            self._inertias[key] = self.chain.inertia(self.pose, given)
+            self._inertias[key] = self.chain.inertia(self.pose, what, point)
         return self._inertias[key]
 
-    def total(
-        self,
-        masses: tuple[tuple[float, str, tuple[float, ...] | None], ...],
-        taken: tuple[int, ...],
-    ) -> Inertia:
+    def total(self, masses: tuple[Mass, ...], taken: tuple[int, ...]) -> Inertia:
         """The weighted sum of inertias, of some of the coordinates.
 
         Args:

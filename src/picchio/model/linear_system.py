@@ -100,15 +100,8 @@ def modal_damping_matrix(
     Returns:
         (n, n) N m s/rad.
     """
-    omega, shapes = undamped_modes(mass_matrix, np.diag(stiffness))
-    ratio = np.broadcast_to(np.asarray(damping_ratio, dtype=float), stiffness.shape)
-    energy = stiffness[:, None] * shapes**2  # (joint, mode); each column sums to omega^2
-    modal_ratio = ratio @ energy / omega**2
-    weighted = mass_matrix @ shapes
-    return (weighted * (2.0 * modal_ratio * omega)) @ weighted.T
-
-
-# A damping matrix from the joints' stated modal damping ratios.
+    ratios = np.broadcast_to(np.asarray(damping_ratio, dtype=float), stiffness.shape)
+    return _by_modes(mass_matrix, np.diag(stiffness), np.eye(len(stiffness)), stiffness, ratios)
 
 
 def shared_damping(
@@ -119,7 +112,7 @@ def shared_damping(
     ratios: FloatArray,
     share: float,
 ) -> FloatArray:
-    """C = M S diag(2 zeta omega) S^T M, ratios weighted by the joints' strain energy.
+    """As `modal_damping_matrix`, in coordinates of which joints' deflections are a part.
 
     Args:
         mass: (c, c) kg m^2.
@@ -138,7 +131,7 @@ def shared_damping(
         whole = _by_modes(mass, stiffness, deflections, joints, ratios)
     if share == 1.0:
         return whole
-    alone = _by_modes(mass[:n, :n], np.diag(joints), np.eye(n), joints, ratios)
+    alone = modal_damping_matrix(mass[:n, :n], joints, ratios)
     return np.asarray(share * whole + (1.0 - share) * deflections.T @ alone @ deflections)
 
 

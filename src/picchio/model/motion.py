@@ -51,14 +51,6 @@ class Motion:
     delays: dict[str, float] = field(default_factory=dict)
     signs: dict[str, FloatArray] = field(default_factory=dict)
 
-    def has(self, joint: str) -> bool:
-        """Whether the joint's motion was recorded.
-
-        Args:
-            joint: its name.
-        """
-        return joint in self.angle
-
     def direction(self, joint: str) -> FloatArray:
         """The sign of the velocity, 1 or -1; 0 while the joint stands.
 

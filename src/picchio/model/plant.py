@@ -10,11 +10,10 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.model.conditions import Conditions
-from picchio.model.elements import Element
 from picchio.model.expansion import Motion
 from picchio.model.geometry import Geometry, Mass
 from picchio.model.linear_system import shared_damping
-from picchio.model.system import VibratingSystem
+from picchio.model.system import Element, VibratingSystem
 from picchio.robot.flexible_robot import FlexibleRobot
 
 Row = dict[str, float]
@@ -27,21 +26,12 @@ _OWN_INERTIA = 1e-4
 
 @dataclass
 class _Spring:
-    """A linear spring and damper of one coordinate, or of a joint's deflection."""
+    """A linear spring and damper of a coordinate, a joint's deflection, or a link's origin."""
 
     of: str
     stiffness: float
     damping: float
     deflection: bool = False
-
-
-@dataclass
-class _Anchor:
-    """An isotropic spring and damper from a link's origin to the world."""
-
-    link: str
-    stiffness: float
-    damping: float
 
 
 class Changes:
@@ -76,7 +66,7 @@ class Changes:
         self._masses: list[Mass] = [(1.0, "robot", None)]
         self._added_inertia: list[tuple[Row, float]] = []
         self._springs: list[_Spring] = []
-        self._anchors: list[_Anchor] = []
+        self._anchors: list[_Spring] = []
         self._elements: list[tuple[Element, str]] = []
         self._contacts: list[Element] = []
 
@@ -124,7 +114,7 @@ class Changes:
 
     def add_anchor(self, link: str, stiffness: float, damping: float) -> None:
         """Tie a link's origin to the world with a spring (N/m) and damper (N s/m)."""
-        self._anchors.append(_Anchor(link, stiffness, damping))
+        self._anchors.append(_Spring(link, stiffness, damping))
 
     def add_element(self, joint: str, element: Element) -> None:
         """Add a nonlinear torque between a joint's link and motor side."""
@@ -263,7 +253,7 @@ class Plant(Changes):
             dampers += spring.damping * np.outer(vector, vector)
         for anchor in self._anchors:
             jacobian = np.zeros((3, size))
-            jacobian[:, wide] = geometry.motion(anchor.link).jacobian[:3, taken]
+            jacobian[:, wide] = geometry.motion(anchor.of).jacobian[:3, taken]
             stiffness += anchor.stiffness * jacobian.T @ jacobian
             dampers += anchor.damping * jacobian.T @ jacobian
         # Where nothing but the joints' springs holds it, both conventions of damping are one.

@@ -3,11 +3,39 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 
 from picchio.core.arrays import FloatArray
-from picchio.model.elements import Element
 from picchio.model.geometry import Geometry
 from picchio.model.linear_system import LinearSystem
+
+
+class ElementKind(IntEnum):
+    """What an element does."""
+
+    BACKLASH = 0
+    CUBIC = 1
+    BOUC_WEN = 2
+    COULOMB = 3
+    CONTACT = 4
+
+
+@dataclass(frozen=True)
+class Element:
+    """One nonlinear element between the sides of a joint, or between tool and workpiece.
+
+    It is a kind and at most six numbers, so that compiled code can take a list of them; the forces
+    are in `picchio.vibration.integration.element_kernel`.
+
+    Attributes:
+        kind: what it does.
+        parameters: BACKLASH: stiffness, gap, rest deflection, rest torque; CUBIC: N m/rad^3;
+            BOUC_WEN: torque, yield deflection; COULOMB: torque; CONTACT: stiffness, damping,
+            preload. SI.
+    """
+
+    kind: ElementKind
+    parameters: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,6 +79,11 @@ class Effect(ABC):
         discrete: nothing lies between its values: they are tried, not fitted.
         mark: how a scene draws it (`picchio.visuals.scene.causes.drawings`); by its target where
             empty.
+        tried: values of typical size to try in screening; where they depend on the campaign, the
+            effect overrides `trials`.
+        takes: what the records must have to show it, a key of `evidence.LACKING`; empty where
+            any will do.
+        among: fields of `Evidence`: the channel groups at which it may be at work.
         tolerance: the key of `[tolerance]` that says how far its `scale` may be from 1 without
             being a cause; empty where nothing is tolerated.
         sidecar: the key of a sidecar that its value belongs to: "stiffness" or "rotor_inertia" of
@@ -111,6 +116,9 @@ class Effect(ABC):
     latent: ClassVar[Latent | None] = None
     discrete: ClassVar[bool] = False
     mark: ClassVar[str] = ""
+    tried: ClassVar[tuple[Mapping[str, float], ...]] = ()
+    takes: ClassVar[str] = ""
+    among: ClassVar[tuple[str, ...]] = ("groups",)
     tolerance: ClassVar[str] = ""
     sidecar: ClassVar[str] = ""
     urdf: ClassVar[Mapping[str, str]] = {}
@@ -240,7 +248,7 @@ class Effect(ABC):
         Returns:
             a dictionary of values a trial.
         """
-        return []
+        return [dict(values) for values in self.tried]
 
     def early_trials(self, scales: Scales) -> list[dict[str, float]]:
         """As `trials`, for the first few cycles: more of them where a resonance is narrow.
@@ -268,7 +276,9 @@ class Effect(ABC):
         Args:
             evidence: what the records can show.
         """
-        return evidence.targets(cls.target_kind)
+        if evidence.motion and cls.elastic:
+            return list(evidence.wound)
+        return evidence.targets(cls.target_kind, cls.among)
 
     @classmethod
     def why_not(cls, evidence: Evidence) -> str:
@@ -277,7 +287,7 @@ class Effect(ABC):
         Args:
             evidence: what the records can show.
         """
-        return ""
+        return evidence.lacks(cls.takes)
 
     @classmethod
     def applies(cls, evidence: Evidence) -> list[str]:
@@ -406,3 +416,8 @@ def parameter(
         meaning: one line for people.
     """
     return Parameter(name, unit, neutral, lower, upper, log, meaning)
+
+
+def factor(name: str, lower: float, upper: float, meaning: str) -> Parameter:
+    """A parameter that multiplies what is stated: 1 changes nothing, and steps are ratios."""
+    return parameter(name, neutral=1.0, lower=lower, upper=upper, log=True, meaning=meaning)

@@ -8,6 +8,15 @@ from picchio.model.effects.effect import TargetKind
 from picchio.model.expansion import BASE_AXES
 from picchio.robot.flexible_robot import FlexibleRobot
 
+LACKING = {
+    "bursts": "no record has a burst of several blows",
+    "programmed": "the force was recorded in every record",
+    "reshaped": "blows of a force that was measured have no other shape to turn into",
+    "days": "the records are not of several known dates",
+    "kelvin": "the records are not of several known temperatures",
+}
+"""What an effect may take of the records (`Effect.takes`), and what is wrong without it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
@@ -43,11 +52,25 @@ class Evidence:
     driven: tuple[str, ...] = ()
     wound: tuple[str, ...] = ()
 
-    def targets(self, kind: TargetKind) -> list[str]:
+    @property
+    def programmed(self) -> bool:
+        """Whether some record's blows are known only as programmed, and may have come otherwise."""
+        return not self.recorded
+
+    def lacks(self, what: str) -> str:
+        """Why these records cannot show an effect, one clause; empty where they can.
+
+        Args:
+            what: the effect takes: a key of `LACKING`, or nothing.
+        """
+        return LACKING[what] if what and not getattr(self, what) else ""
+
+    def targets(self, kind: TargetKind, among: tuple[str, ...] = ("groups",)) -> list[str]:
         """Every target of a kind.
 
         Args:
             kind: what an effect is about.
+            among: fields that name the channel groups that count, where it is about one.
 
         Returns:
             names, in the robot's order.
@@ -60,5 +83,6 @@ class Evidence:
         if kind == "axis":
             return list(BASE_AXES)
         if kind == "channel group":
-            return list(self.groups)
+            wanted = {group for field in among for group in getattr(self, field)}
+            return [group for group in (*self.groups, *self.forces) if group in wanted]
         return [kind]

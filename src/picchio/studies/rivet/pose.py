@@ -20,12 +20,11 @@ from picchio.excitation.piecewise import PiecewiseForce
 from picchio.fatigue.counting.counter import Residue, rainflow
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.shaft_stress import shear_stress
-from picchio.model.elements import ElementKind
 from picchio.model.geometry import Geometry
 from picchio.model.linear_system import LinearSystem
 from picchio.model.model import Model
 from picchio.model.plant import Plant
-from picchio.model.system import VibratingSystem
+from picchio.model.system import ElementKind, VibratingSystem
 from picchio.robot.dynamics.statics import RobotState
 from picchio.robot.joint import Joint
 from picchio.studies.tasks import Operation

@@ -1,4 +1,4 @@
-"""The nonlinear elements' forces, compiled; what each is: `picchio.model.elements`."""
+"""The nonlinear elements' forces, compiled; what each is: `picchio.model.system`."""
 
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations

@@ -10,8 +10,7 @@ import numpy as np
 from picchio.core.arrays import BoolArray, FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.excitation.piecewise import PiecewiseForce
-from picchio.model.elements import ElementKind
-from picchio.model.system import VibratingSystem
+from picchio.model.system import ElementKind, VibratingSystem
 from picchio.vibration.integration.jumps import jump_corrections
 
 # Longest steps, s: the linear part is exact, so these resolve only what comes on top.

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+import pinocchio as pin
+
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.scales import Scales
-from picchio.model.rotation import exp3
 
 
 class ForceDirection(Effect):
@@ -21,15 +22,12 @@ class ForceDirection(Effect):
     )
     meaning = "the tool does not hit along the stated direction"
     mark = "turned arrow"
+    tried = tuple({f"r{axis}": 0.08} for axis in "xyz")  # rad, about each axis
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Turn the direction."""
         if blows.tool_rotation is None:
             return blows
-        turn = exp3([self.values[f"r{axis}"] for axis in "xyz"])
+        turn = pin.exp3(np.array([self.values[f"r{axis}"] for axis in "xyz"]))
         frame = blows.tool_rotation
         return blows.change(direction=frame @ turn @ frame.T @ blows.direction)
-
-    def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """5 degrees about each axis."""
-        return [{f"r{axis}": 0.08} for axis in "xyz"]

@@ -8,8 +8,6 @@ from typing import ClassVar
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.evidence import Evidence
-from picchio.model.effects.scales import Scales
 
 
 class ForceDrift(Effect):
@@ -25,16 +23,9 @@ class ForceDrift(Effect):
     refused: ClassVar[Mapping[str, str]] = {
         "steady state": "blows that grow or fade within a burst have no steady state"
     }
-
-    @classmethod
-    def why_not(cls, evidence: Evidence) -> str:
-        """As of any effect; it takes several blows in a row."""
-        return "" if evidence.bursts else "no record has a burst of several blows"
+    takes = "bursts"
+    tried = ({"per_hit": 0.02},)
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Scale each by its place in the burst."""
         return blows.change(height=blows.height * (1.0 + self.values["per_hit"] * blows.hit))
-
-    def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """2 % a blow."""
-        return [{"per_hit": 0.02}]

@@ -8,9 +8,7 @@ from picchio.core.arrays import FloatArray
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.latent import Latent
-from picchio.model.effects.scales import Scales
 
 
 class MissedHits(Effect):
@@ -25,11 +23,8 @@ class MissedHits(Effect):
         "1 for each blow that is missing", spread="fraction", step=0.2, lower=0.0, upper=1.0,
         whole=True,
     )  # fmt: skip
-
-    @classmethod
-    def why_not(cls, evidence: Evidence) -> str:
-        """As of any effect; it takes several blows in a row."""
-        return "" if evidence.bursts else "no record has a burst of several blows"
+    takes = "bursts"
+    tried = ({},)  # none missing: the blows are looked at one by one
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Weaken (0 to 1) each blow of this record by its own amount."""
@@ -41,7 +36,3 @@ class MissedHits(Effect):
         values = (rng.random(hits) < self.values["fraction"]).astype(float)
         values[0] = 0.0
         return np.asarray(values)
-
-    def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """None missing: the blows are looked at one by one."""
-        return [{}]

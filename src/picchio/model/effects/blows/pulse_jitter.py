@@ -8,9 +8,7 @@ from picchio.core.arrays import FloatArray
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.latent import Latent
-from picchio.model.effects.scales import Scales
 
 
 class PulseJitter(Effect):
@@ -25,11 +23,8 @@ class PulseJitter(Effect):
     parameters = (parameter("std", "s", lower=0.0, upper=1.0, meaning="spread of the times"),)
     meaning = "the blows come irregularly"
     latent = Latent("shift of each blow, s", spread="std", step=2e-4, times=True)
-
-    @classmethod
-    def why_not(cls, evidence: Evidence) -> str:
-        """As of any effect; it takes several blows in a row."""
-        return "" if evidence.bursts else "no record has a burst of several blows"
+    takes = "bursts"
+    tried = ({},)  # on time: the shifts are looked for blow by blow
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Shift each blow of this record by its own amount."""
@@ -41,7 +36,3 @@ class PulseJitter(Effect):
         values = self.values["std"] * rng.standard_normal(hits)
         values[0] = 0.0
         return np.asarray(values)
-
-    def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """On time: the amounts are looked for blow by blow."""
-        return [{}]

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.evidence import Evidence
-from picchio.model.effects.scales import Scales
+from picchio.model.effects.effect import Effect, factor
 
 
 class PulseRate(Effect):
@@ -15,22 +13,11 @@ class PulseRate(Effect):
     name = "pulse_rate"
     where = "blows"
     target_kind = "tool"
-    parameters = (
-        parameter(
-            "scale",
-            neutral=1.0,
-            lower=0.5,
-            upper=2.0,
-            log=True,
-            meaning="true period over programmed",
-        ),
-    )
+    parameters = (factor("scale", 0.5, 2.0, "true period over programmed"),)
     meaning = "the tool hits faster or slower than programmed"
-
-    @classmethod
-    def why_not(cls, evidence: Evidence) -> str:
-        """As of any effect; what was recorded is as it came, whatever was programmed."""
-        return "the force was recorded in every record" if evidence.recorded else ""
+    takes = "programmed"
+    # By little and by more: the phase error grows within a burst.
+    tried = tuple({"scale": s} for s in (0.96, 0.985, 0.995, 1.005, 1.015, 1.04))
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Stretch the times of the blows."""
@@ -39,7 +26,3 @@ class PulseRate(Effect):
         return blows.change(
             start=scale * blows.start, period=period, interval=scale * blows.interval
         )
-
-    def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """Slower and faster by little and by more: the phase runs away within a burst."""
-        return [{"scale": s} for s in (0.96, 0.985, 0.995, 1.005, 1.015, 1.04)]

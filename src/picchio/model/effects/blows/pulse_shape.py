@@ -6,10 +6,7 @@ from picchio.core.errors import InputError
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.evidence import Evidence
-from picchio.model.effects.scales import Scales
-
-NO_SHAPE = "blows of a force that was measured have no other shape to turn into"
+from picchio.model.effects.evidence import LACKING
 
 
 class PulseShape(Effect):
@@ -26,11 +23,8 @@ class PulseShape(Effect):
         parameter("blend", lower=-0.2, upper=1.2, meaning="0 as programmed, 1 the other shape"),
     )
     meaning = "the blows have another shape than programmed"
-
-    @classmethod
-    def why_not(cls, evidence: Evidence) -> str:
-        """As of any effect; the programmed blows must have another shape beside them."""
-        return "" if evidence.reshaped else NO_SHAPE
+    takes = "reshaped"
+    tried = ({"blend": 1.0},)
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Blend the shapes.
@@ -40,9 +34,5 @@ class PulseShape(Effect):
         """
         blend = self.values["blend"]
         if blend and blows.other is None:
-            raise InputError(NO_SHAPE, key=self.name)
+            raise InputError(LACKING["reshaped"], key=self.name)
         return blows.change(blend=blows.blend + blend * (1.0 - 2.0 * blows.blend))
-
-    def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """All the way."""
-        return [{"blend": 1.0}]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 
 
@@ -17,26 +18,20 @@ class Rebound(Effect):
     target_kind = "tool"
     parameters = (
         parameter("ratio", lower=-2.0, upper=2.0, meaning="height over the blow's"),
-        parameter(
-            "delay",
-            "s",
-            neutral=0.01,
-            lower=1e-4,
-            upper=1.0,
-            log=True,
-            meaning="from start to start",
-        ),
-    )
+        parameter("delay", "s", neutral=0.01, lower=1e-4, upper=1.0, log=True,
+                  meaning="from start to start"),
+    )  # fmt: skip
     meaning = "the tool bounces and hits again"
-
-    @classmethod
-    def why_not(cls, evidence: Evidence) -> str:
-        """As of any effect; what was recorded is as it came, whatever was programmed."""
-        return "the force was recorded in every record" if evidence.recorded else ""
+    takes = "programmed"
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
         """Add the echoes."""
-        return blows.with_echo(self.values["delay"], self.values["ratio"])
+        delay, ratio = self.values["delay"], self.values["ratio"]
+        return blows.change(
+            start=np.concatenate([blows.start, blows.start + delay]),
+            height=np.concatenate([blows.height, ratio * blows.height]),
+            hit=np.tile(blows.hit, 2),
+        )
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """A fifth as high, at delays all over the period."""

@@ -7,11 +7,10 @@ import math
 import numpy as np
 
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
-from picchio.model.elements import Element, ElementKind
 from picchio.model.motion import Motion
 from picchio.model.plant import Changes
+from picchio.model.system import Element, ElementKind
 
 
 class Backlash(Effect):
@@ -25,11 +24,6 @@ class Backlash(Effect):
     told_by = "slowly under load, then fast: a delay grows with speed, a spring does not"
     elastic = True
     usual = 11
-
-    @classmethod
-    def targets(cls, evidence: Evidence) -> list[str]:
-        """Every flexible joint; in a motion every one with encoders on both sides of the gear."""
-        return list(evidence.wound) if evidence.motion else super().targets(evidence)
 
     def structure(self, plant: Changes) -> None:
         """Replace the spring's torque by the dead zone's."""

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.elements import Element, ElementKind
 from picchio.model.motion import Motion
 from picchio.model.plant import Changes
+from picchio.model.system import Element, ElementKind
 
 
 class CoulombFriction(Effect):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.elements import Element, ElementKind
 from picchio.model.plant import Changes
+from picchio.model.system import Element, ElementKind
 
 
 class Hysteresis(Effect):
@@ -16,16 +16,9 @@ class Hysteresis(Effect):
     target_kind = "joint"
     parameters = (
         parameter("torque", "N*m", lower=0.0, upper=1e6, meaning="at saturation"),
-        parameter(
-            "deflection",
-            "rad",
-            neutral=1e-3,
-            lower=1e-7,
-            upper=0.1,
-            log=True,
-            meaning="at which it yields",
-        ),
-    )
+        parameter("deflection", "rad", neutral=1e-3, lower=1e-7, upper=0.1, log=True,
+                  meaning="at which it yields"),
+    )  # fmt: skip
     meaning = "gear and seals slip a little before they turn"
     source = (
         "Bouc-Wen with n = 1: Ismail, Ikhouane, Rodellar, Arch. Comput. Methods Eng. 16 (2009) 161"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.elements import Element, ElementKind
 from picchio.model.plant import Changes
+from picchio.model.system import Element, ElementKind
 
 
 class WorkpieceContact(Effect):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Changes
 
@@ -20,11 +19,7 @@ class StiffnessDrift(Effect):
     )
     meaning = "the joint wears or loosens while the campaign lasts"
     mark = "spring"
-
-    @classmethod
-    def why_not(cls, evidence: Evidence) -> str:
-        """As of any effect; it takes records of several dates."""
-        return "" if evidence.days > 0.0 else "the records are not of several known dates"
+    takes = "days"
 
     def structure(self, plant: Changes) -> None:
         """Scale the spring by the date."""

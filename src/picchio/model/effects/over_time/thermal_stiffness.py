@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Changes
 
@@ -20,11 +19,7 @@ class ThermalStiffness(Effect):
     )
     meaning = "the joint softens (or stiffens) when warm"
     mark = "spring"
-
-    @classmethod
-    def why_not(cls, evidence: Evidence) -> str:
-        """As of any effect; it takes records at several temperatures."""
-        return "" if evidence.kelvin > 0.0 else "the records are not of several known temperatures"
+    takes = "kelvin"
 
     def structure(self, plant: Changes) -> None:
         """Scale the spring by the temperature."""

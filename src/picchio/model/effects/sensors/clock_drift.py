@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
 
@@ -16,11 +15,9 @@ class ClockDrift(Effect):
     target_kind = "channel group"
     parameters = (parameter("rate", lower=-0.2, upper=0.2, meaning="relative error of the clock"),)
     meaning = "the channel's clock runs fast or slow"
+    # By little and by more: the phase error grows within a record.
+    tried = tuple({"rate": r} for r in (-0.006, -0.002, 0.002, 0.006))
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:
         """Change the group's chain."""
         sensors.chain(self.target).clock_rate += self.values["rate"]
-
-    def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """Little and more: the phase runs away within a record."""
-        return [{"rate": r} for r in (-0.006, -0.002, 0.002, 0.006)]

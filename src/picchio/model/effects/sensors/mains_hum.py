@@ -8,7 +8,6 @@ from picchio.core.arrays import FloatArray
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import CHANNEL_UNIT, Effect, parameter
 from picchio.model.effects.latent import Latent
-from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
 
@@ -32,6 +31,8 @@ class MainsHum(Effect):
         "cosine and sine of the line, in the channel's unit", spread="amplitude", count=2,
         linear=True,
     )  # fmt: skip
+    # The amplitudes are solved for in every record.
+    tried = ({"frequency": 50.0}, {"frequency": 60.0})
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:
         """Add this record's line."""
@@ -50,7 +51,3 @@ class MainsHum(Effect):
         basis = np.stack([np.cos(phase), np.sin(phase)])
         found = np.linalg.lstsq(basis.T, np.mean(rows, axis=0), rcond=None)[0]
         return rows - found @ basis, (float(found[0]), float(found[1]))
-
-    def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """The mains of both halves of the world; the lines are solved for in every record."""
-        return [{"frequency": 50.0}, {"frequency": 60.0}]

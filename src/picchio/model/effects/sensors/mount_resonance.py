@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.evidence import Evidence
-from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
 # Hz: a tool's bracket is soft, wax and a stud are stiffer.
@@ -20,31 +20,16 @@ class MountResonance(Effect):
     name = "mount_resonance"
     where = "sensor"
     target_kind = "channel group"
+    among = ("accelerations",)
     parameters = (
-        parameter(
-            "frequency",
-            "Hz",
-            neutral=float("inf"),
-            lower=1.0,
-            upper=1e5,
-            log=True,
-            meaning="of the mount",
-        ),
-        parameter(
-            "damping_ratio", neutral=0.05, lower=1e-3, upper=_MOST, log=True, meaning="of the mount"
-        ),
-    )
+        parameter("frequency", "Hz", neutral=math.inf, lower=1.0, upper=1e5, log=True,
+                  meaning="of the mount"),
+        parameter("damping_ratio", neutral=0.05, lower=1e-3, upper=_MOST, log=True,
+                  meaning="of the mount"),
+    )  # fmt: skip
     meaning = "the sensor swings on its magnet, wax or bracket"
-
-    @classmethod
-    def targets(cls, evidence: Evidence) -> list[str]:
-        """The groups that read accelerations: their sensors are mounted on the robot."""
-        return [group for group in evidence.groups if group in evidence.accelerations]
+    tried = tuple({"frequency": f, "damping_ratio": 0.06} for f in _FREQUENCIES)
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:
         """Change the group's chain."""
         sensors.chain(self.target).mount = (self.values["frequency"], self.values["damping_ratio"])
-
-    def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """All over the frequencies where mounts are."""
-        return [{"frequency": f, "damping_ratio": 0.06} for f in _FREQUENCIES]

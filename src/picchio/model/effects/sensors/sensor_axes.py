@@ -8,8 +8,6 @@ import numpy as np
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.evidence import Evidence
-from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
 CHOICES = tuple(
@@ -23,16 +21,13 @@ class SensorAxes(Effect):
     name = "sensor_axes"
     where = "sensor"
     target_kind = "channel group"
+    among = ("vectors",)
     parameters = (
         parameter("code", lower=0, upper=47, meaning="which of the 48 signed permutations"),
     )
     meaning = "cables are swapped or a sensor is mounted the wrong way round"
     discrete = True
-
-    @classmethod
-    def targets(cls, evidence: Evidence) -> list[str]:
-        """The groups that read three axes."""
-        return [group for group in evidence.groups if group in evidence.vectors]
+    tried = tuple({"code": float(code)} for code in range(1, len(CHOICES)))  # all but the identity
 
     @property
     def axes(self) -> str:
@@ -47,7 +42,3 @@ class SensorAxes(Effect):
         turn[range(3), order] = signs
         chain = sensors.chain(self.target)
         chain.turn = turn @ chain.turn
-
-    def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """All but the identity."""
-        return [{"code": float(code)} for code in range(1, len(CHOICES))]

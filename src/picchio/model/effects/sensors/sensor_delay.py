@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
@@ -15,13 +14,9 @@ class SensorDelay(Effect):
     name = "sensor_delay"
     where = "sensor"
     target_kind = "channel group"
+    among = ("groups", "forces")
     parameters = (parameter("delay", "s", lower=-0.1, upper=0.1, meaning="late by"),)
     meaning = "the channel is late against the others"
-
-    @classmethod
-    def targets(cls, evidence: Evidence) -> list[str]:
-        """Every group, that of the force as well."""
-        return [*evidence.groups, *evidence.forces]
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:
         """Change the group's chain."""

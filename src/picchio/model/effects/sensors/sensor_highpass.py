@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
 
@@ -14,17 +13,10 @@ class SensorHighpass(Effect):
     name = "sensor_highpass"
     where = "sensor"
     target_kind = "channel group"
-    parameters = (
-        parameter(
-            "frequency", "Hz", neutral=0.0, lower=1e-4, upper=1e4, log=True, meaning="corner"
-        ),
-    )
+    parameters = (parameter("frequency", "Hz", lower=1e-4, upper=1e4, log=True, meaning="corner"),)
     meaning = "the sensor's electronics take out slow motion"
+    tried = ({"frequency": 0.3}, {"frequency": 1.5})
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:
         """Change the group's chain."""
         sensors.chain(self.target).highpass = self.values["frequency"]
-
-    def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """0.3 and 1.5 Hz."""
-        return [{"frequency": 0.3}, {"frequency": 1.5}]

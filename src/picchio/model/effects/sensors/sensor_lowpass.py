@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
 
@@ -26,11 +25,8 @@ class SensorLowpass(Effect):
         ),
     )
     meaning = "the sensor or its filter takes out fast motion"
+    tried = ({"frequency": 40.0}, {"frequency": 120.0})
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:
         """Change the group's chain."""
         sensors.chain(self.target).lowpass = self.values["frequency"]
-
-    def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """40 and 120 Hz."""
-        return [{"frequency": 40.0}, {"frequency": 120.0}]

@@ -7,11 +7,7 @@ from collections.abc import Sequence
 from picchio.core.errors import InputError
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
-from picchio.model.effects.structure.yielding import (
-    MODAL_SHARE,
-    yielding_damping,
-    yielding_stiffness,
-)
+from picchio.model.effects.structure import yielding
 from picchio.model.expansion import BASE_AXES
 from picchio.model.plant import Changes
 
@@ -23,9 +19,9 @@ class BaseCompliance(Effect):
     where = "structure"
     target_kind = "axis"
     parameters = (
-        yielding_stiffness("of the foundation (N/m along an axis)", upper=1e13),
-        yielding_damping("of the foundation (N s/m along an axis)", upper=1e9),
-        MODAL_SHARE,
+        yielding.stiffness("of the foundation (N/m along an axis)", upper=1e13),
+        yielding.damping("of the foundation (N s/m along an axis)", upper=1e9),
+        yielding.MODAL_SHARE,
     )
     meaning = "pedestal, floor or bolts yield under the whole robot"
 

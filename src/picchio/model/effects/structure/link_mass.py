@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, factor
 from picchio.model.effects.evidence import Evidence
-from picchio.model.effects.scales import Scales
 from picchio.model.plant import Changes
 
 
@@ -14,18 +13,10 @@ class LinkMass(Effect):
     name = "link_mass"
     where = "structure"
     target_kind = "link"
-    parameters = (
-        parameter(
-            "scale",
-            neutral=1.0,
-            lower=0.05,
-            upper=20.0,
-            log=True,
-            meaning="true mass over the URDF's",
-        ),
-    )
+    parameters = (factor("scale", 0.05, 20.0, "true mass over the URDF's"),)
     meaning = "the link's mass and inertia are not the URDF's"
     mark = "link mass"
+    tried = ({"scale": 1.12},)
 
     @classmethod
     def targets(cls, evidence: Evidence) -> list[str]:
@@ -36,7 +27,3 @@ class LinkMass(Effect):
     def structure(self, plant: Changes) -> None:
         """Add the link's own inertia `scale` - 1 times."""
         plant.add_mass(self.values["scale"] - 1.0, self.target)
-
-    def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """An eighth heavier."""
-        return [{"scale": 1.12}]

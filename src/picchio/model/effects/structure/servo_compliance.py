@@ -6,11 +6,7 @@ from collections.abc import Sequence
 
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.effects.structure.yielding import (
-    MODAL_SHARE,
-    yielding_damping,
-    yielding_stiffness,
-)
+from picchio.model.effects.structure import yielding
 from picchio.model.plant import Changes
 
 
@@ -24,18 +20,12 @@ class ServoCompliance(Effect):
     where = "structure"
     target_kind = "joint"
     parameters = (
-        yielding_stiffness("of the servo, after the gear", upper=1e12),
+        yielding.stiffness("of the servo, after the gear", upper=1e12),
         parameter(
-            "rotor_inertia",
-            "kg*m^2",
-            neutral=0.0,
-            lower=1e-9,
-            upper=1e5,
-            log=True,
-            meaning="after the gear",
+            "rotor_inertia", "kg*m^2", lower=1e-9, upper=1e5, log=True, meaning="after the gear"
         ),
-        yielding_damping("of the servo, after the gear", upper=1e7),
-        MODAL_SHARE,
+        yielding.damping("of the servo, after the gear", upper=1e7),
+        yielding.MODAL_SHARE,
     )
     meaning = "the drive does not hold its side of the spring: servo or brake yields"
     mark = "spring"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.scales import Scales
 from picchio.model.plant import Changes
 
 
@@ -19,11 +18,8 @@ class ToolOffset(Effect):
     )
     meaning = "the tool's tip is not where the model has it"
     mark = "offset"
+    tried = tuple({axis: 0.03} for axis in "xyz")  # the fit then moves all three
 
     def structure(self, plant: Changes) -> None:
         """Move the force's point."""
         plant.force_offset = plant.force_offset + [self.values[axis] for axis in "xyz"]
-
-    def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """3 cm along each axis: the fit takes all three."""
-        return [{axis: 0.03} for axis in "xyz"]

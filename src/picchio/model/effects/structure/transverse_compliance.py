@@ -7,11 +7,7 @@ from collections.abc import Sequence
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
-from picchio.model.effects.structure.yielding import (
-    MODAL_SHARE,
-    yielding_damping,
-    yielding_stiffness,
-)
+from picchio.model.effects.structure import yielding
 from picchio.model.plant import Changes
 
 
@@ -22,9 +18,9 @@ class TransverseCompliance(Effect):
     where = "structure"
     target_kind = "joint or link"
     parameters = (
-        yielding_stiffness("tilting stiffness of the bearing", upper=1e12),
-        yielding_damping("tilting damping of the bearing", upper=1e8),
-        MODAL_SHARE,
+        yielding.stiffness("tilting stiffness of the bearing", upper=1e12),
+        yielding.damping("tilting damping of the bearing", upper=1e8),
+        yielding.MODAL_SHARE,
     )
     meaning = "bearing or link bends across the joint's axis"
     mark = "bending"

@@ -14,12 +14,12 @@ MODAL_SHARE = parameter(
 )
 
 
-def yielding_stiffness(meaning: str, upper: float) -> Parameter:
+def stiffness(meaning: str, upper: float) -> Parameter:
     """Of what is rigid in the nominal model, N m/rad."""
     return parameter("stiffness", "N*m/rad", neutral=float("inf"), lower=1e-3, upper=upper,
                      log=True, meaning=meaning)  # fmt: skip
 
 
-def yielding_damping(meaning: str, upper: float) -> Parameter:
+def damping(meaning: str, upper: float) -> Parameter:
     """Beside such a stiffness, N m s/rad."""
     return parameter("damping", "N*m*s/rad", lower=1e-9, upper=upper, log=True, meaning=meaning)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
+import pinocchio as pin
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.model.effects.registry import effect_class
-from picchio.model.rotation import exp3
 from picchio.visuals.plots.style import BLUE
 from picchio.visuals.scene.causes.site import Drawn, Site, check_place
 from picchio.visuals.scene.causes.symbols import (
@@ -131,7 +131,7 @@ def _blow(site: Site) -> list[Drawn]:
 def _force_direction(site: Site) -> list[Drawn]:
     """The stated direction in blue, the found one in the cause's colour."""
     axes = site.robot.state(site.pose).tool_rotation
-    turn = exp3([site.values.get(f"r{axis}", 0.0) for axis in "xyz"])
+    turn = pin.exp3(np.array([site.values.get(f"r{axis}", 0.0) for axis in "xyz"]))
     start, end = _force(site, axes @ turn @ axes.T @ site.direction)
     stated = _force(site, site.direction)
     thick = 0.011 * site.reach
