@@ -99,7 +99,7 @@ def damaged(robot: FlexibleRobot, poses: np.ndarray, curve: SNCurve) -> None:
 
 def shafted(robot: FlexibleRobot) -> FlexibleRobot:
     """The robot with some shaft in every joint, so that there is a stress to count."""
-    shaft = Shaft(0.015, 0.05, 79.3e9)
+    shaft = Shaft(radius=0.015, length=0.05, shear_modulus=79.3e9)
     joints = tuple(dataclasses.replace(j, shaft=shaft) for j in robot.flexible_joints)
     return dataclasses.replace(robot, flexible_joints=joints)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from picchio.core.errors import InputError
 from picchio.fatigue.shaft_stress import (
@@ -19,7 +20,7 @@ from picchio.robot.joint import Shaft
 def solid_bar(
     radius: float = 0.01765, length: float = 0.0504, shear_modulus: float = 79.3e9
 ) -> Shaft:
-    return Shaft(radius, length, shear_modulus)
+    return Shaft(radius=radius, length=length, shear_modulus=shear_modulus)
 
 
 def test_textbook_shaft() -> None:
@@ -70,5 +71,5 @@ def test_bad_torque_is_named(bad: object) -> None:
 @pytest.mark.parametrize("key", ["radius", "length", "shear_modulus"])
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan])
 def test_bad_shaft_is_named(key: str, value: float) -> None:
-    with pytest.raises(InputError, match=key):
+    with pytest.raises(ValidationError, match=key):
         solid_bar(**{key: value})

@@ -273,4 +273,5 @@ def test_numbers_survive_the_way_to_pinocchio(path):
 
 
 def test_balancers_points_may_meet():
-    assert Balancer((1, 0, 0), (1, 0, 0), 100.0).torque_and_stiffness((0, 0, 1), 0.0) == (0.0, 100)
+    balancer = Balancer(parent_point=(1.0, 0.0, 0.0), child_point=(1.0, 0.0, 0.0), stiffness=100.0)
+    assert balancer.torque_and_stiffness((0, 0, 1), 0.0) == (0.0, 100)

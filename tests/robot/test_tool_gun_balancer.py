@@ -114,7 +114,8 @@ def test_a_zero_length_spring_balances_a_pendulum(arm_text, write):
 
 
 def test_balancer_torque_is_the_slope_of_its_energy():
-    balancer = Balancer((-0.3, 0.1, 0.2), (0.25, 0.05, 0.1), 4000.0, 0.2, 700.0)
+    points = {"parent_point": (-0.3, 0.1, 0.2), "child_point": (0.25, 0.05, 0.1)}
+    balancer = Balancer(**points, stiffness=4000.0, free_length=0.2, force=700.0)
     axis = np.array([0.2, -1.0, 0.1])
     unit = axis / np.linalg.norm(axis)
 
@@ -152,7 +153,7 @@ def test_stiffness_follows_gravity(arm, write):
 
 
 def test_stiffness_curve():
-    curve = StiffnessCurve(1e4, 2e4, 4e4, 10.0, 50.0)
+    curve = StiffnessCurve(k1=1e4, k2=2e4, k3=4e4, t1=10.0, t2=50.0)
     torque = [0.0, -10.0, 10.1, -50.0, 50.1, -90.0]
     assert curve.tangent(torque).tolist() == [1e4, 1e4, 2e4, 2e4, 4e4, 4e4]
 

@@ -18,7 +18,7 @@ from picchio.robot.joint import Shaft
 from picchio.studies.tasks import Task
 
 # A shaft for arms whose own nobody has published: assumed, so that a life exists.
-SHAFT = Shaft(0.008, 0.02, 79.3e9, "42CrMo4-QT-shaft")
+SHAFT = Shaft(radius=0.008, length=0.02, shear_modulus=79.3e9, sn_curve="42CrMo4-QT-shaft")
 # Panels for arms whose shipped task is one pose: 2 rows of 3 rivets, 0.1 m apart, tool down.
 PANELS = {"ur10": [0.6, 0.2, 0.5], "panda": [0.45, 0.0, 0.35]}
 

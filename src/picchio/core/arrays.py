@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -15,6 +16,12 @@ ComplexArray: TypeAlias = npt.NDArray[Any]
 IndexArray: TypeAlias = npt.NDArray[Any]
 BoolArray: TypeAlias = npt.NDArray[Any]
 Vector: TypeAlias = tuple[float, float, float]
+
+
+def symmetric(six: Sequence[float]) -> FloatArray:
+    """The matrix (3, 3) of xx, xy, xz, yy, yz, zz."""
+    xx, xy, xz, yy, yz, zz = six
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def as_floats(values: Any, key: str, *, finite: bool = True) -> FloatArray:

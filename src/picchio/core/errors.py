@@ -87,8 +87,9 @@ def describe_choices(value: Any, choices: Iterable[str]) -> str:
     names = [str(choice) for choice in choices]
     if not names:
         return "there are none to choose from"
-    close = difflib.get_close_matches(str(value), names, n=1, cutoff=0.6)
+    lowered = {name.lower(): name for name in reversed(names)}
+    close = difflib.get_close_matches(str(value).lower(), lowered, n=1, cutoff=0.6)
     shown = ", ".join(names[:_MOST_CHOICES])
     more = f" and {len(names) - _MOST_CHOICES} more" if len(names) > _MOST_CHOICES else ""
-    meant = f"did you mean {close[0]!r}? " if close else ""
+    meant = f"did you mean {lowered[close[0]]!r}? " if close else ""
     return f"{meant}valid: {shown}{more}"

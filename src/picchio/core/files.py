@@ -12,6 +12,9 @@ from typing import IO, Any
 
 from picchio.core.errors import InputError
 
+LARGEST = 32 << 20
+"""Bytes of a file that people write."""
+
 
 @contextmanager
 def atomic_write(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
@@ -60,7 +63,7 @@ def sha256(path: str | Path) -> str:
     return digest.hexdigest()
 
 
-def read_text(path: str | Path, *, limit: int = 32 << 20) -> str:
+def read_text(path: str | Path, *, limit: int = LARGEST) -> str:
     """A UTF-8 text file's content.
 
     Args:
@@ -68,7 +71,23 @@ def read_text(path: str | Path, *, limit: int = 32 << 20) -> str:
         limit: refuse files above this size, in bytes.
 
     Raises:
-        InputError: missing, a folder, unreadable, too large, or not UTF-8.
+        InputError: as `read_bytes`, or not UTF-8.
+    """
+    try:
+        return read_bytes(path, limit=limit).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"is not UTF-8 text (byte {error.start})", file=path) from None
+
+
+def read_bytes(path: str | Path, *, limit: int = LARGEST) -> bytes:
+    """A file's content.
+
+    Args:
+        path: the file.
+        limit: refuse files above this size, in bytes.
+
+    Raises:
+        InputError: missing, a folder, unreadable or too large.
     """
     source = Path(path)
     try:
@@ -76,10 +95,8 @@ def read_text(path: str | Path, *, limit: int = 32 << 20) -> str:
             raise InputError("is a folder, not a file", file=source)
         if (size := source.stat().st_size) > limit:
             raise InputError(f"is too large ({size} bytes; at most {limit})", file=source)
-        return source.read_bytes().decode("utf-8-sig")
+        return source.read_bytes()
     except FileNotFoundError:
         raise InputError("no such file", file=source) from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"is not UTF-8 text (byte {error.start})", file=source) from None
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", file=source) from None

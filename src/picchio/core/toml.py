@@ -28,6 +28,7 @@ class StrictModel(BaseModel):
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
 Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+FiniteVector = tuple[Finite, Finite, Finite]
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
@@ -140,41 +141,32 @@ def _field_names(model: type[BaseModel], loc: tuple[int | str, ...]) -> list[str
     here: list[Any] = [model]
     for part in loc:
         here = [step for kind in here for step in _step(kind, part)]
-    names: list[str] = []
-    for kind in here:
-        for name, field in _fields(kind).items():
-            names.append(field.alias or name)
-    return sorted(set(names))
+    tables = [kind for kind in here if _is_table(kind)]
+    return sorted({f.alias or name for kind in tables for name, f in kind.model_fields.items()})
 
 
-def _fields(kind: Any) -> dict[str, Any]:
-    if isinstance(kind, type) and issubclass(kind, BaseModel):
-        return dict(kind.model_fields)
-    return {}
+def _is_table(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, BaseModel)
 
 
 def _step(kind: Any, part: int | str) -> list[Any]:
     """The types reached from `kind` by one key or index."""
-    fields = _fields(kind)
-    for name, field in fields.items():
-        if part in (name, field.alias):
-            return _flatten(field.annotation)
-    if not fields:
-        arguments = typing.get_args(kind)
-        if typing.get_origin(kind) in (list, tuple, set):
-            return _flatten(arguments[0])
-        if typing.get_origin(kind) in (dict,) or getattr(kind, "__name__", "") == "Mapping":
-            return _flatten(arguments[-1])
-        if "Mapping" in str(typing.get_origin(kind)):
-            return _flatten(arguments[-1])
+    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+    if _is_table(kind):
+        for name, field in kind.model_fields.items():
+            if part in (name, field.alias):
+                return leaf_types(field.annotation)
+    elif origin in (list, tuple, dict):
+        return leaf_types(arguments[-1 if origin is dict else 0])
     # A union's tag in the path: stay where we are.
     return [kind]
 
 
-def _flatten(kind: Any) -> list[Any]:
+def leaf_types(kind: Any) -> list[Any]:
+    """The types that an annotation allows, without what is said about them."""
     origin = typing.get_origin(kind)
     if origin is typing.Annotated:
-        return _flatten(typing.get_args(kind)[0])
+        return leaf_types(typing.get_args(kind)[0])
     if origin in (typing.Union, types.UnionType):
-        return [leaf for arm in typing.get_args(kind) for leaf in _flatten(arm)]
+        return [leaf for arm in typing.get_args(kind) for leaf in leaf_types(arm)]
     return [kind]

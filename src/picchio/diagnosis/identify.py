@@ -295,13 +295,13 @@ def _joint(robot: FlexibleRobot, joint: Joint) -> dict[str, Any]:
     found: dict[str, Any] = {"stiffness": joint.stiffness, "damping_ratio": joint.damping_ratio}
     if joint.stiffness_curve is not None:
         del found["stiffness"]
-        found["stiffness_curve"] = asdict(joint.stiffness_curve)
+        found["stiffness_curve"] = joint.stiffness_curve.model_dump()
     for key in ("reducer", "rotor_inertia", "gear_ratio"):
         if (value := getattr(joint, key)) is not None:
             found[key] = value
     for key in ("shaft", "balancer"):
         if (value := getattr(joint, key)) is not None:
-            found[key] = {k: v for k, v in asdict(value).items() if v is not None}
+            found[key] = value.model_dump(exclude_none=True)
     if joint.estimated:
         found["estimated"] = True
     origin = robot.origins.get(f"{joint.name}.stiffness")
@@ -323,9 +323,9 @@ def _standing(robot: FlexibleRobot) -> dict[str, Any]:
     """Gun and mounting, where they are not the usual."""
     found: dict[str, Any] = {}
     if robot.gun is not None:
-        found["gun"] = {k: v for k, v in asdict(robot.gun).items() if v is not None}
+        found["gun"] = robot.gun.model_dump(exclude_none=True)
     if robot.mounting != Mounting():
-        found["base"] = {k: list(v) for k, v in asdict(robot.mounting).items()}
+        found["base"] = robot.mounting.model_dump(exclude_none=True)
     return found
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from picchio.core.arrays import FloatArray
+from picchio.core.arrays import FloatArray, symmetric
 from picchio.core.errors import InputError
 from picchio.robot.flexible_robot import FlexibleRobot
 
@@ -313,7 +313,5 @@ def link_inertia(robot: FlexibleRobot, link: str) -> pin.Inertia:
             value=link,
             choices=[name for name, inertial in robot.tree.links.items() if inertial],
         )
-    ixx, ixy, ixz, iyy, iyz, izz = own.inertia
-    matrix = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
     turn = pin.rpy.rpyToMatrix(*own.rpy)
-    return pin.Inertia(own.mass, np.array(own.xyz), turn @ matrix @ turn.T)
+    return pin.Inertia(own.mass, np.array(own.xyz), turn @ symmetric(own.inertia) @ turn.T)

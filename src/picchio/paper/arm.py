@@ -37,7 +37,7 @@ def arm(given: Assumptions) -> FlexibleRobot:
             dataclasses.replace(
                 joint,
                 damping_ratio=given.damping_ratio,
-                shaft=Shaft(radius, length, given.shear_modulus),
+                shaft=Shaft(radius=radius, length=length, shear_modulus=given.shear_modulus),
             )
         )
     return dataclasses.replace(robot, flexible_joints=tuple(joints))

@@ -4,35 +4,63 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import AfterValidator, model_validator
 
 from picchio.core.arrays import Vector
-from picchio.core.errors import InputError
+from picchio.core.toml import Finite, FiniteVector, NotNegative, Positive, StrictModel
+
+LONGEST_SHAFT = 2.0  # m: no arm has a longer one, a number beyond it is in millimetres
+SOFTEST, STIFFEST = 1e-3, 1e12  # N m/rad or N/m: far beyond any drive on either side
 
 
-@dataclass(frozen=True)
-class StiffnessCurve:
+def _in_metres(value: float) -> float:
+    if value > LONGEST_SHAFT:
+        raise ValueError(f"is above {LONGEST_SHAFT:g} m (in metres?)")
+    return value
+
+
+def _in_newtons(value: float) -> float:
+    if not SOFTEST <= value <= STIFFEST:
+        raise ValueError(
+            f"is outside {SOFTEST:g} to {STIFFEST:g} N m/rad (N/m for a prismatic joint)"
+        )
+    return value
+
+
+ShaftLength = Annotated[Positive, AfterValidator(_in_metres)]
+Stiffness = Annotated[Positive, AfterValidator(_in_newtons)]
+
+
+class StiffnessCurve(StrictModel):
     """Stiffness that grows with the torque, as catalogues of strain-wave gears give it.
 
     Wind-up against torque is three straight lines (for example Harmonic Drive, *Engineering data
     HFUC*, "torsional stiffness"). Small vibration about the pose's gravity torque sees the slope
     there, so the model takes the tangent.
 
-    Args:
-        k1: N m/rad (N/m for a prismatic joint) below `t1`.
-        k2: between `t1` and `t2`.
-        k3: above `t2`.
-        t1: N m (N), the first corner.
-        t2: the second corner, above `t1`.
+    Attributes:
+        k1: N m/rad, below the torque t1.
+        k2: N m/rad, from t1 to t2.
+        k3: N m/rad, above t2.
+        t1: N m, first corner.
+        t2: N m, second corner; above t1.
     """
 
-    k1: float
-    k2: float
-    k3: float
-    t1: float
-    t2: float
+    k1: Stiffness
+    k2: Stiffness
+    k3: Stiffness
+    t1: Positive
+    t2: Positive
+
+    @model_validator(mode="after")
+    def _corners_ascend(self) -> Self:
+        if self.t2 <= self.t1:
+            raise ValueError(f"t2 must be above t1 = {self.t1:g}, it is {self.t2:g}")
+        return self
 
     def tangent(self, torque: ArrayLike) -> NDArray[np.float64]:
         """The slope at a torque, N m/rad; at a corner that of the line below it.
@@ -44,27 +72,26 @@ class StiffnessCurve:
         return np.where(size <= self.t1, self.k1, np.where(size <= self.t2, self.k2, self.k3))
 
 
-@dataclass(frozen=True)
-class Balancer:
+class Balancer(StrictModel):
     """A gravity balancer: a spring or cylinder beside a joint that carries part of the weight.
 
     It pulls two points together, one fixed to the joint's parent link and one to its child link.
     With the distance d(q) between them its energy is E(q) = k (d - d0)^2 / 2 + F d, so the drive
     carries dE/dq on top of gravity's torque, and d2E/dq2 adds to gravity's stiffness.
 
-    Args:
-        parent_point: m, fixed to the parent link, in the joint's frame.
-        child_point: m, fixed to the child link, in the joint's frame at position zero.
+    Attributes:
+        parent_point: m, on the parent link, in the joint's frame at position zero.
+        child_point: m, on the child link, in the joint's frame at position zero.
         stiffness: N/m, of the spring.
-        free_length: m, where the spring pulls nothing.
-        force: N, a constant pull (a gas or hydraulic cylinder); a push is negative.
+        free_length: m, of the unloaded spring.
+        force: N, constant pull beside the spring (of a gas or hydraulic cylinder).
     """
 
-    parent_point: Vector
-    child_point: Vector
-    stiffness: float = 0.0
-    free_length: float = 0.0
-    force: float = 0.0
+    parent_point: FiniteVector
+    child_point: FiniteVector
+    stiffness: NotNegative = 0.0
+    free_length: NotNegative = 0.0
+    force: Finite = 0.0
 
     def torque_and_stiffness(self, axis: Vector, angle: float) -> tuple[float, float]:
         """What it adds to the torque the drive carries, and to that torque's slope.
@@ -94,30 +121,20 @@ class Balancer:
         return pull * rate, self.stiffness * rate * rate + pull * rate_of_rate
 
 
-@dataclass(frozen=True)
-class Shaft:
-    """The round shaft whose torsion is the joint's spring, or a part of it.
+class Shaft(StrictModel):
+    """The round solid shaft whose torsion is the joint's spring, or a part of it.
 
-    Args:
-        radius: m.
-        length: m, the part that twists.
-        shear_modulus: Pa.
-        sn_curve: name of its S-N curve in shear, or None.
-
-    Raises:
-        InputError: a size that is not positive and finite.
+    Attributes:
+        radius: m, at most 2.
+        length: m, at most 2; used to check that k = G Jp / l.
+        shear_modulus: Pa, 79.3e9 for steel.
+        sn_curve: name of a shipped S-N curve, or a `picchio-sn-curve/1` file.
     """
 
-    radius: float
-    length: float
-    shear_modulus: float
+    radius: ShaftLength
+    length: ShaftLength
+    shear_modulus: Positive
     sn_curve: str | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("radius", "length", "shear_modulus"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise InputError("must be positive and finite", key=f"shaft.{name}", value=value)
 
     @property
     def polar_moment(self) -> float:

@@ -1,66 +1,92 @@
-"""What the robot carries: the tool, and the gun that strikes."""
+"""What the robot carries, the tool and the gun that strikes, and how it stands."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Annotated, Self
 
-from picchio.core.arrays import Vector
+import numpy as np
+from pydantic import Field, model_validator
+
+from picchio.core.arrays import symmetric
+from picchio.core.toml import Finite, FiniteVector, NotNegative, Positive, StrictModel
 
 RECOIL_JOINT = "gun_recoil"
 
 
-@dataclass(frozen=True)
-class Tool:
-    """The tool, held rigidly by a frame of the robot and counted once.
+class Tool(StrictModel):
+    """The tool, held rigidly by a frame of the robot, in addition to the URDF's own masses.
 
-    Args:
-        frame: the link that carries it; sensors "at the tool" sit at its origin.
+    Attributes:
+        frame: the URDF frame that carries the tool; sensors "at the tool" sit at its origin.
         xyz: m, from the frame's origin to the point where the force acts, in the frame.
-        axis: unit vector in the frame, the way the tool points: towards the workpiece.
-        mass: kg, on top of what the URDF has.
+        axis: the way the tool points (towards the workpiece), in the frame, of any length; a loaded
+            robot's has unit length.
+        mass: kg, of the tool.
         com: m, centre of mass in the frame.
-        inertia: kg m^2 about the centre of mass, in the frame: ixx ixy ixz iyy iyz izz.
+        inertia: kg m^2, about the centre of mass: ixx, ixy, ixz, iyy, iyz, izz.
+        source: where the values come from.
     """
 
-    frame: str
-    xyz: Vector = (0.0, 0.0, 0.0)
-    axis: Vector = (0.0, 0.0, 1.0)
-    mass: float = 0.0
-    com: Vector = (0.0, 0.0, 0.0)
-    inertia: tuple[float, ...] = (0.0,) * 6
+    frame: str = ""
+    xyz: FiniteVector = (0.0, 0.0, 0.0)
+    axis: FiniteVector = (0.0, 0.0, 1.0)
+    mass: NotNegative = 0.0
+    com: FiniteVector = (0.0, 0.0, 0.0)
+    inertia: Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)] = (0.0,) * 6
+    source: str | None = None
+
+    @model_validator(mode="after")
+    def _can_be(self) -> Self:
+        if not any(abs(part) > 1e-9 for part in self.axis):
+            raise ValueError("the axis has length zero")
+        principal = np.linalg.eigvalsh(symmetric(self.inertia))
+        if principal[0] < -1e-9 * max(abs(principal).max(), 1e-12):
+            raise ValueError("the inertia is not positive semidefinite")
+        if self.mass == 0 and any(self.inertia):
+            raise ValueError("an inertia needs a mass")
+        return self
 
 
-@dataclass(frozen=True)
-class Gun:
-    """The percussive gun, whose body sits at the tool point.
+class Gun(StrictModel):
+    """The percussive tool's body, at the tool point.
 
     With a recoil spring its body slides along the tool's axis: the robot gets a prismatic
     flexible joint of its own, `gun_recoil`, and the force acts on the body. Without one the
     body is rigid with the tool.
 
-    Args:
+    Attributes:
         mass: kg, of the body.
-        recoil_stiffness: N/m, or None for a rigidly held gun.
-        damping_ratio: of the recoil spring.
-        feed_force: N, steady push along the blow; a task without `preload` may take it.
+        recoil_stiffness: N/m, of the spring on which the body slides along the tool's axis; without
+            it the body is fixed.
+        damping_ratio: 1, of the body on its spring.
+        feed_force: N, steady force along the direction, where the task gives no preload.
+        source: where the values come from.
     """
 
-    mass: float
-    recoil_stiffness: float | None = None
-    damping_ratio: float = 0.0
-    feed_force: float = 0.0
+    mass: NotNegative
+    recoil_stiffness: Positive | None = None
+    damping_ratio: NotNegative = 0.0
+    feed_force: Finite = 0.0
+    source: str | None = None
+
+    @model_validator(mode="after")
+    def _recoiling_mass(self) -> Self:
+        if self.recoil_stiffness is not None and self.mass == 0:
+            raise ValueError("a recoil spring needs the gun's mass")
+        return self
 
 
-@dataclass(frozen=True)
-class Mounting:
-    """How the robot is mounted in the world.
+class Mounting(StrictModel):
+    """How the robot stands.
 
-    Args:
-        xyz: m, of the URDF's root link.
-        rpy: rad, fixed-axis roll, pitch, yaw, as in a URDF.
-        gravity: m/s^2, in the world.
+    Attributes:
+        xyz: m, of the base in the world.
+        rpy: rad, roll, pitch and yaw of the base, about fixed axes as in a URDF.
+        gravity: m/s^2, world.
+        source: where the values come from.
     """
 
-    xyz: Vector = (0.0, 0.0, 0.0)
-    rpy: Vector = (0.0, 0.0, 0.0)
-    gravity: Vector = (0.0, 0.0, -9.81)
+    xyz: FiniteVector = (0.0, 0.0, 0.0)
+    rpy: FiniteVector = (0.0, 0.0, 0.0)
+    gravity: FiniteVector = (0.0, 0.0, -9.81)
+    source: str | None = Field(default=None, repr=False)

@@ -6,6 +6,7 @@ other tools' tags and odd spacing stay as they are. The result is read back and 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +15,6 @@ from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
 
 from lxml import etree
-from pydantic import BaseModel
 
 from picchio.core.errors import InputError
 from picchio.robot.annotations.flexibility import Source, check_names
@@ -23,16 +23,11 @@ from picchio.robot.annotations.sidecar import JointEntry, Sidecar, given
 from picchio.robot.urdf.check import read_tree
 from picchio.robot.urdf.xml import NAMESPACE, parse_urdf, read_urdf_bytes
 
-ROBOT_TAGS = ("tool", "gun", "base")
-
-
-@dataclass(frozen=True)
-class Edit:
-    """Replace `length` bytes from `start` by a text."""
-
-    start: int
-    length: int
-    text: str
+Edit = tuple[int, int, str]
+"""Replace the bytes from a start to an end by a text."""
+_NAME = re.compile(rb"<[^ \t\r\n/>]*")
+# A ">" in an attribute does not end a tag.
+_TAG = re.compile(rb"""<(?:"[^"]*"|'[^']*'|[^>"'])*>""")
 
 
 @dataclass
@@ -61,44 +56,23 @@ class Place:
             self.lead = line[1] + line[2]
 
 
-@dataclass
 class Places:
-    """Every place of a file.
-
-    Args:
-        root_name_end: byte after `<robot`.
-        newline: as the file has it.
-        at: by ("joint", its name) or ("robot", the annotation's name).
-    """
-
-    root_name_end: int
-    newline: str
-    at: dict[tuple[str, str], Place]
-
-
-def find_places(content: bytes, namespace: str) -> Places:
     """Where in a checked URDF's bytes annotations stand, and where new ones go.
 
     Args:
-        content: the file's bytes, in a superset of ASCII.
-        namespace: of the annotations.
+        content: the file's bytes, in a superset of ASCII; expat reports positions in them.
+
+    Attributes:
+        root_name_end: byte after `<robot`.
+        at: by ("joint", its name) or ("robot", the annotation's name).
 
     Raises:
         ValueError: expat cannot follow the file's encoding.
     """
-    reader = _Reader(content, namespace)
-    reader.parse()
-    newline = "\r\n" if b"\r\n" in content else "\n"
-    return Places(reader.root_name_end, newline, reader.places)
 
-
-class _Reader:
-    """Reads the file with expat, which reports byte positions."""
-
-    def __init__(self, content: bytes, namespace: str) -> None:
+    def __init__(self, content: bytes) -> None:
         self.content = content
-        self.namespace = namespace
-        self.places: dict[tuple[str, str], Place] = {}
+        self.at: dict[tuple[str, str], Place] = {}
         self.root_name_end = 0
         self._parser = expat.ParserCreate(namespace_separator=" ")
         self._parser.StartElementHandler = self._start
@@ -107,34 +81,32 @@ class _Reader:
         # `<limit/>` at the byte after it, where another element's closing tag may stand.
         self._open: list[bool] = []
         self._joint: Place | None = None
-        self._robot = {tag: Place() for tag in ROBOT_TAGS}
-
-    def parse(self) -> None:
+        self._robot = {tag: Place() for tag in IN_ROBOT}
         try:
-            self._parser.Parse(self.content, True)
+            self._parser.Parse(content, True)
         except (expat.ExpatError, LookupError) as error:
             raise ValueError(str(error)) from None
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         start = self._parser.CurrentByteIndex
-        end = _tag_end(self.content, start)
+        end = self._tag_end(start)
         self._open.append(self.content[end - 2 : end] == b"/>")
         depth = len(self._open)
         blank = self._blank_before(start)
         old = (start - len(blank), end)
-        mine = tag.startswith(f"{self.namespace} ")
         if depth == 1:
-            self.root_name_end = _name_end(self.content, start)
+            name = _NAME.match(self.content, start)
+            self.root_name_end = name.end() if name else start
         elif depth == 2:
             if tag == "joint":
-                self._joint = self.places["joint", attributes["name"]] = Place()
-            for name, place in self._robot.items():
+                self._joint = self.at["joint", attributes["name"]] = Place()
+            for annotation, place in self._robot.items():
                 place.see_child(blank)
-                if tag == f"{self.namespace} {name}":
+                if tag == f"{NAMESPACE} {annotation}":
                     place.old.append(old)
         elif depth == 3 and self._joint is not None:
             self._joint.see_child(blank)
-            if mine:
+            if tag.startswith(f"{NAMESPACE} "):
                 self._joint.old.append(old)
 
     def _end(self, tag: str) -> None:
@@ -142,7 +114,7 @@ class _Reader:
         if not self._open.pop():
             start = self._parser.CurrentByteIndex
             blank = self._blank_before(start)
-            self._close(tag, depth, start - len(blank), _tag_end(self.content, start))
+            self._close(tag, depth, start - len(blank), self._tag_end(start))
         if depth == 2:
             self._joint = None
 
@@ -151,11 +123,11 @@ class _Reader:
         if depth == 1:
             for name, place in self._robot.items():
                 place.insert = insert
-                self.places["robot", name] = place
+                self.at["robot", name] = place
         elif depth == 2 and self._joint is not None:
             self._joint.insert = insert
-        elif tag.startswith(f"{self.namespace} "):
-            name = tag.removeprefix(f"{self.namespace} ")
+        elif tag.startswith(f"{NAMESPACE} "):
+            name = tag.removeprefix(f"{NAMESPACE} ")
             holder = self._robot.get(name) if depth == 2 else self._joint if depth == 3 else None
             if holder is not None:
                 holder.old[-1] = (holder.old[-1][0], end)
@@ -166,26 +138,9 @@ class _Reader:
             begin -= 1
         return self.content[begin:place].decode("ascii")
 
-
-def _name_end(content: bytes, start: int) -> int:
-    place = start + 1
-    while content[place : place + 1] not in (b" ", b"\t", b"\r", b"\n", b"/", b">", b""):
-        place += 1
-    return place
-
-
-def _tag_end(content: bytes, start: int) -> int:
-    """The byte after the tag that starts at `start`; a ">" in an attribute does not end it."""
-    quote = b""
-    for place in range(start, len(content)):
-        byte = content[place : place + 1]
-        if quote:
-            quote = b"" if byte == quote else quote
-        elif byte in (b'"', b"'"):
-            quote = byte
-        elif byte == b">":
-            return place + 1
-    return len(content)
+    def _tag_end(self, start: int) -> int:
+        tag = _TAG.match(self.content, start)
+        return tag.end() if tag else len(self.content)
 
 
 def annotate(urdf: str | Path, sidecar: Sidecar) -> bytes:
@@ -212,21 +167,21 @@ def annotate(urdf: str | Path, sidecar: Sidecar) -> bytes:
                          file=path)  # fmt: skip
     prefix = next((key for key, address in root.nsmap.items() if address == NAMESPACE and key), "")
     try:
-        places = find_places(content, NAMESPACE)
+        places = Places(content)
     except ValueError as error:
         raise InputError(f"cannot be annotated in this encoding: {error}", file=path) from None
     expected: dict[tuple[str, str], dict[str, Any]] = {}
-    edits = []
+    edits: list[Edit] = []
     if not prefix:
         prefix = "picchio"
-        edits.append(Edit(places.root_name_end, 0, f' xmlns:{prefix}="{NAMESPACE}"'))
+        edits.append((places.root_name_end, places.root_name_end, f' xmlns:{prefix}="{NAMESPACE}"'))
     for name, entry in sidecar.joint.items():
         merged = {**given(before.joint.get(name)), **given(entry)}
         if "stiffness" in given(entry):
             merged.pop("stiffness_curve", None)
         if "stiffness_curve" in given(entry):
             merged.pop("stiffness", None)
-        JointEntry.model_validate({key: _plain(value) for key, value in merged.items()})
+        JointEntry.model_validate(merged)
         expected["joint", name] = merged
         edits += _replace(places, ("joint", name), _joint_elements(prefix, merged))
     for tag in IN_ROBOT:
@@ -234,7 +189,7 @@ def annotate(urdf: str | Path, sidecar: Sidecar) -> bytes:
         if given(getattr(sidecar, tag)):
             expected["robot", tag] = values
             edits += _replace(places, ("robot", tag), [_element(prefix, tag, values, {})])
-    result = _apply(content, edits, places.newline)
+    result = _apply(content, edits)
     _read_back(result, path, root, expected)
     return result
 
@@ -295,22 +250,18 @@ def _text(value: Any) -> str:
     return repr(value) if isinstance(value, float) else str(value)
 
 
-def _plain(value: Any) -> Any:
-    return value.model_dump() if isinstance(value, BaseModel) else value
-
-
 def _replace(places: Places, where: tuple[str, str], elements: list[str]) -> list[Edit]:
     """Take the old annotations at a place out and put new ones in."""
     place = places.at[where]
-    edits = [Edit(start, end - start, "") for start, end in place.old]
     lines = "".join(f"{place.lead or ''}{element}" for element in elements)
-    return [*edits, Edit(place.insert, 0, lines)]
+    return [*((start, end, "") for start, end in place.old), (place.insert, place.insert, lines)]
 
 
-def _apply(content: bytes, edits: list[Edit], newline: str) -> bytes:
+def _apply(content: bytes, edits: list[Edit]) -> bytes:
+    newline = "\r\n" if b"\r\n" in content else "\n"
     # From the end, so that earlier places stay where they are; of two at one place the
     # insertion goes in last and stands first.
-    for edit in sorted(edits, key=lambda e: (e.start, e.length), reverse=True):
-        text = edit.text.replace("\n", newline).encode("ascii", "xmlcharrefreplace")
-        content = content[: edit.start] + text + content[edit.start + edit.length :]
+    for start, end, text in sorted(edits, key=lambda edit: edit[:2], reverse=True):
+        inserted = text.replace("\n", newline).encode("ascii", "xmlcharrefreplace")
+        content = content[:start] + inserted + content[end:]
     return content

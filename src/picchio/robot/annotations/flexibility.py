@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from picchio.core.errors import InputError
-from picchio.robot.annotations.sidecar import JointEntry, Sidecar, given
-from picchio.robot.joint import Balancer, Joint, Shaft, StiffnessCurve
+from picchio.robot.annotations.sidecar import Sidecar, given
+from picchio.robot.joint import Joint
 from picchio.robot.urdf.tree import MOVABLE, UrdfJoint, UrdfTree
 
 DEFAULT_DAMPING_RATIO = 0.03
@@ -92,7 +92,7 @@ def check_names(tree: UrdfTree, source: Source) -> None:
                                  key="joint", value=name, choices=tree.movable())  # fmt: skip
             continue
         urdf = tree.joints[name]
-        if not (given(entry).keys() & {"stiffness", "stiffness_curve"}):
+        if not entry.flexible:
             continue
         if urdf.type not in MOVABLE:
             raise InputError(f"a {urdf.type} joint cannot be flexible", file=source.file, key=key,
@@ -111,12 +111,11 @@ def _merge(name: str, sources: Sequence[Source]) -> tuple[dict[str, Any], dict[s
         entry = source.content.joint.get(name)
         if entry is None:
             continue
-        written = given(entry)
-        for key, value in written.items():
+        for key, value in given(entry).items():
             if key == "source" or key in values or _TOGETHER.get(key) in values:
                 continue
             # An estimate is a statement about the stiffness given beside it.
-            if key == "estimated" and not {"stiffness", "stiffness_curve"} & written.keys():
+            if key == "estimated" and not entry.flexible:
                 continue
             values[key] = value
             where[key] = source.origin(entry.source)
@@ -132,31 +131,19 @@ def _joint(urdf: UrdfJoint, values: dict[str, Any], where: dict[str, str], tree:
                                  "and its load a force", key=f"joint.{urdf.name}.{key}",
                                  file=where[key])  # fmt: skip
     curve = values.get("stiffness_curve")
-    shaft = values.get("shaft")
-    balancer = values.get("balancer")
     return Joint(
         name=urdf.name,
         kind=kind,
         stiffness=curve.k1 if curve else values["stiffness"],
         damping_ratio=values.get("damping_ratio", DEFAULT_DAMPING_RATIO),
-        shaft=Shaft(**shaft.model_dump()) if shaft else None,
+        shaft=values.get("shaft"),
         reducer=values.get("reducer"),
         effort_limit=urdf.effort if urdf.effort > 0 else float("inf"),
         lower=urdf.lower,
         upper=urdf.upper,
         rotor_inertia=values.get("rotor_inertia"),
         gear_ratio=values.get("gear_ratio"),
-        stiffness_curve=StiffnessCurve(**curve.model_dump()) if curve else None,
-        balancer=Balancer(**balancer.model_dump()) if balancer else None,
+        stiffness_curve=curve,
+        balancer=values.get("balancer"),
         estimated=values.get("estimated", False),
     )
-
-
-def all_joint_entries(sources: Sequence[Source], key: str) -> dict[str, JointEntry]:
-    """Every joint's strongest entry that gives this key, flexible or not."""
-    found: dict[str, JointEntry] = {}
-    for source in sources:
-        for name, entry in source.content.joint.items():
-            if key in given(entry):
-                found.setdefault(name, entry)
-    return found

@@ -13,64 +13,32 @@ from typing import Any
 from lxml import etree
 
 from picchio.core.errors import InputError
-from picchio.core.toml import validate
-from picchio.robot.annotations.sidecar import FORMAT, Sidecar
+from picchio.core.toml import StrictModel, leaf_types, validate
+from picchio.robot.annotations.sidecar import FORMAT, JointEntry, Sidecar
+from picchio.robot.joint import Balancer, Shaft, StiffnessCurve
+from picchio.robot.tool import Gun, Mounting, Tool
 from picchio.robot.urdf.tree import to_number
 from picchio.robot.urdf.xml import NAMESPACE, local_name
 
-_TEXT, _FLAG, _NUMBER, _NUMBERS = "text", "flag", "number", "numbers"
 
-# element: (the sidecar's key, None for the joint itself; attributes and how they read)
-IN_JOINT: dict[str, tuple[str | None, dict[str, str]]] = {
-    "flexibility": (
-        None,
-        {
-            "stiffness": _NUMBER,
-            "damping_ratio": _NUMBER,
-            "reducer": _TEXT,
-            "rotor_inertia": _NUMBER,
-            "gear_ratio": _NUMBER,
-            "source": _TEXT,
-            "estimated": _FLAG,
-        },
-    ),
-    "shaft": (
-        "shaft",
-        {"radius": _NUMBER, "length": _NUMBER, "shear_modulus": _NUMBER, "sn_curve": _TEXT},
-    ),
-    "stiffness_curve": (
-        "stiffness_curve",
-        dict.fromkeys(("k1", "k2", "k3", "t1", "t2"), _NUMBER),
-    ),
-    "balancer": (
-        "balancer",
-        {
-            "parent_point": _NUMBERS,
-            "child_point": _NUMBERS,
-            "stiffness": _NUMBER,
-            "free_length": _NUMBER,
-            "force": _NUMBER,
-        },
-    ),
+def _attributes_of(table: type[StrictModel]) -> dict[str, Any]:
+    """The attributes of a table's element and their types: what is a table itself is an element."""
+    kinds = {name: leaf_types(field.annotation)[0] for name, field in table.model_fields.items()}
+    return {name: kind for name, kind in kinds.items() if kind not in _WITHIN_A_JOINT}
+
+
+# element: (the sidecar's key, None for the joint itself; its attributes)
+_WITHIN_A_JOINT = (Shaft, StiffnessCurve, Balancer)
+IN_JOINT: dict[str, tuple[str | None, dict[str, Any]]] = {
+    "flexibility": (None, _attributes_of(JointEntry)),
+    "shaft": ("shaft", _attributes_of(Shaft)),
+    "stiffness_curve": ("stiffness_curve", _attributes_of(StiffnessCurve)),
+    "balancer": ("balancer", _attributes_of(Balancer)),
 }
-IN_ROBOT: dict[str, dict[str, str]] = {
-    "tool": {
-        "frame": _TEXT,
-        "xyz": _NUMBERS,
-        "axis": _NUMBERS,
-        "mass": _NUMBER,
-        "com": _NUMBERS,
-        "inertia": _NUMBERS,
-        "source": _TEXT,
-    },
-    "gun": {
-        "mass": _NUMBER,
-        "recoil_stiffness": _NUMBER,
-        "damping_ratio": _NUMBER,
-        "feed_force": _NUMBER,
-        "source": _TEXT,
-    },
-    "base": {"xyz": _NUMBERS, "rpy": _NUMBERS, "gravity": _NUMBERS, "source": _TEXT},
+IN_ROBOT = {
+    "tool": _attributes_of(Tool),
+    "gun": _attributes_of(Gun),
+    "base": _attributes_of(Mounting),
 }
 
 
@@ -135,7 +103,7 @@ def _read_in_joint(element: etree._Element, entry: dict[str, Any], path: Path) -
 
 
 def _attributes(
-    element: etree._Element, known: dict[str, str], path: Path, key: str
+    element: etree._Element, known: dict[str, Any], path: Path, key: str
 ) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for attribute, text in element.attrib.items():
@@ -146,15 +114,15 @@ def _attributes(
     return values
 
 
-def _convert(text: str, kind: str, path: Path, key: str) -> Any:
-    if kind == _TEXT:
+def _convert(text: str, kind: Any, path: Path, key: str) -> Any:
+    if kind is str:
         return text
-    if kind == _FLAG:
+    if kind is bool:
         if text not in ("true", "false"):
             raise InputError("is neither true nor false", file=path, key=key, value=text)
         return text == "true"
     try:
-        return to_number(text) if kind == _NUMBER else [to_number(part) for part in text.split()]
+        return to_number(text) if kind is float else [to_number(part) for part in text.split()]
     except ValueError as error:
         raise InputError(str(error), file=path, key=key, value=text) from None
 

@@ -45,95 +45,15 @@ gravity = [0.0, 0.0, -9.81]  # m/s^2, world
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Any, Self
 
-import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from picchio.core.errors import InputError
-from picchio.core.toml import Finite, NotNegative, Positive, StrictModel, parse_toml
+from picchio.core.toml import Finite, NotNegative, StrictModel, parse_toml
+from picchio.robot.joint import Balancer, Shaft, Stiffness, StiffnessCurve
+from picchio.robot.tool import Gun, Mounting, Tool
 
 FORMAT = "picchio-sidecar/1"
-Vector = tuple[Finite, Finite, Finite]
-Tensor = Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
-LONGEST_SHAFT = 2.0  # m: no arm has a longer one, a number beyond it is in millimetres
-SOFTEST, STIFFEST = 1e-3, 1e12  # N m/rad or N/m: far beyond any drive on either side
-
-
-def _in_metres(value: float) -> float:
-    if value > LONGEST_SHAFT:
-        raise ValueError(f"is above {LONGEST_SHAFT:g} m (in metres?)")
-    return value
-
-
-def _in_newtons(value: float) -> float:
-    if not SOFTEST <= value <= STIFFEST:
-        raise ValueError(
-            f"is outside {SOFTEST:g} to {STIFFEST:g} N m/rad (N/m for a prismatic joint)"
-        )
-    return value
-
-
-ShaftLength = Annotated[Positive, AfterValidator(_in_metres)]
-Stiffness = Annotated[Positive, AfterValidator(_in_newtons)]
-
-
-class ShaftEntry(StrictModel):
-    """A round solid shaft that carries the joint's torque.
-
-    Attributes:
-        radius: m, at most 2.
-        length: m, at most 2; used to check that k = G Jp / l.
-        shear_modulus: Pa, 79.3e9 for steel.
-        sn_curve: name of a shipped S-N curve, or a `picchio-sn-curve/1` file.
-    """
-
-    radius: ShaftLength
-    length: ShaftLength
-    shear_modulus: Positive
-    sn_curve: str | None = None
-
-
-class StiffnessCurveEntry(StrictModel):
-    """Stiffness of a strain-wave gear by torque, as its catalogue gives it.
-
-    Attributes:
-        k1: N m/rad, below the torque t1.
-        k2: N m/rad, from t1 to t2.
-        k3: N m/rad, above t2.
-        t1: N m, first corner.
-        t2: N m, second corner; above t1.
-    """
-
-    k1: Stiffness
-    k2: Stiffness
-    k3: Stiffness
-    t1: Positive
-    t2: Positive
-
-    @model_validator(mode="after")
-    def _corners_ascend(self) -> Self:
-        if self.t2 <= self.t1:
-            raise ValueError(f"t2 must be above t1 = {self.t1:g}, it is {self.t2:g}")
-        return self
-
-
-class BalancerEntry(StrictModel):
-    """A spring between two points that carries part of the gravity torque.
-
-    Attributes:
-        parent_point: m, on the parent link, in the joint's frame at position zero.
-        child_point: m, on the child link, in the joint's frame at position zero.
-        stiffness: N/m, of the spring.
-        free_length: m, of the unloaded spring.
-        force: N, constant pull beside the spring.
-    """
-
-    parent_point: Vector
-    child_point: Vector
-    stiffness: NotNegative = 0.0
-    free_length: NotNegative = 0.0
-    force: Finite = 0.0
 
 
 class JointEntry(StrictModel):
@@ -155,15 +75,20 @@ class JointEntry(StrictModel):
     """
 
     stiffness: Stiffness | None = None
-    stiffness_curve: StiffnessCurveEntry | None = None
+    stiffness_curve: StiffnessCurve | None = None
     damping_ratio: NotNegative | None = None
-    shaft: ShaftEntry | None = None
+    shaft: Shaft | None = None
     reducer: str | None = None
     rotor_inertia: NotNegative | None = None
     gear_ratio: Finite | None = None
-    balancer: BalancerEntry | None = None
+    balancer: Balancer | None = None
     source: str | None = None
     estimated: bool = False
+
+    @property
+    def flexible(self) -> bool:
+        """Whether it gives the joint a spring."""
+        return self.stiffness is not None or self.stiffness_curve is not None
 
     @model_validator(mode="after")
     def _one_stiffness(self) -> Self:
@@ -172,81 +97,6 @@ class JointEntry(StrictModel):
         if self.gear_ratio == 0:
             raise ValueError("gear_ratio must not be zero")
         return self
-
-
-class ToolEntry(StrictModel):
-    """The tool, in addition to the URDF's own masses; all in the tool frame.
-
-    Attributes:
-        frame: the URDF frame that carries the tool.
-        xyz: m, from the frame's origin to the point where the force acts.
-        axis: the way the tool points, of any length.
-        mass: kg, of the tool.
-        com: m, centre of mass.
-        inertia: kg m^2, about the centre of mass: ixx, ixy, ixz, iyy, iyz, izz.
-        source: where the values come from.
-    """
-
-    frame: str | None = None
-    xyz: Vector = (0.0, 0.0, 0.0)
-    axis: Vector = (0.0, 0.0, 1.0)
-    mass: NotNegative = 0.0
-    com: Vector = (0.0, 0.0, 0.0)
-    inertia: Tensor = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    source: str | None = None
-
-    @model_validator(mode="after")
-    def _axis_has_length(self) -> Self:
-        if not any(abs(part) > 1e-9 for part in self.axis):
-            raise ValueError("the axis has length zero")
-        xx, xy, xz, yy, yz, zz = self.inertia
-        principal = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        if principal[0] < -1e-9 * max(abs(principal).max(), 1e-12):
-            raise ValueError("the inertia is not positive semidefinite")
-        if self.mass == 0 and any(self.inertia):
-            raise ValueError("an inertia needs a mass")
-        return self
-
-
-class GunEntry(StrictModel):
-    """The percussive tool's body, at the tool point.
-
-    Attributes:
-        mass: kg, of the body.
-        recoil_stiffness: N/m, of the spring on which the body slides along the tool's axis; without
-            it the body is fixed.
-        damping_ratio: 1, of the body on its spring.
-        feed_force: N, steady force along the direction, where the task gives no preload.
-        source: where the values come from.
-    """
-
-    mass: NotNegative
-    recoil_stiffness: Positive | None = None
-    damping_ratio: NotNegative = 0.0
-    feed_force: Finite = 0.0
-    source: str | None = None
-
-    @model_validator(mode="after")
-    def _recoiling_mass(self) -> Self:
-        if self.recoil_stiffness is not None and self.mass == 0:
-            raise ValueError("a recoil spring needs the gun's mass")
-        return self
-
-
-class BaseEntry(StrictModel):
-    """How the robot stands.
-
-    Attributes:
-        xyz: m, of the base in the world.
-        rpy: rad, roll, pitch and yaw of the base.
-        gravity: m/s^2, world.
-        source: where the values come from.
-    """
-
-    xyz: Vector = (0.0, 0.0, 0.0)
-    rpy: Vector = (0.0, 0.0, 0.0)
-    gravity: Vector = (0.0, 0.0, -9.81)
-    source: str | None = None
 
 
 class Sidecar(StrictModel):
@@ -264,9 +114,9 @@ class Sidecar(StrictModel):
     robot: str | None = None
     description: str | None = None
     joint: dict[str, JointEntry] = Field(default_factory=dict)
-    tool: ToolEntry | None = None
-    gun: GunEntry | None = None
-    base: BaseEntry | None = None
+    tool: Tool | None = None
+    gun: Gun | None = None
+    base: Mounting | None = None
 
 
 def read_sidecar(path: str | Path) -> Sidecar:
@@ -275,10 +125,7 @@ def read_sidecar(path: str | Path) -> Sidecar:
     Raises:
         InputError: no such file, bad TOML, a misspelt key, a value that cannot be.
     """
-    try:
-        return parse_toml(path, Sidecar, format=FORMAT)
-    except ValueError as error:  # tomllib on an integer of thousands of digits
-        raise InputError(f"is not valid TOML: {error}", file=path) from None
+    return parse_toml(path, Sidecar, format=FORMAT)
 
 
 def given(entry: StrictModel | None) -> dict[str, Any]:

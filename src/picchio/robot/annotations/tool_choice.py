@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from picchio.core.errors import InputError
 from picchio.robot.annotations.flexibility import Source
-from picchio.robot.annotations.sidecar import BaseEntry, GunEntry, ToolEntry, given
+from picchio.robot.annotations.sidecar import given
 from picchio.robot.annotations.srdf import Srdf
 from picchio.robot.tool import Gun, Mounting, Tool
 from picchio.robot.urdf.tree import UrdfTree
@@ -29,26 +29,29 @@ def choose_tool(
     Raises:
         InputError: no such frame, or several links could be it.
     """
-    tool = Tool("")
+    values, origins = _strongest(sources, "tool")
+    for source in reversed(sources):
+        if (stated := given(source.content.tool)) and "frame" in stated:
+            values["frame"] = _link(tree, stated["frame"], source.file, "tool.frame")
+    if argument is not None:
+        values["frame"], origins["tool.frame"] = _link(tree, argument, None, "--tool"), "argument"
+    if "frame" not in values:
+        values["frame"], origins["tool.frame"] = _usual_frame(tree, srdf)
+    if "axis" in values:
+        values["axis"] = tuple((np.array(values["axis"]) / np.linalg.norm(values["axis"])).tolist())
+    return Tool.model_construct(**values), origins  # each value was checked where it stands
+
+
+def _strongest(sources: Sequence[Source], table: str) -> tuple[dict[str, Any], dict[str, str]]:
+    """Of each value of a sidecar's table the strongest source's, and where it is from."""
+    values: dict[str, Any] = {}
     origins: dict[str, str] = {}
     for source in reversed(sources):
-        entry: ToolEntry | None = source.content.tool
-        values = given(entry)
-        note = values.pop("source", None)
-        if "frame" in values:
-            values["frame"] = _link(tree, values["frame"], source.file, "tool.frame")
-        tool = replace(tool, **values)
-        origins.update({f"tool.{key}": source.origin(note) for key in values})
-    if argument is not None:
-        tool = replace(tool, frame=_link(tree, argument, None, "--tool"))
-        origins["tool.frame"] = "argument"
-    if not tool.frame:
-        frame, why = _usual_frame(tree, srdf)
-        tool = replace(tool, frame=frame)
-        origins["tool.frame"] = why
-    axis = np.asarray(tool.axis)
-    x, y, z = (axis / np.linalg.norm(axis)).tolist()
-    return replace(tool, axis=(x, y, z)), origins
+        found = given(getattr(source.content, table))
+        note = found.pop("source", None)
+        values |= found
+        origins |= {f"{table}.{key}": source.origin(note) for key in found}
+    return values, origins
 
 
 def _link(tree: UrdfTree, frame: str, file: str | None, key: str) -> str:
@@ -82,22 +85,13 @@ def _usual_frame(tree: UrdfTree, srdf: Srdf | None) -> tuple[str, str]:
 def choose_gun(sources: Sequence[Source]) -> tuple[Gun | None, dict[str, str]]:
     """The gun of the strongest source that has one, and where it is from."""
     for source in sources:
-        entry: GunEntry | None = source.content.gun
-        if entry is not None:
-            values = entry.model_dump(exclude={"source"})
-            origin = source.origin(entry.source)
-            return Gun(**values), {f"gun.{key}": origin for key in values}
+        if (gun := source.content.gun) is not None:
+            origin = source.origin(gun.source)
+            return gun, {f"gun.{key}": origin for key in Gun.model_fields if key != "source"}
     return None, {}
 
 
 def choose_mounting(sources: Sequence[Source]) -> tuple[Mounting, dict[str, str]]:
     """How the robot stands: of each value the strongest source's."""
-    mounting = Mounting()
-    origins: dict[str, str] = {}
-    for source in reversed(sources):
-        entry: BaseEntry | None = source.content.base
-        values = given(entry)
-        note = values.pop("source", None)
-        mounting = replace(mounting, **values)
-        origins.update({f"base.{key}": source.origin(note) for key in values})
-    return mounting, origins
+    values, origins = _strongest(sources, "base")
+    return Mounting.model_construct(**values), origins

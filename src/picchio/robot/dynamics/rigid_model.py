@@ -19,8 +19,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from picchio.core.arrays import Vector
 from picchio.core.errors import InputError
-from picchio.robot.tool import Vector
 from picchio.robot.urdf.tree import UrdfTree
 
 Array = NDArray[np.float64]

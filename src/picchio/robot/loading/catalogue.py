@@ -11,7 +11,7 @@ from picchio.core.errors import InputError
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
 from picchio.robot.annotations.inline import read_annotations
-from picchio.robot.annotations.sidecar import Sidecar, given, read_sidecar
+from picchio.robot.annotations.sidecar import Sidecar, read_sidecar
 from picchio.robot.loading.find import FoundRobot, example_robots, shipped_robots
 from picchio.robot.urdf.check import read_tree
 from picchio.robot.urdf.xml import parse_urdf, read_urdf_bytes
@@ -111,11 +111,7 @@ def describe_robot(robot: FoundRobot) -> RobotEntry:
 
 def _stiffness(sidecar: Sidecar | None, file: Path) -> tuple[tuple[str, ...], str | None, bool]:
     joints = sidecar.joint if sidecar else {}
-    known = {
-        name: entry
-        for name, entry in joints.items()
-        if given(entry).keys() & {"stiffness", "stiffness_curve"}
-    }
+    known = {name: entry for name, entry in joints.items() if entry.flexible}
     if not known:
         return (), None, False
     sources = sorted({entry.source for entry in known.values() if entry.source})

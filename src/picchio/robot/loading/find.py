@@ -6,7 +6,6 @@ looks like a path is taken as one. `package://` addresses go through the same ro
 
 from __future__ import annotations
 
-import difflib
 import os
 from dataclasses import dataclass
 from functools import cache
@@ -67,8 +66,7 @@ def find_robot(robot: str | Path) -> FoundRobot:
         raise InputError("is a folder without robot.urdf", file=path, hint=_folder_hint(path))
     names = [*shipped_robots(), *example_robots()]
     raise InputError("no such robot", key="ROBOT", value=text, choices=names,
-                     hint=_other_case(text, names) + "a path to a URDF is fine, too"
-                     )  # fmt: skip
+                     hint="a path to a URDF is fine, too")  # fmt: skip
 
 
 def _folder_hint(folder: Path) -> str:
@@ -77,15 +75,6 @@ def _folder_hint(folder: Path) -> str:
         return f"ask for {here.name!r}"
     urdfs = [file.name for file in sorted(folder.glob("*.urdf"))[:5]]
     return f"name a URDF in it: {', '.join(urdfs)}" if urdfs else "there is no URDF in it"
-
-
-def _other_case(text: str, names: list[str]) -> str:
-    """A name that is close but for upper and lower case, which the message does not show yet."""
-    if difflib.get_close_matches(text, names, n=1):
-        return ""
-    lowered = {name.lower(): name for name in reversed(names)}
-    close = difflib.get_close_matches(text.lower(), lowered, n=1)
-    return f"did you mean {lowered[close[0]]!r}? " if close else ""
 
 
 def _with_neighbours(urdf: Path) -> FoundRobot:

@@ -11,7 +11,7 @@ from lxml import etree
 
 from picchio.core.errors import InputError, PicchioWarning
 from picchio.core.toml import validate
-from picchio.robot.annotations.flexibility import Source, all_joint_entries, flexible_joints
+from picchio.robot.annotations.flexibility import Source, flexible_joints
 from picchio.robot.annotations.inline import read_annotations
 from picchio.robot.annotations.other_tags import read_drake
 from picchio.robot.annotations.sidecar import FORMAT, Sidecar, read_sidecar
@@ -23,7 +23,6 @@ from picchio.robot.joint import Joint
 from picchio.robot.loading.find import FoundRobot, find_robot
 from picchio.robot.loading.mass_check import check_masses
 from picchio.robot.loading.saved_model import is_saved_model, read_saved_model
-from picchio.robot.tool import Gun
 from picchio.robot.urdf.check import read_tree
 from picchio.robot.urdf.normalised import normalise
 from picchio.robot.urdf.tree import UrdfTree
@@ -78,8 +77,10 @@ def load_robot(
     _warn(tree)
     urdf = normalise(tree, chosen_tool, gun, mounting)
     rigid = RigidModel(urdf.text, tree, mounting.gravity)
-    if gun is not None and urdf.recoil_joint is not None:
-        joints[urdf.recoil_joint] = _recoil(urdf.recoil_joint, gun)
+    if gun is not None and gun.recoil_stiffness is not None and urdf.recoil_joint is not None:
+        joints[urdf.recoil_joint] = Joint(
+            urdf.recoil_joint, "prismatic", gun.recoil_stiffness, gun.damping_ratio
+        )
     if not joints and not allow_rigid:
         raise InputError(
             "no joint of this robot has a stiffness",
@@ -92,7 +93,7 @@ def load_robot(
         name=found.name or tree.name,
         source=found.urdf,
         task_path=found.task,
-        files=_files(found.urdf, flex_file, srdf),
+        files=tuple(file for file in (found.urdf, flex_file, srdf and srdf.path) if file),
         tree=tree,
         tool=chosen_tool,
         gun=gun,
@@ -187,22 +188,13 @@ def _warn_of_damping(joints: Mapping[str, Joint], origins: Mapping[str, str]) ->
             )
 
 
-def _recoil(name: str, gun: Gun) -> Joint:
-    return Joint(name, "prismatic", gun.recoil_stiffness or 0.0, gun.damping_ratio)
-
-
 def _check_balancers(sources: list[Source], joints: Mapping[str, Joint]) -> None:
-    for name in all_joint_entries(sources, "balancer"):
-        if name not in joints:
-            raise InputError(
-                "a balancer on a rigid joint has no effect",
-                key=f"joint.{name}.balancer",
-                hint="give the joint a stiffness",
-            )
-
-
-def _files(urdf: Path, flex: Path | None, srdf: Srdf | None) -> tuple[Path, ...]:
-    return tuple(file for file in (urdf, flex, srdf.path if srdf else None) if file)
+    for source in sources:
+        for name, entry in source.content.joint.items():
+            if entry.balancer is not None and name not in joints:
+                raise InputError("a balancer on a rigid joint has no effect",
+                                 key=f"joint.{name}.balancer",
+                                 hint="give the joint a stiffness")  # fmt: skip
 
 
 def _named_poses(srdf: Srdf | None, names: tuple[str, ...]) -> dict[str, tuple[float, ...]]:

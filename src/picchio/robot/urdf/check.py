@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
+from picchio.core.arrays import symmetric
 from picchio.core.errors import InputError
 from picchio.robot.urdf.tree import MOVABLE, Inertial, UrdfJoint, UrdfTree, read_joints, read_links
 from picchio.robot.urdf.xml import local_name
@@ -123,9 +124,7 @@ def bad_inertia(inertial: Inertial) -> str | None:
     A tensor must be positive semidefinite. The triangle inequality, which many published
     URDFs break a little, is left alone.
     """
-    xx, xy, xz, yy, yz, zz = inertial.inertia
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    principal = np.linalg.eigvalsh(tensor)
+    principal = np.linalg.eigvalsh(symmetric(inertial.inertia))
     # CAD exports leave products of inertia of rounding size on a zero diagonal.
     if principal[0] < -1e-12 - 1e-9 * abs(principal).max():
         moments = ", ".join(f"{value:.4g}" for value in principal)

@@ -12,8 +12,8 @@ from pathlib import Path
 from lxml import etree
 
 from picchio.core.errors import InputError
+from picchio.core.files import read_bytes
 
-MOST_BYTES = 32 << 20
 NAMESPACE = "urn:picchio:1"
 
 _DOCTYPES = tuple(
@@ -27,18 +27,9 @@ def read_urdf_bytes(path: Path) -> bytes:
     Raises:
         InputError: missing, a folder, unreadable, or above 32 MiB.
     """
-    try:
-        if path.is_dir():
-            raise InputError("is a folder, not a URDF file", file=path)
-        if not path.is_file():
-            raise InputError("no such file", file=path)
-        if (size := path.stat().st_size) > MOST_BYTES:
-            raise InputError(f"is too large ({size} bytes; at most {MOST_BYTES})", file=path)
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
-    except ValueError:  # a NUL in the path
-        raise InputError("is not a file name", value=str(path)) from None
+    if path.exists() and not (path.is_file() or path.is_dir()):  # a device may have no end
+        raise InputError("no such file", file=path)
+    return read_bytes(path)
 
 
 def parse_urdf(content: bytes, path: Path) -> etree._Element:
