@@ -9,7 +9,6 @@ from picchio.campaign.channels import (
     ChannelKind,
     parse_channel,
     parse_header,
-    register_channel_kind,
 )
 from picchio.campaign.readers import velocity
 from picchio.campaign.record import Record
@@ -109,18 +108,6 @@ def test_the_grammar_tells_a_joint_from_a_frame():
     assert parse_channel("force")[0].header == "force [N]"
 
 
-def test_a_stranger_adds_a_kind_in_one_place(monkeypatch):
-    monkeypatch.setattr(channels_module, "KINDS", list(channels_module.KINDS))
-    with pytest.raises(InputError, match="unknown channel"):
-        parse_header("strain.link_2 [m/m]")
-    kind = ChannelKind("current", "joint", ("N*m",), meaning="a stranger's")
-    register_channel_kind(kind)
-    assert parse_header("current.j [Nm]")[0].kind is kind
-    with pytest.raises(InputError, match="known already"):
-        register_channel_kind(kind)
-    channels_module._parse.cache_clear()
-
-
 def struck(**channels):
     """What is needed to predict one percussion record that holds such channels."""
     time = np.arange(-50, 250) * 1e-3
@@ -142,11 +129,11 @@ def test_a_channel_that_nothing_predicts_is_told_by_name():
 
 def test_a_kind_that_is_ac_coupled_reads_through_its_corner(monkeypatch):
     """As the same reading behind a high-pass, whose corner a sensor of its own may move."""
-    monkeypatch.setattr(channels_module, "KINDS", list(channels_module.KINDS))
     kind = ChannelKind("geophone", "frame", ("m/s",), True, reader=velocity, ac_corner=4.5)
-    register_channel_kind(kind)
+    monkeypatch.setattr(channels_module, "KINDS", [*channels_module.KINDS, kind])
+    parse_channel.cache_clear()
     robot, setup = struck(**{"geophone.tool.x": 0, "velocity.tool.x": 0})
-    channels_module._parse.cache_clear()
+    parse_channel.cache_clear()
     highpass = effect_class("sensor_highpass")
     behind = setup.predict(Model(robot).with_effects([highpass("velocity.tool", frequency=4.5)]))
     found = setup.predict(Model(robot))

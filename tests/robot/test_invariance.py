@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lxml import etree
 
-from picchio.robot.ik.chain import rotation_from_rpy
 from picchio.robot.joint import Balancer
 from picchio.robot.loading.load import load_robot
 
@@ -70,13 +69,13 @@ def write_urdf(arm: dict, path, *, names=None, order=None, split: bool = False):
         parts.append(joint(names[i], parent, child, j))
         if split:
             near, far = dict(b), dict(b)
-            turned = rotation_from_rpy((0.3, -0.2, 0.5))
+            turned = pin.rpy.rpyToMatrix(0.3, -0.2, 0.5)
             shift = np.array([0.1, 0.2, -0.3])
             # Half the body stays, half sits on a link at another place, seen from there.
             near["mass"] = far["mass"] = 0.5 * b["mass"]
             near["inertia"] = far["inertia"] = 0.5 * b["inertia"]
             far["com"] = turned.T @ (b["com"] - shift)
-            body = rotation_from_rpy(tuple(b["rpy"]))
+            body = pin.rpy.rpyToMatrix(*b["rpy"])
             far["rpy"] = pin.rpy.matrixToRpy(turned.T @ body)
             parts += [link(child, near), link(f"{child}_half", far)]
             place = {"kind": "fixed", "xyz": shift, "rpy": (0.3, -0.2, 0.5)}
@@ -162,7 +161,7 @@ def test_mass_matrix_and_gravity_are_those_of_the_bodies_one_by_one(path, which)
 def test_turning_base_and_gravity_turns_the_answer(path, which, rpy, xyz):
     arm = random_arm(*which)
     pose = np.random.default_rng(which[0]).uniform(-1, 1, which[1])
-    turned = rotation_from_rpy(rpy)
+    turned = pin.rpy.rpyToMatrix(*rpy)
     flex = path.with_suffix(".toml")
     gravity = turned @ [0, 0, -9.81]
     flex.write_text(

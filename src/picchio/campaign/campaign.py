@@ -7,7 +7,7 @@ import shutil
 import tempfile
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -16,7 +16,7 @@ from picchio.campaign.clock import TOLERANCE
 from picchio.campaign.csv_source import CsvSource, write_csv
 from picchio.campaign.parquet_source import ParquetSource, write_parquet
 from picchio.campaign.record import Record
-from picchio.campaign.source import Block, Source
+from picchio.campaign.source import Source
 from picchio.campaign.tables import (
     CAMPAIGN_FILE,
     FORMAT,
@@ -62,7 +62,7 @@ class Campaign:
         content = {"format": FORMAT, **{k: v for k, v in table.items() if v is not None}}
         content["record"] = [r.table.model_dump(exclude_none=True) for r in given]
         checked = validate(content, CampaignTable, format=FORMAT)
-        bound = tuple(record.within(checked.excitation) for record in given)
+        bound = tuple(replace(r, base_excitation=checked.excitation) for r in given)
         campaign = cls(checked, bound)
         campaign._check()
         return campaign
@@ -325,12 +325,8 @@ def _fill(campaign: Campaign, folder: Path, target: Path, suffix: str | None,
         time, _ = parse_channel(TIME)
         channels = [time, *record.source.channels.values()]
         write = write_parquet if path.suffix == ".parquet" else write_csv
-        write(path, channels, _numbered(record))
+        write(path, channels, record.chunks())
     (folder / CAMPAIGN_FILE).write_text(_toml(campaign, names, target), encoding="utf-8")
-
-
-def _numbered(record: Record) -> Iterator[Block]:
-    return ((0, block) for block in record.chunks())
 
 
 def _other_files(campaign: Campaign) -> dict[str, bytes]:
@@ -352,7 +348,7 @@ def _toml(campaign: Campaign, names: list[str], target: Path) -> str:
     document["format"] = FORMAT
     content = campaign.table.model_dump(exclude_none=True, exclude_defaults=True)
     content["record"] = [
-        {**_set_keys(record), "file": name}
+        {**record.table.model_dump(exclude_none=True), "kind": record.kind, "file": name}
         for record, name in zip(campaign.records, names, strict=True)
     ]
     if campaign.table.robot is not None:
@@ -364,24 +360,13 @@ def _toml(campaign: Campaign, names: list[str], target: Path) -> str:
     for entry in content["record"]:
         table = tomlkit.table()
         for key in sorted(entry, key=lambda name: name != "file"):
-            table[key] = _inline(entry[key])
+            table[key] = entry[key]
+            if isinstance(entry[key], dict):
+                table[key] = tomlkit.inline_table()
+                table[key].update(entry[key])
         entries.append(table)
     document["record"] = entries
     return tomlkit.dumps(document)
-
-
-def _set_keys(record: Record) -> dict[str, Any]:
-    return {**record.table.model_dump(exclude_none=True), "kind": record.kind}
-
-
-def _inline(value: Any) -> Any:
-    import tomlkit
-
-    if not isinstance(value, dict):
-        return value
-    table = tomlkit.inline_table()
-    table.update(value)
-    return table
 
 
 def _robot_from(campaign: Campaign, target: Path) -> str:

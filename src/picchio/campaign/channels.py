@@ -125,18 +125,6 @@ class Channel:
         return f"{self.name} [{self.unit}]"
 
 
-def register_channel_kind(kind: ChannelKind) -> None:
-    """Make another kind of channel known.
-
-    Raises:
-        InputError: a kind of this pattern is known already.
-    """
-    if any(known.pattern == kind.pattern for known in [*kinds(), _TIME_KIND]):
-        raise InputError("this kind of channel is known already", value=kind.pattern)
-    KINDS.append(kind)
-    _parse.cache_clear()
-
-
 def kinds() -> list[ChannelKind]:
     """Every kind of channel, those of other packages last."""
     return [*KINDS, *_plugged()]
@@ -156,6 +144,7 @@ def patterns() -> list[str]:
     return [kind.pattern for kind in kinds()]
 
 
+@cache
 def parse_channel(name: str, unit: str | None = None) -> tuple[Channel, Conversion]:
     """The channel of this name, and how values in `unit` become its SI unit.
 
@@ -166,11 +155,6 @@ def parse_channel(name: str, unit: str | None = None) -> tuple[Channel, Conversi
     Raises:
         InputError: no such kind of channel, a joint or axis missing, a unit of another dimension.
     """
-    return _parse(name, unit)
-
-
-@cache
-def _parse(name: str, unit: str | None) -> tuple[Channel, Conversion]:
     problem: InputError | None = None
     for kind in [_TIME_KIND, *kinds()]:
         parts = _split(name, kind)
@@ -183,7 +167,7 @@ def _parse(name: str, unit: str | None) -> tuple[Channel, Conversion]:
             continue
         return Channel(name, kind, *parts, target), convert
     if problem is not None:
-        raise InputError(problem.problem, key=name, value=problem.value, choices=problem.choices)
+        raise problem.placed(key=name)
     raise _unknown(name)
 
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 import csv
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
 from picchio.campaign.channels import Channel
-from picchio.campaign.source import Block, Column, Source, parse_columns
+from picchio.campaign.source import Block, Column, Samples, Source, parse_columns
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, PicchioWarning
 
 _LONGEST_LINE = 1 << 20
 _BYTES_A_VALUE = 20
@@ -77,7 +77,9 @@ class CsvSource(Source):
             self._header(stream)
             first = 0
             while lines := stream.readlines(size * len(self.columns) * _BYTES_A_VALUE):
-                table = self._table(lines, first, stream)
+                table = self._parse_fast(b"".join(lines))
+                if table is None:
+                    table = self._parse_slowly(lines, first, stream)
                 for start in range(0, len(table), size):
                     yield (
                         first + start,
@@ -85,7 +87,9 @@ class CsvSource(Source):
                     )
                 first += len(table)
                 if lines[-1][-1:] not in (b"\n", b"\r"):
-                    self._warn_cut_short(first)
+                    place = self.error("has no line end: the file may have been cut short",
+                                       sample=first - 1)  # fmt: skip
+                    warnings.warn(str(place), PicchioWarning, stacklevel=3)
 
     def _converted(
         self, columns: list[Column], table: FloatArray, first: int
@@ -97,13 +101,8 @@ class CsvSource(Source):
             found[name] = np.ascontiguousarray(column.convert(values))
         return found
 
-    def _table(self, lines: list[bytes], first: int, stream: BinaryIO) -> FloatArray:
-        """(m, columns) as written, from the lines of a block."""
-        fast = self._parse_fast(b"".join(lines))
-        return fast if fast is not None else self._parse_slowly(lines, first, stream)
-
     def _parse_fast(self, data: bytes) -> FloatArray | None:
-        """All numbers at once; None where a line is not exactly the numbers it should hold."""
+        """All numbers of a block, (m, columns); None where a line holds anything else."""
         if not data.endswith(b"\n"):
             data += b"\n"
         data = data.replace(b"\r\n", b"\n")
@@ -155,27 +154,14 @@ class CsvSource(Source):
                 raise self.error("is not a number", channel=name, sample=sample, value=cell)
         return [float(cell) for cell in cells]
 
-    def _warn_cut_short(self, samples: int) -> None:
-        from picchio.core.errors import PicchioWarning
 
-        place = self.error("has no line end: the file may have been cut short", sample=samples - 1)
-        warnings.warn(str(place), PicchioWarning, stacklevel=4)
-
-
-def write_csv(path: Path, channels: Sequence[Channel], blocks: Iterator[Block]) -> int:
-    """Write a record; floats are written such that they read back bit for bit.
-
-    Returns:
-        how many samples were written.
-    """
-    samples = 0
+def write_csv(path: Path, channels: Sequence[Channel], blocks: Iterable[Samples]) -> None:
+    """Write a record; floats are written such that they read back bit for bit."""
     try:
         with open(path, "w", encoding="utf-8", newline="") as stream:
             csv.writer(stream, lineterminator="\n").writerow([c.header for c in channels])
-            for _, block in blocks:
+            for block in blocks:
                 table = np.column_stack([block[channel.name] for channel in channels])
                 stream.writelines(",".join(map(repr, row)) + "\n" for row in table.tolist())
-                samples += len(table)
     except OSError as error:
         raise InputError(f"cannot be written: {error.strerror}", file=path) from None
-    return samples

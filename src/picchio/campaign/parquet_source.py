@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from picchio.campaign.channels import Channel
-from picchio.campaign.source import Block, Column, Source, parse_columns
+from picchio.campaign.source import Block, Column, Samples, Source, parse_columns
 from picchio.core.errors import InputError
 
 
@@ -96,21 +96,14 @@ class ParquetSource(Source):
         return found
 
 
-def write_parquet(path: Path, channels: Sequence[Channel], blocks: Iterator[Block]) -> int:
-    """Write a record in float64, bit for bit.
-
-    Returns:
-        how many samples were written.
-    """
+def write_parquet(path: Path, channels: Sequence[Channel], blocks: Iterable[Samples]) -> None:
+    """Write a record in float64, bit for bit."""
     arrow, parquet = _pyarrow()
     schema = arrow.schema([(channel.header, arrow.float64()) for channel in channels])
-    samples = 0
     try:
         with parquet.ParquetWriter(path, schema) as writer:
-            for _, block in blocks:
+            for block in blocks:
                 arrays = [arrow.array(block[channel.name]) for channel in channels]
                 writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
-                samples += len(arrays[0])
     except OSError as error:
         raise InputError(f"cannot be written: {error.strerror}", file=path) from None
-    return samples

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cached_property
 from pathlib import Path
@@ -244,14 +244,6 @@ class Record:
         for _ in self.chunks():
             pass
         return self.clock
-
-    def within(self, excitation: CampaignExcitation) -> Record:
-        """The same record in a campaign with this `[excitation]`.
-
-        Args:
-            excitation: the blows as programmed.
-        """
-        return replace(self, base_excitation=excitation)
 
 
 def _table(file: str, table: Mapping[str, Any]) -> RecordTable:

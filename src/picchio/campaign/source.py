@@ -14,7 +14,8 @@ from picchio.campaign.units import Conversion
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 
-Block = tuple[int, dict[str, FloatArray]]
+Samples = dict[str, FloatArray]
+Block = tuple[int, Samples]
 
 
 @dataclass(frozen=True)
@@ -103,9 +104,7 @@ def parse_columns(source: Source, cells: Sequence[str]) -> dict[str, Column]:
             channel, convert = parse_header(cell)
         except InputError as error:
             where = f"{source.key}, column {index + 1}" + (f", {error.key}" if error.key else "")
-            shown = {} if error.value is None else {"value": error.value}
-            raise InputError(error.problem, file=source.path, key=where, choices=error.choices,
-                             hint=error.hint, **shown) from None  # fmt: skip
+            raise error.placed(file=source.path, key=where) from None
         if channel.name in columns:
             raise source.error(
                 f"columns {columns[channel.name].index + 1} and {index + 1} are the same channel",

@@ -19,7 +19,11 @@ Vector: TypeAlias = tuple[float, float, float]
 
 
 def symmetric(six: Sequence[float]) -> FloatArray:
-    """The matrix (3, 3) of xx, xy, xz, yy, yz, zz."""
+    """The symmetric matrix (3, 3) of six numbers.
+
+    Args:
+        six: xx, xy, xz, yy, yz, zz.
+    """
     xx, xy, xz, yy, yz, zz = six
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 

@@ -163,7 +163,11 @@ def _step(kind: Any, part: int | str) -> list[Any]:
 
 
 def leaf_types(kind: Any) -> list[Any]:
-    """The types that an annotation allows, without what is said about them."""
+    """The types that an annotation allows, without what is said about them.
+
+    Args:
+        kind: the annotation of a table's key.
+    """
     origin = typing.get_origin(kind)
     if origin is typing.Annotated:
         return leaf_types(typing.get_args(kind)[0])

@@ -13,7 +13,7 @@ from picchio.model.conditions import Conditions
 from picchio.model.expansion import Motion
 from picchio.model.geometry import Geometry, Mass
 from picchio.model.linear_system import shared_damping
-from picchio.model.system import Element, VibratingSystem
+from picchio.model.system import Element, ElementKind, VibratingSystem
 from picchio.robot.flexible_robot import FlexibleRobot
 
 Row = dict[str, float]
@@ -116,13 +116,13 @@ class Changes:
         """Tie a link's origin to the world with a spring (N/m) and damper (N s/m)."""
         self._anchors.append(_Spring(link, stiffness, damping))
 
-    def add_element(self, joint: str, element: Element) -> None:
-        """Add a nonlinear torque between a joint's link and motor side."""
-        self._elements.append((element, self.check_joint(joint)))
+    def add_element(self, joint: str, kind: ElementKind, *parameters: float) -> None:
+        """Add a nonlinear torque between a joint's link and motor side; see `Element`."""
+        self._elements.append((Element(kind, parameters), self.check_joint(joint)))
 
-    def add_contact(self, element: Element) -> None:
-        """Add a nonlinear force between the tool and the workpiece, along the blow."""
-        self._contacts.append(element)
+    def add_contact(self, stiffness: float, damping: float, preload: float) -> None:
+        """Add a force between the tool and the workpiece, along the blow, while they touch."""
+        self._contacts.append(Element(ElementKind.CONTACT, (stiffness, damping, preload)))
 
     def deflection(self, joint: str) -> Row:
         """The coordinates that make a joint's deflection: link side minus motor side."""

@@ -30,8 +30,8 @@ class Element:
     Attributes:
         kind: what it does.
         parameters: BACKLASH: stiffness, gap, rest deflection, rest torque; CUBIC: N m/rad^3;
-            BOUC_WEN: torque, yield deflection; COULOMB: torque; CONTACT: stiffness, damping,
-            preload. SI.
+            BOUC_WEN: torque, yield deflection; COULOMB: torque, smoothing rate; CONTACT:
+            stiffness, damping, preload. SI.
     """
 
     kind: ElementKind

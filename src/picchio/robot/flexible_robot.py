@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +18,6 @@ from picchio.robot.dynamics.statics import RobotState, balancing, stiffness_at_t
 from picchio.robot.joint import Joint
 from picchio.robot.tool import Gun, Mounting, Tool
 from picchio.robot.urdf.tree import UrdfTree
-
-if TYPE_CHECKING:
-    from picchio.robot.ik.inverse_kinematics import Solutions
 
 Array = NDArray[np.float64]
 
@@ -140,7 +137,7 @@ class FlexibleRobot:
         Raises:
             InputError: wrong length, unknown joint or pose name, not a finite number.
         """
-        return check_pose(values, self.joint_names, self.named_poses, self.joint_names_given)
+        return check_pose(self, values)
 
     @property
     def joint_names_given(self) -> tuple[str, ...]:
@@ -280,7 +277,10 @@ class FlexibleRobot:
             axis: (3,) world, along which the tool shall point; None: any way.
             seed: of the first guesses.
         """
-        return list(self._solve(point, axis, seed).poses)
+        # Compiled code takes a second to load: only when it is needed.
+        from picchio.robot.ik.inverse_kinematics import solve
+
+        return list(solve(self, point, axis=axis, seed=seed).poses)
 
     def inverse_kinematics(
         self,
@@ -307,9 +307,3 @@ class FlexibleRobot:
 
         words = branch_words(self, branch)  # a misspelt word need not wait for the search
         return choose_branch(self, self.all_branches(point, axis=axis, seed=seed), words, point)
-
-    def _solve(self, point: ArrayLike, axis: ArrayLike | None, seed: int) -> Solutions:
-        # Compiled code takes a second to load: only when it is needed.
-        from picchio.robot.ik.inverse_kinematics import solve
-
-        return solve(self, point, axis=axis, seed=seed)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from picchio.campaign.campaign import Campaign, load_campaign, write_campaign
 from picchio.campaign.channels import TIME, parse_channel
 from picchio.campaign.importing import read_csv, read_matlab, read_mcap, read_uff
 from picchio.campaign.importing.mapping import ChannelTable, Mapping, read_mapping
-from picchio.campaign.importing.raw import RawChannel, RawFile, Reader
+from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.campaign.importing.resample import common_clock
 from picchio.campaign.record import Record
 from picchio.campaign.units import conversion
@@ -22,9 +21,9 @@ from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
 from picchio.core.results import Result
 
-READERS: MappingProxyType[str, Reader] = MappingProxyType(
-    {"csv": read_csv.read, "uff": read_uff.read, "mcap": read_mcap.read, "matlab": read_matlab.read}
-)
+READERS = {
+    "csv": read_csv.read, "uff": read_uff.read, "mcap": read_mcap.read, "matlab": read_matlab.read
+}  # fmt: skip
 _ENDINGS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".uff": "uff", ".unv": "uff",
             ".mcap": "mcap", ".mat": "matlab"}  # fmt: skip
 
@@ -61,7 +60,10 @@ def read_mapped(
         InputError: the file can't be read, or the mapping does not fit it.
     """
     raw = read_raw(path, mapping)
-    series = _mapped(raw, mapping, mapping_file)
+    series = [
+        raw.channel(entry.series, mapping=mapping_file, key=f"channel[{i}].from")
+        for i, entry in enumerate(mapping.channel)
+    ]
     time, values = _clocked(raw, mapping, series, mapping_file)
     channels, units = {}, {}
     for entry, stored in zip(mapping.channel, values, strict=True):
@@ -76,24 +78,13 @@ def read_mapped(
     name = file or f"{Path(path).stem}.csv"
     try:
         record = Record.from_arrays(name, time, channels, units=units, **table)
-        campaign = Campaign.from_records([record], **_campaign_keys(mapping))
+        campaign = Campaign.from_records([record], **mapping.campaign)
     except InputError as error:
         if error.file is not None:
             raise
         raise InputError(str(error), file=mapping_file or path) from None
     record.check_samples()
     return campaign
-
-
-def _campaign_keys(mapping: Mapping) -> dict[str, object]:
-    return {str(key): value for key, value in mapping.campaign.items()}
-
-
-def _mapped(raw: RawFile, mapping: Mapping, file: Path | None) -> list[RawChannel]:
-    return [
-        raw.channel(entry.series, mapping=file, key=f"channel[{i}].from")
-        for i, entry in enumerate(mapping.channel)
-    ]
 
 
 def _clocked(
@@ -106,8 +97,7 @@ def _clocked(
         try:
             _, convert = conversion(time.unit, ("s",))
         except InputError as error:
-            raise InputError(error.problem, file=file, key="time.unit", value=time.unit,
-                             choices=error.choices) from None  # fmt: skip
+            raise error.placed(file=file, key="time.unit") from None
         own: list[FloatArray | None] = [convert(clock)] * len(series)
     elif time.rate is not None and any(s.time is None for s in series):
         own = [np.arange(s.values.size) / time.rate for s in series]
@@ -135,9 +125,7 @@ def _converted(
     try:
         channel, convert = parse_channel(entry.to, entry.unit or raw.unit)
     except InputError as error:
-        shown = {} if error.value is None else {"value": error.value}
-        raise InputError(error.problem, file=file, key=f"{entry.series} -> {entry.to}",
-                         choices=error.choices, hint=error.hint, **shown) from None  # fmt: skip
+        raise error.placed(file=file, key=f"{entry.series} -> {entry.to}") from None
     if channel.name == TIME:
         raise InputError("the time is no channel; see [time]", file=file, key=entry.to)
     if entry.scale != 1.0:

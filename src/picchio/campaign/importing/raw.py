@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -89,4 +88,10 @@ def as_series(values: object, what: str, path: Path) -> FloatArray:
     return array.astype(np.float64)
 
 
-Reader = Callable[..., RawFile]
+def reason(error: Exception) -> str:
+    """What a reader's library says is wrong, in one line.
+
+    Args:
+        error: as it raised.
+    """
+    return str(error).partition("\n")[0] or type(error).__name__

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from picchio.campaign.importing.mapping import Mapping
-from picchio.campaign.importing.raw import RawChannel, RawFile
+from picchio.campaign.importing.raw import RawChannel, RawFile, reason
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 
@@ -74,8 +74,7 @@ def _load(path: Path) -> dict[str, FloatArray]:
         raise InputError("is a version 7.3 file (HDF5), which is not read",
                          hint="save it in MATLAB with '-v7'") from None  # fmt: skip
     except Exception as error:  # a damaged file may raise anything
-        reason = str(error).partition("\n")[0] or type(error).__name__
-        raise InputError(f"is not a readable .mat file: {reason}") from None
+        raise InputError(f"is not a readable .mat file: {reason(error)}") from None
     series: dict[str, FloatArray] = {}
     for name, value in content.items():
         if not name.startswith("__"):

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from picchio.campaign.importing.mapping import Mapping
-from picchio.campaign.importing.raw import RawChannel, RawFile
+from picchio.campaign.importing.raw import RawChannel, RawFile, reason
 from picchio.core.errors import InputError
 
 _NANO = 1_000_000_000
@@ -60,8 +60,7 @@ def read(path: Path, mapping: Mapping | None) -> RawFile:
                     values.setdefault(name, []).append(number)
                     about[name] = (unit, suggestion)
     except Exception as error:  # mcap's, zstandard's, lz4's and the decoder's own kinds
-        reason = str(error).partition("\n")[0] or type(error).__name__
-        raise InputError(f"is not a readable MCAP file: {reason}", file=path) from None
+        raise InputError(f"is not a readable MCAP file: {reason(error)}", file=path) from None
     if not values:
         raise InputError("holds no JointState, Imu or WrenchStamped message", file=path)
     begin = min(series[0] for series in stamps.values())

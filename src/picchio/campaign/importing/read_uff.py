@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from picchio.campaign.importing.mapping import Mapping
-from picchio.campaign.importing.raw import Names, RawChannel, RawFile, as_series
+from picchio.campaign.importing.raw import Names, RawChannel, RawFile, as_series, reason
 from picchio.core.errors import InputError, PicchioWarning
 
 # Function types of data set 58 that are histories in time: general, and time response.
@@ -40,8 +40,7 @@ def read(path: Path, mapping: Mapping | None) -> RawFile:
             warnings.simplefilter("ignore")
             found = pyuff.UFF(str(path)).read_sets()
     except Exception as error:  # pyuff raises bare Exceptions
-        raise InputError(f"is not a readable universal file: {_first_line(error)}",
-                         file=path) from None  # fmt: skip
+        raise InputError(f"is not a readable universal file: {reason(error)}", file=path) from None
     sets = [found] if isinstance(found, dict) else list(found)
     unique = Names()
     channels: dict[str, RawChannel] = {}
@@ -80,7 +79,3 @@ def _channel(data: dict[str, Any], unique: Names, path: Path) -> RawChannel:
         None if unit.lower() in _NO_UNIT else unit,
         note=label.strip(),
     )
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error) or type(error).__name__).partition("\n")[0]

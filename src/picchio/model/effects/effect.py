@@ -419,5 +419,12 @@ def parameter(
 
 
 def factor(name: str, lower: float, upper: float, meaning: str) -> Parameter:
-    """A parameter that multiplies what is stated: 1 changes nothing, and steps are ratios."""
+    """A parameter that multiplies what is stated: 1 changes nothing, and steps are ratios.
+
+    Args:
+        name: as in JSON.
+        lower: smallest value allowed.
+        upper: largest.
+        meaning: one line.
+    """
     return parameter(name, neutral=1.0, lower=lower, upper=upper, log=True, meaning=meaning)

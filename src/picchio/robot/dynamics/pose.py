@@ -20,24 +20,18 @@ Array = NDArray[np.float64]
 _TURNS = 3.0
 
 
-def check_pose(
-    values: Any,
-    joint_names: tuple[str, ...],
-    named_poses: Mapping[str, tuple[float, ...]],
-    listed: tuple[str, ...],
-) -> Array:
+def check_pose(robot: FlexibleRobot, values: Any) -> Array:
     """A pose (nv,).
 
     Args:
-        values: a list in the order of `joint_names` or of `listed`, a mapping by joint name, or
-            the name of a pose; joints not given are at zero.
-        joint_names: every coordinate.
-        named_poses: poses by name.
-        listed: the joints of a shorter list.
+        robot: whose joints and named poses count.
+        values: a list in the order of `joint_names` or of `joint_names_given`, a mapping by joint
+            name, or the name of a pose; joints not given are at zero.
 
     Raises:
         InputError: wrong length, unknown names, not finite numbers.
     """
+    joint_names = robot.joint_names
     if (
         isinstance(values, np.ndarray)
         and values.shape == (len(joint_names),)
@@ -46,37 +40,31 @@ def check_pose(
     ):
         return values.copy() if values.flags.writeable else values
     if isinstance(values, str):
-        if values not in named_poses:
+        if values not in robot.named_poses:
             raise InputError("the robot has no pose of this name", key="pose", value=values,
-                             choices=named_poses)  # fmt: skip
-        return np.array(named_poses[values])
-    if isinstance(values, Mapping):
-        pose = np.zeros(len(joint_names))
-        for name, value in values.items():
-            if name not in joint_names:
-                raise InputError("the robot has no joint of this name", key="pose", value=name,
-                                 choices=joint_names)  # fmt: skip
-            pose[joint_names.index(name)] = _finite(value, str(name))
-        return pose
-    return _from_list(values, joint_names, listed)
+                             choices=robot.named_poses)  # fmt: skip
+        return np.array(robot.named_poses[values])
+    by_name = values if isinstance(values, Mapping) else _from_list(robot, values)
+    pose = np.zeros(len(joint_names))
+    for name, value in by_name.items():
+        if name not in joint_names:
+            raise InputError("the robot has no joint of this name", key="pose", value=name,
+                             choices=joint_names)  # fmt: skip
+        pose[joint_names.index(name)] = _finite(value, str(name))
+    return pose
 
 
-def _from_list(values: Any, joint_names: tuple[str, ...], listed: tuple[str, ...]) -> Array:
+def _from_list(robot: FlexibleRobot, values: Any) -> dict[str, Any]:
     try:
         numbers = list(values)
     except TypeError:
         raise InputError("a pose is a list of numbers", key="pose", value=values) from None
-    names = joint_names if len(numbers) == len(joint_names) else listed
+    listed = robot.joint_names_given
+    names = robot.joint_names if len(numbers) == len(robot.joint_names) else listed
     if len(numbers) != len(names):
-        raise InputError(
-            f"a pose of this robot has {len(listed)} numbers ({', '.join(listed)})",
-            key="pose",
-            value=len(numbers),
-        )
-    pose = np.zeros(len(joint_names))
-    for name, value in zip(names, numbers, strict=True):
-        pose[joint_names.index(name)] = _finite(value, name)
-    return pose
+        raise InputError(f"a pose of this robot has {len(listed)} numbers ({', '.join(listed)})",
+                         key="pose", value=len(numbers))  # fmt: skip
+    return dict(zip(names, numbers, strict=True))
 
 
 def _finite(value: Any, joint: str) -> float:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
-from picchio.robot.urdf.tree import MOVABLE, Vector
+from picchio.robot.urdf.tree import MOVABLE
 
 if TYPE_CHECKING:
     from picchio.robot.flexible_robot import FlexibleRobot
@@ -51,31 +52,24 @@ class Chain:
         return ~((self.slides[:, None] & (self.follow != 0.0)).any(axis=0))
 
     @property
+    def tables(self) -> tuple[NDArray[Any], ...]:
+        """The chain as the compiled code takes it."""
+        return (self.rotation, self.offset, self.axis, self.slides, self.follow, self.shift,
+                self.tool_axis)  # fmt: skip
+
+    @property
     def reach(self) -> float:
         """A length, m, beyond which nothing can be reached if all joints are revolute."""
         return float(np.linalg.norm(self.offset[1:], axis=1).sum()) or 1.0
 
 
-def rotation_from_rpy(rpy: Vector) -> Array:
-    """URDF's roll, pitch, yaw about fixed axes, rad, as a matrix (3, 3)."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
-
-
 def tool_chain(robot: FlexibleRobot) -> Chain:
     """The chain to the point where the force acts; a gun's recoil stays at rest."""
-    rotation, offset = rotation_from_rpy(robot.mounting.rpy), np.array(robot.mounting.xyz)
-    rotations, offsets, axes, slides = [], [], [], []
-    follows, shifts = [], []
+    rotation, offset = pin.rpy.rpyToMatrix(*robot.mounting.rpy), np.array(robot.mounting.xyz)
+    rotations, offsets, axes, slides, follows, shifts = [], [], [], [], [], []
     for joint in robot.tree.chain(robot.tool.frame):
         offset = offset + rotation @ np.array(joint.xyz)
-        rotation = rotation @ rotation_from_rpy(joint.rpy)
+        rotation = rotation @ pin.rpy.rpyToMatrix(*joint.rpy)
         if joint.type not in MOVABLE:
             continue
         rotations.append(rotation)

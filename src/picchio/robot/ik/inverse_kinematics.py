@@ -9,7 +9,7 @@ the joints' ranges, and `picchio.robot.ik.self_motion` moves along it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -118,16 +118,10 @@ def solve_many(
     found = np.empty((len(targets), len(guesses), joints))
     errors = np.empty((len(targets), len(guesses)))
     solve_points(
-        tables_of(chain), guesses, centre, chain.wraps, chain.lower, chain.upper, targets,
+        chain.tables, guesses, centre, chain.wraps, chain.lower, chain.upper, targets,
         wanted, weight, redundant and not scattered, found, errors,
     )  # fmt: skip
     return _collect(robot, chain, centre, found, errors, 1e-2 if redundant else 1e-5)
-
-
-def tables_of(chain: Chain) -> tuple[NDArray[Any], ...]:
-    """The chain as the compiled code takes it."""
-    return (chain.rotation, chain.offset, chain.axis, chain.slides, chain.follow, chain.shift,
-            chain.tool_axis)  # fmt: skip
 
 
 def _collect(
@@ -151,17 +145,18 @@ def _collect(
 def _distinct(chain: Chain, centre: Array, candidates: Array, same: float) -> list[Array]:
     """Different poses, a full turn of a joint counting as none, the least bent first."""
     turn = 2.0 * np.pi
-    brought = list(candidates)
-    # Rounded keys: the order must not hang on the last bit.
-    brought.sort(key=lambda q: (round(float(np.abs(q - centre).max()), 4), np.round(q, 4).tolist()))
+
+    def order(q: Array) -> tuple[float, list[float]]:
+        # Rounded: the order must not hang on the last bit.
+        return round(float(np.abs(q - centre).max()), 4), np.round(q, 4).tolist()
+
+    def apart(q: Array, other: Array) -> float:
+        gap = np.abs(q - other)
+        return float(np.where(chain.wraps, np.minimum(gap, np.abs(turn - gap)), gap).max())
+
     kept: list[Array] = []
-    for q in brought:
-        for other in kept:
-            gap = np.abs(q - other)
-            gap = np.where(chain.wraps, np.minimum(gap, np.abs(turn - gap)), gap)
-            if gap.max() < same:
-                break
-        else:
+    for q in sorted(candidates, key=order):
+        if all(apart(q, other) >= same for other in kept):
             kept.append(q)
     return kept
 

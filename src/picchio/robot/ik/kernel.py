@@ -9,8 +9,15 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from picchio.robot.ik.chain_kernel import forward, gap, normal_equations, square
-from picchio.robot.ik.small_matrices import cholesky_solve, copy, copy_matrix
+from picchio.robot.ik.chain_kernel import (
+    cholesky_solve,
+    copy,
+    copy_matrix,
+    forward,
+    gap,
+    normal_equations,
+    square,
+)
 
 
 @njit(cache=True)

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from picchio.robot.ik.chain import tool_chain
+from picchio.robot.ik.chain import Chain, tool_chain
 from picchio.robot.ik.chain_kernel import forward
-from picchio.robot.ik.inverse_kinematics import tables_of
 from picchio.robot.ik.kernel import relax
 
 if TYPE_CHECKING:
@@ -38,7 +37,7 @@ def self_motion_basis(
         InputError: as `FlexibleRobot.pose`.
     """
     chain = tool_chain(robot)
-    jacobian = _task(robot, robot.pose(pose), keep_axis)[1]
+    _, jacobian, _ = _task(chain, robot.pose(pose), keep_axis)
     _, values, rows = np.linalg.svd(jacobian)
     rank = int((values > tolerance * values[0]).sum()) if len(values) else 0
     basis = np.zeros((robot.rigid.nv, len(chain.index) - rank))
@@ -65,29 +64,20 @@ def move_along_self_motion(
     """
     chain = tool_chain(robot)
     start, goal = robot.pose(pose), robot.pose(towards)
-    residual, _ = _task(robot, start, keep_axis)
-    weight = _weight(chain.reach, keep_axis)
+    residual, _, weight = _task(chain, start, keep_axis)
     # The task of standing still: the target is where the tool is now.
     axis = residual[3:] / weight if keep_axis else np.zeros(3)
     q = start[chain.index].copy()
-    relax(
-        tables_of(chain), q, goal[chain.index], chain.lower, chain.upper, residual[:3].copy(),
-        axis, weight, 400,
-    )  # fmt: skip
+    relax(chain.tables, q, goal[chain.index], chain.lower, chain.upper, residual[:3].copy(),
+          axis, weight, 400)  # fmt: skip
     moved = start.copy()
     moved[chain.index] = q
     return moved
 
 
-def _weight(reach: float, keep_axis: bool) -> float:
-    return 0.3 * reach if keep_axis else 0.0
-
-
-def _task(robot: FlexibleRobot, pose: Array, keep_axis: bool) -> tuple[Array, Array]:
-    """The tool's place and weighted axis (6,), and their Jacobian (6, k)."""
-    chain = tool_chain(robot)
+def _task(chain: Chain, pose: Array, keep_axis: bool) -> tuple[Array, Array, float]:
+    """The tool's place and weighted axis (6,), their Jacobian (6, k), and the axis's weight, m."""
     residual, jacobian = np.empty(6), np.empty((6, len(chain.index)))
-    zero = np.zeros(3)
-    weight = _weight(chain.reach, keep_axis)
-    forward(tables_of(chain), pose[chain.index], residual, jacobian, zero, zero, weight)
-    return residual, jacobian
+    zero, weight = np.zeros(3), 0.3 * chain.reach if keep_axis else 0.0
+    forward(chain.tables, pose[chain.index], residual, jacobian, zero, zero, weight)
+    return residual, jacobian, weight

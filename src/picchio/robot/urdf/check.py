@@ -28,74 +28,66 @@ def read_tree(root: etree._Element, path: Path) -> UrdfTree:
     Raises:
         InputError: with the true reason why this is no robot.
     """
+    try:
+        return _tree(root, path)
+    except InputError as error:
+        raise error.placed(file=path) from None
+
+
+def _tree(root: etree._Element, path: Path) -> UrdfTree:
     if local_name(root) != "robot":
-        raise InputError("the first element must be <robot>", file=path, value=local_name(root))
+        raise InputError("the first element must be <robot>", value=local_name(root))
     name = root.get("name")
     if not name:
-        raise InputError("the robot has no name", file=path,
-                         hint='write <robot name="...">')  # fmt: skip
-    links = read_links(root, path)
+        raise InputError("the robot has no name", hint='write <robot name="...">')
+    links = read_links(root)
     if not links:
-        raise InputError("the robot has no links", file=path)
-    joints = read_joints(root, path)
-    _check_size(links, joints, path)
-    base = _root_link(links, joints, path)
-    remarks = _settle_mimics(joints, path)
-    return UrdfTree(name, links, joints, base, path, tuple(remarks))
-
-
-def _check_size(
-    links: dict[str, Inertial | None], joints: dict[str, UrdfJoint], path: Path
-) -> None:
+        raise InputError("the robot has no links")
+    joints = read_joints(root)
     movable = sum(joint.type in MOVABLE for joint in joints.values())
     for what, count, most in (
         ("links", len(links), MOST_LINKS),
         ("movable joints", movable, MOST_MOVABLE),
     ):
         if count > most:
-            raise InputError(f"has {count} {what}; at most {most} are accepted", file=path)
+            raise InputError(f"has {count} {what}; at most {most} are accepted")
+    base = _root_link(links, joints)
+    remarks = _settle_mimics(joints)
+    return UrdfTree(name, links, joints, base, path, tuple(remarks))
 
 
-def _root_link(links: dict[str, Inertial | None], joints: dict[str, UrdfJoint], path: Path) -> str:
-    carrier: dict[str, str] = {}
+def _root_link(links: dict[str, Inertial | None], joints: dict[str, UrdfJoint]) -> str:
+    carrier: dict[str, UrdfJoint] = {}
     for joint in joints.values():
         for end in (joint.parent, joint.child):
             if end not in links:
-                raise InputError("no link of this name", file=path, key=f"joint {joint.name}",
-                                 value=end, choices=links)  # fmt: skip
+                raise InputError("no link of this name", key=f"joint {joint.name}", value=end,
+                                 choices=links)  # fmt: skip
         if joint.child in carrier:
-            raise InputError(
-                f"two joints carry link {joint.child!r}: {carrier[joint.child]!r} and "
-                f"{joint.name!r}; a URDF is a tree",
-                file=path,
-            )
-        carrier[joint.child] = joint.name
+            raise InputError(f"two joints carry link {joint.child!r}: "
+                             f"{carrier[joint.child].name!r} and {joint.name!r}; a URDF is a "
+                             "tree")  # fmt: skip
+        carrier[joint.child] = joint
     roots = [name for name in links if name not in carrier]
     if not roots:
-        raise InputError("the joints form a closed loop: every link has a parent", file=path)
+        raise InputError("the joints form a closed loop: every link has a parent")
     if len(roots) > 1:
-        raise InputError(
-            "more than one root link: "
-            + ", ".join(repr(name) for name in roots[:4])
-            + (" ..." if len(roots) > 4 else ""),
-            file=path,
-            hint="join them with a joint",
-        )
-    parent = {joint.child: joint.parent for joint in joints.values()}
+        some = ", ".join(repr(name) for name in roots[:4]) + (" ..." if len(roots) > 4 else "")
+        raise InputError(f"more than one root link: {some}", hint="join them with a joint")
     reached = {roots[0]}
     for link in links:
         trail: set[str] = set()
         here = link
         while here not in reached:
             if here in trail:
-                raise InputError(f"the joints around link {here!r} form a closed loop", file=path)
+                raise InputError(f"the joints around link {here!r} form a closed loop")
             trail.add(here)
-            here = parent[here]
+            here = carrier[here].parent
         reached |= trail
     return roots[0]
 
 
-def _settle_mimics(joints: dict[str, UrdfJoint], path: Path) -> list[str]:
+def _settle_mimics(joints: dict[str, UrdfJoint]) -> list[str]:
     """Free the joints that mimic nothing that moves, as Pinocchio does; say which."""
     remarks = []
     for joint in list(joints.values()):
@@ -112,8 +104,8 @@ def _settle_mimics(joints: dict[str, UrdfJoint], path: Path) -> list[str]:
         seen = [joint.name]
         while (mimic := joints[seen[-1]].mimic) is not None:
             if mimic.joint in seen:
-                key = f"joint {joint.name}"
-                raise InputError("mimic joints follow each other in a circle", file=path, key=key)
+                raise InputError("mimic joints follow each other in a circle",
+                                 key=f"joint {joint.name}")  # fmt: skip
             seen.append(mimic.joint)
     return remarks
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from lxml import etree
 
 from picchio.robot.tool import RECOIL_JOINT, Gun, Mounting, Tool
-from picchio.robot.urdf.tree import MOVABLE, ZERO, Inertial, UrdfTree, Vector
+from picchio.robot.urdf.tree import INERTIA, MOVABLE, ZERO, Inertial, UrdfTree, Vector
 
 
 @dataclass(frozen=True)
@@ -53,13 +53,12 @@ def normalise(tree: UrdfTree, tool: Tool, gun: Gun | None, mounting: Mounting) -
         _joint(robot, names.new("picchio_tool_mount"), "fixed", tool.frame, body, ZERO, ZERO)
     point = names.new("picchio_tool_point")
     gun_body = Inertial(gun.mass, ZERO, ZERO, (0.0,) * 6) if gun and gun.mass > 0 else None
+    _link(robot, point, gun_body)
     if gun is None or gun.recoil_stiffness is None:
-        _link(robot, point, gun_body)
         _joint(robot, names.new("picchio_tool_offset"), "fixed", tool.frame, point, tool.xyz, ZERO)
         recoil = None
     else:
         recoil = names.new(RECOIL_JOINT)
-        _link(robot, point, gun_body)
         _joint(robot, recoil, "prismatic", tool.frame, point, tool.xyz, ZERO, tool.axis)
     return NormalisedUrdf(etree.tostring(robot, encoding="unicode"), point, recoil)
 
@@ -84,8 +83,7 @@ def _link(robot: etree._Element, name: str, inertial: Inertial | None) -> None:
     element = etree.SubElement(link, "inertial")
     etree.SubElement(element, "origin", xyz=_text(inertial.xyz), rpy=_text(inertial.rpy))
     etree.SubElement(element, "mass", value=repr(inertial.mass))
-    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    values = {name: repr(value) for name, value in zip(names, inertial.inertia, strict=True)}
+    values = {name: repr(value) for name, value in zip(INERTIA, inertial.inertia, strict=True)}
     etree.SubElement(element, "inertia", values)
 
 

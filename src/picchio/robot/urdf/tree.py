@@ -8,19 +8,23 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from lxml import etree
 
 from picchio.core.arrays import Vector
 from picchio.core.errors import InputError
-from picchio.robot.urdf.xml import children, local_name
+from picchio.robot.urdf.xml import children
 
+T = TypeVar("T")
 MOVABLE = ("revolute", "continuous", "prismatic")
 LOCKED = ("floating", "planar")
 JOINT_TYPES = (*MOVABLE, *LOCKED, "fixed")
 ZERO: Vector = (0.0, 0.0, 0.0)
+INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 # Above this a sum of squares in the dynamics is on its way to overflow.
 LARGEST = 1e12
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\Z")
@@ -118,137 +122,120 @@ class UrdfTree:
         return found
 
 
-def read_links(root: etree._Element, path: Path) -> dict[str, Inertial | None]:
+def read_links(root: etree._Element) -> dict[str, Inertial | None]:
     """Every link's inertial, None where it has none.
 
     Raises:
         InputError: missing or duplicate names, malformed numbers, negative mass.
     """
-    links: dict[str, Inertial | None] = {}
-    for element in children(root, "link"):
-        name = _name(element, path)
-        if name in links:
-            raise InputError("two links have the same name", file=path, key=f"link {name}")
-        links[name] = _inertial(element, path, f"link {name}")
-    return links
+    return _by_name(root, "link", _inertial)
 
 
-def _inertial(link: etree._Element, path: Path, key: str) -> Inertial | None:
-    found = children(link, "inertial")
-    if not found:
-        return None
-    if len(found) > 1:
-        raise InputError("has more than one <inertial>", file=path, key=key)
-    xyz, rpy = _origin(found[0], path, key)
-    mass = children(found[0], "mass")
-    inertia = children(found[0], "inertia")
-    for tag, elements in (("mass", mass), ("inertia", inertia)):
-        if len(elements) != 1:
-            raise InputError(f"<inertial> needs one <{tag}>, it has {len(elements)}",
-                             file=path, key=key)  # fmt: skip
-    value = number(mass[0], "value", path, key)
-    if value < 0:
-        raise InputError("the mass is negative", file=path, key=key, value=value)
-    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-    tensor = tuple(number(inertia[0], each, path, key) for each in names)
-    return Inertial(value, xyz, rpy, tensor)
-
-
-def read_joints(root: etree._Element, path: Path) -> dict[str, UrdfJoint]:
+def read_joints(root: etree._Element) -> dict[str, UrdfJoint]:
     """Every joint by name.
 
     Raises:
         InputError: missing or duplicate names, an unknown type, missing parents, children or
             limits, a zero axis, malformed numbers.
     """
-    joints: dict[str, UrdfJoint] = {}
-    for element in children(root, "joint"):
-        name = _name(element, path)
-        if name in joints:
-            raise InputError("two joints have the same name", file=path, key=f"joint {name}")
-        joints[name] = _joint(element, name, path)
-    return joints
+    return _by_name(root, "joint", _joint)
 
 
-def _joint(element: etree._Element, name: str, path: Path) -> UrdfJoint:
-    key = f"joint {name}"
+def _by_name(
+    root: etree._Element, tag: str, read: Callable[[etree._Element, str], T]
+) -> dict[str, T]:
+    found: dict[str, T] = {}
+    for element in children(root, tag):
+        name = element.get("name")
+        if not name:
+            raise InputError(f"a <{tag}> has no name (line {element.sourceline})")
+        if name in found:
+            raise InputError(f"two {tag}s have the same name", key=f"{tag} {name}")
+        try:
+            found[name] = read(element, name)
+        except InputError as error:
+            raise error.placed(key=f"{tag} {name}") from None
+    return found
+
+
+def _inertial(link: etree._Element, name: str) -> Inertial | None:
+    found = children(link, "inertial")
+    if not found:
+        return None
+    if len(found) > 1:
+        raise InputError("has more than one <inertial>")
+    mass, inertia = children(found[0], "mass"), children(found[0], "inertia")
+    for tag, elements in (("mass", mass), ("inertia", inertia)):
+        if len(elements) != 1:
+            raise InputError(f"<inertial> needs one <{tag}>, it has {len(elements)}")
+    value = number(mass[0], "value")
+    if value < 0:
+        raise InputError("the mass is negative", value=value)
+    tensor = tuple(number(inertia[0], each) for each in INERTIA)
+    return Inertial(value, *_origin(found[0]), tensor)
+
+
+def _joint(element: etree._Element, name: str) -> UrdfJoint:
     kind = element.get("type")
     if kind not in JOINT_TYPES:
-        raise InputError("unknown joint type", file=path, key=key, value=kind, choices=JOINT_TYPES)
-    xyz, rpy = _origin(element, path, key)
+        raise InputError("unknown joint type", value=kind, choices=JOINT_TYPES)
     axis: Vector = (1.0, 0.0, 0.0)
     if kind in MOVABLE and (found := children(element, "axis")):
-        axis = three_numbers(found[0], "xyz", path, key, default=axis)
+        axis = three_numbers(found[0], "xyz", default=axis)
         if not any(abs(part) > 1e-12 for part in axis):
-            raise InputError("the axis has length zero", file=path, key=key, value=axis)
-    lower, upper, effort = _limits(element, kind, path, key)
-    return UrdfJoint(name, kind, _end(element, "parent", path, key),
-                     _end(element, "child", path, key), xyz, rpy, axis, lower, upper, effort,
-                     _mimic(element, path, key) if kind in MOVABLE else None)  # fmt: skip
+            raise InputError("the axis has length zero", value=axis)
+    xyz, rpy = _origin(element)
+    return UrdfJoint(name, kind, _end(element, "parent"), _end(element, "child"), xyz, rpy, axis,
+                     *_limits(element, kind),
+                     _mimic(element) if kind in MOVABLE else None)  # fmt: skip
 
 
-def _limits(element: etree._Element, kind: str, path: Path, key: str) -> tuple[float, float, float]:
+def _limits(element: etree._Element, kind: str) -> tuple[float, float, float]:
     unlimited = float("inf")
     found = children(element, "limit")
-    if kind not in MOVABLE:
+    if kind not in MOVABLE or (kind == "continuous" and not found):
         return -unlimited, unlimited, unlimited
     if not found:
-        if kind == "continuous":
-            return -unlimited, unlimited, unlimited
         raise InputError(f"a {kind} joint needs <limit lower= upper= effort= velocity=>, "
-                         "it has none", file=path, key=key)  # fmt: skip
-    for need in ("effort", "velocity"):
-        if found[0].get(need) is None:
-            raise InputError(f"<limit> has no {need}", file=path, key=key)
-    number(found[0], "velocity", path, key, infinite=True)
-    effort = number(found[0], "effort", path, key, infinite=True)
+                         "it has none")  # fmt: skip
+    number(found[0], "velocity", infinite=True)
+    effort = number(found[0], "effort", infinite=True)
     if effort < 0:
-        raise InputError("the effort limit is negative", file=path, key=key, value=effort)
+        raise InputError("the effort limit is negative", value=effort)
     if kind == "continuous":
         return -unlimited, unlimited, effort
-    lower = number(found[0], "lower", path, key, default=0.0, infinite=True)
-    upper = number(found[0], "upper", path, key, default=0.0, infinite=True)
+    lower = number(found[0], "lower", default=0.0, infinite=True)
+    upper = number(found[0], "upper", default=0.0, infinite=True)
     if lower > upper:
-        raise InputError("the lower limit is above the upper limit", file=path, key=key,
-                         value=(lower, upper))  # fmt: skip
+        raise InputError("the lower limit is above the upper limit", value=(lower, upper))
     return lower, upper, effort
 
 
-def _mimic(element: etree._Element, path: Path, key: str) -> Mimic | None:
-    found = children(element, "mimic")
-    if not found:
-        return None
-    return Mimic(
-        found[0].get("joint") or "",
-        number(found[0], "multiplier", path, key, default=1.0),
-        number(found[0], "offset", path, key, default=0.0),
-    )
+def _mimic(element: etree._Element) -> Mimic | None:
+    for found in children(element, "mimic"):
+        return Mimic(
+            found.get("joint") or "",
+            number(found, "multiplier", default=1.0),
+            number(found, "offset", default=0.0),
+        )
+    return None
 
 
-def _origin(element: etree._Element, path: Path, key: str) -> tuple[Vector, Vector]:
-    found = children(element, "origin")
-    if not found:
-        return ZERO, ZERO
-    return (
-        three_numbers(found[0], "xyz", path, key, default=ZERO),
-        three_numbers(found[0], "rpy", path, key, default=ZERO),
-    )
+def _origin(element: etree._Element) -> tuple[Vector, Vector]:
+    for found in children(element, "origin"):
+        return (
+            three_numbers(found, "xyz", default=ZERO),
+            three_numbers(found, "rpy", default=ZERO),
+        )
+    return ZERO, ZERO
 
 
-def _end(element: etree._Element, tag: str, path: Path, key: str) -> str:
+def _end(element: etree._Element, tag: str) -> str:
     found = children(element, tag)
     link = found[0].get("link") if len(found) == 1 else None
     if not link:
-        raise InputError(f'needs one <{tag} link="...">', file=path, key=key)
+        raise InputError(f'needs one <{tag} link="...">')
     return link
-
-
-def _name(element: etree._Element, path: Path) -> str:
-    name = element.get("name")
-    if not name:
-        raise InputError(f"a <{local_name(element)}> has no name (line {element.sourceline})",
-                         file=path)  # fmt: skip
-    return name
 
 
 def to_number(text: str, *, infinite: bool = False) -> float:
@@ -277,8 +264,6 @@ def to_number(text: str, *, infinite: bool = False) -> float:
 def number(
     element: etree._Element,
     attribute: str,
-    path: Path,
-    key: str,
     *,
     default: float | None = None,
     infinite: bool = False,
@@ -292,17 +277,15 @@ def number(
     tag = etree.QName(element).localname
     if text is None:
         if default is None:
-            raise InputError(f"<{tag}> has no {attribute}", file=path, key=key)
+            raise InputError(f"<{tag}> has no {attribute}")
         return default
     try:
         return to_number(text, infinite=infinite)
     except ValueError as error:
-        raise InputError(f"<{tag} {attribute}> {error}", file=path, key=key, value=text) from None
+        raise InputError(f"<{tag} {attribute}> {error}", value=text) from None
 
 
-def three_numbers(
-    element: etree._Element, attribute: str, path: Path, key: str, *, default: Vector
-) -> Vector:
+def three_numbers(element: etree._Element, attribute: str, *, default: Vector) -> Vector:
     """Three numbers from an attribute, such as xyz or rpy.
 
     Raises:
@@ -314,9 +297,9 @@ def three_numbers(
     tag = etree.QName(element).localname
     parts = text.split()
     if len(parts) != 3:
-        raise InputError(f"<{tag} {attribute}> needs three numbers", file=path, key=key, value=text)
+        raise InputError(f"<{tag} {attribute}> needs three numbers", value=text)
     try:
         x, y, z = (to_number(part) for part in parts)
     except ValueError as error:
-        raise InputError(f"<{tag} {attribute}> {error}", file=path, key=key, value=text) from None
+        raise InputError(f"<{tag} {attribute}> {error}", value=text) from None
     return x, y, z

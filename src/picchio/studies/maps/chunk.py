@@ -199,14 +199,13 @@ def tool_places(robot: FlexibleRobot, poses: FloatArray) -> FloatArray:
     """(p, 3) m, world: where the tool's force acts at poses (p, nv)."""
     from picchio.robot.ik.chain import tool_chain
     from picchio.robot.ik.chain_kernel import places_of
-    from picchio.robot.ik.inverse_kinematics import tables_of
     from picchio.robot.tool import RECOIL_JOINT
 
     if RECOIL_JOINT in robot.joint_names:  # the chain ends before it
         return np.array([robot.tool_position(pose) for pose in poses]).reshape(-1, 3)
     chain = tool_chain(robot)
     found = np.empty((len(poses), 3))
-    places_of(tables_of(chain), np.ascontiguousarray(poses[:, chain.index]), found)
+    places_of(chain.tables, np.ascontiguousarray(poses[:, chain.index]), found)
     return found
 
 

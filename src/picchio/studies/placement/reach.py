@@ -10,7 +10,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.ik.chain import Chain, tool_chain
-from picchio.robot.ik.inverse_kinematics import TOLERANCE, tables_of
+from picchio.robot.ik.inverse_kinematics import TOLERANCE
 from picchio.robot.ik.kernel import solve_points
 from picchio.studies.placement.work import Work
 
@@ -144,7 +144,7 @@ class Reach:
         q = np.empty((len(moves), len(guesses), len(chain.index)))
         error = np.empty(q.shape[:2])
         solve_points(
-            tables_of(chain), guesses, self._middle, chain.wraps, chain.lower, chain.upper,
+            chain.tables, guesses, self._middle, chain.wraps, chain.lower, chain.upper,
             targets, axes, weight, False, q, error,
         )  # fmt: skip
         q[error >= TOLERANCE] = np.nan

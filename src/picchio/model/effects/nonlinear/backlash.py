@@ -10,7 +10,7 @@ from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.motion import Motion
 from picchio.model.plant import Changes
-from picchio.model.system import Element, ElementKind
+from picchio.model.system import ElementKind
 
 
 class Backlash(Effect):
@@ -32,9 +32,7 @@ class Backlash(Effect):
             torque = -load  # what the spring carries, along the deflection
         gap = self.values["gap"]
         rest = torque / stiffness + (math.copysign(0.5 * gap, torque) if torque else 0.0)
-        plant.add_element(
-            self.target, Element(ElementKind.BACKLASH, (stiffness, gap, rest, torque))
-        )
+        plant.add_element(self.target, ElementKind.BACKLASH, stiffness, gap, rest, torque)
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """A tenth, a half and once the largest deflection."""

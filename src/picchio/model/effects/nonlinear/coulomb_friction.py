@@ -9,7 +9,7 @@ from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.motion import Motion
 from picchio.model.plant import Changes
-from picchio.model.system import Element, ElementKind
+from picchio.model.system import ElementKind
 
 
 class CoulombFriction(Effect):
@@ -34,10 +34,8 @@ class CoulombFriction(Effect):
 
     def structure(self, plant: Changes) -> None:
         """Add the friction."""
-        plant.add_element(
-            self.target,
-            Element(ElementKind.COULOMB, (self.values["torque"], self.values["smoothing"])),
-        )
+        torque, smoothing = self.values["torque"], self.values["smoothing"]
+        plant.add_element(self.target, ElementKind.COULOMB, torque, smoothing)
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """A twentieth of the spring's largest torque, and a fifth of that; ideal and smoothed."""

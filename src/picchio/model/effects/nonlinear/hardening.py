@@ -5,7 +5,7 @@ from __future__ import annotations
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Changes
-from picchio.model.system import Element, ElementKind
+from picchio.model.system import ElementKind
 
 
 class Hardening(Effect):
@@ -24,7 +24,7 @@ class Hardening(Effect):
 
     def structure(self, plant: Changes) -> None:
         """Add the cubic torque."""
-        plant.add_element(self.target, Element(ElementKind.CUBIC, (self.values["cubic"],)))
+        plant.add_element(self.target, ElementKind.CUBIC, self.values["cubic"])
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """A tenth more torque at the largest deflection."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Changes
-from picchio.model.system import Element, ElementKind
+from picchio.model.system import ElementKind
 
 
 class Hysteresis(Effect):
@@ -26,10 +26,8 @@ class Hysteresis(Effect):
 
     def structure(self, plant: Changes) -> None:
         """Add the element."""
-        plant.add_element(
-            self.target,
-            Element(ElementKind.BOUC_WEN, (self.values["torque"], self.values["deflection"])),
-        )
+        torque, deflection = self.values["torque"], self.values["deflection"]
+        plant.add_element(self.target, ElementKind.BOUC_WEN, torque, deflection)
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """A twentieth of the spring's torque, at two yield deflections."""

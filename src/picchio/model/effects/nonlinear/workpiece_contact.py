@@ -5,7 +5,6 @@ from __future__ import annotations
 from picchio.model.effects.effect import Effect, parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Changes
-from picchio.model.system import Element, ElementKind
 
 
 class WorkpieceContact(Effect):
@@ -25,11 +24,7 @@ class WorkpieceContact(Effect):
     def structure(self, plant: Changes) -> None:
         """Add the contact."""
         values = self.values
-        plant.add_contact(
-            Element(
-                ElementKind.CONTACT, (values["stiffness"], values["damping"], values["preload"])
-            )
-        )
+        plant.add_contact(values["stiffness"], values["damping"], values["preload"])
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """As stiff as the arm, lifted early, late or never."""
