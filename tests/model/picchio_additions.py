@@ -16,8 +16,7 @@ from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.latent import Latent
+from picchio.model.effects.effect import Effect, Latent, Parameter
 from picchio.model.effects.scales import Scales
 
 
@@ -27,7 +26,7 @@ class SupplyScatter(Effect):
     name = "supply_scatter"
     where = "blows"
     target_kind = "tool"
-    parameters = (parameter("std", lower=0.0, upper=1.0, meaning="of the force, relative"),)
+    parameters = (Parameter("std", lower=0.0, upper=1.0, meaning="of the force, relative"),)
     meaning = "the air supply's pressure differs from record to record"
     latent = Latent(
         "relative change of a record's force", "std", step=1e-2, lower=-0.9, upper=5.0, count=1

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from picchio.campaign.campaign import load_campaign, write_campaign
+from picchio.campaign.campaign import load_campaign
 from picchio.core.errors import InputError
 from picchio.core.toml import validate
 from picchio.model.effects.registry import effect_class
@@ -109,7 +109,7 @@ def test_a_wrong_model_is_seen_in_every_channel(robot):
 
 def test_written_and_read_back_it_is_the_same(robot, tmp_path):
     made = simulated_campaign(robot, plan(levels=[150.0, 300.0]), robot_name="fanuc_like_3dof")
-    write_campaign(made, tmp_path / "campaign")
+    made.save(tmp_path / "campaign")
     read = load_campaign(tmp_path / "campaign")
     assert read.table.provenance["seed"] == 0
     assert [r.excitation.force for r in read] == [150.0, 300.0]

@@ -15,7 +15,7 @@ import picchio
 from picchio.cli.main import run
 from picchio.diagnosis.result import Cause, Diagnosis, Value
 from picchio.excitation.pulse_train import PulseTrain
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.registry import catalogue
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.visuals.diagnosis_file import read_diagnosis
@@ -179,7 +179,7 @@ class Gremlin(Effect):
     name = "gremlin"
     where = "structure"
     target_kind = "link"
-    parameters = (parameter("count", meaning="how many"),)
+    parameters = (Parameter("count", meaning="how many"),)
     meaning = "somebody else's effect"
 
 

@@ -27,7 +27,7 @@ from picchio.campaign.tables import (
     Tolerance,
 )
 from picchio.core.errors import InputError, PicchioWarning
-from picchio.core.files import umask
+from picchio.core.files import relative_name, umask
 from picchio.core.toml import parse_toml, validate
 
 MAPPING_FILE = "mapping.toml"
@@ -143,19 +143,52 @@ class Campaign:
         for record in self.records:
             record.check_samples()
 
-    def save(self, folder: str | Path, *, suffix: str | None = None,
-             overwrite: bool = False) -> Campaign:  # fmt: skip
-        """Write the campaign to a folder, as `write_campaign` does.
+    def save(
+        self,
+        folder: str | Path,
+        *,
+        suffix: str | None = None,
+        overwrite: bool = False,
+        extra_files: Mapping[str, bytes] | None = None,
+    ) -> Campaign:
+        """Write the campaign, in memory or from elsewhere, to a folder.
+
+        The whole folder appears, or nothing changes: everything goes to a folder beside the target,
+        which is then renamed. Samples are checked on the way and written in SI, block by block;
+        floats read back bit for bit.
 
         Args:
             folder: where to; its parent must exist.
             suffix: ".csv" or ".parquet" for every record; None keeps each record's own.
-            overwrite: replace a campaign that stands there.
+            overwrite: replace a campaign that stands there; any other folder is never replaced.
+            extra_files: further files by name, such as {"mapping.toml": b"..."}.
 
         Returns:
             the campaign as it was written, read from the folder.
+
+        Raises:
+            InputError: the folder exists or can't be written, or a sample is wrong.
         """
-        return write_campaign(self, folder, suffix=suffix, overwrite=overwrite)
+        target = Path(folder)
+        _check_target(target, overwrite)
+        if suffix is not None and suffix not in SUFFIXES:
+            raise InputError("unknown kind of file", value=suffix, choices=SUFFIXES)
+        try:
+            temporary = Path(
+                tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
+            )
+        except OSError as error:
+            raise InputError(f"cannot write here: {error.strerror}", file=target) from None
+        try:
+            os.chmod(temporary, 0o777 & ~umask())
+            _fill(self, temporary, target, suffix, extra_files or {})
+            load_campaign(temporary)
+            _put_in_place(temporary, target)
+        except OSError as error:
+            raise InputError(f"cannot be written: {error.strerror}", file=target) from None
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+        return load_campaign(target)
 
     def _check(self) -> None:
         """What one table alone cannot know."""
@@ -226,55 +259,6 @@ def _open(folder: Path, entry: RecordTable, index: int) -> Source:
     if not os.path.realpath(path).startswith(os.path.realpath(folder) + os.sep):
         raise InputError("is outside the campaign's folder", file=path, key=f"{key}.file")
     return ParquetSource(path, key) if path.suffix == ".parquet" else CsvSource(path, key)
-
-
-def write_campaign(
-    campaign: Campaign,
-    folder: str | Path,
-    *,
-    suffix: str | None = None,
-    overwrite: bool = False,
-    extra_files: Mapping[str, bytes] | None = None,
-) -> Campaign:
-    """Write a campaign, in memory or from elsewhere, to a folder.
-
-    The whole folder appears, or nothing changes: everything goes to a folder beside the target,
-    which is then renamed. Samples are checked on the way and written in SI; floats read back bit
-    for bit.
-
-    Args:
-        campaign: what to write; one larger than memory is copied block by block.
-        folder: where; its parent must exist.
-        suffix: ".csv" or ".parquet" for all records; as their names say where None.
-        overwrite: replace a campaign that is there already; any other folder is never replaced.
-        extra_files: further files by name, such as {"mapping.toml": b"..."}.
-
-    Returns:
-        the campaign as it now stands on disk.
-
-    Raises:
-        InputError: the folder exists or can't be written, or a sample is wrong.
-    """
-    target = Path(folder)
-    _check_target(target, overwrite)
-    if suffix is not None and suffix not in SUFFIXES:
-        raise InputError("unknown kind of file", value=suffix, choices=SUFFIXES)
-    try:
-        temporary = Path(
-            tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
-        )
-    except OSError as error:
-        raise InputError(f"cannot write here: {error.strerror}", file=target) from None
-    try:
-        os.chmod(temporary, 0o777 & ~umask())
-        _fill(campaign, temporary, target, suffix, extra_files or {})
-        load_campaign(temporary)
-        _put_in_place(temporary, target)
-    except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror}", file=target) from None
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-    return load_campaign(target)
 
 
 def _check_target(target: Path, overwrite: bool) -> None:
@@ -352,7 +336,9 @@ def _toml(campaign: Campaign, names: list[str], target: Path) -> str:
         for record, name in zip(campaign.records, names, strict=True)
     ]
     if campaign.table.robot is not None:
-        content["robot"] = _robot_from(campaign, target)
+        # A URDF is named relative to the campaign's file, wherever that moves.
+        robot = str(campaign.robot)
+        content["robot"] = relative_name(robot, target) if Path(robot).is_file() else robot
     for key in ("robot", "tool", "notes", "excitation", "tolerance", "controller", "provenance"):
         if content.get(key) is not None:
             document[key] = content[key]
@@ -367,12 +353,3 @@ def _toml(campaign: Campaign, names: list[str], target: Path) -> str:
         entries.append(table)
     document["record"] = entries
     return tomlkit.dumps(document)
-
-
-def _robot_from(campaign: Campaign, target: Path) -> str:
-    """A URDF is named relative to the campaign's file, wherever that moves."""
-    robot = str(campaign.robot)
-    path = Path(robot)
-    if not path.is_file():
-        return robot
-    return Path(os.path.relpath(path.resolve(), target.resolve())).as_posix()

@@ -12,7 +12,7 @@ from typing import BinaryIO
 import numpy as np
 
 from picchio.campaign.channels import Channel
-from picchio.campaign.source import Block, Column, Samples, Source, parse_columns
+from picchio.campaign.source import Block, Column, FileSource, Samples
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, PicchioWarning
 
@@ -21,28 +21,16 @@ _BYTES_A_VALUE = 20
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.I)
 
 
-class CsvSource(Source):
-    """A CSV file with the header `channel [unit]`; one line a sample, commas, points.
-
-    Args:
-        path: the file; its header is read at once, its samples when needed.
-        key: the record's name in messages.
-
-    Raises:
-        InputError: missing, empty, not UTF-8, or a header that is wrong.
-    """
+class CsvSource(FileSource):
+    """A CSV file with the header `channel [unit]`; one line a sample, commas, points."""
 
     row_word = "line"
     first_row = 2
 
-    def __init__(self, path: Path, key: str = "record") -> None:
-        self.path: Path = path
-        self.key = key
+    def names(self) -> list[str]:
+        """As `FileSource`."""
         with self._open() as stream:
-            self.columns: dict[str, Column] = parse_columns(self, self._header(stream))
-        self.channels: dict[str, Channel] = {
-            name: column.channel for name, column in list(self.columns.items())[1:]
-        }
+            return self._header(stream)
 
     def _open(self) -> BinaryIO:
         try:

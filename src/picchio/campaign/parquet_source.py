@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from picchio.campaign.channels import Channel
-from picchio.campaign.source import Block, Column, Samples, Source, parse_columns
+from picchio.campaign.source import Block, Column, FileSource, Samples
 from picchio.core.errors import InputError
 
 
@@ -24,36 +24,26 @@ def _pyarrow() -> tuple[Any, Any]:
     return pyarrow, pyarrow.parquet
 
 
-class ParquetSource(Source):
-    """A Parquet file whose columns are named `channel [unit]`; integers and floats.
-
-    Args:
-        path: the file; its schema is read at once, its samples when needed.
-        key: the record's name in messages.
-
-    Raises:
-        InputError: pyarrow is missing; the file is missing, no Parquet, or its columns are wrong.
-    """
+class ParquetSource(FileSource):
+    """A Parquet file whose columns are named `channel [unit]`; integers and floats."""
 
     row_word = "row"
 
     def __init__(self, path: Path, key: str = "record") -> None:
-        self.path: Path = path
-        self.key = key
+        super().__init__(path, key)
         arrow, _ = _pyarrow()
-        with self._open() as file:
-            schema = file.schema_arrow
-            if file.metadata.num_rows == 0:
-                raise self.error("is empty")
-        self.columns: dict[str, Column] = parse_columns(self, schema.names)
         for name, column in self.columns.items():
-            kind = schema.types[column.index]
+            kind = self._schema.types[column.index]
             if not (arrow.types.is_floating(kind) or arrow.types.is_integer(kind)):
                 raise self.error("must be a column of numbers", channel=name, value=str(kind))
-        self.channels: dict[str, Channel] = {
-            name: column.channel for name, column in list(self.columns.items())[1:]
-        }
-        self._headers = list(schema.names)
+
+    def names(self) -> list[str]:
+        """As `FileSource`."""
+        with self._open() as file:
+            if file.metadata.num_rows == 0:
+                raise self.error("is empty")
+            self._schema = file.schema_arrow
+        return list(self._schema.names)
 
     def _open(self) -> Any:
         arrow, parquet = _pyarrow()
@@ -69,7 +59,7 @@ class ParquetSource(Source):
         """As `Source`; reads only the columns needed, one row group at a time."""
         arrow, _ = _pyarrow()
         wanted = [self.columns[name] for name in names]
-        headers = [self._headers[column.index] for column in wanted]
+        headers = [self._schema.names[column.index] for column in wanted]
         with self._open() as file:
             first = 0
             try:
@@ -86,7 +76,7 @@ class ParquetSource(Source):
         found = {}
         for column in columns:
             name = column.channel.name
-            cells = batch.column(self._headers[column.index])
+            cells = batch.column(self._schema.names[column.index])
             if cells.null_count:
                 empty = int(np.flatnonzero(cells.is_null().to_numpy(zero_copy_only=False))[0])
                 raise self.error("the value is missing", channel=name, sample=first + empty)

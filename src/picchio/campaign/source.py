@@ -91,7 +91,32 @@ class Source(ABC):
                              value=float(values[bad]))  # fmt: skip
 
 
-def parse_columns(source: Source, cells: Sequence[str]) -> dict[str, Column]:
+class FileSource(Source):
+    """The samples in a file whose columns are named `channel [unit]`.
+
+    Args:
+        path: the file; its columns' names are read at once, its samples when needed.
+        key: the record's name in messages.
+
+    Attributes:
+        columns: by channel name, the time first.
+
+    Raises:
+        InputError: missing, empty, not of this kind, or the names are wrong.
+    """
+
+    def __init__(self, path: Path, key: str = "record") -> None:
+        self.path: Path = path
+        self.key = key
+        self.columns = _columns(self, self.names())
+        self.channels = {name: c.channel for name, c in self.columns.items() if name != TIME}
+
+    @abstractmethod
+    def names(self) -> list[str]:
+        """The columns' names."""
+
+
+def _columns(source: Source, cells: Sequence[str]) -> dict[str, Column]:
     """The columns of a file by channel name, the time first.
 
     Raises:

@@ -63,6 +63,16 @@ def sha256(path: str | Path) -> str:
     return digest.hexdigest()
 
 
+def relative_name(path: str | Path, folder: Path) -> str:
+    """The way to a file from a folder, with forward slashes, as a file in the folder names it.
+
+    Args:
+        path: of the file.
+        folder: which may not exist yet.
+    """
+    return Path(os.path.relpath(Path(path).resolve(), folder.resolve())).as_posix()
+
+
 def read_text(path: str | Path, *, limit: int = LARGEST) -> str:
     """A UTF-8 text file's content.
 

@@ -182,15 +182,12 @@ class Model:
             effect.sense(sensors, conditions or Conditions())
         return sensors
 
-    def force(
-        self, excitation: Excitation, hits: int | None, conditions: Conditions | None = None
-    ) -> PiecewiseForce:
+    def force(self, excitation: Excitation, hits: int | None) -> PiecewiseForce:
         """The force F(t) with the effects in it: a burst, or one period of the steady train.
 
         Args:
             excitation: the blows as programmed.
             hits: of the burst; None for the steady train.
-            conditions: when and how warm, and in which record.
 
         Raises:
             InputError: an effect that has no steady state.
@@ -200,22 +197,19 @@ class Model:
         if not self.changes_blows:
             return excitation.one_period() if hits is None else excitation.burst(hits)
         blows = Blows.of(excitation, hits, np.array([0.0, 0.0, 1.0]))
-        return self.blows(blows, conditions).force()
+        return self.blows(blows).force()
 
-    def force_directions(
-        self, tool_rotation: FloatArray, conditions: Conditions | None = None
-    ) -> FloatArray:
+    def force_directions(self, tool_rotation: FloatArray) -> FloatArray:
         """What becomes of the programmed force direction: (3, 3), actual = matrix @ programmed.
 
         Args:
             tool_rotation: (3, 3), the tool frame's axes at rest, world.
-            conditions: when and how warm, and in which record.
         """
         if not self.changes_blows:
             return np.eye(3)
         still = PulseTrain(force=1.0, period=1.0, width=0.5)
         columns = [
-            self.blows(Blows.of(still, 1, axis).change(tool_rotation=tool_rotation), conditions)
+            self.blows(Blows.of(still, 1, axis).change(tool_rotation=tool_rotation))
             for axis in np.eye(3)
         ]
         return np.array([blows.direction for blows in columns]).T

@@ -49,6 +49,7 @@ class Changes:
             and motor side alone, as if nothing else moved (0), or in between: where an effect
             lets something else yield, the two differ, and data can tell.
         force_offset: (3,) m, in the tool frame, from where the force is taken to act.
+        added_inertias: (coordinate, kg m^2) of inertias that move with a coordinate.
         coordinates: those of the wide chain that move, then those that effects add.
     """
 
@@ -64,7 +65,7 @@ class Changes:
         self.coordinates: list[str] = list(robot.flexible_names)
         self._motors: dict[str, str] = {}
         self._masses: list[Mass] = [(1.0, "robot", None)]
-        self._added_inertia: list[tuple[Row, float]] = []
+        self.added_inertias: list[tuple[str, float]] = []
         self._springs: list[_Spring] = []
         self._anchors: list[_Spring] = []
         self._elements: list[tuple[Element, str]] = []
@@ -91,7 +92,7 @@ class Changes:
 
     def add_inertia(self, joint: str, inertia: float) -> None:
         """Add a constant inertia that turns with the link side, kg m^2."""
-        self._added_inertia.append(({self.check_joint(joint): 1.0}, inertia))
+        self.added_inertias.append((self.check_joint(joint), inertia))
 
     def add_coordinate(
         self, name: str, stiffness: float, damping: float, inertia: float = 0.0
@@ -101,7 +102,7 @@ class Changes:
             self.coordinates.append(name)
         self._springs.append(_Spring(name, stiffness, damping))
         if inertia:
-            self._added_inertia.append(({name: 1.0}, inertia))
+            self.added_inertias.append((name, inertia))
 
     def add_motor(self, joint: str, inertia: float, stiffness: float, damping: float) -> None:
         """Let the motor side of a joint yield against its servo."""
@@ -146,11 +147,6 @@ class Changes:
     def added_masses(self) -> tuple[Mass, ...]:
         """(weight, link, point) of every mass beside the robot's own."""
         return tuple(self._masses[1:])
-
-    @property
-    def added_inertias(self) -> tuple[tuple[str, float], ...]:
-        """(joint, kg m^2) of inertias that turn with a joint's link side."""
-        return tuple((next(iter(row)), value) for row, value in self._added_inertia)
 
 
 class Plant(Changes):
@@ -233,10 +229,10 @@ class Plant(Changes):
         if self.gravity_stiffness:
             gravity = among_all(inertia.gravity_gradient)
             curvature = among_all(inertia.gravity_curvature)
-        for row, value in self._added_inertia:
-            vector = self._vector(row)
-            mass = mass + value * np.outer(vector, vector)
-        mass = self._with_own_inertia(mass)
+        own = np.zeros(size)
+        for name, value in self.added_inertias:
+            own[names.index(name)] += value
+        mass = self._with_own_inertia(mass + np.diag(own))
 
         joints = np.array(list(self.springs.values()))
         deflections = np.eye(len(joints), size)  # the joints' coordinates are the first

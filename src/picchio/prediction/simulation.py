@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from picchio.campaign.campaign import Campaign, write_campaign
+from picchio.campaign.campaign import Campaign
 from picchio.campaign.channels import Channel
 from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
@@ -128,7 +128,7 @@ def simulate(
             raise
         raise error.placed(file=file) from None
     if to is not None:
-        made = write_campaign(made, to, overwrite=overwrite)
+        made = made.save(to, overwrite=overwrite)
     return Simulation(made, asked, loaded.name, provenance(files, seed=asked.seed))
 
 

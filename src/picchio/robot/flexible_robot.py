@@ -232,10 +232,8 @@ class FlexibleRobot:
         Raises:
             InputError: no such frame.
         """
-        if frame in self.tree.links:
-            return frame
-        if frame in self.tree.joints:
-            return self.tree.joints[frame].child
+        if (link := self.tree.link_of(frame)) is not None:
+            return link
         raise InputError("no such frame", key="frame", value=frame, choices=self.tree.links)
 
     def frame_placement(self, pose: ArrayLike, frame: str) -> tuple[Array, Array]:
@@ -260,10 +258,8 @@ class FlexibleRobot:
         Raises:
             InputError: no such frame; as `pose`.
         """
-        full = self.pose(pose)
-        return self.rigid.jacobian(full, self.rigid.frame(self.link_of(frame)))[
-            :, self.flexible_index
-        ]
+        full = self.rigid.jacobian(self.pose(pose), self.rigid.frame(self.link_of(frame)))
+        return full[:, self.flexible_index]
 
     def all_branches(
         self, point: ArrayLike, *, axis: ArrayLike | None = None, seed: int = 0

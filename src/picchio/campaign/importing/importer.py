@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from picchio.campaign.campaign import Campaign, load_campaign, write_campaign
+from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.channels import TIME, parse_channel
 from picchio.campaign.importing import read_csv, read_matlab, read_mcap, read_uff
 from picchio.campaign.importing.mapping import ChannelTable, Mapping, read_mapping
@@ -221,7 +221,7 @@ def import_record(
     extra = {"mapping.toml": rules.read_bytes()}
     if append:
         new, extra = _appended(new, Path(to), extra["mapping.toml"])
-    made = write_campaign(_noted(new, origin), to, overwrite=append, extra_files=extra)
+    made = _noted(new, origin).save(to, overwrite=append, extra_files=extra)
     return ImportedRecord(made, origin)
 
 

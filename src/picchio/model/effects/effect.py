@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from abc import ABC
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from picchio.core.arrays import FloatArray
     from picchio.model.blows import Blows
     from picchio.model.effects.evidence import Evidence
-    from picchio.model.effects.latent import Latent
     from picchio.model.effects.scales import Scales
     from picchio.model.motion import Motion
     from picchio.model.plant import Changes
@@ -41,7 +40,7 @@ class Parameter:
 
     Attributes:
         name: as in JSON.
-        unit: SI.
+        unit: SI; "1" for a pure number.
         neutral: the value at which nothing changes (may be infinite).
         lower: smallest value allowed.
         upper: largest.
@@ -50,12 +49,53 @@ class Parameter:
     """
 
     name: str
-    unit: str
-    neutral: float
+    unit: str = "1"
+    _: KW_ONLY
+    neutral: float = 0.0
     lower: float = -math.inf
     upper: float = math.inf
     logarithmic: bool = False
     meaning: str = ""
+
+
+@dataclass(frozen=True)
+class Latent:
+    """Numbers that an effect draws anew in every record (`Effect.hidden`).
+
+    A fit moves them together with what all records share, by differences; where the numbers
+    have a structure that makes more possible, it is declared here.
+
+    Attributes:
+        what: the numbers, for people.
+        spread: the effect's parameter that says how large they are; it follows from them.
+        step: by which a number is moved to see what it changes.
+        lower, upper: bounds of a number.
+        count: how many a record has; None: one for each blow, that of the first being 0.
+        whole: a number is 0 or 1.
+        times: the numbers are by how many s blows come late, at most half an interval: blows are
+            looked for one after the other.
+        linear: readings change in proportion to the numbers: they are solved for in the
+            residual (`Effect.take_out`), not fitted.
+    """
+
+    what: str
+    spread: str
+    step: float = 1e-3
+    lower: float = -1e6
+    upper: float = 1e6
+    count: int | None = None
+    whole: bool = False
+    times: bool = False
+    linear: bool = False
+
+    @property
+    def first(self) -> int:
+        """The index of the first number that is free."""
+        return 1 if self.count is None else 0
+
+    def size(self, hits: int) -> int:
+        """How many numbers a record of so many blows has."""
+        return hits if self.count is None else self.count
 
 
 class Effect(ABC):
@@ -394,30 +434,6 @@ class Effect(ABC):
 CHANNEL_UNIT = "channel"
 
 
-def parameter(
-    name: str,
-    unit: str = "1",
-    *,
-    neutral: float = 0.0,
-    lower: float = -math.inf,
-    upper: float = math.inf,
-    log: bool = False,
-    meaning: str = "",
-) -> Parameter:
-    """A parameter, in few words.
-
-    Args:
-        name: as in a model file.
-        unit: SI, in words that pint reads; empty for a ratio.
-        neutral: the value without effect.
-        lower: least value, or None.
-        upper: largest value, or None.
-        log: search its logarithm.
-        meaning: one line for people.
-    """
-    return Parameter(name, unit, neutral, lower, upper, log, meaning)
-
-
 def factor(name: str, lower: float, upper: float, meaning: str) -> Parameter:
     """A parameter that multiplies what is stated: 1 changes nothing, and steps are ratios.
 
@@ -427,4 +443,4 @@ def factor(name: str, lower: float, upper: float, meaning: str) -> Parameter:
         upper: largest.
         meaning: one line.
     """
-    return parameter(name, neutral=1.0, lower=lower, upper=upper, log=True, meaning=meaning)
+    return Parameter(name, neutral=1.0, lower=lower, upper=upper, logarithmic=True, meaning=meaning)

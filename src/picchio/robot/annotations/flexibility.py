@@ -130,20 +130,13 @@ def _joint(urdf: UrdfJoint, values: dict[str, Any], where: dict[str, str], tree:
                 raise InputError(f"a prismatic joint has no torsion {key}; its spring is in N/m "
                                  "and its load a force", key=f"joint.{urdf.name}.{key}",
                                  file=where[key])  # fmt: skip
-    curve = values.get("stiffness_curve")
+    if "stiffness_curve" in values:
+        values["stiffness"] = values["stiffness_curve"].k1
     return Joint(
         name=urdf.name,
         kind=kind,
-        stiffness=curve.k1 if curve else values["stiffness"],
-        damping_ratio=values.get("damping_ratio", DEFAULT_DAMPING_RATIO),
-        shaft=values.get("shaft"),
-        reducer=values.get("reducer"),
         effort_limit=urdf.effort if urdf.effort > 0 else float("inf"),
         lower=urdf.lower,
         upper=urdf.upper,
-        rotor_inertia=values.get("rotor_inertia"),
-        gear_ratio=values.get("gear_ratio"),
-        stiffness_curve=curve,
-        balancer=values.get("balancer"),
-        estimated=values.get("estimated", False),
+        **{"damping_ratio": DEFAULT_DAMPING_RATIO, **values},
     )

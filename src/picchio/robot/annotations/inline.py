@@ -53,88 +53,90 @@ def read_annotations(root: etree._Element, path: Path) -> Sidecar | None:
         InputError: the prefix bound to something else, an unknown element or attribute, an
             element in the wrong place, a value that cannot be.
     """
-    _check_prefix(root, path)
+    try:
+        found = _read(root)
+    except InputError as error:
+        raise error.placed(file=path) from None
+    if found == {"joint": {}}:
+        return None
+    return validate({"format": FORMAT, **found}, Sidecar, format=FORMAT, file=path)
+
+
+def _read(root: etree._Element) -> dict[str, Any]:
+    """The annotations as a sidecar has them."""
+    _check_prefix(root)
     found: dict[str, Any] = {"joint": {}}
     for element in root.iter(f"{{{NAMESPACE}}}*"):
         parent = element.getparent()
         name = local_name(element)
         # Not the <joint> of a <transmission>, which only refers to one.
         if parent is not None and parent.tag == "joint" and parent.getparent() is root:
-            _read_in_joint(element, found["joint"].setdefault(parent.get("name"), {}), path)
+            joint = parent.get("name")
+            _read_in_joint(element, parent, found["joint"].setdefault(joint, {}), f"joint {joint}")
         elif parent is root and name in IN_ROBOT:
             if name in found:
-                raise InputError(f"<picchio:{name}> occurs twice", file=path)
-            found[name] = _attributes(element, IN_ROBOT[name], path, f"picchio:{name}")
+                raise InputError(f"<picchio:{name}> occurs twice")
+            found[name] = _attributes(element, IN_ROBOT[name], f"picchio:{name}")
         else:
-            _refuse(element, path)
-    if found == {"joint": {}}:
-        return None
-    return validate({"format": FORMAT, **found}, Sidecar, format=FORMAT, file=path)
+            _refuse(element)
+    return found
 
 
-def _check_prefix(root: etree._Element, path: Path) -> None:
+def _check_prefix(root: etree._Element) -> None:
     for element in root.iter(etree.Element):
         for prefix, address in element.nsmap.items():
             mine = str(address).startswith("urn:picchio")
             if (prefix == "picchio" or mine) and address != NAMESPACE:
-                raise InputError(
-                    "the picchio prefix is bound to an unknown namespace",
-                    file=path,
-                    key=f"xmlns:{prefix}",
-                    value=address,
-                    choices=[NAMESPACE],
-                )
+                raise InputError("the picchio prefix is bound to an unknown namespace",
+                                 key=f"xmlns:{prefix}", value=address,
+                                 choices=[NAMESPACE])  # fmt: skip
 
 
-def _read_in_joint(element: etree._Element, entry: dict[str, Any], path: Path) -> None:
+def _read_in_joint(
+    element: etree._Element, joint: etree._Element, entry: dict[str, Any], place: str
+) -> None:
     name = local_name(element)
     if name not in IN_JOINT:
-        _refuse(element, path)
-    parent = element.getparent()
-    place = f"joint {parent.get('name') if parent is not None else ''}"
+        _refuse(element)
     target, attributes = IN_JOINT[name]
-    values = _attributes(element, attributes, path, f"{place}: picchio:{name}")
-    if parent is not None and len(parent.findall(str(element.tag))) > 1:
-        raise InputError(f"<picchio:{name}> occurs twice", file=path, key=place)
+    values = _attributes(element, attributes, f"{place}: picchio:{name}")
+    if len(joint.findall(str(element.tag))) > 1:
+        raise InputError(f"<picchio:{name}> occurs twice", key=place)
     if target is None:
         entry.update(values)
     else:
         entry[target] = values
 
 
-def _attributes(
-    element: etree._Element, known: dict[str, Any], path: Path, key: str
-) -> dict[str, Any]:
+def _attributes(element: etree._Element, known: dict[str, Any], key: str) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for attribute, text in element.attrib.items():
         name = str(attribute)
         if name not in known:
-            raise InputError("unknown attribute", file=path, key=key, value=name, choices=known)
-        values[name] = _convert(str(text), known[name], path, f"{key} {name}")
+            raise InputError("unknown attribute", key=key, value=name, choices=known)
+        values[name] = _convert(str(text), known[name], f"{key} {name}")
     return values
 
 
-def _convert(text: str, kind: Any, path: Path, key: str) -> Any:
+def _convert(text: str, kind: Any, key: str) -> Any:
     if kind is str:
         return text
     if kind is bool:
         if text not in ("true", "false"):
-            raise InputError("is neither true nor false", file=path, key=key, value=text)
+            raise InputError("is neither true nor false", key=key, value=text)
         return text == "true"
     try:
         return to_number(text) if kind is float else [to_number(part) for part in text.split()]
     except ValueError as error:
-        raise InputError(str(error), file=path, key=key, value=text) from None
+        raise InputError(str(error), key=key, value=text) from None
 
 
-def _refuse(element: etree._Element, path: Path) -> None:
+def _refuse(element: etree._Element) -> None:
     name = local_name(element)
     line = f"line {element.sourceline}"
     if name in IN_JOINT:
-        raise InputError(
-            f"<picchio:{name}> belongs directly in a <joint> of <robot> ({line})", file=path
-        )
+        raise InputError(f"<picchio:{name}> belongs directly in a <joint> of <robot> ({line})")
     if name in IN_ROBOT:
-        raise InputError(f"<picchio:{name}> belongs directly in <robot> ({line})", file=path)
-    raise InputError(f"unknown picchio element ({line})", file=path, value=name,
+        raise InputError(f"<picchio:{name}> belongs directly in <robot> ({line})")
+    raise InputError(f"unknown picchio element ({line})", value=name,
                      choices=[*IN_JOINT, *IN_ROBOT])  # fmt: skip

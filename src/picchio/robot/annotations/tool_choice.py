@@ -9,8 +9,8 @@ import numpy as np
 
 from picchio.core.errors import InputError
 from picchio.robot.annotations.flexibility import Source
+from picchio.robot.annotations.other_tags import Srdf
 from picchio.robot.annotations.sidecar import given
-from picchio.robot.annotations.srdf import Srdf
 from picchio.robot.tool import Gun, Mounting, Tool
 from picchio.robot.urdf.tree import UrdfTree
 
@@ -55,10 +55,8 @@ def _strongest(sources: Sequence[Source], table: str) -> tuple[dict[str, Any], d
 
 
 def _link(tree: UrdfTree, frame: str, file: str | None, key: str) -> str:
-    if frame in tree.links:
-        return frame
-    if frame in tree.joints:
-        return tree.joints[frame].child
+    if (link := tree.link_of(frame)) is not None:
+        return link
     raise InputError("the robot has no frame of this name", file=file, key=key, value=frame,
                      choices=dict.fromkeys([*tree.leaves(), *tree.links]))  # fmt: skip
 

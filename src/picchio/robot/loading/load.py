@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,9 +13,8 @@ from picchio.core.errors import InputError, PicchioWarning
 from picchio.core.toml import validate
 from picchio.robot.annotations.flexibility import Source, flexible_joints
 from picchio.robot.annotations.inline import read_annotations
-from picchio.robot.annotations.other_tags import read_drake
+from picchio.robot.annotations.other_tags import Srdf, find_srdf, read_drake
 from picchio.robot.annotations.sidecar import FORMAT, Sidecar, read_sidecar
-from picchio.robot.annotations.srdf import Srdf, find_srdf
 from picchio.robot.annotations.tool_choice import choose_gun, choose_mounting, choose_tool
 from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -70,11 +69,11 @@ def load_robot(
     sources, flex_file = _sources(root, found, flex, values, srdf)
     joints, origins = flexible_joints(tree, sources)
     _check_balancers(sources, joints)
-    _warn_of_damping(joints, origins)
+    for remark in _remarks(tree, joints, origins):
+        warnings.warn(remark, PicchioWarning, stacklevel=2)
     chosen_tool, tool_origins = choose_tool(tree, tool, sources, srdf)
     gun, gun_origins = choose_gun(sources)
     mounting, base_origins = choose_mounting(sources)
-    _warn(tree)
     urdf = normalise(tree, chosen_tool, gun, mounting)
     rigid = RigidModel(urdf.text, tree, mounting.gravity)
     if gun is not None and gun.recoil_stiffness is not None and urdf.recoil_joint is not None:
@@ -100,7 +99,10 @@ def load_robot(
         mounting=mounting,
         flexible_joints=tuple(joints[name] for name in rigid.joint_names if name in joints),
         origin_of={**origins, **tool_origins, **gun_origins, **base_origins},
-        named_poses=_named_poses(srdf, rigid.joint_names),
+        named_poses={
+            pose: tuple(values.get(name, 0.0) for name in rigid.joint_names)
+            for pose, values in (srdf.poses if srdf else {}).items()
+        },
         rigid=rigid,
         tool_point=urdf.tool_point,
     )
@@ -166,25 +168,20 @@ def _check_owner(sidecar: Sidecar, file: Path, found: FoundRobot, name: str) -> 
         )
 
 
-def _warn(tree: UrdfTree) -> None:
-    remarks = list(tree.remarks)
+def _remarks(
+    tree: UrdfTree, joints: Mapping[str, Joint], origins: Mapping[str, str]
+) -> Iterator[str]:
+    """What the user should know of how the robot was read."""
+    for remark in tree.remarks:
+        yield f"{tree.path}: {remark}"
     if tree.locked():
-        remarks.append(
-            "joints of several degrees of freedom are held fixed: " + ", ".join(tree.locked())
-        )
-    for remark in remarks:
-        warnings.warn(f"{tree.path}: {remark}", PicchioWarning, stacklevel=3)
-
-
-def _warn_of_damping(joints: Mapping[str, Joint], origins: Mapping[str, str]) -> None:
+        held = ", ".join(tree.locked())
+        yield f"{tree.path}: joints of several degrees of freedom are held fixed: {held}"
     for name, joint in joints.items():
         if joint.damping_ratio > 1:
-            origin = origins[f"{name}.damping_ratio"]
-            warnings.warn(
+            yield (
                 f"joint {name!r}: damping_ratio {joint.damping_ratio:g} is above 1 "
-                f"(overdamped), which is unusual; from {origin}",
-                PicchioWarning,
-                stacklevel=3,
+                f"(overdamped), which is unusual; from {origins[f'{name}.damping_ratio']}"
             )
 
 
@@ -195,11 +192,3 @@ def _check_balancers(sources: list[Source], joints: Mapping[str, Joint]) -> None
                 raise InputError("a balancer on a rigid joint has no effect",
                                  key=f"joint.{name}.balancer",
                                  hint="give the joint a stiffness")  # fmt: skip
-
-
-def _named_poses(srdf: Srdf | None, names: tuple[str, ...]) -> dict[str, tuple[float, ...]]:
-    if srdf is None:
-        return {}
-    return {
-        pose: tuple(values.get(name, 0.0) for name in names) for pose, values in srdf.poses.items()
-    }

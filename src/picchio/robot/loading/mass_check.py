@@ -48,12 +48,9 @@ def _check_carried(robot: FlexibleRobot, joint: str) -> None:
     # Mass without weight is written by some exporters: inertia alone does for a rotation.
     if any(body is not None and any(body.inertia) for body in bodies):
         return
-    raise InputError(
-        f"joint {joint!r} is flexible but carries no mass",
-        file=robot.source,
-        key=f"link {links[0]}",
-        hint="give the link an <inertial>, give [tool] a mass, or leave the joint rigid",
-    )
+    raise InputError(f"joint {joint!r} is flexible but carries no mass", file=robot.source,
+                     key=f"link {links[0]}", hint="give the link an <inertial>, give [tool] a "
+                     "mass, or leave the joint rigid")  # fmt: skip
 
 
 def _check_mass_matrix(robot: FlexibleRobot) -> None:

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from picchio.core.errors import InputError
+from picchio.core.files import relative_name
 from picchio.core.toml import Finite, StrictModel, parse_toml, read_toml
 
 FORMAT = "picchio-model/1"
@@ -124,8 +125,4 @@ def saved_model_text(
 
 
 def _relative(name: str, folder: Path | None) -> str:
-    path = Path(name)
-    if not path.exists():
-        return name
-    base = (folder or Path()).resolve()
-    return Path(os.path.relpath(path.resolve(), base)).as_posix()
+    return relative_name(name, folder or Path()) if Path(name).exists() else name

@@ -94,6 +94,12 @@ class UrdfTree:
         parents = {joint.parent for joint in self.joints.values()}
         return [name for name in self.links if name not in parents]
 
+    def link_of(self, frame: str) -> str | None:
+        """The link whose frame this is: a link's name, or a joint's for the link it carries."""
+        if frame in self.links:
+            return frame
+        return self.joints[frame].child if frame in self.joints else None
+
     def chain(self, link: str) -> list[UrdfJoint]:
         """The joints from the root to a link, in that order.
 

@@ -59,7 +59,7 @@ def parse_urdf(content: bytes, path: Path) -> etree._Element:
             raise InputError("is a TOML file, not a URDF", file=path,
                              hint="a sidecar belongs to --flex, a task to --task"
                              ) from None  # fmt: skip
-        raise InputError(_reason(error), file=path, hint=_hint(error)) from None
+        raise _told(error, path) from None
     except (ValueError, LookupError) as error:
         raise InputError(f"is not readable as XML: {error}", file=path) from None
     if root.getroottree().docinfo.doctype:
@@ -78,19 +78,14 @@ def _is_toml(content: bytes, path: Path) -> bool:
         return False
 
 
-def _reason(error: etree.XMLSyntaxError) -> str:
+def _told(error: etree.XMLSyntaxError, path: Path) -> InputError:
     text = str(error.msg).replace(f"{error.filename}, ", "")
-    if "Namespace prefix" in text:
-        return f"uses an XML prefix that is not declared: {text}"
-    return f"is not valid XML: {text}"
-
-
-def _hint(error: etree.XMLSyntaxError) -> str | None:
-    if "Namespace prefix picchio" in str(error.msg):
-        return f'write <robot name="..." xmlns:picchio="{NAMESPACE}">'
-    if "Namespace prefix" in str(error.msg):
-        return 'declare it: <robot name="..." xmlns:PREFIX="...">'
-    return None
+    if "Namespace prefix" not in text:
+        return InputError(f"is not valid XML: {text}", file=path)
+    hint = 'declare it: <robot name="..." xmlns:PREFIX="...">'
+    if "Namespace prefix picchio" in text:
+        hint = f'write <robot name="..." xmlns:picchio="{NAMESPACE}">'
+    return InputError(f"uses an XML prefix that is not declared: {text}", file=path, hint=hint)
 
 
 def local_name(element: etree._Element) -> str:

@@ -22,8 +22,7 @@ from picchio.diagnosis.percussion.fit.least_squares import (
 )
 from picchio.diagnosis.percussion.fit.slopes import jacobian
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.model.effects.effect import Effect
-from picchio.model.effects.latent import Latent
+from picchio.model.effects.effect import Effect, Latent
 
 # What numbers that are drawn anew in every record cost: they come from one distribution.
 

@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 
 
 class ForceDirection(Effect):
@@ -17,7 +17,7 @@ class ForceDirection(Effect):
     where = "blows"
     target_kind = "tool"
     parameters = tuple(
-        parameter(f"r{axis}", "rad", lower=-1.6, upper=1.6, meaning=f"about the tool's {axis}")
+        Parameter(f"r{axis}", "rad", lower=-1.6, upper=1.6, meaning=f"about the tool's {axis}")
         for axis in "xyz"
     )
     meaning = "the tool does not hit along the stated direction"

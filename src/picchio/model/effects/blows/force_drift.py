@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 
 
 class ForceDrift(Effect):
@@ -17,7 +17,7 @@ class ForceDrift(Effect):
     where = "blows"
     target_kind = "tool"
     parameters = (
-        parameter("per_hit", lower=-0.5, upper=0.5, meaning="relative change from blow to blow"),
+        Parameter("per_hit", lower=-0.5, upper=0.5, meaning="relative change from blow to blow"),
     )
     meaning = "the blows fade or build up within a burst (air supply, heating)"
     refused: ClassVar[Mapping[str, str]] = {

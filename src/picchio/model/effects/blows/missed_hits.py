@@ -7,8 +7,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.latent import Latent
+from picchio.model.effects.effect import Effect, Latent, Parameter
 
 
 class MissedHits(Effect):
@@ -17,7 +16,7 @@ class MissedHits(Effect):
     name = "missed_hits"
     where = "blows"
     target_kind = "tool"
-    parameters = (parameter("fraction", lower=0.0, upper=1.0, meaning="of the blows, missing"),)
+    parameters = (Parameter("fraction", lower=0.0, upper=1.0, meaning="of the blows, missing"),)
     meaning = "the tool misfires now and then"
     latent = Latent(
         "1 for each blow that is missing", spread="fraction", step=0.2, lower=0.0, upper=1.0,

@@ -7,8 +7,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
-from picchio.model.effects.latent import Latent
+from picchio.model.effects.effect import Effect, Latent, Parameter
 
 
 class PulseJitter(Effect):
@@ -20,7 +19,7 @@ class PulseJitter(Effect):
     name = "pulse_jitter"
     where = "blows"
     target_kind = "tool"
-    parameters = (parameter("std", "s", lower=0.0, upper=1.0, meaning="spread of the times"),)
+    parameters = (Parameter("std", "s", lower=0.0, upper=1.0, meaning="spread of the times"),)
     meaning = "the blows come irregularly"
     latent = Latent("shift of each blow, s", spread="std", step=2e-4, times=True)
     takes = "bursts"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from picchio.core.errors import InputError
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.evidence import LACKING
 
 
@@ -20,7 +20,7 @@ class PulseShape(Effect):
     where = "blows"
     target_kind = "tool"
     parameters = (
-        parameter("blend", lower=-0.2, upper=1.2, meaning="0 as programmed, 1 the other shape"),
+        Parameter("blend", lower=-0.2, upper=1.2, meaning="0 as programmed, 1 the other shape"),
     )
     meaning = "the blows have another shape than programmed"
     takes = "reshaped"

@@ -6,7 +6,7 @@ import numpy as np
 
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 
 
@@ -17,8 +17,8 @@ class Rebound(Effect):
     where = "blows"
     target_kind = "tool"
     parameters = (
-        parameter("ratio", lower=-2.0, upper=2.0, meaning="height over the blow's"),
-        parameter("delay", "s", neutral=0.01, lower=1e-4, upper=1.0, log=True,
+        Parameter("ratio", lower=-2.0, upper=2.0, meaning="height over the blow's"),
+        Parameter("delay", "s", neutral=0.01, lower=1e-4, upper=1.0, logarithmic=True,
                   meaning="from start to start"),
     )  # fmt: skip
     meaning = "the tool bounces and hits again"

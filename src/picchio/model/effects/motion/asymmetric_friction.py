@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.motion import Motion
 
 
@@ -15,9 +15,9 @@ class AsymmetricFriction(Effect):
     where = "motion"
     target_kind = "joint"
     parameters = (
-        parameter("torque", "N*m", lower=-1e6, upper=1e6,
+        Parameter("torque", "N*m", lower=-1e6, upper=1e6,
                   meaning="dry: half of (forwards less backwards)"),
-        parameter("coefficient", "N*m*s/rad", lower=-1e7, upper=1e7,
+        Parameter("coefficient", "N*m*s/rad", lower=-1e7, upper=1e7,
                   meaning="viscous: half of (forwards less backwards)"),
     )  # fmt: skip
     linear = ("torque", "coefficient")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.motion import Motion
 
 
@@ -17,7 +17,7 @@ class EncoderDelay(Effect):
     name = "encoder_delay"
     where = "motion"
     target_kind = "channel group"
-    parameters = (parameter("delay", "s", lower=0.0, upper=0.2, meaning="late by this"),)
+    parameters = (Parameter("delay", "s", lower=0.0, upper=0.2, meaning="late by this"),)
     meaning = "readings arrive late: sampling, filtering or the bus takes its time"
     told_by = "slowly under load, then fast: a delay grows with speed, a spring does not"
     late = True

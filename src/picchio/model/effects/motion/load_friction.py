@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.motion import Motion
 
 
@@ -15,7 +15,7 @@ class LoadFriction(Effect):
     where = "motion"
     target_kind = "joint"
     parameters = (
-        parameter("coefficient", lower=0.0, upper=1.0, meaning="friction over transmitted torque"),
+        Parameter("coefficient", lower=0.0, upper=1.0, meaning="friction over transmitted torque"),
     )
     linear = ("coefficient",)
     meaning = "teeth and bearings rub more under load: the gear's efficiency"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.motion import Motion
 
 
@@ -15,8 +15,8 @@ class StribeckFriction(Effect):
     where = "motion"
     target_kind = "joint"
     parameters = (
-        parameter("torque", "N*m", lower=0.0, upper=1e6, meaning="what is added near standstill"),
-        parameter("velocity", "rad/s", neutral=0.01, lower=1e-7, upper=1e3, log=True,
+        Parameter("torque", "N*m", lower=0.0, upper=1e6, meaning="what is added near standstill"),
+        Parameter("velocity", "rad/s", neutral=0.01, lower=1e-7, upper=1e3, logarithmic=True,
                   meaning="where it has fallen to 37 %"),
     )  # fmt: skip
     linear = ("torque",)

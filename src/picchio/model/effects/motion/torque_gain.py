@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.motion import Motion
 
 
@@ -13,7 +13,7 @@ class TorqueGain(Effect):
     where = "motion"
     target_kind = "joint"
     parameters = (
-        parameter("gain", neutral=1.0, lower=0.5, upper=2.0, meaning="reported over true"),
+        Parameter("gain", neutral=1.0, lower=0.5, upper=2.0, meaning="reported over true"),
     )
     meaning = "the constant from current to torque is wrong"
     told_by = "once with a known mass at the tool and once without"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.motion import Motion
 
 
@@ -14,7 +14,7 @@ class TorqueOffset(Effect):
     name = "torque_offset"
     where = "motion"
     target_kind = "joint"
-    parameters = (parameter("torque", "N*m", lower=-1e6, upper=1e6, meaning="added"),)
+    parameters = (Parameter("torque", "N*m", lower=-1e6, upper=1e6, meaning="added"),)
     linear = ("torque",)
     meaning = "the current sensor's zero is off, or a constant load pulls at the joint"
     usual = 8

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.motion import Motion
 
 
@@ -18,9 +18,9 @@ class TorqueRipple(Effect):
     where = "motion"
     target_kind = "joint"
     parameters = (
-        parameter("order", "1", neutral=1.0, lower=1e-3, upper=1e6, meaning="cycles a motor turn"),
-        parameter("cosine", "N*m", lower=-1e6, upper=1e6, meaning="amplitude at angle zero"),
-        parameter("sine", "N*m", lower=-1e6, upper=1e6, meaning="a quarter period later"),
+        Parameter("order", "1", neutral=1.0, lower=1e-3, upper=1e6, meaning="cycles a motor turn"),
+        Parameter("cosine", "N*m", lower=-1e6, upper=1e6, meaning="amplitude at angle zero"),
+        Parameter("sine", "N*m", lower=-1e6, upper=1e6, meaning="a quarter period later"),
     )
     linear = ("cosine", "sine")
     meaning = "magnets, slots, bearings or the wave generator pulse once or several times a turn"

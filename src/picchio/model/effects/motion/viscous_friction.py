@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.motion import Motion
 
 
@@ -16,7 +16,7 @@ class ViscousFriction(Effect):
     where = "motion"
     target_kind = "joint"
     parameters = (
-        parameter("coefficient", "N*m*s/rad", lower=0.0, upper=1e7, meaning="torque over velocity"),
+        Parameter("coefficient", "N*m*s/rad", lower=0.0, upper=1e7, meaning="torque over velocity"),
     )
     linear = ("coefficient",)
     meaning = "lubricant and seals resist in proportion to the speed"

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.motion import Motion
 from picchio.model.plant import Changes
@@ -19,7 +19,7 @@ class Backlash(Effect):
     name = "backlash"
     where = "nonlinear"
     target_kind = "joint"
-    parameters = (parameter("gap", "rad", lower=0.0, upper=0.2, meaning="full width of the play"),)
+    parameters = (Parameter("gap", "rad", lower=0.0, upper=0.2, meaning="full width of the play"),)
     meaning = "the gear has play: no torque within the gap"
     told_by = "slowly under load, then fast: a delay grows with speed, a spring does not"
     elastic = True

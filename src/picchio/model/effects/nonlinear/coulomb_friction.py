@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.motion import Motion
 from picchio.model.plant import Changes
@@ -19,10 +19,10 @@ class CoulombFriction(Effect):
     where = "nonlinear"
     target_kind = "joint"
     parameters = (
-        parameter(
+        Parameter(
             "torque", "N*m", lower=0.0, upper=1e6, meaning="friction (N for a prismatic joint)"
         ),
-        parameter("smoothing", "rad/s", lower=0.0, upper=5e-3, meaning="rate below which it fades"),
+        Parameter("smoothing", "rad/s", lower=0.0, upper=5e-3, meaning="rate below which it fades"),
     )
     linear = ("torque",)
     meaning = "dry friction between link and motor side"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Changes
 from picchio.model.system import ElementKind
@@ -15,7 +15,7 @@ class Hardening(Effect):
     where = "nonlinear"
     target_kind = "joint"
     parameters = (
-        parameter(
+        Parameter(
             "cubic", "N*m/rad^3", lower=-1e16, upper=1e16, meaning="torque over deflection cubed"
         ),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Changes
 from picchio.model.system import ElementKind
@@ -15,8 +15,8 @@ class Hysteresis(Effect):
     where = "nonlinear"
     target_kind = "joint"
     parameters = (
-        parameter("torque", "N*m", lower=0.0, upper=1e6, meaning="at saturation"),
-        parameter("deflection", "rad", neutral=1e-3, lower=1e-7, upper=0.1, log=True,
+        Parameter("torque", "N*m", lower=0.0, upper=1e6, meaning="at saturation"),
+        Parameter("deflection", "rad", neutral=1e-3, lower=1e-7, upper=0.1, logarithmic=True,
                   meaning="at which it yields"),
     )  # fmt: skip
     meaning = "gear and seals slip a little before they turn"

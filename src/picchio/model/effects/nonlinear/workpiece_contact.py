@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Changes
 
@@ -14,9 +14,9 @@ class WorkpieceContact(Effect):
     where = "nonlinear"
     target_kind = "tool"
     parameters = (
-        parameter("stiffness", "N/m", lower=0.0, upper=1e9, meaning="of workpiece and tip"),
-        parameter("preload", "N", neutral=0.0, lower=0.0, upper=1e6, meaning="at rest"),
-        parameter("damping", "N*s/m", lower=0.0, upper=1e6, meaning="of workpiece and tip"),
+        Parameter("stiffness", "N/m", lower=0.0, upper=1e9, meaning="of workpiece and tip"),
+        Parameter("preload", "N", neutral=0.0, lower=0.0, upper=1e6, meaning="at rest"),
+        Parameter("damping", "N*s/m", lower=0.0, upper=1e6, meaning="of workpiece and tip"),
     )
     meaning = "the workpiece holds the tool as long as it touches"
     mark = "plate"

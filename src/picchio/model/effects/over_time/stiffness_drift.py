@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Changes
 
@@ -15,7 +15,7 @@ class StiffnessDrift(Effect):
     where = "over-time"
     target_kind = "joint"
     parameters = (
-        parameter("per_day", "1/day", lower=-10.0, upper=10.0, meaning="relative change a day"),
+        Parameter("per_day", "1/day", lower=-10.0, upper=10.0, meaning="relative change a day"),
     )
     meaning = "the joint wears or loosens while the campaign lasts"
     mark = "spring"

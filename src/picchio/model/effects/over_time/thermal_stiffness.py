@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Changes
 
@@ -15,7 +15,7 @@ class ThermalStiffness(Effect):
     where = "over-time"
     target_kind = "joint"
     parameters = (
-        parameter("per_kelvin", "1/K", lower=-1.0, upper=1.0, meaning="relative change a kelvin"),
+        Parameter("per_kelvin", "1/K", lower=-1.0, upper=1.0, meaning="relative change a kelvin"),
     )
     meaning = "the joint softens (or stiffens) when warm"
     mark = "spring"

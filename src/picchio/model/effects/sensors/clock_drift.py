@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.sensing import Sensors
 
 
@@ -13,7 +13,7 @@ class ClockDrift(Effect):
     name = "clock_drift"
     where = "sensor"
     target_kind = "channel group"
-    parameters = (parameter("rate", lower=-0.2, upper=0.2, meaning="relative error of the clock"),)
+    parameters = (Parameter("rate", lower=-0.2, upper=0.2, meaning="relative error of the clock"),)
     meaning = "the channel's clock runs fast or slow"
     # By little and by more: the phase error grows within a record.
     tried = tuple({"rate": r} for r in (-0.006, -0.002, 0.002, 0.006))

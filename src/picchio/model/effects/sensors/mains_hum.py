@@ -6,8 +6,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import CHANNEL_UNIT, Effect, parameter
-from picchio.model.effects.latent import Latent
+from picchio.model.effects.effect import CHANNEL_UNIT, Effect, Latent, Parameter
 from picchio.model.sensing import Sensors
 
 
@@ -21,10 +20,10 @@ class MainsHum(Effect):
     where = "sensor"
     target_kind = "channel group"
     parameters = (
-        parameter(
+        Parameter(
             "amplitude", CHANNEL_UNIT, lower=0.0, upper=1e12, meaning="in the channel's unit"
         ),
-        parameter("frequency", "Hz", neutral=50.0, lower=40.0, upper=70.0, meaning="of the mains"),
+        Parameter("frequency", "Hz", neutral=50.0, lower=40.0, upper=70.0, meaning="of the mains"),
     )
     meaning = "the mains leak into the cable"
     latent = Latent(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.sensing import Sensors
 
 # Hz: a tool's bracket is soft, wax and a stud are stiffer.
@@ -22,9 +22,9 @@ class MountResonance(Effect):
     target_kind = "channel group"
     among = ("accelerations",)
     parameters = (
-        parameter("frequency", "Hz", neutral=math.inf, lower=1.0, upper=1e5, log=True,
+        Parameter("frequency", "Hz", neutral=math.inf, lower=1.0, upper=1e5, logarithmic=True,
                   meaning="of the mount"),
-        parameter("damping_ratio", neutral=0.05, lower=1e-3, upper=_MOST, log=True,
+        Parameter("damping_ratio", neutral=0.05, lower=1e-3, upper=_MOST, logarithmic=True,
                   meaning="of the mount"),
     )  # fmt: skip
     meaning = "the sensor swings on its magnet, wax or bracket"

@@ -7,7 +7,7 @@ from itertools import permutations, product
 import numpy as np
 
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.sensing import Sensors
 
 CHOICES = tuple(
@@ -23,7 +23,7 @@ class SensorAxes(Effect):
     target_kind = "channel group"
     among = ("vectors",)
     parameters = (
-        parameter("code", lower=0, upper=47, meaning="which of the 48 signed permutations"),
+        Parameter("code", lower=0, upper=47, meaning="which of the 48 signed permutations"),
     )
     meaning = "cables are swapped or a sensor is mounted the wrong way round"
     discrete = True

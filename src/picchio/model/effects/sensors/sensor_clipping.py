@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import CHANNEL_UNIT, Effect, parameter
+from picchio.model.effects.effect import CHANNEL_UNIT, Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
@@ -15,13 +15,13 @@ class SensorClipping(Effect):
     where = "sensor"
     target_kind = "channel group"
     parameters = (
-        parameter(
+        Parameter(
             "limit",
             CHANNEL_UNIT,
             neutral=float("inf"),
             lower=1e-12,
             upper=1e12,
-            log=True,
+            logarithmic=True,
             meaning="largest reading",
         ),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.sensing import Sensors
 
@@ -15,7 +15,7 @@ class SensorDelay(Effect):
     where = "sensor"
     target_kind = "channel group"
     among = ("groups", "forces")
-    parameters = (parameter("delay", "s", lower=-0.1, upper=0.1, meaning="late by"),)
+    parameters = (Parameter("delay", "s", lower=-0.1, upper=0.1, meaning="late by"),)
     meaning = "the channel is late against the others"
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.sensing import Sensors
 
 
@@ -13,7 +13,9 @@ class SensorHighpass(Effect):
     name = "sensor_highpass"
     where = "sensor"
     target_kind = "channel group"
-    parameters = (parameter("frequency", "Hz", lower=1e-4, upper=1e4, log=True, meaning="corner"),)
+    parameters = (
+        Parameter("frequency", "Hz", lower=1e-4, upper=1e4, logarithmic=True, meaning="corner"),
+    )
     meaning = "the sensor's electronics take out slow motion"
     tried = ({"frequency": 0.3}, {"frequency": 1.5})
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.sensing import Sensors
 
 
@@ -14,13 +14,13 @@ class SensorLowpass(Effect):
     where = "sensor"
     target_kind = "channel group"
     parameters = (
-        parameter(
+        Parameter(
             "frequency",
             "Hz",
             neutral=float("inf"),
             lower=0.1,
             upper=1e5,
-            log=True,
+            logarithmic=True,
             meaning="corner",
         ),
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from picchio.model.conditions import Conditions
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.sensing import Sensors
 
 
@@ -18,7 +18,7 @@ class SensorMisalignment(Effect):
     target_kind = "channel group"
     among = ("vectors",)
     parameters = tuple(
-        parameter(f"r{axis}", "rad", lower=-1.6, upper=1.6, meaning=f"about the frame's {axis}")
+        Parameter(f"r{axis}", "rad", lower=-1.6, upper=1.6, meaning=f"about the frame's {axis}")
         for axis in "xyz"
     )
     meaning = "the sensor is mounted a little askew"

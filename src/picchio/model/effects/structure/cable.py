@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.effects.structure.yielding import MODAL_SHARE
 from picchio.model.plant import Changes
@@ -15,8 +15,8 @@ class Cable(Effect):
     where = "structure"
     target_kind = "link"
     parameters = (
-        parameter("stiffness", "N/m", lower=0.0, upper=1e9, meaning="of the cable"),
-        parameter("damping", "N*s/m", lower=0.0, upper=1e6, meaning="of the cable"),
+        Parameter("stiffness", "N/m", lower=0.0, upper=1e9, meaning="of the cable"),
+        Parameter("damping", "N*s/m", lower=0.0, upper=1e6, meaning="of the cable"),
         MODAL_SHARE,
     )
     meaning = "a cable or hose holds the link"

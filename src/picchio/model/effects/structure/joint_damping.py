@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.plant import Changes
 
@@ -14,7 +14,7 @@ class JointDamping(Effect):
     where = "structure"
     target_kind = "joint"
     parameters = (
-        parameter(
+        Parameter(
             "damping", "N*m*s/rad", lower=-1e6, upper=1e6, meaning="added damping of the joint"
         ),
     )

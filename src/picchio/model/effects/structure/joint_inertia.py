@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.motion import Motion
 from picchio.model.plant import Changes
@@ -15,7 +15,7 @@ class JointInertia(Effect):
     where = "structure"
     target_kind = "joint"
     parameters = (
-        parameter(
+        Parameter(
             "inertia", "kg*m^2", lower=-1e4, upper=1e5, meaning="added inertia about the joint"
         ),
     )

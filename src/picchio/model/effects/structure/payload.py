@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.motion import Motion
 from picchio.model.plant import Changes
@@ -14,7 +14,7 @@ class Payload(Effect):
     name = "payload"
     where = "structure"
     target_kind = "tool"
-    parameters = (parameter("mass", "kg", lower=-500.0, upper=5000.0, meaning="added mass"),)
+    parameters = (Parameter("mass", "kg", lower=-500.0, upper=5000.0, meaning="added mass"),)
     meaning = "the tool is heavier (or lighter) than stated"
     sidecar = "mass"
     told_by = "once with a known mass at the tool and once without"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.effects.structure import yielding
 from picchio.model.plant import Changes
@@ -21,12 +21,11 @@ class ServoCompliance(Effect):
     target_kind = "joint"
     parameters = (
         yielding.stiffness("of the servo, after the gear", upper=1e12),
-        parameter(
-            "rotor_inertia", "kg*m^2", lower=1e-9, upper=1e5, log=True, meaning="after the gear"
-        ),
+        Parameter("rotor_inertia", "kg*m^2", lower=1e-9, upper=1e5, logarithmic=True,
+                  meaning="after the gear"),
         yielding.damping("of the servo, after the gear", upper=1e7),
         yielding.MODAL_SHARE,
-    )
+    )  # fmt: skip
     meaning = "the drive does not hold its side of the spring: servo or brake yields"
     mark = "spring"
     source = "Spong, J. Dyn. Sys. Meas. Control 109 (1987) 310, doi:10.1115/1.3143860"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import Effect, parameter
+from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.plant import Changes
 
 
@@ -13,7 +13,7 @@ class ToolOffset(Effect):
     where = "structure"
     target_kind = "tool"
     parameters = tuple(
-        parameter(axis, "m", lower=-2.0, upper=2.0, meaning=f"offset along the tool's {axis}")
+        Parameter(axis, "m", lower=-2.0, upper=2.0, meaning=f"offset along the tool's {axis}")
         for axis in "xyz"
     )
     meaning = "the tool's tip is not where the model has it"

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from picchio.model.effects.effect import Parameter, parameter
+from picchio.model.effects.effect import Parameter
 
 # See `Plant.modal_share`.
-MODAL_SHARE = parameter(
+MODAL_SHARE = Parameter(
     "modal_share",
     neutral=1.0,
     lower=0.0,
@@ -16,10 +16,12 @@ MODAL_SHARE = parameter(
 
 def stiffness(meaning: str, upper: float) -> Parameter:
     """Of what is rigid in the nominal model, N m/rad."""
-    return parameter("stiffness", "N*m/rad", neutral=float("inf"), lower=1e-3, upper=upper,
-                     log=True, meaning=meaning)  # fmt: skip
+    return Parameter("stiffness", "N*m/rad", neutral=float("inf"), lower=1e-3, upper=upper,
+                     logarithmic=True, meaning=meaning)  # fmt: skip
 
 
 def damping(meaning: str, upper: float) -> Parameter:
     """Beside such a stiffness, N m s/rad."""
-    return parameter("damping", "N*m*s/rad", lower=1e-9, upper=upper, log=True, meaning=meaning)
+    return Parameter(
+        "damping", "N*m*s/rad", lower=1e-9, upper=upper, logarithmic=True, meaning=meaning
+    )
