@@ -131,7 +131,7 @@ def shared_damping(
         whole = _by_modes(mass, stiffness, deflections, joints, ratios)
     if share == 1.0:
         return whole
-    alone = modal_damping_matrix(mass[:n, :n], joints, ratios)
+    alone = _by_modes(mass[:n, :n], np.diag(joints), np.eye(n), joints, ratios)
     return np.asarray(share * whole + (1.0 - share) * deflections.T @ alone @ deflections)
 
 

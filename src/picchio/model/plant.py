@@ -229,10 +229,10 @@ class Plant(Changes):
         if self.gravity_stiffness:
             gravity = among_all(inertia.gravity_gradient)
             curvature = among_all(inertia.gravity_curvature)
-        own = np.zeros(size)
         for name, value in self.added_inertias:
-            own[names.index(name)] += value
-        mass = self._with_own_inertia(mass + np.diag(own))
+            mass = mass.copy()
+            mass[names.index(name), names.index(name)] += value
+        mass = self._with_own_inertia(mass)
 
         joints = np.array(list(self.springs.values()))
         deflections = np.eye(len(joints), size)  # the joints' coordinates are the first

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -39,7 +38,7 @@ class FlexibleRobot:
         gun: the percussive gun, or None.
         mounting: how the robot stands.
         flexible_joints: the n joints with a stiffness, in tangent order.
-        origin_of: where every value is from; read it as `origins`.
+        origins: where each value is from: "joint_1.stiffness" -> "flex.toml: Dumas 2011".
         named_poses: poses by name, from the SRDF.
         rigid: the rigid robot's dynamics.
         tool_point: the link at whose origin the force acts.
@@ -56,7 +55,7 @@ class FlexibleRobot:
     gun: Gun | None
     mounting: Mounting
     flexible_joints: tuple[Joint, ...]
-    origin_of: dict[str, str]
+    origins: Mapping[str, str]
     named_poses: dict[str, tuple[float, ...]]
     rigid: RigidModel
     tool_point: str
@@ -122,11 +121,6 @@ class FlexibleRobot:
     def tool_frame(self) -> str:
         """The frame that carries the tool."""
         return self.tool.frame
-
-    @property
-    def origins(self) -> Mapping[str, str]:
-        """Where each value is from: "joint_1.stiffness" -> "flex.toml: Dumas 2011"."""
-        return MappingProxyType(self.origin_of)
 
     def pose(self, values: str | Sequence[float] | Mapping[str, float] | ArrayLike) -> Array:
         """A checked pose (nv,) from a list, from joint names (the rest at zero), or a name.

@@ -48,6 +48,5 @@ def from_dict(table: Mapping[str, Any]) -> Effect:
     Raises:
         InputError: an unknown effect or parameter, a value out of bounds.
     """
-    hidden = table.get("hidden", {})
     effect = effect_class(table["effect"])(table["target"], **table.get("parameters", {}))
-    return effect.with_hidden(hidden) if hidden else effect
+    return effect.with_hidden(table.get("hidden", {}))

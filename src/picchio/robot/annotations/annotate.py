@@ -7,7 +7,7 @@ other tools' tags and odd spacing stay as they are. The result is read back and 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -188,7 +188,9 @@ def annotate(urdf: str | Path, sidecar: Sidecar) -> bytes:
         values = {**given(getattr(before, tag)), **given(getattr(sidecar, tag))}
         if given(getattr(sidecar, tag)):
             expected["robot", tag] = values
-            edits += _replace(places, ("robot", tag), [_element(prefix, tag, values, {})])
+            edits += _replace(
+                places, ("robot", tag), [_element(prefix, tag, values, IN_ROBOT[tag])]
+            )
     result = _apply(content, edits)
     _read_back(result, path, root, expected)
     return result
@@ -236,8 +238,8 @@ def _joint_elements(prefix: str, values: Mapping[str, Any]) -> list[str]:
     return elements
 
 
-def _element(prefix: str, tag: str, values: Mapping[str, Any], order: Mapping[str, str]) -> str:
-    names = [name for name in order if name in values] or list(values)
+def _element(prefix: str, tag: str, values: Mapping[str, Any], order: Iterable[str]) -> str:
+    names = [name for name in order if name in values]
     text = " ".join(f"{name}={quoteattr(_text(values[name]))}" for name in names)
     return f"<{prefix}:{tag} {text}/>"
 

@@ -105,11 +105,6 @@ class RigidModel:
         """Degrees of freedom."""
         return len(self.joint_names)
 
-    @property
-    def links(self) -> tuple[str, ...]:
-        """Names of all links."""
-        return tuple(self._frames)
-
     def _data(self) -> Any:
         data = getattr(self._local, "data", None)
         if data is None:

@@ -98,7 +98,7 @@ def load_robot(
         gun=gun,
         mounting=mounting,
         flexible_joints=tuple(joints[name] for name in rigid.joint_names if name in joints),
-        origin_of={**origins, **tool_origins, **gun_origins, **base_origins},
+        origins={**origins, **tool_origins, **gun_origins, **base_origins},
         named_poses={
             pose: tuple(values.get(name, 0.0) for name in rigid.joint_names)
             for pose, values in (srdf.poses if srdf else {}).items()

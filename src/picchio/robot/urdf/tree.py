@@ -95,7 +95,11 @@ class UrdfTree:
         return [name for name in self.links if name not in parents]
 
     def link_of(self, frame: str) -> str | None:
-        """The link whose frame this is: a link's name, or a joint's for the link it carries."""
+        """The link whose frame this is, or None.
+
+        Args:
+            frame: a link's name, or a joint's for the link it carries.
+        """
         if frame in self.links:
             return frame
         return self.joints[frame].child if frame in self.joints else None
