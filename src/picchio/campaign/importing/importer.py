@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.channels import TIME, parse_channel
 from picchio.campaign.importing import read_csv, read_matlab, read_mcap, read_uff
@@ -15,7 +13,6 @@ from picchio.campaign.importing.mapping import ChannelTable, Mapping, read_mappi
 from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.campaign.importing.resample import common_clock
 from picchio.campaign.record import Record
-from picchio.campaign.units import conversion
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
@@ -64,7 +61,7 @@ def read_mapped(
         raw.channel(entry.series, mapping=mapping_file, key=f"channel[{i}].from")
         for i, entry in enumerate(mapping.channel)
     ]
-    time, values = _clocked(raw, mapping, series, mapping_file)
+    time, values = common_clock(raw, mapping.time, series, mapping_file)
     channels, units = {}, {}
     for entry, stored in zip(mapping.channel, values, strict=True):
         if entry.to in channels:
@@ -85,37 +82,6 @@ def read_mapped(
         raise InputError(str(error), file=mapping_file or path) from None
     record.check_samples()
     return campaign
-
-
-def _clocked(
-    raw: RawFile, mapping: Mapping, series: list[RawChannel], file: Path | None
-) -> tuple[FloatArray, list[FloatArray]]:
-    """One clock for all series, and their values on it."""
-    time = mapping.time
-    if time.series is not None:
-        clock = raw.channel(time.series, mapping=file, key="time.series").values
-        try:
-            _, convert = conversion(time.unit, ("s",))
-        except InputError as error:
-            raise error.placed(file=file, key="time.unit") from None
-        own: list[FloatArray | None] = [convert(clock)] * len(series)
-    elif time.rate is not None and any(s.time is None for s in series):
-        own = [np.arange(s.values.size) / time.rate for s in series]
-    else:
-        own = [s.time for s in series]
-    stamps: list[FloatArray] = []
-    for entry, stamp in zip(series, own, strict=True):
-        if stamp is None:
-            raise InputError("this file has no clock of its own", file=file, key="time",
-                             hint="give [time] series (which holds the time) or rate")  # fmt: skip
-        if stamp.size != entry.values.size:
-            raise InputError(f"has {entry.values.size} samples and its clock {stamp.size}",
-                             file=raw.path, key=entry.name)  # fmt: skip
-        stamps.append(stamp)
-    clock, values = common_clock(
-        stamps, series, rate=time.rate, resample=time.resample is not None, file=raw.path
-    )
-    return (clock - time.zero if time.zero else clock), values
 
 
 def _converted(

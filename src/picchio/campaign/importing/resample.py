@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from picchio.campaign.clock import TOLERANCE
-from picchio.campaign.importing.raw import RawChannel
+from picchio.campaign.importing.mapping import TimeTable
+from picchio.campaign.importing.raw import RawChannel, RawFile
+from picchio.campaign.units import conversion
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 
@@ -16,23 +18,27 @@ _LARGEST_GAP = 5.0
 
 
 def common_clock(
-    stamps: list[FloatArray],
-    series: list[RawChannel],
-    *,
-    rate: float | None,
-    resample: bool,
-    file: Path,
+    raw: RawFile, asked: TimeTable, series: list[RawChannel], mapping: Path | None
 ) -> tuple[FloatArray, list[FloatArray]]:
     """One even clock for all series, and their values on it.
 
     Series that share an even clock pass unchanged, bit for bit. Others are drawn by straight
-    lines between their stamps onto a clock of `rate` over the time they have in common; that
-    acts as a low-pass: at a tenth of the stamps' rate it takes up to 3 %, and noise is thinned.
+    lines between their stamps onto a clock of the rate asked for, over the time they have in
+    common; that acts as a low-pass: at a tenth of the stamps' rate it takes up to 3 %, and noise is
+    thinned.
+
+    Args:
+        raw: the file.
+        asked: the mapping's `[time]`.
+        series: those of the file that are imported.
+        mapping: its file, for messages.
 
     Raises:
         InputError: stamps that differ, are uneven or out of order and no resampling is asked
-            for; a rate that is missing; a dropout; no time in common.
+            for; no stamps, or a rate that is missing; a dropout; no time in common.
     """
+    file, rate = raw.path, asked.rate
+    stamps = _stamps(raw, asked, series, mapping)
     for stamp, entry in zip(stamps, series, strict=True):
         if stamp.size < 2:
             raise InputError("holds fewer than two samples", file=file, key=entry.name)
@@ -42,14 +48,14 @@ def common_clock(
                              key=entry.name)  # fmt: skip
     first = stamps[0]
     same = all(stamp is first or np.array_equal(stamp, first) for stamp in stamps)
-    if not resample:
+    if asked.resample is None:
         if not same:
             raise InputError("the series have stamps of their own", file=file,
                              hint=_advice(stamps))  # fmt: skip
         if (jitter := _jitter(first)) > TOLERANCE:
             raise InputError(f"the clock is not even (by {jitter:.2g} steps)", file=file,
                              hint=_advice(stamps))  # fmt: skip
-        return first, [entry.values for entry in series]
+        return first - asked.zero, [entry.values for entry in series]
     if rate is None:
         raise InputError("resampling needs a rate", file=file, key="time.rate",
                          hint=_advice(stamps))  # fmt: skip
@@ -65,7 +71,34 @@ def common_clock(
     if end <= begin or samples < 2:
         raise InputError("the series have no time in common", file=file)
     clock = begin + np.arange(samples) / rate
-    return clock, [np.interp(clock, s, e.values) for s, e in zip(stamps, series, strict=True)]
+    values = [np.interp(clock, s, e.values) for s, e in zip(stamps, series, strict=True)]
+    return clock - asked.zero, values
+
+
+def _stamps(
+    raw: RawFile, asked: TimeTable, series: list[RawChannel], mapping: Path | None
+) -> list[FloatArray]:
+    """The time of every sample of each series, s."""
+    own: list[FloatArray | None] = [s.time for s in series]
+    if asked.series is not None:
+        clock = raw.channel(asked.series, mapping=mapping, key="time.series").values
+        try:
+            _, convert = conversion(asked.unit, ("s",))
+        except InputError as error:
+            raise error.placed(file=mapping, key="time.unit") from None
+        own = [convert(clock)] * len(series)
+    elif asked.rate is not None and any(s.time is None for s in series):
+        own = [np.arange(s.values.size) / asked.rate for s in series]
+    stamps: list[FloatArray] = []
+    for entry, stamp in zip(series, own, strict=True):
+        if stamp is None:
+            raise InputError("this file has no clock of its own", file=mapping, key="time",
+                             hint="give [time] series (which holds the time) or rate")  # fmt: skip
+        if stamp.size != entry.values.size:
+            raise InputError(f"has {entry.values.size} samples and its clock {stamp.size}",
+                             file=raw.path, key=entry.name)  # fmt: skip
+        stamps.append(stamp)
+    return stamps
 
 
 def _jitter(time: FloatArray) -> float:

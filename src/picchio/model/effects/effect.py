@@ -94,7 +94,11 @@ class Latent:
         return 1 if self.count is None else 0
 
     def size(self, hits: int) -> int:
-        """How many numbers a record of so many blows has."""
+        """How many numbers a record of so many blows has.
+
+        Args:
+            hits: blows of the record.
+        """
         return hits if self.count is None else self.count
 
 

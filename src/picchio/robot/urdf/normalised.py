@@ -35,10 +35,18 @@ class NormalisedUrdf:
 def normalise(tree: UrdfTree, tool: Tool, gun: Gun | None, mounting: Mounting) -> NormalisedUrdf:
     """Write the URDF for Pinocchio."""
     robot = etree.Element("robot", name="robot")
-    names = _Names(tree)
-    world = names.new("picchio_world")
+    taken = {*tree.links, *tree.joints}
+
+    def new(wish: str) -> str:
+        """A name that the URDF does not use yet."""
+        while wish in taken:
+            wish += "_"
+        taken.add(wish)
+        return wish
+
+    world = new("picchio_world")
     _link(robot, world, None)
-    _joint(robot, names.new("picchio_mounting"), "fixed", world, tree.root, mounting.xyz,
+    _joint(robot, new("picchio_mounting"), "fixed", world, tree.root, mounting.xyz,
            mounting.rpy)  # fmt: skip
     for link, inertial in tree.links.items():
         _link(robot, link, inertial)
@@ -48,32 +56,19 @@ def normalise(tree: UrdfTree, tool: Tool, gun: Gun | None, mounting: Mounting) -
         _joint(robot, joint.name, kind, joint.parent, joint.child, joint.xyz, joint.rpy,
                joint.axis)  # fmt: skip
     if tool.mass > 0:
-        body = names.new("picchio_tool_body")
+        body = new("picchio_tool_body")
         _link(robot, body, Inertial(tool.mass, tool.com, ZERO, tool.inertia))
-        _joint(robot, names.new("picchio_tool_mount"), "fixed", tool.frame, body, ZERO, ZERO)
-    point = names.new("picchio_tool_point")
+        _joint(robot, new("picchio_tool_mount"), "fixed", tool.frame, body, ZERO, ZERO)
+    point = new("picchio_tool_point")
     gun_body = Inertial(gun.mass, ZERO, ZERO, (0.0,) * 6) if gun and gun.mass > 0 else None
     _link(robot, point, gun_body)
     if gun is None or gun.recoil_stiffness is None:
-        _joint(robot, names.new("picchio_tool_offset"), "fixed", tool.frame, point, tool.xyz, ZERO)
+        _joint(robot, new("picchio_tool_offset"), "fixed", tool.frame, point, tool.xyz, ZERO)
         recoil = None
     else:
-        recoil = names.new(RECOIL_JOINT)
+        recoil = new(RECOIL_JOINT)
         _joint(robot, recoil, "prismatic", tool.frame, point, tool.xyz, ZERO, tool.axis)
     return NormalisedUrdf(etree.tostring(robot, encoding="unicode"), point, recoil)
-
-
-class _Names:
-    """Names that the URDF does not use yet."""
-
-    def __init__(self, tree: UrdfTree) -> None:
-        self._taken = {*tree.links, *tree.joints}
-
-    def new(self, wish: str) -> str:
-        while wish in self._taken:
-            wish += "_"
-        self._taken.add(wish)
-        return wish
 
 
 def _link(robot: etree._Element, name: str, inertial: Inertial | None) -> None:
