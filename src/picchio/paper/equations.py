@@ -48,10 +48,6 @@ class Equation:
     check: str
     gap: float | None
 
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
-
 
 Check = Callable[[Study], float]
 Row = tuple[Callable[..., Any], str, Check]
@@ -113,9 +109,7 @@ def _energy(study: Study) -> float:
             turn = (ends[1][1] - ends[0][1]) / (2.0 * step) @ (0.5 * (ends[0][1] + ends[1][1])).T
             spin = np.array([turn[2, 1], turn[0, 2], turn[1, 0]])
             frame = world.robot.frame_placement(pose, f"link_{i + 1}")[1]
-            inertia = np.array(arm.inertias[i])
-            if study.given.inertia_about == "joint" and i > 0:
-                inertia = inertia - mass * (centre @ centre - centre**2)
+            inertia = arm.inertia(i, study.given.inertia_about)
             total += float(0.5 * mass * speed @ speed + 0.5 * inertia @ (frame.T @ spin) ** 2)
         exact = float(0.5 * rate @ world.robot.state(pose).mass_matrix @ rate)
         worst = max(worst, abs(total / exact - 1.0))
