@@ -108,7 +108,10 @@ def _local(dataset: Dataset, folder: Path) -> dict[str, Path]:
 
 
 def content(path: Path) -> bytes:
-    """A file's bytes, unpacked where it is gzipped.
+    """The bytes of a file, unpacked where it is gzipped.
+
+    Args:
+        path: the file.
 
     Raises:
         InputError: it can't be read.
@@ -121,7 +124,11 @@ def content(path: Path) -> bytes:
 
 
 def load_variables(path: Path, names: Sequence[str]) -> dict[str, Any]:
-    """Variables of a .mat file; structs as objects with their fields.
+    """The variables of a .mat file by name; structs as objects with their fields.
+
+    Args:
+        path: the file.
+        names: of the variables.
 
     Raises:
         InputError: no .mat file, or a variable is missing.

@@ -34,7 +34,11 @@ class Input:
     log: bool = False
 
     def at(self, share: float) -> Any:
-        """The value at a share from 0 to 1 of the range, or of the list of choices."""
+        """The value at a share of the range, or of the list of choices.
+
+        Args:
+            share: 0 to 1.
+        """
         if self.low is None or self.high is None:
             return self.choices[min(int(share * len(self.choices)), len(self.choices) - 1)]
         if self.log:

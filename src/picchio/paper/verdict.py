@@ -89,7 +89,12 @@ CLAIMS: dict[str, Claim] = {}
 
 
 def claim(figure: str = "", name: str = "") -> Callable[[Test], Test]:
-    """Register a test of the claim that is called like it, or `name`."""
+    """A decorator that registers the test of a claim.
+
+    Args:
+        figure: of the page that shows it; empty for none.
+        name: the claim's; the test's own if empty.
+    """
 
     def register(test: Test) -> Test:
         key = name or test.__name__
@@ -107,7 +112,15 @@ Holds = Callable[[World], tuple[bool, float]]
 def claim_of_worlds(
     figure: str, test: str, says: str, among: Sequence[str] = (), most: int | None = None
 ) -> Callable[[Holds], Holds]:
-    """Register a claim that is tried in every world, see `across`; in the first `most` if given."""
+    """A decorator that registers a claim to be tried in every world, see `across`.
+
+    Args:
+        figure: of the page that shows it; empty for none.
+        test: what is tried.
+        says: what decides, with fields.
+        among: the inputs that the claim can depend on; all if none are named.
+        most: how many worlds to try at most.
+    """
 
     def register(holds: Holds) -> Holds:
         name = holds.__name__

@@ -119,7 +119,11 @@ class World:
         return np.array([self.peaks(self.path_poses, n).peak_deflection for n in cut])
 
     def rivet_peaks(self, hits: int | None = None) -> FloatArray:
-        """(3 directions, 15 rivets, 3 joints) rad: of the steady state, or of a burst."""
+        """Largest deflections at the rivets, (3 directions, 15 rivets, 3 joints) rad.
+
+        Args:
+            hits: of a burst from rest; None for the steady state.
+        """
         directions = self.printed.directions
         return np.array([self.peaks(self.rivet_poses, n, hits).peak_deflection for n in directions])
 

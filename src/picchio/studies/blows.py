@@ -59,7 +59,7 @@ def blows_of(
 
 
 def hits_of_rivet(robot: FlexibleRobot) -> int:
-    """Blows a rivet takes on the robot's example task.
+    """The blows that a rivet takes on the robot's example task.
 
     Args:
         robot: one without an example task takes as many as a task that does not say.

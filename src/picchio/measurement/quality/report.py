@@ -151,7 +151,11 @@ class QualityReport(TableResult):
         return [sorted(g, key=lambda f: -abs(f.value or 0.0)) for g in groups.values()]
 
     def signal_to_noise(self, channel: str) -> float:
-        """The channel's RMS over all records against its noise, dB; NaN where it is not known."""
+        """A channel's RMS over all records against its noise, dB; NaN where that is not known.
+
+        Args:
+            channel: its name.
+        """
         noise = self.noise.get(channel)
         rms = [r.channels[channel]["rms"] for r in self.records if channel in r.channels]
         size = float(np.sqrt(np.mean(np.square(rms))))
