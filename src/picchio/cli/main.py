@@ -15,7 +15,7 @@ from picchio.cli.app import app
 # Importing its file adds a command, in the order of `picchio --help`.
 from picchio.cli.life import assess, envelope, fit_sn, map, place, view  # noqa: F401
 from picchio.cli.measured import check, diagnose, identify, import_, simulate  # noqa: F401
-from picchio.cli.output import say_warning
+from picchio.cli.output import begin, say_warning
 from picchio.cli.reference import described, reproduce, robots  # noqa: F401
 from picchio.core.errors import InputError, PicchioError
 
@@ -33,6 +33,7 @@ def main(arguments: list[str] | None = None) -> None:
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line and return the exit code."""
     given = sys.argv[1:] if arguments is None else arguments
+    begin(given)
     if given and given[-1] == "--version":  # of every subcommand, too
         given = ["--version"]
     try:

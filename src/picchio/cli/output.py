@@ -6,7 +6,7 @@ import json
 import os
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -17,8 +17,17 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from picchio.core.results import Result
+
 _PATIENCE = 2.0
+_typed: list[str] = []
 _said: list[str] = []
+
+
+def begin(arguments: Sequence[str]) -> None:
+    """Start a command: keep what was typed for a report, forget an earlier command's warnings."""
+    _typed[:] = arguments
+    _said.clear()
 
 
 def say_warning(message: str) -> None:
@@ -27,16 +36,6 @@ def say_warning(message: str) -> None:
     if line not in _said:
         _said.append(line)
         print(f"picchio: warning: {line}", file=sys.stderr)
-
-
-def said_warnings() -> list[str]:
-    """The warnings printed so far."""
-    return list(_said)
-
-
-def command_line() -> str:
-    """What was typed, for a report."""
-    return shlex.join(["picchio", *sys.argv[1:]])
 
 
 def console() -> Console:
@@ -132,6 +131,21 @@ def write_text(target: str | Path, text: str) -> None:
 
     with atomic_write(target) as stream:
         stream.write(text)
+
+
+def write_report(result: Result, target: Path | None, **options: Any) -> None:
+    """Write a result's page where one is asked for, with what was typed and the warnings so far.
+
+    Args:
+        result: what the command found.
+        target: the file of `--report`.
+        **options: what the page needs besides, see `picchio.report`.
+    """
+    if target is not None:
+        import picchio
+
+        typed = shlex.join(["picchio", *_typed])
+        picchio.report(result, command=typed, warnings=_said, **options).save(target)
 
 
 def deliver(

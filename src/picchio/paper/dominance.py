@@ -63,14 +63,14 @@ def search_dominance(study: Study) -> Dominance:
     agree = np.empty(_TRIED)
     best: tuple[float, World | None] = (-1.0, None)
     hits = 0
-    frames = {
-        (about, elbow): World(study.given.but(inertia_about=about, elbow=elbow))
+    frames = [
+        World(study.given.but(inertia_about=about, elbow=elbow))
         for about in ("cg", "joint")
         for elbow in ("down", "up")
-    }
+    ]
     for k in range(_TRIED):
         changes = {name: entries[name].at(rng.random()) for name in _NAMES}
-        frame = list(frames.values())[rng.integers(len(frames))]
+        frame = frames[rng.integers(len(frames))]
         world = World(frame.given.but(**changes))
         poses = poses_at([(changes["path_x"], 0.0, z) for z in heights], frame.given.elbow)
         mass, jacobian = frame.robot.mass_and_jacobian(poses)

@@ -51,11 +51,6 @@ class Finding:
     number: float | None = None
     condition: str = ""
 
-    @property
-    def spoken(self) -> str:
-        """The verdict with its condition."""
-        return f"{self.verdict} {self.condition}".strip()
-
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {

@@ -144,36 +144,34 @@ def formats(name: str | None = None) -> FormatList:
     return FormatList(tuple(found[:1]))
 
 
-# TOML files: name, format, table, commands, meaning.
-_TABLES: tuple[tuple[str, str, type[BaseModel], str, str], ...] = (
-    ("task", tasks.FORMAT, tasks.TaskTable, "assess, place, view, diagnose",
+# TOML files: format, table, commands, meaning.
+_TABLES: tuple[tuple[str, type[BaseModel], str, str], ...] = (
+    (tasks.FORMAT, tasks.TaskTable, "assess, place, view, diagnose",
      "the work: blows, directions and the poses or points where rivets are set"),
-    ("sidecar", sidecar.FORMAT, sidecar.Sidecar, "--flex; annotate, identify",
+    (sidecar.FORMAT, sidecar.Sidecar, "--flex; annotate, identify",
      "what a URDF does not say: stiffness, damping, shafts, reducers, tool, gun"),
-    ("campaign", campaign.FORMAT, campaign.CampaignTable, "check, diagnose, identify",
+    (campaign.FORMAT, campaign.CampaignTable, "check, diagnose, identify",
      "campaign.toml: measured records and what was programmed"),
-    ("plan", plan.FORMAT, plan.Plan, "simulate; diagnose --plan",
+    (plan.FORMAT, plan.Plan, "simulate; diagnose --plan",
      "a test to be done: poses, directions, sensors with their noise"),
-    ("mapping", mapping.FORMAT, mapping.Mapping, "import",
+    (mapping.FORMAT, mapping.Mapping, "import",
      "how the series of a measured file become channels"),
-    ("model", saved_model.FORMAT, saved_model.SavedModel, "ROBOT; diagnose --model",
+    (saved_model.FORMAT, saved_model.SavedModel, "ROBOT; diagnose --model",
      "a robot, its sidecar and the effects that a diagnosis found"),
-    ("sn-curve", sn_library.SN_FORMAT, sn_library.SNCurveFile, "--sn-curve; fit-sn --out",
+    (sn_library.SN_FORMAT, sn_library.SNCurveFile, "--sn-curve; fit-sn --out",
      "an S-N curve in shear"),
-    ("reducers", reducer.REDUCER_FORMAT, reducer.ReducerFile, "load_reducer(catalogues=...)",
+    (reducer.REDUCER_FORMAT, reducer.ReducerFile, "load_reducer(catalogues=...)",
      "a maker's catalogue of reducers"),
 )  # fmt: skip
 
 
 @cache
 def _known() -> tuple[FileFormat, ...]:
-    tables = [
-        FileFormat(
-            name, format, "TOML", "input", meaning, command,
-            (_format_key(format), *_keys(table)),
-        )
-        for name, format, table, command, meaning in _TABLES
-    ]  # fmt: skip
+    tables = []
+    for format, table, command, meaning in _TABLES:
+        name = format.removeprefix("picchio-").partition("/")[0]
+        keys = (_format_key(format), *_keys(table))
+        tables.append(FileFormat(name, format, "TOML", "input", meaning, command, keys))
     return (*tables, _record(), *_contracts(), _map())
 
 
@@ -212,13 +210,12 @@ def _contracts() -> Iterator[FileFormat]:
     content = tomllib.loads(text)
     shared = content.pop("shared")
     for name, entry in content.items():
-        keys = []
-        if entry["kind"] == "JSON":
-            keys.append(_format_key(entry["format"]))
+        kind, role = entry.get("kind", "JSON"), entry.get("role", "output")
+        format = entry.get("format", f"picchio-{name}/1") if kind == "JSON" else ""
+        keys = [_format_key(format)] if format else []
         for path, line in entry["keys"].items():
             keys += [_contract_key(*found) for found in _expanded(path, line, shared)]
-        yield FileFormat(name, entry.get("format", ""), entry["kind"], entry["role"],
-                         entry["meaning"], entry["command"], tuple(keys))  # fmt: skip
+        yield FileFormat(name, format, kind, role, entry["meaning"], entry["command"], tuple(keys))
 
 
 def _expanded(path: str, line: str, shared: dict[str, Any]) -> Iterator[tuple[str, str]]:

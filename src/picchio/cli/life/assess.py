@@ -23,13 +23,12 @@ from picchio.cli.options import (
 )
 from picchio.cli.output import (
     check_targets,
-    command_line,
     console,
     count_of,
     deliver,
     progress,
-    said_warnings,
     table,
+    write_report,
 )
 from picchio.core.errors import InputError
 from picchio.studies.assessment.result import format_count, verdict
@@ -155,19 +154,17 @@ def assess(
         with progress("samples") as tick:
             spread = picchio.uncertain_life(loaded, work, seed=seed or 0, progress=tick, **options)
         content["uncertainty"] = spread.to_dict()
-    if report is not None:
-        picchio.report(
-            found,
-            robot=loaded,
-            task=work,
-            warnings=said_warnings(),
-            command=command_line(),
-            gravity_stiffness=gravity_stiffness,
-            sn_curve=sn_curve,
-            allowed=allowed or (),
-            spread=spread,
-            terms=terms,
-        ).save(report)
+    write_report(
+        found,
+        report,
+        robot=loaded,
+        task=work,
+        gravity_stiffness=gravity_stiffness,
+        sn_curve=sn_curve,
+        allowed=allowed or (),
+        spread=spread,
+        terms=terms,
+    )
 
     def show_all() -> None:
         show(found, path, terms)

@@ -10,17 +10,22 @@ import numpy as np
 import typer
 
 from picchio.cli.app import app
-from picchio.cli.options import FlexOption, JsonOption, ReportOption, ToolOption
+from picchio.cli.options import (
+    FlexOption,
+    GravityStiffnessOption,
+    JsonOption,
+    ReportOption,
+    ToolOption,
+)
 from picchio.cli.output import (
     check_targets,
-    command_line,
     console,
     count_of,
     deliver,
     progress,
-    said_warnings,
     say_warning,
     table,
+    write_report,
 )
 from picchio.core.errors import InputError
 
@@ -65,13 +70,7 @@ def check(
             "--verbose", "-v", help="Show every record, and each finding on a line of its own."
         ),
     ] = False,
-    gravity_stiffness: Annotated[
-        bool,
-        typer.Option(
-            "--gravity-stiffness/--no-gravity-stiffness",
-            help="Whether --report simulates with gravity's stiffness dg/dq beside the springs'.",
-        ),
-    ] = True,
+    gravity_stiffness: GravityStiffnessOption = True,
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -79,7 +78,7 @@ def check(
 
     Clipping, dropouts, spikes, drift, uneven clocks, swapped or flipped axes, hum, high-passes,
     delays, records that are too short, aliasing, repeats, and the noise of every channel. --report
-    shows how a simulation of the nominal robot differs from the records.
+    shows how a simulation of the nominal robot, with gravity's stiffness or without, differs.
     """
     import math
 
@@ -96,13 +95,7 @@ def check(
             loaded, robot, flex=flex, tool=tool, use_robot=not no_robot, keep_going=keep_going,
             progress=tell,
         )  # fmt: skip
-    if report is not None:
-        picchio.report(
-            found,
-            command=command_line(),
-            warnings=said_warnings(),
-            gravity_stiffness=gravity_stiffness,
-        ).save(report)
+    write_report(found, report, gravity_stiffness=gravity_stiffness)
     deliver(found.to_dict(), json, lambda: _show(found, verbose))
     if json == "-":  # what people would have read in the table
         for group in found.groups():

@@ -21,13 +21,12 @@ from picchio.cli.options import (
 )
 from picchio.cli.output import (
     check_targets,
-    command_line,
     console,
     count_of,
     deliver,
-    said_warnings,
     table,
     telling,
+    write_report,
     write_text,
 )
 from picchio.studies.assessment.result import format_count
@@ -101,11 +100,7 @@ def diagnose(
         )
     if model is not None:
         write_text(model, found.model_text(model.parent))
-    if report is not None:
-        folder = model.parent if model is not None else None
-        picchio.report(found, command=command_line(), warnings=said_warnings(), folder=folder).save(
-            report
-        )
+    write_report(found, report, folder=None if model is None else model.parent)
     if plan is not None and found.plan is not None:
         write_text(plan, found.plan)
     deliver(found.to_dict(), json, lambda: _show(found, plan))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -26,14 +27,8 @@ def effects(
     import picchio
 
     found = picchio.effects(name)
-
-    def show() -> None:
-        if name is not None:
-            _show_effect(found.effects[0])
-        else:
-            _list_effects(found.effects)
-
-    deliver(found.to_dict(), json, show)
+    one, every = partial(_show_effect, found.effects[0]), partial(_list_effects, found.effects)
+    deliver(found.to_dict(), json, one if name else every)
 
 
 @app.command(epilog="Example: picchio formats task")
@@ -47,14 +42,8 @@ def formats(
     import picchio
 
     found = picchio.formats(name)
-
-    def show() -> None:
-        if name is not None:
-            _show_format(found.formats[0])
-        else:
-            _list_formats(found.formats)
-
-    deliver(found.to_dict(), json, show)
+    one, every = partial(_show_format, found.formats[0]), partial(_list_formats, found.formats)
+    deliver(found.to_dict(), json, one if name else every)
 
 
 def _list_effects(entries: tuple[EffectDescription, ...]) -> None:

@@ -9,15 +9,7 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import JsonOption, ReportOption
-from picchio.cli.output import (
-    check_targets,
-    command_line,
-    console,
-    deliver,
-    progress,
-    said_warnings,
-    table,
-)
+from picchio.cli.output import check_targets, console, deliver, progress, table, write_report
 
 if TYPE_CHECKING:
     from picchio.paper.run import Reproduction
@@ -55,9 +47,7 @@ def reproduce(
     given = parse_assumptions(assume or [])
     with progress("hypotheses about Table 2") as told:
         found = picchio.reproduce(given, worlds=WORLDS if worlds is None else worlds, progress=told)
-    if report is not None:
-        page = picchio.report(found, command=command_line(), warnings=said_warnings())
-        page.save(report)
+    write_report(found, report)
     deliver(found.to_dict(), json, lambda: _show(found, report))
 
 

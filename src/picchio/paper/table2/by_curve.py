@@ -177,18 +177,16 @@ def _fit(
 ) -> CurveFit:
     name, count, fit = hypothesis
     every = np.arange(s.size)
-    best: tuple[float, int | None, FloatArray, dict[str, float]] | None = None
-    tries: list[int | None] = [int(k) for k in every] if aside else [None]
-    for out in tries:
-        kept = every if out is None else np.delete(every, out)
-        line, values = fit(s[kept], n[kept])
-        cost = float(((n - np.polyval(line, s))[kept] ** 2).sum())
-        if best is None or cost < best[0]:
-            best = (cost, out, line, values)
-    assert best is not None
-    _, gone, line, values = best
-    residuals = n - np.polyval(line, s)
+
+    def cost(out: int) -> float:
+        rest = np.delete(every, out)
+        line, _ = fit(s[rest], n[rest])
+        return float(((n - np.polyval(line, s))[rest] ** 2).sum())
+
+    gone = min(map(int, every), key=cost) if aside else None
     kept = every if gone is None else np.delete(every, gone)
+    line, values = fit(s[kept], n[kept])
+    residuals = n - np.polyval(line, s)
     # A rounded number is uniform within its half digit.
     known = rounding[kept] ** 2 / 3.0
     error = likely_error(residuals[kept], known)

@@ -89,11 +89,13 @@ def evaluate(
     mean_errors = ln_mean + shift - ln_stress
     ln_cycles = np.log(printed.cycles[finite])
     # N ~ S^-m over what the rivets' spread adds to the damage at the mean.
-    life_errors = -exponent * ln_stress - rule.average(per_joint, exponent) - ln_cycles
+    predicted = -exponent * ln_stress - rule.average(per_joint, exponent)
     if rule.counts is None:  # the curve's level is free
-        life_errors -= (target.life * life_errors).sum() / target.life.sum()
+        level = float((target.life * (ln_cycles - predicted)).sum() / target.life.sum())
+        predicted = predicted + level
     else:
-        life_errors += exponent * math.log(printed.sn_curve.a) - math.log(rule.counts)
+        predicted = predicted + exponent * math.log(printed.sn_curve.a) - math.log(rule.counts)
+    life_errors = predicted - ln_cycles
     cost = float((target.mean * mean_errors**2).sum() + (target.life * life_errors**2).sum())
     return Fit(rule, place, np.array(v), mean_errors, life_errors, cost,
                float(np.exp(shift) * 1e6), exponent)  # fmt: skip
