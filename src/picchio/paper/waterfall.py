@@ -16,7 +16,6 @@ from picchio.fatigue.miner import damage, life
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import load_sn_curve
 from picchio.paper.fourier import worst_responses
-from picchio.paper.statics import gravity_stress
 from picchio.paper.world import World
 from picchio.studies.rivet.pose import JointLoad, Rivet
 
@@ -67,7 +66,7 @@ def waterfall(world: World) -> tuple[Step, ...]:
         for operation in world.operations()
         for pose in operation.poses
     ]
-    gravity = np.tile(1e6 * gravity_stress(world), (3, 1))
+    gravity = np.tile(1e6 * world.gravity_stress, (3, 1))
     steel = load_sn_curve(STEEL, quiet=True)
     paper = world.printed.sn_curve.sn_curve(steel.tensile_strength)
 

@@ -132,6 +132,26 @@ class World:
         """(3 directions, 15 rivets, 3 joints) MPa: Figs. 13-15 (b)."""
         return self.stress(self.rivet_peaks())
 
+    @cached_property
+    def sweep(self) -> tuple[FloatArray, FloatArray]:
+        """Joint 2 from full down to full up, joint 3 straight: (k,) rad, (k, 3) N m to hold it."""
+        limit = self.printed.arm.limits[1]
+        angle = np.linspace(-limit, limit, 181)
+        return angle, np.abs([self.robot.gravity_torque([0.0, q, 0.0]) for q in angle])
+
+    @property
+    def share_held(self) -> float:
+        """Share of that sweep in which joint 2's stated actuator is strong enough."""
+        return float((self.sweep[1][:, 1] <= self.printed.arm.actuator_torques[1]).mean())
+
+    @cached_property
+    def gravity_stress(self) -> FloatArray:
+        """(15, 3) MPa, gravity's steady stress in the shafts at the rivets."""
+        shafts = [joint.shaft for joint in self.robot.flexible_joints if joint.shaft]
+        factors = np.array([shaft.radius / shaft.polar_moment for shaft in shafts])
+        torque = np.abs([self.robot.gravity_torque(pose) for pose in self.rivet_poses])
+        return np.asarray(torque * factors / 1e6)
+
     def operations(self) -> tuple[Operation, ...]:
         """The three operations of section 4.3."""
         return tuple(

@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from picchio.core.arrays import FloatArray
+from picchio.paper.arm import poses_at
 from picchio.paper.claims.envelope import lean, waist
 from picchio.paper.dominance import search_dominance
 from picchio.paper.figures.base import PaperFigure, rounded
-from picchio.paper.statics import path_bend
 from picchio.paper.study import Study
 from picchio.paper.world import World
 from picchio.visuals.plots.style import BLUE, COLOURS, GREY, INK, MUTED, VERMILION, look
@@ -136,7 +136,8 @@ def reach_of_path(study: Study) -> PaperFigure:
     world = study.base
     limit = float(world.printed.arm.limits[2])
     x = np.linspace(0.2, 1.6, 400)
-    bend = path_bend(world, x)
+    points = [[(at, 0.0, z) for at in x] for z in world.printed.task.path_heights]
+    bend = np.abs(poses_at(points)[..., 2])
     worst = bend.max(axis=0)
     least = float(np.degrees(np.nanmin(worst)))
     at = float(x[int(np.nanargmin(worst))])

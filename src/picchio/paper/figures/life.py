@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 
 from picchio.fatigue.sn.library import load_sn_curve
 from picchio.paper.figures.base import PaperFigure, rounded
-from picchio.paper.statics import gravity_stress, holding_torque
 from picchio.paper.study import Study
 from picchio.paper.waterfall import STEEL, Step
 from picchio.visuals.plots.style import BLUE, GREEN, GREY, INK, MUTED, ORANGE, VERMILION, look
@@ -56,16 +55,16 @@ def figure_11(study: Study) -> PaperFigure:
 
 def gravity(study: Study) -> tuple[PaperFigure, PaperFigure]:
     """Torque to hold the arm, and the steady stress it makes."""
-    held = holding_torque(study.base)
-    limits = study.printed.arm.actuator_torques
-    stress = gravity_stress(study.base).mean(axis=0)
+    angle, torque = study.base.sweep
+    largest, limits = torque.max(axis=0), study.printed.arm.actuator_torques
+    stress = study.base.gravity_stress.mean(axis=0)
     vibration = study.base.rivet_stress.mean(axis=1)
     printed = study.printed.stress
 
     def draw(ax: Axes) -> None:
         for j in (1, 2):
             style = look(j)
-            ax.plot(np.degrees(held.angle), held.torque[:, j], label=f"joint {j + 1}", **style)
+            ax.plot(np.degrees(angle), torque[:, j], label=f"joint {j + 1}", **style)
             ax.axhline(limits[j], color=style["color"], linewidth=0.9, linestyle=(0, (1, 1.5)))
             ax.text(-88, limits[j] + 8, f"its actuator: {limits[j]:.0f} N m", fontsize=8,
                     color=style["color"])  # fmt: skip
@@ -87,14 +86,14 @@ def gravity(study: Study) -> tuple[PaperFigure, PaperFigure]:
     return (
         PaperFigure(
             "gravity", "Gravity against the stated actuators",
-            f"Stretched out, joint 2 must hold {held.largest[1]:.0f} N m and joint 3 "
-            f"{held.largest[2]:.0f} N m, without tool or payload; the stated actuators give "
+            f"Stretched out, joint 2 must hold {largest[1]:.0f} N m and joint 3 "
+            f"{largest[2]:.0f} N m, without tool or payload; the stated actuators give "
             f"{limits[1]:.0f} and {limits[2]:.0f} N m. The arm cannot hold itself up, unless its "
             "gravity is balanced, of which the paper says nothing.",
             "Holding torque of joints 2 and 3 over joint 2's angle, with the actuators' limits",
-            {"angle_deg": rounded(np.degrees(held.angle[::6])), "torque": rounded(held.torque[::6]),
-             "largest": rounded(held.largest), "actuators": list(limits),
-             "share_held": held.share_held}, draw, height=3.0,
+            {"angle_deg": rounded(np.degrees(angle[::6])), "torque": rounded(torque[::6]),
+             "largest": rounded(largest), "actuators": list(limits),
+             "share_held": study.base.share_held}, draw, height=3.0,
         ),
         PaperFigure(
             "gravity-stress", "Gravity's steady stress against the vibration",
@@ -160,25 +159,17 @@ def corrections(steps: tuple[Step, ...]) -> PaperFigure:
             else:
                 ax.barh(k, end - base, left=base, height=0.5, color=colour,
                         alpha=0.35 if math.isinf(step.rivets) else 0.75)  # fmt: skip
-            words = (
-                f"{step.rivets:.3g}"
-                if math.isfinite(step.rivets)
-                else (f"no end ({end:.2g} without the limit)")
-            )
-            factor = (
-                ""
-                if k == len(steps) - 1 or math.isinf(step.rivets)
-                else (f"  (× {step.rivets / base:.2g})")
-            )
             joint = f", joint {step.joint + 1}" if step.joint >= 0 else ""
             if math.isinf(step.rivets):
+                words, side, away = f"no end ({end:.2g} without the limit){joint}", "right", -8
                 arrow = {"arrowstyle": "->", "color": colour, "lw": 1.4}
                 ax.annotate("", (end * 8, k), xytext=(end, k), arrowprops=arrow)
-            low = end < base
-            ax.annotate(words + joint + factor, (base if low else end, k),
-                        xytext=(8 if not math.isinf(step.rivets) else -8, 0),
-                        textcoords="offset points", va="center", fontsize=8.5,
-                        ha="right" if math.isinf(step.rivets) else "left")  # fmt: skip
+            else:
+                words, side, away = f"{step.rivets:.3g}{joint}", "left", 8
+                if k < len(steps) - 1:
+                    words += f"  (× {step.rivets / base:.2g})"
+            ax.annotate(words, (max(base, end), k), xytext=(away, 0), ha=side, va="center",
+                        textcoords="offset points", fontsize=8.5)  # fmt: skip
         ax.set_xscale("log")
         ax.set_yticks(range(len(steps)), [s.name for s in reversed(steps)])
         ax.set(xlabel="rivets to failure", xlim=(min(ends) / 4, top))
