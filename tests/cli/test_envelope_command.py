@@ -1,22 +1,11 @@
 """`picchio envelope` as a stranger and as a program meet it."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 
 
-def picchio(*arguments):
-    return subprocess.run(
-        [sys.executable, "-c", "from picchio.cli.main import main; main()", *arguments],
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-
-
-def test_json_as_the_contract_has_it():
+def test_json_as_the_contract_has_it(picchio):
     done = picchio("envelope", "fanuc_like_3dof", "--pose=-1,0.5,0", "--json", "-")
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
@@ -31,7 +20,7 @@ def test_json_as_the_contract_has_it():
         assert sum(c * c for c in joint["worst_direction"]) == pytest.approx(1.0)
 
 
-def test_the_blows_can_be_set():
+def test_the_blows_can_be_set(picchio):
     options = ("--force", "600", "--period", "0.05", "--width", "0.01", "--json", "-")
     done = picchio("envelope", "fanuc_like_3dof", "--pose=0.3,1.1,-1.0", *options)
     blows = json.loads(done.stdout)["excitation"]
@@ -50,7 +39,7 @@ def test_the_blows_can_be_set():
         ([], "--pose"),
     ],
 )
-def test_bad_input_is_one_line_and_exit_2(arguments, part):
+def test_bad_input_is_one_line_and_exit_2(picchio, arguments, part):
     done = picchio("envelope", "fanuc_like_3dof", *arguments)
     assert done.returncode == 2
     assert done.stdout == ""

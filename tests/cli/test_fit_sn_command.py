@@ -1,22 +1,11 @@
 """`picchio fit-sn` on made and on real tests."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
 from picchio.fatigue.sn.library import load_sn_curve
-
-
-def picchio(*arguments):
-    return subprocess.run(
-        [sys.executable, "-c", "from picchio.cli.main import main; main()", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
 
 
 @pytest.fixture
@@ -35,7 +24,7 @@ def tests_file(tmp_path):
     return path
 
 
-def test_a_curve_that_assess_can_use(tests_file, tmp_path):
+def test_a_curve_that_assess_can_use(picchio, tests_file, tmp_path):
     out = tmp_path / "my-steel.toml"
     done = picchio("fit-sn", tests_file, "--out", out, "--json", "-")
     assert done.returncode == 0, done.stderr
@@ -52,7 +41,7 @@ def test_a_curve_that_assess_can_use(tests_file, tmp_path):
     assert "my-steel" in done.stdout
 
 
-def test_real_tests_print_a_table(measured_data):
+def test_real_tests_print_a_table(picchio, measured_data):
     done = picchio("fit-sn", measured_data / "sn-tests" / "fatigue-data-fractures.csv")
     assert done.returncode == 0, done.stderr
     for word in ("slope", "endurance limit", "scatter", "interval", "run-outs"):
@@ -68,7 +57,7 @@ def test_real_tests_print_a_table(measured_data):
         ("a,b\n1,2\n", "stress"),
     ],
 )
-def test_bad_tables(tmp_path, text, part):
+def test_bad_tables(picchio, tmp_path, text, part):
     path = tmp_path / "tests.csv"
     path.write_text(text)
     done = picchio("fit-sn", path)
@@ -78,7 +67,7 @@ def test_bad_tables(tmp_path, text, part):
     assert part in done.stderr.lower()
 
 
-def test_a_picture_of_real_tests(measured_data, tmp_path):
+def test_a_picture_of_real_tests(picchio, measured_data, tmp_path):
     source = measured_data / "sn-tests" / "fatigue-data-fractures.csv"
     for name, start in (("fit.png", b"\x89PNG"), ("fit.svg", b"<?xml"), ("fit.PDF", b"%PDF")):
         done = picchio("fit-sn", source, "--plot", tmp_path / name)
@@ -87,7 +76,7 @@ def test_a_picture_of_real_tests(measured_data, tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["fit.PDF", "fit.png", "fit.svg"]
 
 
-def test_a_picture_of_no_known_kind(tests_file, tmp_path):
+def test_a_picture_of_no_known_kind(picchio, tests_file, tmp_path):
     done = picchio("fit-sn", tests_file, "--plot", tmp_path / "fit.docx")
     assert done.returncode == 2
     assert "--plot" in done.stderr

@@ -1,23 +1,11 @@
 """`picchio map` and `picchio annotate` as programs meet them; --version of every command."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 
 
-def picchio(*arguments, cwd=None):
-    return subprocess.run(
-        [sys.executable, "-c", "from picchio.cli.main import main; main()", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        timeout=120,
-    )
-
-
-def test_a_map_as_json(tmp_path):
+def test_a_map_as_json(picchio, tmp_path):
     done = picchio(
         "map", "fanuc_like_3dof", "--joint-grid", "1,4,4", "--out", "m.nc", "--json", "-",
         cwd=tmp_path,
@@ -49,7 +37,7 @@ def test_a_map_as_json(tmp_path):
         (["--force", "nan"], "--force"),
     ],
 )
-def test_a_bad_map_is_one_line_and_leaves_nothing(tmp_path, arguments, part):
+def test_a_bad_map_is_one_line_and_leaves_nothing(picchio, tmp_path, arguments, part):
     done = picchio("map", "fanuc_like_3dof", *arguments, "--out", "m.nc", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stdout == ""
@@ -58,7 +46,7 @@ def test_a_bad_map_is_one_line_and_leaves_nothing(tmp_path, arguments, part):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_annotate_does_not_overwrite_what_it_reads(tmp_path, repository):
+def test_annotate_does_not_overwrite_what_it_reads(picchio, tmp_path, repository):
     arm = tmp_path / "arm.urdf"
     arm.write_bytes((repository / "robots" / "fanuc_like_3dof" / "robot.urdf").read_bytes())
     flex = repository / "robots" / "fanuc_like_3dof" / "flex.toml"
@@ -70,12 +58,12 @@ def test_annotate_does_not_overwrite_what_it_reads(tmp_path, repository):
 
 
 @pytest.mark.parametrize("command", ["assess", "map", "robots", "annotate", "fit-sn"])
-def test_every_command_tells_version_and_shows_an_example(command):
+def test_every_command_tells_version_and_shows_an_example(picchio, command):
     assert picchio(command, "--version").stdout.startswith("picchio 0.")
     assert "Example: picchio" in picchio(command, "--help").stdout
 
 
-def test_damage_on_a_mesh(tmp_path):
+def test_damage_on_a_mesh(picchio, tmp_path):
     """A panel whose normals point at the robot: pushes along them, and the life they cost."""
     (tmp_path / "panel.obj").write_text(
         "v 1.3 -0.2 0.4\nv 1.3 0.2 0.4\nv 1.3 0.2 0.6\nv 1.3 -0.2 0.6\nf 1 3 2\nf 1 4 3\n"

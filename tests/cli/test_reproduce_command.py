@@ -2,20 +2,9 @@
 
 import json
 import re
-import subprocess
-import sys
 
 import pytest
 from lxml import html as lxml_html
-
-
-def picchio(*arguments, timeout=120):
-    return subprocess.run(
-        [sys.executable, "-c", "from picchio.cli.main import main; main()", *arguments],
-        capture_output=True,
-        text=True,
-        timeout=timeout,
-    )
 
 
 @pytest.mark.parametrize(
@@ -28,7 +17,7 @@ def picchio(*arguments, timeout=120):
         (["--report", "/nowhere/at/all.html"], "folder does not exist"),
     ],
 )
-def test_bad_input_is_one_line_and_exit_2(arguments, part):
+def test_bad_input_is_one_line_and_exit_2(picchio, arguments, part):
     done = picchio("reproduce", *arguments)
     assert done.returncode == 2
     assert done.stdout == ""
@@ -37,19 +26,17 @@ def test_bad_input_is_one_line_and_exit_2(arguments, part):
     assert part in lines[0]
 
 
-def test_help_has_an_example():
+def test_help_has_an_example(picchio):
     done = picchio("reproduce", "--help")
     assert done.returncode == 0
     assert "Example: picchio reproduce" in done.stdout
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def whole(picchio, tmp_path_factory):
     folder = tmp_path_factory.mktemp("paper")
     page, data = folder / "page.html", folder / "paper.json"
-    done = picchio(
-        "reproduce", "--worlds", "24", "--report", str(page), "--json", str(data), timeout=590
-    )
+    done = picchio("reproduce", "--worlds", "24", "--report", str(page), "--json", str(data))
     assert done.returncode == 0, done.stderr
     return done, page.read_text("utf-8"), json.loads(data.read_text("utf-8"))
 

@@ -25,9 +25,9 @@ def table(cycles):
 def test_a_table_by_the_printed_curve_is_told(factor, name):
     paper = printed()
     found = curve_of_table(table(paper.sn_curve.cycles(paper.stress) / factor))
-    assert found.best.name == name
-    assert found.best.aside is None
-    assert np.abs(found.best.residuals).max() < 0.01
+    assert found.fits[0].name == name
+    assert found.fits[0].aside is None
+    assert np.abs(found.fits[0].residuals).max() < 0.01
 
 
 @pytest.mark.parametrize("out", [None, 0, 5])
@@ -38,7 +38,7 @@ def test_a_table_by_another_curve_and_its_misprint_are_told(out):
     if out is not None:
         row, joint = [(r, j) for r in range(3) for j in range(3) if paper.stress[r, j] > 0][out]
         cycles[row, joint] *= 1.8
-    found = curve_of_table(table(cycles)).best
+    found = curve_of_table(table(cycles)).fits[0]
     assert found.name == "another curve S = a N^b"
     assert found.aside == out
     assert found.values["exponent"] == pytest.approx(2.3, rel=1e-3)
@@ -49,7 +49,7 @@ def test_a_table_of_noise_belongs_to_no_curve():
     paper = printed()
     rng = np.random.default_rng(5)
     cycles = np.where(paper.stress > 0, 10 ** rng.uniform(5, 8, (3, 3)), np.inf)
-    found = curve_of_table(table(cycles)).best
+    found = curve_of_table(table(cycles)).fits[0]
     assert np.nanmedian(np.abs(found.left_out)) > 0.3
 
 
@@ -57,7 +57,7 @@ def test_the_papers_own_table():
     found = curve_of_table(printed())
     assert found.over_printed.min() == pytest.approx(12.2, abs=0.05)
     assert found.over_printed.max() == pytest.approx(115.9, abs=0.1)
-    best = found.best
+    best = found.fits[0]
     assert found.labels[best.aside] == "left, joint 3"
     kept = np.delete(np.arange(8), best.aside)
     # By numpy alone: a line through the logarithms of the other seven.

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from picchio.paper.assumptions import Assumptions
-from picchio.paper.claims.trial import CLAIMS
 from picchio.paper.printed import printed
-from picchio.paper.verdict import Verdict
+from picchio.paper.verdict import CLAIMS, Verdict
 
 HOLDS, ONLY_IF, FAILS = Verdict.HOLDS, Verdict.CONDITIONAL, Verdict.FAILS
 

@@ -7,7 +7,7 @@ import pytest
 
 from picchio.core.results import plain
 from picchio.paper.assumptions import Assumptions
-from picchio.paper.conflicts import CONFLICTS
+from picchio.paper.conflicts import conflicts
 from picchio.paper.figures import blows, envelope, life, reach, rivets, table2
 from picchio.paper.influence import influences
 from picchio.paper.study import Study
@@ -40,7 +40,7 @@ def test_each_can_be_drawn_and_told(figures):
 
 @pytest.mark.slow
 def test_every_conflict_has_its_number_and_its_figure(study, figures):
-    found = [finder(study, figures) for finder in CONFLICTS]
+    found = conflicts(study, figures)
     assert len({conflict.name for conflict in found}) == len(found) >= 9
     for conflict in found:
         assert conflict.figure in figures

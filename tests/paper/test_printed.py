@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from picchio.paper.assumptions import INPUTS, Assumptions, parse_assumptions
-from picchio.paper.claims.registry import claim
-from picchio.paper.claims.trial import CLAIMS
 from picchio.paper.printed import printed
+from picchio.paper.verdict import CLAIMS, claim
 
 
 def test_every_sentence_is_tried_and_every_test_has_its_sentence():
@@ -20,7 +19,7 @@ def test_every_sentence_is_tried_and_every_test_has_its_sentence():
 
 def test_a_claim_can_be_added_once():
     with pytest.raises(ValueError, match="twice"):
-        claim("poses")(lambda study: None)
+        claim(name="poses")(lambda study: None)
 
 
 def test_the_equations_are_all_there():

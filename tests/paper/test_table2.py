@@ -5,7 +5,7 @@ import pytest
 
 from picchio.paper.assumptions import Assumptions
 from picchio.paper.printed import printed
-from picchio.paper.table2.fit import evaluate, refine, whole_target
+from picchio.paper.table2.fit import Target, evaluate, refine
 from picchio.paper.table2.place import Place, decode, encode, steady_extremes
 from picchio.paper.table2.rules import at_mean, at_worst, by_miner, rules
 from picchio.paper.world import World
@@ -71,7 +71,7 @@ def made_up(rule, exponent=None):
 def test_the_rule_that_made_a_table_fits_it_and_the_others_do_not(k):
     every = rules(12)[:4]
     paper, place = made_up(every[k])
-    target = whole_target(paper)
+    target = Target(paper)
     costs = [evaluate(rule, place, encode(WORLD), target).cost for rule in every]
     assert costs[k] == pytest.approx(0.0, abs=1e-12)
     assert min(cost for i, cost in enumerate(costs) if i != k) > 0.05
@@ -81,7 +81,7 @@ def test_a_fit_finds_its_way_back():
     rule = rules(12)[2]
     paper, place = made_up(rule)
     near = encode(WORLD | {"period": 0.072, "panel_x": 0.88, "pitch": 0.11})
-    fit = refine(rule, place, near, whole_target(paper), 60)
+    fit = refine(rule, place, near, Target(paper), 60)
     assert fit.cost < 1e-6
     assert decode(fit.vector[:7])["period"] == pytest.approx(0.07, rel=1e-3)
     assert fit.stress_per_twist == pytest.approx(25e9, rel=1e-3)
@@ -94,4 +94,4 @@ def test_every_rule_has_the_same_freedom_but_what_it_says():
 def test_a_world_out_of_reach_is_no_fit():
     place = Place(Assumptions())
     far = encode(WORLD | {"panel_x": 1.45, "panel_y": 1.0})
-    assert evaluate(rules(12)[0], place, far, whole_target(printed())) is None
+    assert evaluate(rules(12)[0], place, far, Target(printed())) is None

@@ -43,7 +43,8 @@ def printed(*arguments, width, monkeypatch):
     """What the command prints on a terminal of this width."""
     from rich.console import Console
 
-    monkeypatch.setattr("picchio.cli.output.console", lambda: Console(width=width, highlight=False))
+    module = "picchio.cli.reference.described"
+    monkeypatch.setattr(f"{module}.console", lambda: Console(width=width, highlight=False))
     out = io.StringIO()
     with contextlib.redirect_stdout(out):
         assert run(list(arguments)) == 0

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import typer
 
-from picchio.cli.annotate import register
+from picchio.cli.main import app
 from picchio.core.errors import InputError
 from picchio.robot.loading.load import load_robot
 
 
 def run(*arguments: str) -> None:
-    app = typer.Typer()
-    register(app)
-    app.callback()(lambda: None)  # with a single command typer would take its name away
     app(["annotate", *arguments], standalone_mode=False)
 
 

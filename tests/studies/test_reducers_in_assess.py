@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import picchio
-from picchio.cli.assess import show
+from picchio.cli.life.assess import show
 from picchio.core.errors import PicchioWarning
 from picchio.fatigue.reducer import load_reducer
 from picchio.studies.assessment.checks import reducer_checks

@@ -13,7 +13,7 @@ import pytest
 from lxml import html as lxml_html
 
 from picchio.campaign.campaign import Campaign
-from picchio.cli.diagnose import show_diagnosis
+from picchio.cli.measured.diagnose import show_diagnosis
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.conclude.holdout import holdout_gain
 from picchio.diagnosis.percussion.criteria.bic import bic

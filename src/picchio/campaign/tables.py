@@ -75,7 +75,8 @@ def _finite_leaves(value: Any) -> Any:
 InsideFile = Annotated[str, AfterValidator(_inside)]
 DataFile = Annotated[str, AfterValidator(_inside), AfterValidator(_data_file)]
 Direction = Annotated[list[Finite], Field(min_length=3, max_length=3), AfterValidator(_direction)]
-Pose = Annotated[dict[str, float] | list[float], PlainValidator(_pose)]
+_AnyPose = dict[str, float] | list[float]
+Pose = Annotated[_AnyPose, PlainValidator(_pose, json_schema_input_type=_AnyPose)]
 FreeTable = Annotated[dict[str, Any], AfterValidator(_finite_leaves)]
 Hits = Annotated[int, Field(gt=0, strict=True)]
 

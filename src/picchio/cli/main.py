@@ -6,84 +6,26 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
-import picchio.cli.annotate
-import picchio.cli.assess
-import picchio.cli.check
-import picchio.cli.diagnose
-import picchio.cli.effects
-import picchio.cli.envelope
-import picchio.cli.fit_sn
-import picchio.cli.formats
-import picchio.cli.identify
-import picchio.cli.import_
-import picchio.cli.map
-import picchio.cli.place
-import picchio.cli.reproduce
-import picchio.cli.robots
-import picchio.cli.simulate
-import picchio.cli.view
-from picchio.core.errors import InputError, PicchioError
+from picchio.cli.app import app
 
-app = typer.Typer(
-    name="picchio",
-    help="Fatigue life of flexible-joint robots under percussive tools.",
-    add_completion=True,
-    rich_markup_mode="rich",
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-for register in (
-    picchio.cli.annotate.register,
-    picchio.cli.assess.register,
-    picchio.cli.check.register,
-    picchio.cli.diagnose.register,
-    picchio.cli.effects.register,
-    picchio.cli.envelope.register,
-    picchio.cli.fit_sn.register,
-    picchio.cli.formats.register,
-    picchio.cli.identify.register,
-    picchio.cli.import_.register,
-    picchio.cli.map.register,
-    picchio.cli.place.register,
-    picchio.cli.reproduce.register,
-    picchio.cli.robots.register,
-    picchio.cli.simulate.register,
-    picchio.cli.view.register,
-):
-    register(app)
+# Importing its file adds a command, in the order of `picchio --help`.
+from picchio.cli.life import assess, envelope, fit_sn, map, place, view  # noqa: F401
+from picchio.cli.measured import check, diagnose, identify, import_, simulate  # noqa: F401
+from picchio.cli.output import begin, say_warning
+from picchio.cli.reference import described, reproduce, robots  # noqa: F401
+from picchio.core.errors import InputError, PicchioError
 
 # Typer carries its own copy of click since 0.20: this is whichever it uses.
 _UsageError: Any = typer.BadParameter.__mro__[1]
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
-        from picchio.core.provenance import package_version
-
-        typer.echo(f"picchio {package_version()}")
-        raise typer.Exit
-
-
-@app.callback()
-def _root(
-    version: Annotated[
-        bool,
-        typer.Option("--version", callback=_version, is_eager=True, help="Print the version."),
-    ] = False,
-) -> None:
-    """Fatigue life of flexible-joint robots under percussive tools.
-
-    Example: picchio assess fanuc_like_3dof
-    """
-
-
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exit 0 on success, 2 on bad input with one line on stderr."""
-    warnings.showwarning = _show_warning
+    warnings.showwarning = lambda message, *_, **__: say_warning(str(message))
     warnings.simplefilter("default")
     sys.exit(run(arguments))
 
@@ -91,6 +33,7 @@ def main(arguments: list[str] | None = None) -> None:
 def run(arguments: list[str] | None = None) -> int:
     """Run the command line and return the exit code."""
     given = sys.argv[1:] if arguments is None else arguments
+    begin(given)
     if given and given[-1] == "--version":  # of every subcommand, too
         given = ["--version"]
     try:
@@ -126,9 +69,3 @@ def _as_typed(error: PicchioError, given: Sequence[str]) -> PicchioError:
 def _fail(problem: str) -> int:
     print(f"picchio: error: {' '.join(problem.split())}", file=sys.stderr)
     return 2
-
-
-def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    from picchio.cli.output import say_warning
-
-    say_warning(str(message))

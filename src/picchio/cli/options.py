@@ -1,54 +1,112 @@
-"""Arguments and options that several subcommands share."""
+"""Arguments and options that several subcommands share, and how their text is read."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from picchio.core.errors import InputError
+
+if TYPE_CHECKING:
+    from picchio.robot.flexible_robot import FlexibleRobot
 
 RobotArgument = Annotated[
     str,
     typer.Argument(
         metavar="ROBOT",
-        help="A name from `picchio robots`, or a path to a URDF.",
-        show_default=False,
+        help="A name from `picchio robots`, a URDF, or a saved model (picchio-model/1).",
     ),
 ]
 FlexOption = Annotated[
     Path | None,
-    typer.Option("--flex", metavar="FILE", help="Sidecar with stiffnesses and shafts (TOML)."),
+    typer.Option(
+        metavar="FILE",
+        help="Sidecar (TOML) with stiffness, damping and shafts; the robot's own if not given.",
+    ),
 ]
 ToolOption = Annotated[
-    str | None, typer.Option("--tool", metavar="FRAME", help="Frame where the tool's force acts.")
+    str | None,
+    typer.Option(
+        metavar="FRAME",
+        help="Frame of the URDF on which the tool's force acts; the sidecar's if not given.",
+    ),
 ]
 TaskOption = Annotated[
     Path | None,
-    typer.Option("--task", metavar="FILE", help="Task (TOML); the robot's own if not given."),
+    typer.Option(
+        metavar="FILE",
+        help="What the robot does (TOML, see `picchio formats task`); its example task if not "
+        "given.",
+    ),
 ]
 SNCurveOption = Annotated[
     str | None,
-    typer.Option(metavar="NAME", help="S-N curve for all joints: a name or a TOML file."),
-]
-PoseOption = Annotated[
-    str, typer.Option("--pose", metavar="Q1,Q2,...", help="Joint positions, rad or m.")
+    typer.Option(
+        metavar="NAME",
+        help="S-N curve of all shafts: a name or a TOML file; each shaft's own if not given.",
+    ),
 ]
 ForceOption = Annotated[
-    float | None, typer.Option(help="N, height of a blow; the example task's if not given.")
+    float | None, typer.Option(help="Height of a blow, N; the example task's if not given.")
 ]
-PeriodOption = Annotated[float | None, typer.Option(help="s, from one blow to the next.")]
-WidthOption = Annotated[float | None, typer.Option(help="s, width of a blow.")]
+PeriodOption = Annotated[
+    float | None, typer.Option(help="Time from one blow to the next, s; likewise.")
+]
+WidthOption = Annotated[float | None, typer.Option(help="Duration of a blow, s; likewise.")]
 HitsOption = Annotated[
     int | None, typer.Option(help="Blows of a burst from rest; steady state if not given.")
 ]
+DataOption = Annotated[
+    Path, typer.Option(metavar="CAMPAIGN", help="Measured data: a folder with a campaign.toml.")
+]
+ReportOption = Annotated[
+    Path | None, typer.Option(metavar="OUT.html", help="Write one HTML page to read and print.")
+]
 JsonOption = Annotated[
-    str | None,
-    typer.Option("--json", metavar="FILE", help="Write the result as JSON; - for stdout."),
+    str | None, typer.Option(metavar="FILE", help="Write the result as JSON; - for stdout.")
 ]
 GravityStiffnessOption = Annotated[
     bool,
     typer.Option(
         "--gravity-stiffness/--no-gravity-stiffness",
-        help="Add gravity's stiffness dg/dq to the springs'.",
+        help="Whether gravity's stiffness dg/dq is added to that of the springs.",
     ),
 ]
+
+
+def numbers(text: str, key: str, count: int | None = None) -> list[float]:
+    """Numbers separated by commas.
+
+    Args:
+        text: as given.
+        key: the option, for the message.
+        count: how many there must be; any number if not given.
+
+    Raises:
+        InputError: something that is no number, or not as many as there must be.
+    """
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError("must be numbers separated by commas", key=key, value=text) from None
+    if count is not None and len(values) != count:
+        raise InputError(f"must be {count} numbers", key=key, value=text)
+    return values
+
+
+def task_file(robot: FlexibleRobot, task: Path | None) -> Path:
+    """The task that was given, or else the robot's example.
+
+    Raises:
+        InputError: neither.
+    """
+    path = task or robot.task_path
+    if path is None:
+        raise InputError(
+            f"{robot.name} has no example task of its own",
+            key="--task",
+            hint="give one: a TOML file of the format picchio-task/1",
+        )
+    return path

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from picchio.core.errors import InputError
 
@@ -18,8 +17,17 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from picchio.core.results import Result
+
 _PATIENCE = 2.0
+_typed: list[str] = []
 _said: list[str] = []
+
+
+def begin(arguments: Sequence[str]) -> None:
+    """Start a command: keep what was typed for a report, forget an earlier command's warnings."""
+    _typed[:] = arguments
+    _said.clear()
 
 
 def say_warning(message: str) -> None:
@@ -28,16 +36,6 @@ def say_warning(message: str) -> None:
     if line not in _said:
         _said.append(line)
         print(f"picchio: warning: {line}", file=sys.stderr)
-
-
-def said_warnings() -> list[str]:
-    """The warnings printed so far."""
-    return list(_said)
-
-
-def command_line() -> str:
-    """What was typed, for a report."""
-    return shlex.join(["picchio", *sys.argv[1:]])
 
 
 def console() -> Console:
@@ -68,55 +66,105 @@ def definitions(rows: Iterable[tuple[str, str]]) -> Table:
     return table
 
 
-def check_target(target: str | Path | None, inputs: Iterable[str | Path | None]) -> None:
-    """Refuse, before any work, an output that cannot be written or would destroy an input.
+def table(headers: Iterable[str], rows: Iterable[Iterable[str]], **style: Any) -> Table:
+    """A table to print; where there is little room, the first column alone is not broken.
 
     Args:
-        target: where a result shall go; None or "-" for nowhere.
+        headers: of the columns; one that begins with ">" is set to the right.
+        rows: cells, with rich's markup.
+        **style: of `rich.table.Table`, such as its title.
+    """
+    from rich import box
+    from rich.table import Table
+
+    look: dict[str, Any] = {"box": box.SIMPLE_HEAD, "pad_edge": False, "title_justify": "left"}
+    made = Table(title_style="bold", caption_justify="left", **look | style)
+    for header in headers:
+        side: Literal["left", "right"] = "right" if header.startswith(">") else "left"
+        first = not made.columns
+        made.add_column(
+            header.removeprefix(">"),
+            justify=side,
+            no_wrap=first,
+            overflow="ellipsis" if first else "fold",
+        )
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
+def count_of(count: float, noun: str) -> str:
+    """A number with its noun: "1 rivet", "12 rivets"."""
+    return f"{count:g} {noun}{'' if count == 1 else 's'}"
+
+
+def check_targets(
+    targets: Iterable[str | Path | None], inputs: Iterable[str | Path | None]
+) -> None:
+    """Refuse, before any work, outputs that cannot be written or would destroy an input.
+
+    Args:
+        targets: where results shall go; None or "-" for nowhere.
         inputs: files that the command reads.
 
     Raises:
         InputError: the folder is missing or read-only, or the file is one of the inputs.
     """
-    if target is None or str(target) == "-":
-        return
-    path = Path(target)
-    if path.is_dir() and path.suffix != ".zarr":
-        raise InputError("is a folder, not a file to write", file=path)
-    if not path.parent.is_dir():
-        raise InputError("cannot write here: the folder does not exist", file=path)
-    if not os.access(path.parent, os.W_OK):
-        raise InputError("cannot write here: the folder is read-only", file=path)
-    for source in inputs:
-        both = source is not None and path.exists() and Path(source).exists()
-        if source is not None and both and path.samefile(source):
+    read = [Path(source) for source in inputs if source is not None and Path(source).exists()]
+    for target in targets:
+        if target is None or str(target) == "-":
+            continue
+        path = Path(target)
+        if path.is_dir() and path.suffix != ".zarr":
+            raise InputError("is a folder, not a file to write", file=path)
+        if not path.parent.is_dir():
+            raise InputError("cannot write here: the folder does not exist", file=path)
+        if not os.access(path.parent, os.W_OK):
+            raise InputError("cannot write here: the folder is read-only", file=path)
+        if path.exists() and any(path.samefile(source) for source in read):
             raise InputError("would overwrite an input of this command", file=path)
 
 
-def check_numbers(**options: float | None) -> None:
-    """Refuse options that are not finite numbers, named as on the command line.
-
-    Raises:
-        InputError: NaN or infinite.
-    """
-    for name, value in options.items():
-        if value is not None and not math.isfinite(value):
-            raise InputError(
-                "must be a finite number", key=f"--{name.replace('_', '-')}", value=value
-            )
-
-
-def write_json(data: dict[str, Any], target: str) -> None:
-    """Write JSON to a file, whole or not at all, or to stdout for "-"."""
+def write_text(target: str | Path, text: str) -> None:
+    """Write a text file, whole or not at all."""
     from picchio.core.files import atomic_write
-    from picchio.core.results import plain
 
-    text = json.dumps(plain(data), indent=2, allow_nan=False) + "\n"
-    if target == "-":
-        sys.stdout.write(text)
-        return
     with atomic_write(target) as stream:
         stream.write(text)
+
+
+def write_report(result: Result, target: Path | None, **options: Any) -> None:
+    """Write a result's page where one is asked for, with what was typed and the warnings so far.
+
+    Args:
+        result: what the command found.
+        target: the file of `--report`.
+        **options: what the page needs besides, see `picchio.report`.
+    """
+    if target is not None:
+        import picchio
+
+        typed = shlex.join(["picchio", *_typed])
+        picchio.report(result, command=typed, warnings=_said, **options).save(target)
+
+
+def deliver(
+    content: Mapping[str, Any], target: str | None, show: Callable[[], object] = lambda: None
+) -> None:
+    """Write a result as JSON where that is asked for; show it, unless stdout holds the JSON.
+
+    Args:
+        content: of the result, `to_dict()`.
+        target: the file of `--json`; "-" for stdout, None where there is none.
+        show: prints the result for people.
+    """
+    if target is not None:
+        text = json.dumps(content, indent=2, allow_nan=False) + "\n"
+        if target == "-":
+            sys.stdout.write(text)
+            return
+        write_text(target, text)
+    show()
 
 
 @contextmanager

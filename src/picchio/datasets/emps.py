@@ -25,7 +25,7 @@ import numpy as np
 from picchio.campaign.campaign import Campaign
 from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
-from picchio.datasets.fetch import Dataset, RemoteFile
+from picchio.datasets.fetch import Dataset, RemoteFile, load_variables
 
 _HOME = "examples/EMPS/data/"
 DATASET = Dataset(
@@ -90,7 +90,5 @@ def build(files: Mapping[str, Path]) -> Campaign:
 
 
 def _read(path: Path) -> dict[str, FloatArray]:
-    from picchio.datasets.matlab import load_variables
-
     found = load_variables(path, ("t", "qg", "qm", "vir", "kp", "kv", "gtau"))
     return {key: np.ravel(value).astype(np.float64) for key, value in found.items()}

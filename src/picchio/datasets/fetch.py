@@ -1,4 +1,4 @@
-"""Where a data set's files are: a local folder, or the authors' repository at a fixed commit."""
+"""Where a data set's files are, a folder or the authors' repository, and how they are read."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import gzip
 import hashlib
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 from picchio.core.errors import InputError, PicchioWarning
@@ -107,7 +108,10 @@ def _local(dataset: Dataset, folder: Path) -> dict[str, Path]:
 
 
 def content(path: Path) -> bytes:
-    """A file's bytes, unpacked where it is gzipped.
+    """The bytes of a file, unpacked where it is gzipped.
+
+    Args:
+        path: the file.
 
     Raises:
         InputError: it can't be read.
@@ -117,6 +121,32 @@ def content(path: Path) -> bytes:
         return gzip.decompress(data) if path.suffix == ".gz" else data
     except (OSError, EOFError) as error:
         raise InputError(f"cannot be read: {error}", file=path) from None
+
+
+def load_variables(path: Path, names: Sequence[str]) -> dict[str, Any]:
+    """The variables of a .mat file by name; structs as objects with their fields.
+
+    Args:
+        path: the file.
+        names: of the variables.
+
+    Raises:
+        InputError: no .mat file, or a variable is missing.
+    """
+    from scipy.io import loadmat
+
+    try:
+        with warnings.catch_warnings():
+            # The KUKA files hold one opaque MATLAB object beside the data.
+            warnings.simplefilter("ignore")
+            found = loadmat(path, squeeze_me=True, struct_as_record=False, variable_names=names)
+    except Exception as error:  # scipy raises many kinds on a broken file
+        reason = str(error).partition("\n")[0]
+        raise InputError(f"is not a readable .mat file: {reason}", file=path) from None
+    for name in names:
+        if name not in found:
+            raise InputError("the variable is missing", file=path, key=name)
+    return {name: found[name] for name in names}
 
 
 def _download(dataset: Dataset, name: str) -> Path:

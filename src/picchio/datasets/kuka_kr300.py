@@ -30,8 +30,7 @@ from picchio.campaign.campaign import Campaign
 from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.datasets.fetch import Dataset, RemoteFile
-from picchio.datasets.matlab import load_variables
+from picchio.datasets.fetch import Dataset, RemoteFile, load_variables
 
 _HASHES = {
     "A": "4c152c5b7f2c899731fdeebcf0d011cc103df72be19fac160caf47aa9b73ab75",

@@ -55,18 +55,14 @@ def urdf(values: PrintedArm, inertia_about: str = "cg") -> str:
 
     Args:
         values: as printed.
-        inertia_about: what Table 1's inertias are taken about: "cg", or "joint", whose share
-            m c^2 is then subtracted.
+        inertia_about: what Table 1's inertias are taken about: "cg" or "joint".
     """
     lines = ['<robot name="paper_arm" xmlns:picchio="urn:picchio:1"><link name="base"/>']
     place, parent = "0 0 0", "base"
     steps = ("0 0 {:.17g}", "{:.17g} 0 0", "{:.17g} 0 0")
     axes = ("0 0 1", "0 -1 0", "0 -1 0")
     for i in range(3):
-        centre, inertia = np.array(values.centres_of_gravity[i]), np.array(values.inertias[i])
-        if inertia_about == "joint" and i > 0:
-            inertia = inertia - values.masses[i] * (centre @ centre - centre**2)
-        x, y, z = inertia
+        centre, (x, y, z) = values.centres_of_gravity[i], values.inertia(i, inertia_about)
         limit, name = values.limits[i], f"link_{i + 1}"
         lines.append(
             f'<joint name="joint_{i + 1}" type="revolute"><parent link="{parent}"/>'

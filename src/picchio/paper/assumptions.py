@@ -33,6 +33,18 @@ class Input:
     choices: tuple[Any, ...] = ()
     log: bool = False
 
+    def at(self, share: float) -> Any:
+        """The value at a share of the range, or of the list of choices.
+
+        Args:
+            share: 0 to 1.
+        """
+        if self.low is None or self.high is None:
+            return self.choices[min(int(share * len(self.choices)), len(self.choices) - 1)]
+        if self.log:
+            return float(self.low * (self.high / self.low) ** share)
+        return float(self.low + share * (self.high - self.low))
+
 
 @dataclass(frozen=True)
 class Assumptions:
@@ -100,8 +112,8 @@ INPUTS: tuple[Input, ...] = (
 )  # fmt: skip
 
 
-def parse_assumptions(given: Iterable[str], base: Assumptions | None = None) -> Assumptions:
-    """Assumptions changed by words such as "period=0.1".
+def parse_assumptions(given: Iterable[str]) -> Assumptions:
+    """The base world's assumptions, changed by words such as "period=0.1".
 
     Raises:
         InputError: an unknown name, or a bad value.
@@ -135,4 +147,4 @@ def parse_assumptions(given: Iterable[str], base: Assumptions | None = None) -> 
         values[name] = int(number) if whole else number
     if values.get("duty", 0.5) >= 1.0:
         raise InputError("must be below 1", key="--assume duty", value=values["duty"])
-    return (base or Assumptions()).but(**values)
+    return Assumptions(**values)

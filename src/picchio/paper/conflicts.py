@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,44 +31,28 @@ class Conflict:
     number: float
     figure: str
 
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+def conflicts(study: Study, figures: Mapping[str, PaperFigure]) -> tuple[Conflict, ...]:
+    """All of them, by the numbers of the figures that show them."""
+    shown = {name: figure.data for name, figure in figures.items()}
+    return (*_of_gravity(study, shown), *_of_reach(study, shown), *_of_life(study, shown),
+            *_of_joints(study, shown))  # fmt: skip
 
 
-Finder = Callable[[Study, dict[str, PaperFigure]], Conflict]
-CONFLICTS: list[Finder] = []
+_Shown = Mapping[str, Mapping[str, Any]]
 
 
-def conflict(finder: Finder) -> Finder:
-    """Register one."""
-    CONFLICTS.append(finder)
-    return finder
-
-
-def conflicts(study: Study, figures: dict[str, PaperFigure]) -> tuple[Conflict, ...]:
-    """All of them."""
-    return tuple(finder(study, figures) for finder in CONFLICTS)
-
-
-@conflict
-def _actuators(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
-    data = figures["gravity"].data
-    need, have = data["largest"][1], data["actuators"][1]
-    return Conflict(
+def _of_gravity(study: Study, shown: _Shown) -> Iterator[Conflict]:
+    need, have = shown["gravity"]["largest"][1], shown["gravity"]["actuators"][1]
+    yield Conflict(
         "actuators",
         f"Joint 2's actuator gives {have:.0f} N m at most (p. 297).",
         f"To hold the arm of Table 1 stretched out takes {need:.0f} N m, {need / have:.2g} times "
         "that, before any tool or payload.",
         need, "gravity",
     )  # fmt: skip
-
-
-@conflict
-def _mean_stress(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
-    data = figures["gravity-stress"].data
-    steady, largest = data["gravity"][1], float(np.max(study.printed.stress[:, 1]))
-    return Conflict(
+    steady, largest = shown["gravity-stress"]["gravity"][1], float(study.printed.stress[:, 1].max())
+    yield Conflict(
         "mean-stress",
         f"Joint 2's fatigue stress is {largest:g} MPa at most (Table 2).",
         f"Gravity puts {steady:.0f} MPa into the same shaft, {steady / largest:.2g} times as much, "
@@ -77,116 +61,89 @@ def _mean_stress(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
     )  # fmt: skip
 
 
-@conflict
-def _range(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
-    data = figures["range"].data
-    return Conflict(
+def _of_reach(study: Study, shown: _Shown) -> Iterator[Conflict]:
+    path, heights = shown["range"], study.printed.task.path_heights
+    yield Conflict(
         "range",
-        f"Joint 3 turns ± {data['limit_deg']:.0f}° (p. 297); Fig. 9's tool goes from z = "
-        f"{study.printed.task.path_heights[0]:g} to {study.printed.task.path_heights[-1]:g} m at "
-        "the same x.",
-        f"No x allows that. The best, {data['at_x']:.2f} m, needs {data['least_bend_deg']:.0f}°.",
-        data["least_bend_deg"], "range",
+        f"Joint 3 turns ± {path['limit_deg']:.0f}° (p. 297); Fig. 9's tool goes from z = "
+        f"{heights[0]:g} to {heights[-1]:g} m at the same x.",
+        f"No x allows that. The best, {path['at_x']:.2f} m, needs {path['least_bend_deg']:.0f}°.",
+        path["least_bend_deg"], "range",
     )  # fmt: skip
-
-
-@conflict
-def _rings(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
-    return Conflict(
+    spread = shown["rings"]["spread"]
+    yield Conflict(
         "rings",
         "Joint 2's largest deflection over all directions is at the up and low end (p. 299, "
         "Fig. 10b).",
         "Worst-direction maps of joints 2 and 3 are rings about joint 2: turning it changes the "
-        f"peak by {figures['rings'].data['spread']:.1g} of itself, so up, down and out are alike.",
-        figures["rings"].data["spread"], "rings",
+        f"peak by {spread:.1g} of itself, so up, down and out are alike.",
+        spread, "rings",
     )  # fmt: skip
-
-
-@conflict
-def _x_force(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
-    data = figures["x-force"].data["joint_1"]
-    return Conflict(
+    by_x = shown["x-force"]["joint_1"]
+    yield Conflict(
         "x-force",
         "At full reach along x, forces along x make the largest torque on joint 1 (p. 299).",
-        f"They point at its axis: {plainly(max(data['x']))} mrad. Forces along y make up to "
-        f"{max(data['y']):.2g} mrad.",
-        max(data["x"]), "x-force",
+        f"They point at its axis: {plainly(max(by_x['x']))} mrad. Forces along y make up to "
+        f"{max(by_x['y']):.2g} mrad.",
+        max(by_x["x"]), "x-force",
     )  # fmt: skip
-
-
-@conflict
-def _z_force(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
-    data = figures["z-force"].data["joint_2"]
-    return Conflict(
+    by_z = shown["z-force"]["joint_2"]
+    yield Conflict(
         "z-force",
         "At full reach along z, forces along z make the largest torque on joint 2 (p. 299).",
-        f"They pass through its axis: {plainly(data['z'][-1])} mrad. Forces along x make "
-        f"{data['x'][-1]:.2g} mrad there. In both sentences the axes may be exchanged; with x the "
+        f"They pass through its axis: {plainly(by_z['z'][-1])} mrad. Forces along x make "
+        f"{by_z['x'][-1]:.2g} mrad there. In both sentences the axes may be exchanged; with x the "
         "second comes right for joint 2, the first stays wrong for joint 1.",
-        data["z"][-1], "z-force",
+        by_z["z"][-1], "z-force",
     )  # fmt: skip
 
 
-@conflict
-def _steady(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
-    data = figures["steady-state"].data
-    rivet = study.printed.task.hits_per_rivet * study.given.period
-    return Conflict(
+def _of_life(study: Study, shown: _Shown) -> Iterator[Conflict]:
+    blows, hits = shown["steady-state"], study.printed.task.hits_per_rivet
+    yield Conflict(
         "steady-state",
         f"The transient dies out and the steady state counts (p. 295); a rivet takes "
-        f"{study.printed.task.hits_per_rivet} hits (p. 300).",
-        f"The slowest mode fades with {data['time_constant']:.2g} s, a rivet lasts {rivet:.2g} s: "
-        f"the real peak is {data['ratio']:.3g} times the steady one.",
-        data["ratio"], "steady-state",
+        f"{hits} hits (p. 300).",
+        f"The slowest mode fades with {blows['time_constant']:.2g} s, a rivet lasts "
+        f"{hits * study.given.period:.2g} s: the real peak is {blows['ratio']:.3g} times the "
+        "steady one.",
+        blows["ratio"], "steady-state",
     )  # fmt: skip
-
-
-@conflict
-def _curve(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
-    return Conflict(
+    curve = shown["fig-11"]
+    yield Conflict(
         "curve",
         "The S–N curve is of steel like that of common joint shafts (p. 299).",
-        f"It allows {figures['fig-11'].data['at_1000']:,.0f} MPa in shear at 1,000 cycles; an "
-        "ordinary quenched and tempered shaft steel breaks at "
-        f"{figures['fig-11'].data['steel_breaks_at']:,.0f} MPa at once.",
-        figures["fig-11"].data["at_1000"], "fig-11",
+        f"It allows {curve['at_1000']:,.0f} MPa in shear at 1,000 cycles; an ordinary quenched "
+        f"and tempered shaft steel breaks at {curve['steel_breaks_at']:,.0f} MPa at once.",
+        curve["at_1000"], "fig-11",
     )  # fmt: skip
-
-
-@conflict
-def _table(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
-    table = study.curve_of_table
-    return Conflict(
+    longer = study.curve_of_table.over_printed
+    yield Conflict(
         "table-2",
         "Table 2's N follow from its mean stresses by the S–N curve (pp. 299–300).",
-        f"By that curve they would be {table.over_printed.min():.3g} to "
-        f"{table.over_printed.max():.3g} times as long. They follow from the means by another.",
-        float(table.over_printed.max()), "table-2-lives",
+        f"By that curve they would be {longer.min():.3g} to {longer.max():.3g} times as long. "
+        "They follow from the means by another.",
+        float(longer.max()), "table-2-lives",
     )  # fmt: skip
 
 
-@conflict
-def _shaft(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
+def _of_joints(study: Study, shown: _Shown) -> Iterator[Conflict]:
     shaft = study.base.robot.flexible_joints[1].shaft
     assert shaft is not None
-    return Conflict(
+    slender = shaft.length / (2.0 * shaft.radius)
+    yield Conflict(
         "shaft",
         "Joint stiffness k is given (p. 297), stress comes from G r Δq / l (eq. 17): k and G r / l "
         "both describe the same shaft.",
         f"With the assumed G r / l the shaft is {2e3 * shaft.radius:.0f} mm thick and "
-        f"{1e3 * shaft.length:.0f} mm long: {shaft.length / (2 * shaft.radius):.2g} times as long "
-        f"as thick, in the joint of an arm of {sum(study.printed.arm.link_lengths[1:]):g} m. A "
-        "drive yields in its gears too, and then eq. 17 overstates the stress.",
-        shaft.length / (2.0 * shaft.radius), "shaft",
+        f"{1e3 * shaft.length:.0f} mm long: {slender:.2g} times as long as thick, in the joint of "
+        f"an arm of {sum(study.printed.arm.link_lengths[1:]):g} m. A drive yields in its gears "
+        "too, and then eq. 17 overstates the stress.",
+        slender, "shaft",
     )  # fmt: skip
-
-
-@conflict
-def _sequence(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
-    data = figures["dominance"].data
-    share = data["agree"][4] / data["tried"]
+    share = shown["dominance"]["agree"][4] / shown["dominance"]["tried"]
     wanted, stiffness = study.printed.task.dominant_joints, study.printed.arm.stiffness
-    return Conflict(
+    yield Conflict(
         "sequence",
         f"Going down, the dominant joint is {', '.join(map(str, wanted))} (p. 297).",
         f"Joint 1's spring is {stiffness[0] / stiffness[1]:.2g} times as stiff as the others, so "
@@ -194,14 +151,9 @@ def _sequence(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
         "paper leaves open do all four.",
         share, "dominance",
     )  # fmt: skip
-
-
-@conflict
-def _phase(study: Study, figures: dict[str, PaperFigure]) -> Conflict:
-    data = figures["phase"].data
-    exact, plain = np.array(data["exact"]), np.array(data["plain"])
+    exact, plain = (np.array(shown["phase"][key]) for key in ("exact", "plain"))
     off = float(np.abs(plain - exact).max() / np.abs(exact).max())
-    return Conflict(
+    yield Conflict(
         "phase",
         "The phase of eq. 13 is a sum of two tan⁻¹ (p. 295).",
         f"Above resonance their quadrant is wrong; so taken, the history errs by {100 * off:.2g} % "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -51,15 +52,9 @@ class Dominance:
         )
 
 
+@lru_cache(maxsize=1)
 def search_dominance(study: Study) -> Dominance:
-    """Random worlds on the vertical path, a seed that is the study's; kept on the study."""
-    known = study.__dict__.get("_dominance")
-    if known is None:
-        known = study.__dict__.setdefault("_dominance", _search(study))
-    return known  # type: ignore[no-any-return]
-
-
-def _search(study: Study) -> Dominance:
+    """Random worlds on the vertical path, with the study's seed; kept for the last study."""
     rng = np.random.default_rng(study.seed)
     wanted = np.array(study.printed.task.dominant_joints) - 1
     heights = study.printed.task.path_heights
@@ -68,22 +63,20 @@ def _search(study: Study) -> Dominance:
     agree = np.empty(_TRIED)
     best: tuple[float, World | None] = (-1.0, None)
     hits = 0
-    frames = {
-        (about, elbow): World(study.given.but(inertia_about=about, elbow=elbow))
+    frames = [
+        World(study.given.but(inertia_about=about, elbow=elbow))
         for about in ("cg", "joint")
         for elbow in ("down", "up")
-    }
+    ]
     for k in range(_TRIED):
-        changes = {}
-        for name in _NAMES:
-            entry, share = entries[name], rng.random()
-            low, high = float(entry.low or 0.0), float(entry.high or 0.0)
-            changes[name] = low * (high / low) ** share if entry.log else low + share * (high - low)
-        frame = list(frames.values())[rng.integers(len(frames))]
+        changes = {name: entries[name].at(rng.random()) for name in _NAMES}
+        frame = frames[rng.integers(len(frames))]
         world = World(frame.given.but(**changes))
         poses = poses_at([(changes["path_x"], 0.0, z) for z in heights], frame.given.elbow)
         mass, jacobian = frame.robot.mass_and_jacobian(poses)
-        peaks = _worst(world, frame, mass, jacobian)
+        peaks = batch_peaks(
+            mass, jacobian, frame.robot.stiffness, world.given.damping_ratio, world.blows
+        ).peak_deflection
         values[k] = list(changes.values())
         same = peaks.argmax(axis=1) == wanted
         agree[k] = same.sum()
@@ -94,9 +87,3 @@ def _search(study: Study) -> Dominance:
             if margin > best[0]:
                 best = (margin, world)
     return Dominance(_TRIED, hits, values, agree, best[1], best[0])
-
-
-def _worst(world: World, frame: World, mass: FloatArray, jacobian: FloatArray) -> FloatArray:
-    return batch_peaks(
-        mass, jacobian, frame.robot.stiffness, world.given.damping_ratio, world.blows
-    ).peak_deflection

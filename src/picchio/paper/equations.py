@@ -48,10 +48,6 @@ class Equation:
     check: str
     gap: float | None
 
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
-
 
 Check = Callable[[Study], float]
 Row = tuple[Callable[..., Any], str, Check]
@@ -113,9 +109,7 @@ def _energy(study: Study) -> float:
             turn = (ends[1][1] - ends[0][1]) / (2.0 * step) @ (0.5 * (ends[0][1] + ends[1][1])).T
             spin = np.array([turn[2, 1], turn[0, 2], turn[1, 0]])
             frame = world.robot.frame_placement(pose, f"link_{i + 1}")[1]
-            inertia = np.array(arm.inertias[i])
-            if study.given.inertia_about == "joint" and i > 0:
-                inertia = inertia - mass * (centre @ centre - centre**2)
+            inertia = arm.inertia(i, study.given.inertia_about)
             total += float(0.5 * mass * speed @ speed + 0.5 * inertia @ (frame.T @ spin) ** 2)
         exact = float(0.5 * rate @ world.robot.state(pose).mass_matrix @ rate)
         worst = max(worst, abs(total / exact - 1.0))
@@ -166,8 +160,12 @@ def _modes(study: Study) -> float:
     return float(np.abs(left - right).max() / np.abs(left).max())
 
 
-def _series(study: Study) -> float:
-    """Eq. 12."""
+def series_gap(study: Study) -> float:
+    """The largest difference of eq. 12's coefficients from those of the exact pulse, over F0.
+
+    Args:
+        study: its base world's blows, and as many harmonics as it assumes.
+    """
     count = study.given.harmonics
     printed = printed_series(study.base.blows, count)
     exact = study.base.blows.one_period().fourier_coefficients(count)
@@ -204,7 +202,7 @@ DONE_BY: dict[str, Row] = {
     "9": (modal_analysis, _EOM, _motion),
     "10": (undamped_modes, _MODES, _modes),
     "11": (modal_damping_matrix, _EOM, _motion),
-    "12": (PiecewiseForce.fourier_coefficients, "eq. 12 against the exact pulse", _series),
+    "12": (PiecewiseForce.fourier_coefficients, "eq. 12 against the exact pulse", series_gap),
     "13": (truncated_fourier_response, "eq. 13 with atan2 against the exact steady state",
            lambda study: amplitude_and_phase(study.base).right_error),
     "14": _STRESS,

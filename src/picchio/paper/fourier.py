@@ -60,12 +60,8 @@ def printed_response(
             phase = np.nan_to_num(phase)
         else:
             phase = np.arctan2(2.0 * ratio * r, 1.0 - r**2) + np.arctan2(b, a)
-        shift = j * wave
-        found[i] = terms[0].real / stiffness
-        for k in range(0, harmonics, 500):
-            part = slice(k, k + 500)
-            angle = np.outer(shift[part], time) - phase[part, None]
-            found[i] += size[part] @ np.cos(angle)
+        angle = np.outer(j * wave, time) - phase[:, None]
+        found[i] = terms[0].real / stiffness + size @ np.cos(angle)
     return found
 
 

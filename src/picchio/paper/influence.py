@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -52,13 +53,10 @@ class Influence:
         }  # fmt: skip
 
 
-def influences(study: Study) -> list[Influence]:
-    """Every input, the most influential first; kept on the study."""
-    known = study.__dict__.get("_influences")
-    if known is None:
-        known = sorted((_one(study, entry) for entry in INPUTS), key=lambda i: -i.factor)
-        study.__dict__["_influences"] = known
-    return known  # type: ignore[no-any-return]
+@lru_cache(maxsize=1)
+def influences(study: Study) -> tuple[Influence, ...]:
+    """Every input, the most influential first; kept for the last study."""
+    return tuple(sorted((_one(study, entry) for entry in INPUTS), key=lambda i: -i.factor))
 
 
 def _one(study: Study, entry: Input) -> Influence:
@@ -87,15 +85,8 @@ def _one(study: Study, entry: Input) -> Influence:
 def _values(entry: Input) -> list[Any]:
     if entry.choices:
         return list(entry.choices)
-    assert entry.low is not None
-    assert entry.high is not None
-    share = np.linspace(0.0, 1.0, _STEPS)
-    if entry.log:
-        found = entry.low * (entry.high / entry.low) ** share
-    else:
-        found = entry.low + (entry.high - entry.low) * share
-    whole = entry.name == "harmonics"
-    return [int(v) if whole else float(v) for v in found]
+    found = [entry.at(share) for share in np.linspace(0.0, 1.0, _STEPS)]
+    return [int(value) for value in found] if entry.name == "harmonics" else found
 
 
 def _words(entry: Input) -> str:

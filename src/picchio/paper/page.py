@@ -8,7 +8,6 @@ from importlib.resources import files
 from typing import Any
 
 from picchio.paper.assumptions import INPUTS
-from picchio.paper.figures.base import PaperFigure
 from picchio.paper.run import Reproduction
 from picchio.paper.verdict import Verdict
 from picchio.studies.assessment.result import format_count
@@ -60,7 +59,7 @@ def reproduction_page(
         inputs=INPUTS,
         svg=shown,
         redrawn=[found.figures[name] for name in REDRAWN],
-        extra=_extra(found.figures, REDRAWN),
+        extra=[found.figures[name] for name in ("fig-9-found",) if name in found.figures],
         counts=found.counts,
         total=len(found.claims),
         worlds=len(found.study.worlds),
@@ -78,11 +77,6 @@ def reproduction_page(
         command=command or "picchio reproduce",
         warnings=warnings,
     )
-
-
-def _extra(figures: dict[str, PaperFigure], shown: Sequence[str]) -> list[PaperFigure]:
-    """The figures that stand nowhere else on the page."""
-    return [figures[name] for name in ("fig-9-found",) if name in figures and name not in shown]
 
 
 def power(value: float) -> str:

@@ -34,6 +34,19 @@ class PrintedArm(StrictModel):
         """(3,) rad, each joint's range is from minus to plus this."""
         return np.pi * np.array(self.joint_limits_over_pi)
 
+    def inertia(self, link: int, about: str) -> FloatArray:
+        """(3,) kg m^2, a link's inertia about its centre of gravity.
+
+        Args:
+            link: index.
+            about: what Table 1's inertias are taken about: "cg", or "joint", whose share m c^2 is
+                subtracted.
+        """
+        found, centre = np.array(self.inertias[link]), np.array(self.centres_of_gravity[link])
+        if about == "joint" and link > 0:
+            found = found - self.masses[link] * (centre @ centre - centre**2)
+        return found
+
 
 class PrintedTask(StrictModel):
     """What the arm does: blows, rivets, the vertical path of Fig. 9."""

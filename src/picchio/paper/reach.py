@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.paper.arm import places_of
-from picchio.paper.world import World
 
-_TURNS, _BENDS = 41, 24
+if TYPE_CHECKING:
+    from picchio.paper.world import World
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +52,7 @@ class ReachMap:
         return np.asarray(self.place.reshape(-1, 3)[flat])
 
 
-def reach_map(world: World, turns: int = _TURNS, bends: int = _BENDS) -> ReachMap:
+def reach_map(world: World, turns: int, bends: int) -> ReachMap:
     """Peaks of the steady state over the reach within the stated joint limits.
 
     Joint 2's range is stated from -pi/2 to pi/2 and joint 3's from -70 to 70 degrees; one elbow

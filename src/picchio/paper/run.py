@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from picchio.core.errors import InputError
@@ -12,11 +12,11 @@ from picchio.core.html import sheet
 from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
 from picchio.paper.assumptions import INPUTS, Assumptions, parse_assumptions
-from picchio.paper.claims.trial import Tried, try_claims
+from picchio.paper.claims import Tried, try_claims
 from picchio.paper.conflicts import Conflict, conflicts
 from picchio.paper.equations import Equation, equations
+from picchio.paper.figures import all_figures
 from picchio.paper.figures.base import PaperFigure
-from picchio.paper.figures.catalogue import all_figures
 from picchio.paper.influence import Influence, influences
 from picchio.paper.printed import paper_file
 from picchio.paper.study import WORLDS, Study
@@ -94,9 +94,9 @@ class Reproduction(TableResult):
             "worlds": len(self.study.worlds),
             "counts": self.counts,
             "claims": self._rows(),
-            "conflicts": [found.to_dict() for found in self.conflicts],
+            "conflicts": [asdict(found) for found in self.conflicts],
             "slips": [slip.model_dump() for slip in printed.slips],
-            "equations": [equation.to_dict() for equation in self.equations],
+            "equations": [asdict(equation) for equation in self.equations],
             "table1": {
                 "mass": printed.arm.masses,
                 "centre_of_gravity": printed.arm.centres_of_gravity,
@@ -148,23 +148,20 @@ def reproduce(
         raise InputError("must be at least 8", key="worlds", value=worlds)
     if not isinstance(assume, Assumptions):
         assume = parse_assumptions(f"{name}={value}" for name, value in (assume or {}).items())
+    study = Study(assume, worlds, seed, progress)
     with one_thread():
-        return _run(Study(assume, worlds, seed, progress))
-
-
-def _run(study: Study) -> Reproduction:
-    _ = study.base.rivet_poses, study.base.path_poses  # what is out of reach is said at once
-    steps = waterfall(study.base)
-    claims = try_claims(study)
-    figures = {figure.name: figure for figure in all_figures(study, steps)}
-    return Reproduction(
-        study=study,
-        claims=claims,
-        conflicts=conflicts(study, figures),
-        equations=equations(study),
-        figures=figures,
-        steps=steps,
-        influences=tuple(influences(study)),
-        answer=answer(study),
-        origin=provenance([paper_file()], seed=study.seed),
-    )
+        _ = study.base.rivet_poses, study.base.path_poses  # what is out of reach is said at once
+        steps = waterfall(study.base)
+        claims = try_claims(study)
+        figures = {figure.name: figure for figure in all_figures(study, steps)}
+        return Reproduction(
+            study=study,
+            claims=claims,
+            conflicts=conflicts(study, figures),
+            equations=equations(study),
+            figures=figures,
+            steps=steps,
+            influences=influences(study),
+            answer=answer(study),
+            origin=provenance([paper_file()], seed=seed),
+        )

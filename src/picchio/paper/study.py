@@ -8,7 +8,6 @@ from functools import cached_property
 
 from picchio.paper.assumptions import Assumptions
 from picchio.paper.printed import Printed, printed
-from picchio.paper.reach import ReachMap, reach_map
 from picchio.paper.table2.by_curve import CurveOfTable, curve_of_table
 from picchio.paper.table2.compare import Comparison, compare_hypotheses
 from picchio.paper.table2.place import FREE, decode
@@ -41,27 +40,12 @@ class Study:
     @cached_property
     def base(self) -> World:
         """The world of the given assumptions."""
-        return World(self.given)
+        return World(self.given, fine=True)
 
     @cached_property
     def worlds(self) -> tuple[World, ...]:
         """The base, and random others."""
         return (self.base, *random_worlds(self.count, self.seed, self.given))
-
-    def reach(self, world: World) -> ReachMap:
-        """Fig. 10's maps in a world; kept.
-
-        Args:
-            world: whose maps.
-
-        Returns:
-            the map, computed once.
-        """
-        known = self.__dict__.setdefault("_maps", {})
-        if id(world) not in known:
-            fine = world is self.base
-            known[id(world)] = reach_map(world) if fine else reach_map(world, 25, 13)
-        return known[id(world)]  # type: ignore[no-any-return]
 
     @cached_property
     def curve_of_table(self) -> CurveOfTable:

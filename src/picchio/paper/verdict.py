@@ -1,23 +1,24 @@
-"""Verdicts on a claim, and the number that decides."""
+"""Claims of the paper, their verdicts, and the number that decides each."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from picchio.paper.assumptions import INPUTS
 from picchio.paper.world import World
 
+if TYPE_CHECKING:
+    from picchio.paper.study import Study
+
 BLOWS = ("period", "duty", "damping_ratio", "inertia_about", "elbow")
 PATH = (*BLOWS, "path_x")
 PANEL = (*BLOWS, "pitch", "panel_x", "panel_y", "panel_z")
-REACH = BLOWS
-"""The inputs that claims on the vertical path, on the rivets and on the reach depend on."""
-
+"""The inputs that claims on the reach, on the vertical path and on the rivets depend on."""
 
 _TELLING, _RARE = 0.75, 8
 """Share of worlds that an input must get right to decide; fewer worlds than this are rare."""
@@ -50,11 +51,6 @@ class Finding:
     number: float | None = None
     condition: str = ""
 
-    @property
-    def spoken(self) -> str:
-        """The verdict with its condition."""
-        return f"{self.verdict} {self.condition}".strip()
-
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {
@@ -64,6 +60,69 @@ class Finding:
             "decides": self.decides,
             "number": self.number,
         }
+
+
+Test = Callable[["Study"], Finding]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A sentence of the paper and how it is tried.
+
+    Attributes:
+        name: the key under which the sentence and its page stand in `data/paper.toml`.
+        figure: of the page that shows it, such as "fig-10"; empty for none.
+        test: from a study to a finding.
+    """
+
+    name: str
+    figure: str
+    test: Test
+
+
+CLAIMS: dict[str, Claim] = {}
+
+
+def claim(figure: str = "", name: str = "") -> Callable[[Test], Test]:
+    """A decorator that registers the test of a claim.
+
+    Args:
+        figure: of the page that shows it; empty for none.
+        name: the claim's; the test's own if empty.
+    """
+
+    def register(test: Test) -> Test:
+        key = name or test.__name__
+        if key in CLAIMS:
+            raise ValueError(f"the claim {key!r} is tried twice")
+        CLAIMS[key] = Claim(key, figure, test)
+        return test
+
+    return register
+
+
+Holds = Callable[[World], tuple[bool, float]]
+
+
+def claim_of_worlds(
+    figure: str, test: str, says: str, among: Sequence[str] = (), most: int | None = None
+) -> Callable[[Holds], Holds]:
+    """A decorator that registers a claim to be tried in every world, see `across`.
+
+    Args:
+        figure: of the page that shows it; empty for none.
+        test: what is tried.
+        says: what decides, with fields.
+        among: the inputs that the claim can depend on; all if none are named.
+        most: how many worlds to try at most.
+    """
+
+    def register(holds: Holds) -> Holds:
+        name = holds.__name__
+        claim(figure, name)(lambda study: across(study.worlds[:most], holds, test, says, among))
+        return holds
+
+    return register
 
 
 def decided(
@@ -81,7 +140,7 @@ def unknown(test: str, decides: str) -> Finding:
 
 def across(
     worlds: Sequence[World],
-    holds: Callable[[World], tuple[bool, float]],
+    holds: Holds,
     test: str,
     says: str,
     among: Sequence[str] = (),

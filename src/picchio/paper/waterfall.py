@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,11 +11,11 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.fatigue.counting.counter import rainflow
 from picchio.fatigue.counting.cycles import Cycles
+from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.miner import damage, life
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import load_sn_curve
 from picchio.paper.fourier import worst_responses
-from picchio.paper.statics import gravity_stress
 from picchio.paper.world import World
 from picchio.studies.rivet.pose import JointLoad, Rivet
 
@@ -60,45 +59,56 @@ class Step:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class _Loads:
-    world: World
-    poses: list[tuple[JointLoad, ...]]
-    gravity: FloatArray
-    hits: int
-
-    @property
-    def torque_factor(self) -> float:
-        return self.world.given.stress_per_twist
-
-
-def _loads(world: World) -> _Loads:
-    poses = [
+def waterfall(world: World) -> tuple[Step, ...]:
+    """The life by the paper's method, by each correction alone, and by all together."""
+    rivets = [
         Rivet(world.model, operation, pose).loads()
         for operation in world.operations()
         for pose in operation.poses
     ]
-    gravity = np.tile(1e6 * gravity_stress(world), (3, 1))
-    return _Loads(world, poses, gravity, world.printed.task.hits_per_rivet)
-
-
-def waterfall(world: World) -> tuple[Step, ...]:
-    """The life by the paper's method, by each correction alone, and by all together."""
-    loads = _loads(world)
+    gravity = np.tile(1e6 * world.gravity_stress, (3, 1))
     steel = load_sn_curve(STEEL, quiet=True)
     paper = world.printed.sn_curve.sn_curve(steel.tensile_strength)
-    sets: list[tuple[str, tuple[str, ...]]] = [("the paper's method", ())]
-    sets += [(WORDS[name], (name,)) for name in CORRECTIONS]
-    sets += [("all four", CORRECTIONS)]
+
+    def lives(chosen: tuple[str, ...], curve: SNCurve) -> FloatArray:
+        """(3,) rivets to failure: the rivets of the task in turn."""
+        rule: Rule = "fkm" if "gravity" in chosen else "none"
+        spent = np.zeros(3)
+        for loads, means in zip(rivets, gravity, strict=True):
+            for j, load in enumerate(loads):
+                cycles = _cycles(world, load, chosen)
+                if rule == "fkm":
+                    cycles = cycles.shifted(float(means[j]))
+                spent[j] += damage(cycles, curve, rule)
+        return np.array([life(float(d) / len(rivets)) for d in spent])
+
+    sets: dict[str, tuple[str, ...]] = {
+        "the paper's method": (),
+        **{WORDS[name]: (name,) for name in CORRECTIONS},
+        "all four": CORRECTIONS,
+    }
     steps = []
-    for name, chosen in sets:
+    for name, chosen in sets.items():
         curve = steel if "curve" in chosen else paper
-        rivets, joint = _weakest(_lives(loads, chosen, curve))
+        found = lives(chosen, curve)
+        joint = int(np.argmin(found)) if np.isfinite(found).any() else -1
         endless = dataclasses.replace(curve, miner="elementary") if curve.knees else curve
-        steps.append(
-            Step(name, chosen, rivets, joint, float(np.min(_lives(loads, chosen, endless))))
-        )
+        least = float(lives(chosen, endless).min())
+        steps.append(Step(name, chosen, float(found.min()), joint, least))
     return tuple(steps)
+
+
+def _cycles(world: World, load: JointLoad, chosen: tuple[str, ...]) -> Cycles:
+    """Stress cycles of one rivet in one joint, Pa, about their own mean."""
+    points = load.rest if "transient" in chosen else load.steady
+    assert points is not None
+    stress = world.given.stress_per_twist * points
+    hits = world.printed.task.hits_per_rivet
+    if "counting" not in chosen:
+        peak = float(np.abs(stress).max())
+        return Cycles(np.array([2.0 * peak]), np.zeros(1), np.array([float(hits)]))
+    counted = rainflow(stress)
+    return counted if "transient" in chosen else counted.repeated(hits)
 
 
 def paper_lives(world: World) -> FloatArray:
@@ -113,37 +123,3 @@ def peak_over_amplitude(world: World) -> float:
     _, steady, n, joint = worst_responses(world, world.printed.task.hits_per_rivet)
     value = steady.turning_points(n)[joint][1]
     return float(np.abs(value).max() / (0.5 * np.ptp(value)))
-
-
-def _weakest(lives: FloatArray) -> tuple[float, int]:
-    joint = int(np.argmin(lives))
-    return float(lives[joint]), joint if math.isfinite(lives[joint]) else -1
-
-
-def _lives(loads: _Loads, chosen: tuple[str, ...], curve: SNCurve) -> FloatArray:
-    """(3,) rivets to failure: the rivets of the task in turn."""
-    spent = np.zeros(3)
-    for pose, gravity in zip(loads.poses, loads.gravity, strict=True):
-        for j in range(3):
-            cycles = _cycles(loads, pose, j, chosen)
-            rule = "none"
-            if "gravity" in chosen:
-                cycles, rule = cycles.shifted(float(gravity[j])), "fkm"
-            spent[j] += damage(cycles, curve, rule)  # type: ignore[arg-type]
-    return np.array([life(float(d) / len(loads.poses)) for d in spent])
-
-
-def _cycles(
-    loads: _Loads, pose: tuple[JointLoad, ...], joint: int, chosen: tuple[str, ...]
-) -> Cycles:
-    """Stress cycles of one rivet, Pa, about their own mean."""
-    load = pose[joint]
-    points = load.rest if "transient" in chosen else load.steady
-    assert points is not None
-    stress = loads.torque_factor * points
-    if "counting" not in chosen:
-        peak = float(np.abs(stress).max())
-        return Cycles(np.array([2.0 * peak]), np.zeros(1), np.array([float(loads.hits)]))
-    if "transient" in chosen:
-        return rainflow(stress)
-    return rainflow(stress).repeated(loads.hits)

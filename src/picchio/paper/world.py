@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,8 +13,9 @@ from picchio.core.errors import InputError
 from picchio.excitation.pulse_train import PulseTrain
 from picchio.model.model import Model
 from picchio.paper.arm import arm, poses_at, rivet_points
-from picchio.paper.assumptions import INPUTS, Assumptions, Input
+from picchio.paper.assumptions import INPUTS, Assumptions
 from picchio.paper.printed import Printed, printed
+from picchio.paper.reach import ReachMap, reach_map
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.tasks import Operation
 from picchio.vibration.batch.peaks import BatchPeaks, batch_peaks
@@ -23,9 +23,15 @@ from picchio.vibration.batch.peaks import BatchPeaks, batch_peaks
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """The paper's arm and blows under one set of assumptions."""
+    """The paper's arm and blows under one set of assumptions.
+
+    Attributes:
+        given: the assumptions.
+        fine: whether Fig. 10's maps are drawn from, and not just searched.
+    """
 
     given: Assumptions
+    fine: bool = False
 
     @property
     def printed(self) -> Printed:
@@ -93,10 +99,58 @@ class World:
         return self.peaks(self.path_poses)
 
     @cached_property
+    def reach(self) -> ReachMap:
+        """Fig. 10's maps."""
+        return reach_map(self, 41, 24) if self.fine else reach_map(self, 25, 13)
+
+    def path_radii(self, angle: FloatArray, towards: ArrayLike = (0.0, 0.0, 1.0)) -> FloatArray:
+        """Peaks on the vertical path under forces from +x by some angles towards a direction.
+
+        Args:
+            angle: (k,) rad.
+            towards: (3,), square to x.
+
+        Returns:
+            (k, 4 poses, 3 joints) rad.
+        """
+        cut = np.outer(np.cos(angle), (1.0, 0.0, 0.0)) + np.outer(
+            np.sin(angle), np.asarray(towards)
+        )
+        return np.array([self.peaks(self.path_poses, n).peak_deflection for n in cut])
+
+    def rivet_peaks(self, hits: int | None = None) -> FloatArray:
+        """Largest deflections at the rivets, (3 directions, 15 rivets, 3 joints) rad.
+
+        Args:
+            hits: of a burst from rest; None for the steady state.
+        """
+        directions = self.printed.directions
+        return np.array([self.peaks(self.rivet_poses, n, hits).peak_deflection for n in directions])
+
+    @cached_property
     def rivet_stress(self) -> FloatArray:
         """(3 directions, 15 rivets, 3 joints) MPa: Figs. 13-15 (b)."""
-        found = [self.peaks(self.rivet_poses, n).peak_deflection for n in self.printed.directions]
-        return self.stress(np.array(found))
+        return self.stress(self.rivet_peaks())
+
+    @cached_property
+    def sweep(self) -> tuple[FloatArray, FloatArray]:
+        """Joint 2 from full down to full up, joint 3 straight: (k,) rad, (k, 3) N m to hold it."""
+        limit = self.printed.arm.limits[1]
+        angle = np.linspace(-limit, limit, 181)
+        return angle, np.abs([self.robot.gravity_torque([0.0, q, 0.0]) for q in angle])
+
+    @property
+    def share_held(self) -> float:
+        """Share of that sweep in which joint 2's stated actuator is strong enough."""
+        return float((self.sweep[1][:, 1] <= self.printed.arm.actuator_torques[1]).mean())
+
+    @cached_property
+    def gravity_stress(self) -> FloatArray:
+        """(15, 3) MPa, gravity's steady stress in the shafts at the rivets."""
+        shafts = [joint.shaft for joint in self.robot.flexible_joints if joint.shaft]
+        factors = np.array([shaft.radius / shaft.polar_moment for shaft in shafts])
+        torque = np.abs([self.robot.gravity_torque(pose) for pose in self.rivet_poses])
+        return np.asarray(torque * factors / 1e6)
 
     def operations(self) -> tuple[Operation, ...]:
         """The three operations of section 4.3."""
@@ -131,7 +185,7 @@ def random_worlds(count: int, seed: int = 0, base: Assumptions | None = None) ->
     share = (rank + rng.random(rank.shape)) / count
     worlds = []
     for row in share.T:
-        changes = {entry.name: _value(entry, u) for entry, u in zip(drawn, row, strict=True)}
+        changes = {entry.name: entry.at(u) for entry, u in zip(drawn, row, strict=True)}
         given = (base or Assumptions()).but(**changes)
         while np.isnan(poses_at(rivet_points(given))).any():
             given = given.but(
@@ -139,13 +193,3 @@ def random_worlds(count: int, seed: int = 0, base: Assumptions | None = None) ->
             )
         worlds.append(World(given))
     return worlds
-
-
-def _value(entry: Input, share: float) -> Any:
-    if entry.choices:
-        return entry.choices[min(int(share * len(entry.choices)), len(entry.choices) - 1)]
-    assert entry.low is not None
-    assert entry.high is not None
-    if entry.log:
-        return float(entry.low * (entry.high / entry.low) ** share)
-    return float(entry.low + share * (entry.high - entry.low))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from picchio.core.html import sheet
-from picchio.core.results import TableResult
+from picchio.core.results import TableResult, plain
 from picchio.model.effects.effect import CHANNEL_UNIT, Effect, Parameter
 from picchio.model.effects.registry import catalogue, effect_class
 from picchio.model.effects.scales import Scales
@@ -95,28 +95,15 @@ class EffectDescription:
         Returns:
             the attributes by name.
         """
-        return {
-            "name": self.name,
-            "where": self.where,
-            "target": self.target,
+        shown = ("name", "unit", "lower", "upper", "neutral", "meaning")
+        told = {
+            **vars(self),
             "target_meaning": target_meaning(self.target),
-            "meaning": self.meaning,
-            "detail": self.detail,
-            "parameters": [
-                {
-                    "name": p.name,
-                    "unit": p.unit,
-                    "lower": _finite(p.lower),
-                    "upper": _finite(p.upper),
-                    "neutral": _finite(p.neutral),
-                    "meaning": p.meaning,
-                }
-                for p in self.parameters
-            ],
+            "parameters": [{key: getattr(p, key) for key in shown} for p in self.parameters],
             "drawn": self.drawn or None,
             "source": self.source or None,
-            "example": self.example,
         }
+        return {key: plain(value) for key, value in told.items()}
 
 
 @dataclass(frozen=True, repr=False)
@@ -265,10 +252,6 @@ def _typical(effect: type[Effect], target: str) -> dict[str, float]:
     inside = {p.name: min(max(steps[p.name], p.lower), p.upper) for p in effect.parameters}
     amounts = {p.name: inside[p.name] for p in effect.parameters if p.unit != "1"}
     return (amounts or inside) | found
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _toml(value: float) -> str:

@@ -8,6 +8,7 @@ docstring. JSON outputs and data files, which no table checks, are described in 
 from __future__ import annotations
 
 import inspect
+import json
 import re
 import tomllib
 import types
@@ -16,11 +17,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.resources import files
-from typing import Any, Literal
+from typing import Any
 
-from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 from pydantic import BaseModel
-from pydantic.fields import FieldInfo
 
 from picchio.campaign import tables as campaign
 from picchio.campaign.channels import kinds
@@ -45,8 +44,6 @@ _UNITS = ("1", "N", "m", "s", "kg", "rad", "Pa", "Hz", "rpm", "h", "days", "cycl
 _SYMBOL = f"(?:{'|'.join(map(re.escape, _UNITS))})"
 _UNIT = re.compile(rf"({_SYMBOL}(?: or {_SYMBOL})?(?: \([^)]*\))?), (.+)")
 _ENTRY = re.compile(r"([A-Za-z_][\w, ]*): (.*)")
-_BOUNDS = ((Gt, "gt", ">"), (Ge, "ge", ">="), (Lt, "lt", "<"), (Le, "le", "<="))
-_NAMES = {float: "number", int: "whole number", str: "text", bool: "true or false"}
 
 
 @dataclass(frozen=True)
@@ -92,14 +89,6 @@ class FileFormat:
     command: str
     keys: tuple[Key, ...]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values.
-
-        Returns:
-            the attributes by name, keys as a list.
-        """
-        return {**asdict(self), "keys": [asdict(key) for key in self.keys]}
-
 
 @dataclass(frozen=True, repr=False)
 class FormatList(TableResult):
@@ -117,7 +106,7 @@ class FormatList(TableResult):
         return f"{len(self.formats)} formats: {', '.join(entry.name for entry in self.formats)}"
 
     def _content(self) -> dict[str, Any]:
-        return {"format": FORMAT, "formats": [entry.to_dict() for entry in self.formats]}
+        return {"format": FORMAT, "formats": [asdict(entry) for entry in self.formats]}
 
     def _rows(self) -> list[dict[str, Any]]:
         return [{"name": f.name, **asdict(key)} for f in self.formats for key in f.keys]
@@ -155,36 +144,34 @@ def formats(name: str | None = None) -> FormatList:
     return FormatList(tuple(found[:1]))
 
 
-# TOML files: name, format, table, commands, meaning.
-_TABLES: tuple[tuple[str, str, type[BaseModel], str, str], ...] = (
-    ("task", tasks.FORMAT, tasks.TaskTable, "assess, place, view, diagnose",
+# TOML files: format, table, commands, meaning.
+_TABLES: tuple[tuple[str, type[BaseModel], str, str], ...] = (
+    (tasks.FORMAT, tasks.TaskTable, "assess, place, view, diagnose",
      "the work: blows, directions and the poses or points where rivets are set"),
-    ("sidecar", sidecar.FORMAT, sidecar.Sidecar, "--flex; annotate, identify",
+    (sidecar.FORMAT, sidecar.Sidecar, "--flex; annotate, identify",
      "what a URDF does not say: stiffness, damping, shafts, reducers, tool, gun"),
-    ("campaign", campaign.FORMAT, campaign.CampaignTable, "check, diagnose, identify",
+    (campaign.FORMAT, campaign.CampaignTable, "check, diagnose, identify",
      "campaign.toml: measured records and what was programmed"),
-    ("plan", plan.FORMAT, plan.Plan, "simulate; diagnose --plan",
+    (plan.FORMAT, plan.Plan, "simulate; diagnose --plan",
      "a test to be done: poses, directions, sensors with their noise"),
-    ("mapping", mapping.FORMAT, mapping.Mapping, "import",
+    (mapping.FORMAT, mapping.Mapping, "import",
      "how the series of a measured file become channels"),
-    ("model", saved_model.FORMAT, saved_model.SavedModel, "ROBOT; diagnose --model",
+    (saved_model.FORMAT, saved_model.SavedModel, "ROBOT; diagnose --model",
      "a robot, its sidecar and the effects that a diagnosis found"),
-    ("sn-curve", sn_library.SN_FORMAT, sn_library.SNCurveFile, "--sn-curve; fit-sn --out",
+    (sn_library.SN_FORMAT, sn_library.SNCurveFile, "--sn-curve; fit-sn --out",
      "an S-N curve in shear"),
-    ("reducers", reducer.REDUCER_FORMAT, reducer.ReducerFile, "load_reducer(catalogues=...)",
+    (reducer.REDUCER_FORMAT, reducer.ReducerFile, "load_reducer(catalogues=...)",
      "a maker's catalogue of reducers"),
 )  # fmt: skip
 
 
 @cache
 def _known() -> tuple[FileFormat, ...]:
-    tables = [
-        FileFormat(
-            name, format, "TOML", "input", meaning, command,
-            (_format_key(format), *_keys(table)),
-        )
-        for name, format, table, command, meaning in _TABLES
-    ]  # fmt: skip
+    tables = []
+    for format, table, command, meaning in _TABLES:
+        name = format.removeprefix("picchio-").partition("/")[0]
+        keys = (_format_key(format), *_keys(table))
+        tables.append(FileFormat(name, format, "TOML", "input", meaning, command, keys))
     return (*tables, _record(), *_contracts(), _map())
 
 
@@ -223,13 +210,12 @@ def _contracts() -> Iterator[FileFormat]:
     content = tomllib.loads(text)
     shared = content.pop("shared")
     for name, entry in content.items():
-        keys = []
-        if entry["kind"] == "JSON":
-            keys.append(_format_key(entry["format"]))
+        kind, role = entry.get("kind", "JSON"), entry.get("role", "output")
+        format = entry.get("format", f"picchio-{name}/1") if kind == "JSON" else ""
+        keys = [_format_key(format)] if format else []
         for path, line in entry["keys"].items():
             keys += [_contract_key(*found) for found in _expanded(path, line, shared)]
-        yield FileFormat(name, entry.get("format", ""), entry["kind"], entry["role"],
-                         entry["meaning"], entry["command"], tuple(keys))  # fmt: skip
+        yield FileFormat(name, format, kind, role, entry["meaning"], entry["command"], tuple(keys))
 
 
 def _expanded(path: str, line: str, shared: dict[str, Any]) -> Iterator[tuple[str, str]]:
@@ -250,19 +236,19 @@ def _contract_key(path: str, line: str) -> Key:
 
 def _keys(table: type[BaseModel], before: str = "") -> Iterator[Key]:
     """Every key of a table, tables within it included."""
-    meanings = described(table)
+    meanings, schema = described(table), table.model_json_schema()["properties"]
     # A table's own keys, then those that it shares with others.
     own = [name for name in table.model_fields if name in table.__annotations__]
     for name in dict.fromkeys([*own, *table.model_fields]):
         field = table.model_fields[name]
-        path = before + (field.alias or name)
+        key = field.alias or name
+        node, path = schema[key], before + key
         unit, meaning = _split_unit(meanings.get(name, ""))
-        arms = _arms(field.annotation)
-        kind = _type(arms, field)
+        kind = _type(node)
         if issubclass(table, ExcitationTable) and name == "kind":
             kind = " | ".join(f'"{known}"' for known in catalogue())
-        yield Key(path, kind, unit, _default(field), field.is_required(), meaning)
-        for tail, inner in (found for arm in arms for found in _inner(arm)):
+        yield Key(path, kind, unit, _default(node), field.is_required(), meaning)
+        for tail, inner in (found for arm in _arms(field.annotation) for found in _inner(arm)):
             yield from _keys(inner, f"{path}{tail}.")
     if issubclass(table, ExcitationTable):
         yield from _declared(before)
@@ -327,73 +313,52 @@ def _inner(kind: Any) -> Iterator[tuple[str, type[BaseModel]]]:
                 yield tail + more, table
 
 
-def _type(arms: list[Any], field: FieldInfo) -> str:
-    text = " or ".join(dict.fromkeys(_type_name(arm) for arm in arms))
-    return f"{text} {', '.join(_limits(_metadata(field)))}".strip()
+_WORDS = {"number": "number", "integer": "whole number", "string": "text",
+          "boolean": "true or false"}  # fmt: skip
+_BOUNDS = {"exclusiveMinimum": ">", "minimum": ">=", "exclusiveMaximum": "<", "maximum": "<="}
 
 
-def _metadata(field: FieldInfo) -> list[Any]:
-    """Bounds may stand on the field, or within its annotation's first arm."""
-    found = list(field.metadata)
-    for arm in typing.get_args(field.annotation) or (field.annotation,):
-        if typing.get_origin(arm) is typing.Annotated:
-            found += typing.get_args(arm)[1:]
-    return [leaf for part in found for leaf in getattr(part, "metadata", None) or [part]]
-
-
-def _limits(metadata: list[Any]) -> list[str]:
-    found = []
-    for part in metadata:
-        for kind, attribute, sign in _BOUNDS:
-            if isinstance(part, kind):
-                found.append(f"{sign} {getattr(part, attribute):g}")
-        if isinstance(part, (MinLen, MaxLen)):
-            many = part.min_length if isinstance(part, MinLen) else part.max_length
-            found.append(f"{'at least' if isinstance(part, MinLen) else 'at most'} {many} long")
-    return list(dict.fromkeys(found))
-
-
-def _type_name(kind: Any) -> str:
-    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
-    if origin is typing.Annotated:
-        return _type_name(arguments[0])
-    if origin is Literal:
-        return " | ".join(f'"{value}"' if isinstance(value, str) else str(value)
-                          for value in arguments)  # fmt: skip
-    if origin in (typing.Union, types.UnionType):
-        return " or ".join(dict.fromkeys(_type_name(arm) for arm in _arms(kind)))
-    if origin is tuple and Ellipsis not in arguments:
-        return f"list of {len(arguments)} {_plural(arguments[0])}"
-    if origin in (list, tuple):
-        return f"list of {_plural(arguments[0])}"
-    if origin is dict:
-        return "table of any keys" if arguments[1] is Any else f"table of {_plural(arguments[1])}"
-    if isinstance(kind, type) and issubclass(kind, BaseModel):
+def _type(node: Mapping[str, Any]) -> str:
+    """What a node of a JSON schema allows, in words; null, for keys left out, is not told."""
+    if "anyOf" in node:
+        arms = [arm for arm in node["anyOf"] if arm.get("type") != "null"]
+        return " or ".join(dict.fromkeys(_type(arm) for arm in arms))
+    if "$ref" in node:
         return "table"
-    return _NAMES.get(kind, "date and time" if kind.__name__ == "datetime" else "anything")
+    choices = node.get("enum", [node["const"]] if "const" in node else [])
+    if choices:
+        return " | ".join(json.dumps(choice) for choice in choices)
+    bounds = [f"{sign} {node[key]:g}" for key, sign in _BOUNDS.items() if key in node]
+    least, most = (node.get(f"{end}Items", node.get(f"{end}Length")) for end in ("min", "max"))
+    count = f"{least} " if least is not None and least == most else ""
+    if least is not None and not count:
+        bounds.append(f"at least {least} long")
+    kind = node.get("type")
+    if kind == "array":
+        inner = node.get("prefixItems", [node.get("items")])[0]
+        words = f"list of {count}{_plural(_type(inner))}"
+    elif kind == "object":
+        inner = node.get("additionalProperties")
+        words = f"table of {_plural(_type(inner)) if isinstance(inner, dict) else 'any keys'}"
+    elif node.get("format") == "date-time":
+        words = "date and time"
+    else:
+        words = _WORDS.get(str(kind), "anything")
+    return f"{words} {', '.join(bounds)}".strip()
 
 
-def _plural(kind: Any) -> str:
-    first, _, rest = _type_name(kind).partition(" ")
-    if first == "whole":
-        return "whole numbers"
-    return f"{first}{'s' if first in ('number', 'table', 'list') else ''} {rest}".strip()
+def _plural(words: str) -> str:
+    return re.sub("^(whole number|number|table|list)", r"\1s", words)
 
 
-def _default(field: FieldInfo) -> str:
+def _default(node: Mapping[str, Any]) -> str:
     """The default as TOML would have it; empty for none and for tables."""
-    if field.is_required() or field.default_factory is not None:
+    value = node.get("default")
+    if value in (None, "", []) or isinstance(value, dict):
         return ""
-    value = field.default
-    if value is None or isinstance(value, BaseModel) or value in ("", ()):
-        return ""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return f'"{value}"'
-    if isinstance(value, tuple):
+    if isinstance(value, list):
         return f"[{', '.join(f'{part:g}' for part in value)}]"
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{value:g}" if isinstance(value, float) else json.dumps(value)
 
 
 def sections(entry: FileFormat) -> Mapping[str, tuple[Key, ...]]:

@@ -56,3 +56,14 @@ def blows_of(
         if given.get(key) is None:
             raise
         raise InputError(error.problem, key=key, value=error.value) from None
+
+
+def hits_of_rivet(robot: FlexibleRobot) -> int:
+    """The blows that a rivet takes on the robot's example task.
+
+    Args:
+        robot: one without an example task takes as many as a task that does not say.
+    """
+    if robot.task_path is None:
+        return TaskTable.model_fields["hits_per_rivet"].get_default()  # type: ignore[no-any-return]
+    return parse_toml(robot.task_path, TaskTable, format=FORMAT).hits_per_rivet

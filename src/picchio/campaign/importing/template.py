@@ -2,11 +2,33 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from picchio.campaign.channels import patterns
+from picchio.campaign.importing.importer import read_raw
 from picchio.campaign.importing.mapping import FORMAT
 from picchio.campaign.importing.raw import RawChannel, RawFile
+from picchio.core.errors import InputError
+from picchio.core.files import atomic_write
 
 _TIMES = ("t", "time", "time [s]", "time_s", "timestamp", "zeit")
+
+
+def write_mapping(file: str | Path, out: str | Path) -> None:
+    """Write a mapping to start from, for a file that is to be imported.
+
+    Args:
+        file: to be imported.
+        out: where the mapping goes; a file that stands there is left alone.
+
+    Raises:
+        InputError: the file cannot be read, or `out` exists or cannot be written.
+    """
+    if Path(out).exists():
+        raise InputError("exists already and is left alone", file=out)
+    template = mapping_template(read_raw(file))
+    with atomic_write(out) as stream:
+        stream.write(template)
 
 
 def mapping_template(raw: RawFile) -> str:

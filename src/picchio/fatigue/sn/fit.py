@@ -17,6 +17,7 @@ from picchio.core.errors import InputError, PicchioWarning
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
 from picchio.fatigue.sn.curve import SNCurve
+from picchio.fatigue.sn.library import write_sn_curve
 from picchio.fatigue.sn.likelihood import Likelihood, maximise
 from picchio.fatigue.sn.profile import Profile
 from picchio.fatigue.sn.test_table import SNTests, read_sn_tests
@@ -149,6 +150,17 @@ class SNFit(TableResult):
             assumptions=self.assumptions,
         )
         return median if survival == 0.5 else median.at_survival(survival)
+
+    def save(self, path: str | Path) -> None:
+        """Write the curve at `design_survival` to a TOML file, named after the file.
+
+        Args:
+            path: the file; `load_sn_curve` and `--sn-curve` read it.
+
+        Raises:
+            InputError: it cannot be written there.
+        """
+        write_sn_curve(self.curve(self.design_survival, name=Path(path).stem), path)
 
     def band(self, cycles: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Where the median line itself may lie: pointwise interval at `level`.

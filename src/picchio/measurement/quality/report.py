@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.record import Record
@@ -99,6 +102,7 @@ def summarise(scan: RecordScan) -> RecordSummary:
 
 
 FORMAT = "picchio-check/1"
+_NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -133,6 +137,31 @@ class QualityReport(TableResult):
             severity: "error", "warning" or "note".
         """
         return sum(finding.severity == severity for finding in self.findings)
+
+    def groups(self) -> list[list[Finding]]:
+        """The findings, those of the same thing in several records together, the worst first."""
+        groups: dict[tuple[str, ...], list[Finding]] = {}
+        for finding in self.findings:
+            pattern = _NUMBER.sub("#", finding.message)
+            channel = re.sub(r"\.[xyz]$", "", finding.channel or "")
+            if finding.check == "length":
+                channel = ""
+            key = (finding.check, finding.severity, channel, pattern)
+            groups.setdefault(key, []).append(finding)
+        return [sorted(g, key=lambda f: -abs(f.value or 0.0)) for g in groups.values()]
+
+    def signal_to_noise(self, channel: str) -> float:
+        """A channel's RMS over all records against its noise, dB; NaN where that is not known.
+
+        Args:
+            channel: its name.
+        """
+        noise = self.noise.get(channel)
+        rms = [r.channels[channel]["rms"] for r in self.records if channel in r.channels]
+        size = float(np.sqrt(np.mean(np.square(rms))))
+        if noise is None or noise.std <= 0.0 or size <= 0.0:
+            return math.nan
+        return 20.0 * math.log10(size / noise.std)
 
     def _headline(self) -> str:
         counts = [(self.count(severity), severity) for severity in SEVERITIES]

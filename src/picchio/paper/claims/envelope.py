@@ -7,10 +7,9 @@ from functools import partial
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.paper.claims.registry import claim
 from picchio.paper.dominance import search_dominance
 from picchio.paper.study import Study
-from picchio.paper.verdict import PATH, Finding, Verdict, across
+from picchio.paper.verdict import PATH, Finding, Verdict, across, claim, claim_of_worlds
 from picchio.paper.world import World
 
 _PINCHED = 0.2
@@ -24,10 +23,7 @@ def waist(world: World) -> FloatArray:
 
     0 for two balls that touch: a deflection with one direction of its own.
     """
-    angle = np.linspace(0.0, np.pi, 36, endpoint=False)
-    cut = np.zeros((36, 3))
-    cut[:, 0], cut[:, 2] = np.cos(angle), np.sin(angle)
-    radii = np.array([world.peaks(world.path_poses, n).peak_deflection for n in cut])
+    radii = world.path_radii(np.linspace(0.0, np.pi, 36, endpoint=False))
     found = radii.min(axis=0) / radii.max(axis=0).clip(1e-30)
     # Joint 1 answers to the force across the arm's plane alone.
     found[:, 0] = radii[:, :, 0].max(axis=0) / world.path_peaks.peak_deflection[:, 0]
@@ -40,61 +36,48 @@ def lean(world: World) -> FloatArray:
     return np.asarray(np.degrees(np.arctan2(n[..., 2] * np.sign(n[..., 0]), np.abs(n[..., 0]))))
 
 
-@claim("double_ball", "fig-9")
-def double_ball(study: Study) -> Finding:
+@claim_of_worlds(
+    "fig-9",
+    "waist over length of every envelope (joint 1's is a double ball exactly); below "
+    f"{_PINCHED:g} it looks like one",
+    "joints 2 and 3: {base} in the base world, {least} to {most} over {worlds} worlds",
+    PATH,
+    most=64,
+)
+def double_ball(world: World) -> tuple[bool, float]:
     """How near an envelope is to two touching balls."""
-
-    def shaped(world: World) -> tuple[bool, float]:
-        worst = float(waist(world).max())
-        return worst < _PINCHED, worst
-
-    return across(
-        study.worlds[:64], shaped,
-        "waist over length of every envelope (joint 1's is a double ball exactly); below "
-        f"{_PINCHED:g} it looks like one",
-        "joints 2 and 3: {base} in the base world, {least} to {most} over {worlds} worlds",
-        PATH,
-    )  # fmt: skip
+    worst = float(waist(world).max())
+    return worst < _PINCHED, worst
 
 
-@claim("symmetric", "fig-9")
-def symmetric(study: Study) -> Finding:
+@claim_of_worlds(
+    "fig-9",
+    "angle between the directions of the largest and the least deflection of joints 2 and 3, "
+    f"less 90°; up to {_SQUARE:g}° counts as perpendicular (to the arm's plane all of them "
+    "are symmetric)",
+    "{base}° away in the base world, {least}° to {most}° over {worlds} worlds",
+    PATH,
+    most=24,
+)
+def symmetric(world: World) -> tuple[bool, float]:
     """Whether the force that does least is square to the one that does most."""
-    angle = np.linspace(0.0, np.pi, 180, endpoint=False)
-    cut = np.zeros((180, 3))
-    cut[:, 0], cut[:, 2] = np.cos(angle), np.sin(angle)
-
-    def square(world: World) -> tuple[bool, float]:
-        radii = np.array([world.peaks(world.path_poses, n).peak_deflection for n in cut])
-        gap = np.abs(radii.argmax(axis=0) - radii.argmin(axis=0))[:, 1:]
-        away = float(np.abs(np.minimum(gap, 180 - gap) - 90).max())
-        return away <= _SQUARE, away
-
-    return across(
-        study.worlds[:24], square,
-        "angle between the directions of the largest and the least deflection of joints 2 and 3, "
-        f"less 90°; up to {_SQUARE:g}° counts as perpendicular (to the arm's plane all of them "
-        "are symmetric)",
-        "{base}° away in the base world, {least}° to {most}° over {worlds} worlds",
-        PATH,
-    )  # fmt: skip
+    radii = world.path_radii(np.linspace(0.0, np.pi, 180, endpoint=False))
+    gap = np.abs(radii.argmax(axis=0) - radii.argmin(axis=0))[:, 1:]
+    away = float(np.abs(np.minimum(gap, 180 - gap) - 90).max())
+    return away <= _SQUARE, away
 
 
-@claim("envelope_size", "fig-9")
-def envelope_size(study: Study) -> Finding:
+@claim_of_worlds(
+    "fig-9",
+    "largest over smallest envelope of a joint among the four poses",
+    "a factor of {base} in the base world, {least} to {most} over {worlds} worlds",
+    PATH,
+)
+def envelope_size(world: World) -> tuple[bool, float]:
     """The envelopes grow and shrink along the path."""
-
-    def grows(world: World) -> tuple[bool, float]:
-        peaks = world.path_peaks.peak_deflection
-        ratio = float((peaks.max(axis=0) / peaks.min(axis=0)).max())
-        return ratio > 1.1, ratio
-
-    return across(
-        study.worlds, grows,
-        "largest over smallest envelope of a joint among the four poses",
-        "a factor of {base} in the base world, {least} to {most} over {worlds} worlds",
-        PATH,
-    )  # fmt: skip
+    peaks = world.path_peaks.peak_deflection
+    ratio = float((peaks.max(axis=0) / peaks.min(axis=0)).max())
+    return ratio > 1.1, ratio
 
 
 def _dominant(k: int, study: Study) -> Finding:
@@ -102,9 +85,8 @@ def _dominant(k: int, study: Study) -> Finding:
     wanted = study.printed.task.dominant_joints[k]
 
     def dominates(world: World) -> tuple[bool, float]:
-        return int(world.path_peaks.peak_deflection[k].argmax()) + 1 == wanted, float(
-            world.path_peaks.peak_deflection[k].argmax() + 1
-        )
+        joint = int(world.path_peaks.peak_deflection[k].argmax()) + 1
+        return joint == wanted, float(joint)
 
     return across(
         study.worlds, dominates,
@@ -116,10 +98,10 @@ def _dominant(k: int, study: Study) -> Finding:
 
 
 for _k, _name in enumerate(("dominant_top", "dominant_second", "dominant_third", "dominant_low")):
-    claim(_name, "fig-9")(partial(_dominant, _k))
+    claim("fig-9", _name)(partial(_dominant, _k))
 
 
-@claim("dominant_all", "dominance")
+@claim("dominance")
 def dominant_all(study: Study) -> Finding:
     """All four at once; searched for, since it is rare."""
     found = search_dominance(study)
@@ -133,37 +115,29 @@ def dominant_all(study: Study) -> Finding:
     )
 
 
-@claim("direction_joint_1", "fig-9")
-def direction_joint_1(study: Study) -> Finding:
+@claim_of_worlds(
+    "fig-9",
+    "angle between joint 1's worst direction and y at the four poses",
+    "{most}° at most over {worlds} worlds",
+    PATH,
+)
+def direction_joint_1(world: World) -> tuple[bool, float]:
     """Joint 1's worst direction is across the arm's plane."""
-
-    def steady(world: World) -> tuple[bool, float]:
-        across_plane = np.abs(world.path_peaks.direction[:, 0, 1]).min()
-        off = float(np.degrees(np.arccos(np.clip(across_plane, 0.0, 1.0))))
-        return off < 1e-3, off
-
-    return across(
-        study.worlds, steady,
-        "angle between joint 1's worst direction and y at the four poses",
-        "{most}° at most over {worlds} worlds",
-        PATH,
-    )  # fmt: skip
+    across_plane = np.abs(world.path_peaks.direction[:, 0, 1]).min()
+    off = float(np.degrees(np.arccos(np.clip(across_plane, 0.0, 1.0))))
+    return off < 1e-3, off
 
 
-@claim("direction_swings", "fig-9")
-def direction_swings(study: Study) -> Finding:
+@claim_of_worlds(
+    "fig-9",
+    "whether the worst directions of joints 2 and 3 lean to different sides at the top and at "
+    "the bottom of the path",
+    "{base} of 2 joints in the base world; both in {share} of {worlds} worlds",
+    PATH,
+)
+def direction_swings(world: World) -> tuple[bool, float]:
     """The worst directions of joints 2 and 3 swing through the vertical."""
-
-    def swings(world: World) -> tuple[bool, float]:
-        # From leaning one way to leaning the other: the sign of the lean changes, top to bottom.
-        tilt = lean(world)[:, 1:]
-        changes = np.sign(tilt[0]) != np.sign(tilt[-1])
-        return bool(changes.all()), float(changes.sum())
-
-    return across(
-        study.worlds, swings,
-        "whether the worst directions of joints 2 and 3 lean to different sides at the top and at "
-        "the bottom of the path",
-        "{base} of 2 joints in the base world; both in {share} of {worlds} worlds",
-        PATH,
-    )  # fmt: skip
+    # From leaning one way to leaning the other: the sign of the lean changes, top to bottom.
+    tilt = lean(world)[:, 1:]
+    changes = np.sign(tilt[0]) != np.sign(tilt[-1])
+    return bool(changes.all()), float(changes.sum())

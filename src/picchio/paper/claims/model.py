@@ -5,62 +5,49 @@ from __future__ import annotations
 import numpy as np
 
 from picchio.model.linear_system import undamped_modes
-from picchio.paper.claims.registry import claim
-from picchio.paper.fourier import amplitude_and_phase, printed_series
-from picchio.paper.statics import holding_torque
+from picchio.paper.equations import series_gap
+from picchio.paper.fourier import amplitude_and_phase
 from picchio.paper.study import Study
-from picchio.paper.verdict import PANEL, Finding, across, decided
+from picchio.paper.verdict import PANEL, Finding, across, claim, claim_of_worlds, decided
 from picchio.paper.world import World
 
 
-@claim("mimics", "gravity")
+@claim("gravity")
 def mimics(study: Study) -> Finding:
     """Whether the actuators could hold the arm up."""
-    found = holding_torque(study.base)
+    largest = study.base.sweep[1].max(axis=0)
     limits = study.printed.arm.actuator_torques
     return decided(
-        bool(found.largest[1] <= limits[1] and found.largest[2] <= limits[2]),
+        bool(largest[1] <= limits[1] and largest[2] <= limits[2]),
         "torque to hold the unloaded arm against gravity, at full horizontal reach, against the "
         "stated actuators",
-        f"joint 2: {found.largest[1]:.0f} N m against {limits[1]:.0f} N m, joint 3: "
-        f"{found.largest[2]:.0f} N m against {limits[2]:.0f} N m; joint 2 can hold the arm in "
-        f"{100 * found.share_held:.0f} % of its range with joint 3 straight",
-        float(found.largest[1]),
+        f"joint 2: {largest[1]:.0f} N m against {limits[1]:.0f} N m, joint 3: "
+        f"{largest[2]:.0f} N m against {limits[2]:.0f} N m; joint 2 can hold the arm in "
+        f"{100 * study.base.share_held:.0f} % of its range with joint 3 straight",
+        float(largest[1]),
     )
 
 
-@claim("fixed_direction")
-def fixed_direction(study: Study) -> Finding:
+@claim_of_worlds(
+    "",
+    "sum of the joints' largest deflections in a rivet of 12 hits: the most the gun can turn",
+    "{base}° in the base world, {most}° at most over {worlds} worlds; up to 1°, which "
+    "turns 1.7 % of the force aside, may be ignored",
+    PANEL,
+)
+def fixed_direction(world: World) -> tuple[bool, float]:
     """How far the gun turns while it hits."""
-
-    def turns(world: World) -> tuple[bool, float]:
-        worst = [
-            world.peaks(world.rivet_poses, n, hits=12).peak_deflection.sum(axis=1).max()
-            for n in world.printed.directions
-        ]
-        degrees = float(np.degrees(max(worst)))
-        return degrees < 1.0, degrees
-
-    return across(
-        study.worlds, turns,
-        "sum of the joints' largest deflections in a rivet of 12 hits: the most the gun can turn",
-        "{base}° in the base world, {most}° at most over {worlds} worlds; up to 1°, which "
-        "turns 1.7 % of the force aside, may be ignored",
-        PANEL,
-    )  # fmt: skip
+    degrees = float(np.degrees(world.rivet_peaks(hits=12).sum(axis=-1).max()))
+    return degrees < 1.0, degrees
 
 
-@claim("transient", "steady-state")
+@claim("steady-state")
 def transient(study: Study) -> Finding:
     """Whether the steady state is there when it matters."""
     hits = study.printed.task.hits_per_rivet
 
     def settled(world: World) -> tuple[bool, float]:
-        rest = [
-            world.peaks(world.rivet_poses, n, hits=hits).peak_deflection
-            for n in world.printed.directions
-        ]
-        peaks = world.stress(np.max(rest, axis=(0, 1)))
+        peaks = world.stress(world.rivet_peaks(hits).max(axis=(0, 1)))
         ratio = float((peaks / world.rivet_stress.max(axis=(0, 1))).max())
         return ratio < 1.1, ratio
 
@@ -73,7 +60,7 @@ def transient(study: Study) -> Finding:
     )  # fmt: skip
 
 
-@claim("decoupled")
+@claim()
 def decoupled(study: Study) -> Finding:
     """S^T M S and S^T K S are diagonal."""
     worst = 0.0
@@ -92,14 +79,10 @@ def decoupled(study: Study) -> Finding:
     )
 
 
-@claim("fourier", "fig-4")
+@claim("fig-4")
 def fourier(study: Study) -> Finding:
     """Eq. 12's coefficients against those of the exact pulse."""
-    count = study.given.harmonics
-    printed = printed_series(study.base.blows, count)
-    exact = study.base.blows.one_period().fourier_coefficients(count)
-    ours = np.concatenate([[exact[0].real], 2.0 * exact[1:]])
-    gap = float(np.abs(printed - ours).max() / study.base.blows.force)
+    count, gap = study.given.harmonics, series_gap(study)
     return decided(
         gap < 1e-9,
         f"eq. 12's a0, a_j, b_j against the exact pulse's, {count} harmonics",
@@ -108,7 +91,7 @@ def fourier(study: Study) -> Finding:
     )
 
 
-@claim("phase", "phase")
+@claim("phase")
 def phase(study: Study) -> Finding:
     """Eq. 13 with the arctangent as it is written."""
     found = amplitude_and_phase(study.base)
@@ -124,7 +107,7 @@ def phase(study: Study) -> Finding:
     )
 
 
-@claim("shaft_strain", "shaft")
+@claim("shaft")
 def shaft_strain(study: Study) -> Finding:
     """Eqs. 14-17 take the whole of a joint's spring to be one shaft."""
     radii = [1e3 * j.shaft.radius for j in study.base.robot.flexible_joints if j.shaft]

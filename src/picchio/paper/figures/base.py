@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from picchio.visuals.plots.style import STYLE
@@ -24,7 +24,10 @@ class PaperFigure:
         caption: what it shows.
         alt: the same for readers who cannot see it.
         data: the numbers behind it, for JSON.
-        draw: makes it and returns one of its axes.
+        draw: draws it on its Axes: one, a row (columns,), or (rows, columns).
+        columns, rows: of Axes.
+        width, height: of the figure, inches.
+        sharex: whether the Axes share their abscissa.
         wide: whether it takes the page's whole width.
     """
 
@@ -33,19 +36,23 @@ class PaperFigure:
     caption: str
     alt: str
     data: Mapping[str, Any]
-    draw: Callable[[], Axes]
-    wide: bool = field(default=False)
+    draw: Callable[[Any], None]
+    columns: int = 1
+    rows: int = 1
+    width: float = 6.4
+    height: float = 3.4
+    sharex: bool = False
+    wide: bool = False
 
     def plot(self) -> Figure:
         """The figure, in the house style; for notebooks too."""
         with mpl.rc_context(STYLE):
-            figure = self.draw().get_figure(root=True)
-        assert figure is not None
+            size = (self.width, self.height)
+            figure = Figure(figsize=size, layout="constrained", facecolor="none")
+            self.draw(figure.subplots(self.rows, self.columns, sharex=self.sharex))
         return figure
 
     def _repr_png_(self) -> bytes:
-        import io
-
         stream = io.BytesIO()
         with mpl.rc_context(STYLE):
             self.plot().savefig(stream, format="png", dpi=110, facecolor="white")
@@ -55,16 +62,6 @@ class PaperFigure:
         """For JSON."""
         return {"name": self.name, "title": self.title, "caption": self.caption,
                 "data": dict(self.data)}  # fmt: skip
-
-
-def panels(
-    columns: int = 1, rows: int = 1, width: float = 6.4, height: float = 3.4, **options: Any
-) -> Any:
-    """Axes (rows, columns) of a figure that pyplot does not know; one if there is but one."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(width, height), layout="constrained", facecolor="none")
-        axes = figure.subplots(rows, columns, squeeze=False, **options)
-    return axes[0, 0] if axes.size == 1 else axes
 
 
 def rounded(values: Any, digits: int = 6) -> list[Any]:

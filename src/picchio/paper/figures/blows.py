@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from picchio.paper.figures.base import PaperFigure, panels, rounded
+from picchio.paper.figures.base import PaperFigure, rounded
 from picchio.paper.fourier import amplitude_and_phase, printed_force, worst_of, worst_responses
 from picchio.paper.study import Study
 from picchio.visuals.plots.style import BLUE, INK, MUTED, VERMILION, look
@@ -19,14 +19,12 @@ def figure_4(study: Study) -> PaperFigure:
     sums = {n: printed_force(blows, n, time) for n in sorted({5, count, 10 * count})}
     over = max(float(s.max()) for s in sums.values()) / blows.force - 1.0
 
-    def draw() -> Axes:
-        ax = panels(height=3.0)
+    def draw(ax: Axes) -> None:
         for k, (n, force) in enumerate(sums.items()):
-            ax.plot(1e3 * time, force, linewidth=1.2, label=f"eq. 12, N = {n}", **_thin(k))
+            ax.plot(1e3 * time, force, linewidth=1.2, label=f"eq. 12, N = {n}", **look(k))
         ax.plot(1e3 * time, exact, color=INK, linewidth=1.6, label="exact")
         ax.set(xlabel="time [ms]", ylabel="force [N]")
         ax.legend(loc="upper right")
-        return ax  # type: ignore[no-any-return]
 
     return PaperFigure(
         "fig-4", "Fig. 4: the periodic pulse train",
@@ -35,13 +33,8 @@ def figure_4(study: Study) -> PaperFigure:
         "picchio solves the pulse itself and needs no harmonics.",
         "Force over time: rectangular pulses and Fourier sums of 5 and more harmonics",
         {"time": rounded(time[::8]), "force": {str(n): rounded(f[::8]) for n, f in sums.items()},
-         "overshoot": over}, draw,
+         "overshoot": over}, draw, height=3.0,
     )  # fmt: skip
-
-
-def _thin(k: int) -> dict[str, object]:
-    style = look(k)
-    return {"color": style["color"], "linestyle": style["linestyle"]}
 
 
 def figure_8(study: Study) -> PaperFigure:
@@ -53,22 +46,20 @@ def figure_8(study: Study) -> PaperFigure:
     stress = world.stress(steady.deflection(time, n))
     name = world.printed.table2[d].direction
 
-    def draw() -> Axes:
-        ax = panels(height=3.0)
+    def draw(ax: Axes) -> None:
         for j, row in enumerate(stress):
             ax.plot(1e3 * time, row, label=f"joint {j + 1}", **look(j))
         ax.axhline(0.0, color=MUTED, linewidth=0.7)
         ax.set(xlabel="time [ms]", ylabel="shear stress [MPa]")
         ax.legend(loc="upper right", ncols=3)
         ax.margins(y=0.2)
-        return ax  # type: ignore[no-any-return]
 
     return PaperFigure(
         "fig-8", "Fig. 8: joint shear stress under percussive riveting",
         f"Steady state at the most stressed rivet of the base world ({name}, rivet {k + 1}). "
         "Which pose and direction the paper shows is not told.",
         "Shear stress of the three joints over three blows",
-        {"time": rounded(time[::5]), "stress": rounded(stress[:, ::5])}, draw,
+        {"time": rounded(time[::5]), "stress": rounded(stress[:, ::5])}, draw, height=3.0,
     )  # fmt: skip
 
 
@@ -84,8 +75,7 @@ def steady_state(study: Study) -> PaperFigure:
     ratio = float(np.abs(burst).max() / np.abs(band).max())
     slowest = -float(rest.modes.poles.real.max())
 
-    def draw() -> Axes:
-        ax = panels(height=3.0)
+    def draw(ax: Axes) -> None:
         ax.axhspan(band.min(), band.max(), color=VERMILION, alpha=0.25, linewidth=0,
                    label="steady state, which the paper takes")  # fmt: skip
         ax.plot(time, burst, color=BLUE, label=f"a rivet of {hits} hits from rest")
@@ -97,7 +87,6 @@ def steady_state(study: Study) -> PaperFigure:
         ax.set_xlim(0.0, end)
         ax.margins(y=0.25)
         ax.legend(loc="upper right")
-        return ax  # type: ignore[no-any-return]
 
     return PaperFigure(
         "steady-state", "A steady state in 12 hits",
@@ -106,7 +95,7 @@ def steady_state(study: Study) -> PaperFigure:
         f"peak is {ratio:.3g} times the steady one.",
         "Stress from rest over a rivet: it swings far beyond the band of the steady state",
         {"time": rounded(time[::5]), "stress": rounded(burst[::5]), "steady": rounded(band),
-         "ratio": ratio, "time_constant": 1.0 / slowest}, draw,
+         "ratio": ratio, "time_constant": 1.0 / slowest}, draw, height=3.0,
     )  # fmt: skip
 
 
@@ -114,8 +103,7 @@ def phase(study: Study) -> PaperFigure:
     """Eq. 13 with two arctangents."""
     found = amplitude_and_phase(study.base)
 
-    def draw() -> Axes:
-        ax = panels(height=3.0)
+    def draw(ax: Axes) -> None:
         ax.plot(1e3 * found.time, found.exact, color=INK, linewidth=2.4, label="exact")
         ax.plot(1e3 * found.time, found.plain, color=VERMILION, linestyle=(0, (5, 2)),
                 label="eq. 13, plain tan⁻¹")  # fmt: skip
@@ -124,7 +112,6 @@ def phase(study: Study) -> PaperFigure:
         ax.set(xlabel="time [ms]", ylabel="deflection [mrad]")
         ax.margins(y=0.25)
         ax.legend(loc="upper right", ncols=3, fontsize=7.5)
-        return ax  # type: ignore[no-any-return]
 
     return PaperFigure(
         "phase", "Eq. 13's phase",
@@ -133,5 +120,5 @@ def phase(study: Study) -> PaperFigure:
         f"{100 * found.plain_history:.2g} % of its peak. With the right quadrant it is exact.",
         "Deflection over one period: exact, by eq. 13 as written, and with the right quadrant",
         {"time": rounded(found.time[::4]), "exact": rounded(found.exact[::4]),
-         "plain": rounded(found.plain[::4]), "right": rounded(found.right[::4])}, draw,
+         "plain": rounded(found.plain[::4]), "right": rounded(found.right[::4])}, draw, height=3.0,
     )  # fmt: skip

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 
 from picchio.core.arrays import FloatArray
+from picchio.paper.arm import poses_at
 from picchio.paper.claims.envelope import lean, waist
 from picchio.paper.dominance import search_dominance
-from picchio.paper.figures.base import PaperFigure, panels, rounded
-from picchio.paper.statics import path_bend
+from picchio.paper.figures.base import PaperFigure, rounded
 from picchio.paper.study import Study
 from picchio.paper.world import World
 from picchio.visuals.plots.style import BLUE, COLOURS, GREY, INK, MUTED, VERMILION, look
-
-_COUNT = 60
 
 
 def figure_9(study: Study) -> PaperFigure:
@@ -29,20 +29,14 @@ def figure_9(study: Study) -> PaperFigure:
 
 def envelopes(world: World, name: str, title: str, caption: str) -> PaperFigure:
     """The four poses of the vertical path, with their envelopes."""
-    angle = np.linspace(0.0, np.pi, _COUNT, endpoint=False)
-    flat = np.zeros((_COUNT, 3))
-    flat[:, 0], flat[:, 2] = np.cos(angle), np.sin(angle)
-    level = np.zeros((_COUNT, 3))
-    level[:, 0], level[:, 1] = np.cos(angle), np.sin(angle)
-    radii = 1e3 * np.array([world.peaks(world.path_poses, n).peak_deflection for n in flat])
-    first = 1e3 * np.array([world.peaks(world.path_poses, n).peak_deflection for n in level])
-    radii[:, :, 0] = first[:, :, 0]
+    angle = np.linspace(0.0, np.pi, 60, endpoint=False)
+    radii = 1e3 * world.path_radii(angle)
+    radii[:, :, 0] = 1e3 * world.path_radii(angle, towards=(0.0, 1.0, 0.0))[:, :, 0]
     peaks = 1e3 * world.path_peaks.peak_deflection
     heights = world.printed.task.path_heights
     wanted = world.printed.task.dominant_joints
 
-    def draw() -> Axes:
-        axes = panels(4, 1, width=11.5, height=3.9)[0]
+    def draw(axes: Any) -> None:
         largest = peaks.max()
         for k, ax in enumerate(axes):
             _arm(ax, world, k)
@@ -68,7 +62,6 @@ def envelopes(world: World, name: str, title: str, caption: str) -> PaperFigure:
                 ax.set_yticklabels([])
         axes[0].set_ylabel("z [m]")
         axes[0].legend(loc="upper left", fontsize=7.5, handlelength=1.6)
-        return axes[0]  # type: ignore[no-any-return]
 
     leads = ", ".join(f"joint {int(row.argmax()) + 1}" for row in peaks)
     return PaperFigure(
@@ -76,7 +69,8 @@ def envelopes(world: World, name: str, title: str, caption: str) -> PaperFigure:
         f"Direction envelopes of the three joints at four heights; the largest is {leads}",
         {"height": list(heights), "peak_mrad": rounded(peaks), "lean_deg": rounded(lean(world)),
          "waist": rounded(waist(world)),
-         "worst_direction": rounded(world.path_peaks.direction)}, draw, wide=True,
+         "worst_direction": rounded(world.path_peaks.direction)},
+        draw, columns=4, width=11.5, height=3.9, wide=True,
     )  # fmt: skip
 
 
@@ -96,8 +90,7 @@ def dominance(study: Study) -> tuple[PaperFigure, ...]:
     wanted = ", ".join(str(j) for j in study.printed.task.dominant_joints)
     values, agree = found.values, found.agree
 
-    def draw() -> Axes:
-        axes = panels(2, 1, width=8.4, height=3.3)[0]
+    def draw(axes: Any) -> None:
         counts = np.array([(agree == k).sum() for k in range(5)])
         axes[0].bar(range(5), 100 * counts / counts.sum(), color=[GREY] * 4 + [VERMILION])
         for k, count in enumerate(counts):
@@ -106,7 +99,6 @@ def dominance(study: Study) -> tuple[PaperFigure, ...]:
         axes[0].set(xlabel="heights at which the joint agrees", ylabel="worlds [%]",
                     title="How many of four agree")  # fmt: skip
         _scatter(axes[1], values, agree)
-        return axes[0]  # type: ignore[no-any-return]
 
     made = [PaperFigure(
         "dominance", f"How rare the sequence {wanted} is",
@@ -115,7 +107,8 @@ def dominance(study: Study) -> tuple[PaperFigure, ...]:
         "a harmonic of the blows meets just as the arm comes down.",
         f"Bars: share of worlds by agreeing heights; {found.hits} of {found.tried} agree at four",
         {"tried": found.tried, "hits": found.hits,
-         "agree": [int((agree == k).sum()) for k in range(5)]}, draw, wide=True,
+         "agree": [int((agree == k).sum()) for k in range(5)]},
+        draw, columns=2, width=8.4, height=3.3, wide=True,
     )]  # fmt: skip
     if found.example is not None:
         made.append(envelopes(
@@ -143,15 +136,15 @@ def reach_of_path(study: Study) -> PaperFigure:
     world = study.base
     limit = float(world.printed.arm.limits[2])
     x = np.linspace(0.2, 1.6, 400)
-    bend = path_bend(world, x)
+    points = [[(at, 0.0, z) for at in x] for z in world.printed.task.path_heights]
+    bend = np.abs(poses_at(points)[..., 2])
     worst = bend.max(axis=0)
     least = float(np.degrees(np.nanmin(worst)))
     at = float(x[int(np.nanargmin(worst))])
     l1, l2, l3 = world.printed.arm.link_lengths
     inner = float(np.sqrt(l2**2 + l3**2 + 2.0 * l2 * l3 * np.cos(limit)))
 
-    def draw() -> Axes:
-        axes = panels(2, 1, width=9.4, height=3.6)[0]
+    def draw(axes: Any) -> None:
         ax = axes[0]
         theta = np.linspace(-np.pi / 2, np.pi / 2, 200)
         ring = np.concatenate([(l2 + l3) * np.exp(1j * theta), inner * np.exp(1j * theta[::-1])])
@@ -174,7 +167,6 @@ def reach_of_path(study: Study) -> PaperFigure:
         axes[1].set(xlabel="x of the path [m]", ylabel="joint 3 must bend [°]",
                     title="What a path at one x asks of joint 3")  # fmt: skip
         axes[1].legend(loc="lower left", fontsize=8)
-        return axes[0]  # type: ignore[no-any-return]
 
     return PaperFigure(
         "range", "Joint 3's range against Fig. 9's path",
@@ -183,5 +175,6 @@ def reach_of_path(study: Study) -> PaperFigure:
         f"bend {least:.0f}°. The figures here go beyond the stated range.",
         "Reach of the arm within the stated joint range, and the bend that the path needs",
         {"least_bend_deg": least, "at_x": at, "limit_deg": float(np.degrees(limit)),
-         "x": rounded(x[::8]), "bend_deg": rounded(np.degrees(bend[:, ::8]))}, draw, wide=True,
+         "x": rounded(x[::8]), "bend_deg": rounded(np.degrees(bend[:, ::8]))},
+        draw, columns=2, width=9.4, height=3.6, wide=True,
     )  # fmt: skip

@@ -8,8 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from picchio.fatigue.sn.library import load_sn_curve
-from picchio.paper.figures.base import PaperFigure, panels, rounded
-from picchio.paper.statics import gravity_stress, holding_torque
+from picchio.paper.figures.base import PaperFigure, rounded
 from picchio.paper.study import Study
 from picchio.paper.waterfall import STEEL, Step
 from picchio.visuals.plots.style import BLUE, GREEN, GREY, INK, MUTED, ORANGE, VERMILION, look
@@ -19,16 +18,14 @@ def figure_11(study: Study) -> PaperFigure:
     """The S-N curve, a shaft steel's, and the curve of Table 2."""
     curve, table = study.printed.sn_curve, study.curve_of_table
     steel = load_sn_curve(STEEL, quiet=True)
-    best = table.fit("another curve S = a N^b", aside=True)
     assert steel.ultimate_shear is not None
     n = np.geomspace(1e2, 1e9, 200)
     strength = curve.a * n**curve.b
     at_1000 = curve.a * 1000.0**curve.b
     limit = steel.ultimate_shear / 1e6
-    hidden = best.values["a"] * n ** best.values["b"]
+    hidden = table.other.values["a"] * n ** table.other.values["b"]
 
-    def draw() -> Axes:
-        ax = panels(width=7.4, height=3.8)
+    def draw(ax: Axes) -> None:
         ax.loglog(n, strength, color=BLUE, linewidth=2, label=f"printed: {curve.a:g} N^{curve.b:g}")
         life = np.geomspace(1e3, 1e9, 300)
         ax.loglog(life, steel.amplitude(life) / 1e6, color=GREEN, label=f"{STEEL} (FKM)")
@@ -43,7 +40,6 @@ def figure_11(study: Study) -> PaperFigure:
                     textcoords="offset points", fontsize=8.5, color=BLUE)  # fmt: skip
         ax.set(xlabel="cycles to failure [–]", ylabel="shear stress [MPa]", xlim=(1e2, 1e9))
         ax.legend(loc="lower left", fontsize=8)
-        return ax  # type: ignore[no-any-return]
 
     return PaperFigure(
         "fig-11", "Fig. 11: torsional S–N curve of steel",
@@ -53,32 +49,29 @@ def figure_11(study: Study) -> PaperFigure:
         "S-N curves: the printed one far above Table 2's points, a shaft steel with its limit",
         {"cycles": rounded(n[::10]), "printed": rounded(strength[::10]),
          "steel": rounded(steel.amplitude(n[::10]) / 1e6), "through_table_2": rounded(hidden[::10]),
-         "at_1000": at_1000, "steel_breaks_at": limit}, draw, wide=True,
+         "at_1000": at_1000, "steel_breaks_at": limit}, draw, width=7.4, height=3.8, wide=True,
     )  # fmt: skip
 
 
 def gravity(study: Study) -> tuple[PaperFigure, PaperFigure]:
     """Torque to hold the arm, and the steady stress it makes."""
-    held = holding_torque(study.base)
-    limits = study.printed.arm.actuator_torques
-    stress = gravity_stress(study.base).mean(axis=0)
+    angle, torque = study.base.sweep
+    largest, limits = torque.max(axis=0), study.printed.arm.actuator_torques
+    stress = study.base.gravity_stress.mean(axis=0)
     vibration = study.base.rivet_stress.mean(axis=1)
     printed = study.printed.stress
 
-    def draw() -> Axes:
-        ax = panels(height=3.0)
+    def draw(ax: Axes) -> None:
         for j in (1, 2):
             style = look(j)
-            ax.plot(np.degrees(held.angle), held.torque[:, j], label=f"joint {j + 1}", **style)
+            ax.plot(np.degrees(angle), torque[:, j], label=f"joint {j + 1}", **style)
             ax.axhline(limits[j], color=style["color"], linewidth=0.9, linestyle=(0, (1, 1.5)))
             ax.text(-88, limits[j] + 8, f"its actuator: {limits[j]:.0f} N m", fontsize=8,
                     color=style["color"])  # fmt: skip
         ax.set(xlabel="joint 2 [°], joint 3 straight", ylabel="torque to hold [N m]")
         ax.legend(loc="upper right")
-        return ax  # type: ignore[no-any-return]
 
-    def draw_stress() -> Axes:
-        ax = panels(height=3.0)
+    def draw_stress(ax: Axes) -> None:
         at = np.arange(3)
         ax.bar(at - 0.27, printed.max(axis=0), 0.25, color=ORANGE, label="Table 2, largest mean")
         ax.bar(at, vibration.max(axis=0), 0.25, color=BLUE, label="vibration, base world")
@@ -88,20 +81,19 @@ def gravity(study: Study) -> tuple[PaperFigure, PaperFigure]:
         ax.set_xticks(at, [f"joint {j + 1}" for j in at])
         ax.set(ylabel="shear stress [MPa]")
         ax.legend(loc="upper left")
-        return ax  # type: ignore[no-any-return]
 
     times = stress[1] / printed[:, 1].max()
     return (
         PaperFigure(
             "gravity", "Gravity against the stated actuators",
-            f"Stretched out, joint 2 must hold {held.largest[1]:.0f} N m and joint 3 "
-            f"{held.largest[2]:.0f} N m, without tool or payload; the stated actuators give "
+            f"Stretched out, joint 2 must hold {largest[1]:.0f} N m and joint 3 "
+            f"{largest[2]:.0f} N m, without tool or payload; the stated actuators give "
             f"{limits[1]:.0f} and {limits[2]:.0f} N m. The arm cannot hold itself up, unless its "
             "gravity is balanced, of which the paper says nothing.",
             "Holding torque of joints 2 and 3 over joint 2's angle, with the actuators' limits",
-            {"angle_deg": rounded(np.degrees(held.angle[::6])), "torque": rounded(held.torque[::6]),
-             "largest": rounded(held.largest), "actuators": list(limits),
-             "share_held": held.share_held}, draw,
+            {"angle_deg": rounded(np.degrees(angle[::6])), "torque": rounded(torque[::6]),
+             "largest": rounded(largest), "actuators": list(limits),
+             "share_held": study.base.share_held}, draw, height=3.0,
         ),
         PaperFigure(
             "gravity-stress", "Gravity's steady stress against the vibration",
@@ -111,7 +103,7 @@ def gravity(study: Study) -> tuple[PaperFigure, PaperFigure]:
             "Stress by gravity, by the vibration and of Table 2, joint by joint",
             {"gravity": rounded(stress), "vibration": rounded(vibration),
              "printed": rounded(printed)},
-            draw_stress,
+            draw_stress, height=3.0,
         ),
     )  # fmt: skip
 
@@ -124,8 +116,7 @@ def shaft(study: Study) -> PaperFigure:
     length = {k: modulus * np.pi * radius**4 / (2.0 * k) for k in sorted(set(arm.stiffness))}
     own = [j.shaft for j in study.base.robot.flexible_joints]
 
-    def draw() -> Axes:
-        ax = panels(height=3.2)
+    def draw(ax: Axes) -> None:
         for i, (k, values) in enumerate(length.items()):
             ax.loglog(2e3 * radius, 1e3 * values, **look(i), label=f"k = {k:.3g} N m/rad")
         for j in own:
@@ -140,7 +131,6 @@ def shaft(study: Study) -> PaperFigure:
                         color=MUTED, xytext=(3, 3), textcoords="offset points")  # fmt: skip
         ax.set(xlabel="thickness [mm]", ylabel="length [mm]")
         ax.legend(loc="lower right")
-        return ax  # type: ignore[no-any-return]
 
     return PaperFigure(
         "shaft", "Spring against shaft: k = G Jp / l",
@@ -149,7 +139,8 @@ def shaft(study: Study) -> PaperFigure:
         "shaft as short as it is thick is a whole drive's spring in name only.",
         "Length over thickness of shafts with the stated stiffness",
         {"thickness_mm": rounded(2e3 * radius[::6]),
-         "length_mm": {f"{k:g}": rounded(1e3 * v[::6]) for k, v in length.items()}}, draw,
+         "length_mm": {f"{k:g}": rounded(1e3 * v[::6]) for k, v in length.items()}},
+        draw, height=3.2,
     )  # fmt: skip
 
 
@@ -158,8 +149,7 @@ def corrections(steps: tuple[Step, ...]) -> PaperFigure:
     base = steps[0].rivets
     ends = [s.without_limit if math.isinf(s.rivets) else s.rivets for s in steps]
 
-    def draw() -> Axes:
-        ax = panels(width=9.0, height=3.4)
+    def draw(ax: Axes) -> None:
         top = max(ends) * 30
         for k, (step, end) in enumerate(zip(reversed(steps), reversed(ends), strict=True)):
             colour = GREY if step.rivets == base else GREEN if end > base else VERMILION
@@ -169,35 +159,26 @@ def corrections(steps: tuple[Step, ...]) -> PaperFigure:
             else:
                 ax.barh(k, end - base, left=base, height=0.5, color=colour,
                         alpha=0.35 if math.isinf(step.rivets) else 0.75)  # fmt: skip
-            words = (
-                f"{step.rivets:.3g}"
-                if math.isfinite(step.rivets)
-                else (f"no end ({end:.2g} without the limit)")
-            )
-            factor = (
-                ""
-                if k == len(steps) - 1 or math.isinf(step.rivets)
-                else (f"  (× {step.rivets / base:.2g})")
-            )
             joint = f", joint {step.joint + 1}" if step.joint >= 0 else ""
             if math.isinf(step.rivets):
+                words, side, away = f"no end ({end:.2g} without the limit){joint}", "right", -8
                 arrow = {"arrowstyle": "->", "color": colour, "lw": 1.4}
                 ax.annotate("", (end * 8, k), xytext=(end, k), arrowprops=arrow)
-            low = end < base
-            ax.annotate(words + joint + factor, (base if low else end, k),
-                        xytext=(8 if not math.isinf(step.rivets) else -8, 0),
-                        textcoords="offset points", va="center", fontsize=8.5,
-                        ha="right" if math.isinf(step.rivets) else "left")  # fmt: skip
+            else:
+                words, side, away = f"{step.rivets:.3g}{joint}", "left", 8
+                if k < len(steps) - 1:
+                    words += f"  (× {step.rivets / base:.2g})"
+            ax.annotate(words, (max(base, end), k), xytext=(away, 0), ha=side, va="center",
+                        textcoords="offset points", fontsize=8.5)  # fmt: skip
         ax.set_xscale("log")
         ax.set_yticks(range(len(steps)), [s.name for s in reversed(steps)])
         ax.set(xlabel="rivets to failure", xlim=(min(ends) / 4, top))
         ax.grid(axis="y", visible=False)
-        return ax  # type: ignore[no-any-return]
 
     return PaperFigure(
         "corrections", "The life of the paper's task, by each correction",
         "The base world's task: the paper's method, each correction of it alone, all together. "
         "Pale bars run to where the curve would end without its endurance limit.",
         "Bars from the life by the paper's method to that with each correction",
-        {"steps": [s.to_dict() for s in steps]}, draw, wide=True,
+        {"steps": [s.to_dict() for s in steps]}, draw, width=9.0, height=3.4, wide=True,
     )  # fmt: skip

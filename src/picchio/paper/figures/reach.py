@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from picchio.core.arrays import FloatArray
-from picchio.paper.figures.base import PaperFigure, panels, rounded
+from picchio.paper.figures.base import PaperFigure, rounded
 from picchio.paper.reach import ReachMap
 from picchio.paper.study import Study
 from picchio.paper.verdict import plainly
@@ -19,17 +19,15 @@ _NAMES = {"worst": "worst direction", "x": "force along x", "z": "force along z"
 
 def figure_10(study: Study) -> PaperFigure:
     """Three joints by the worst direction, and by forces along x and z."""
-    reach = study.reach(study.base)
+    reach = study.base.reach
     maps = {"worst": reach.worst, "x": reach.along["x"], "z": reach.along["z"]}
 
-    def draw() -> Axes:
-        axes = panels(3, 3, width=10.8, height=9.2)
+    def draw(axes: Any) -> None:
         for r, (name, peaks) in enumerate(maps.items()):
             for j in range(3):
                 _map(axes[r, j], reach, peaks, j, f"Joint {j + 1}, {_NAMES[name]}")
                 axes[r, j].set_xlabel("x [m]" if r == 2 else "")
             axes[r, 0].set_ylabel("z [m]")
-        return axes[0, 0]  # type: ignore[no-any-return]
 
     tops = {name: [rounded(reach.top(peaks, j)) for j in range(3)] for name, peaks in maps.items()}
     return PaperFigure(
@@ -41,11 +39,11 @@ def figure_10(study: Study) -> PaperFigure:
         "Nine maps of the x-z plane: three joints, by worst direction, force along x, along z",
         {"place": rounded(reach.place[::4, ::4], 4), "bend": rounded(reach.bend[::4]),
          "peak_mrad": {name: rounded(peaks[::4, ::4], 4) for name, peaks in maps.items()},
-         "largest_at": tops}, draw, wide=True,
+         "largest_at": tops}, draw, columns=3, rows=3, width=10.8, height=9.2, wide=True,
     )  # fmt: skip
 
 
-def _map(ax: Axes, reach: ReachMap, peaks: FloatArray, j: int, title: str) -> Any:
+def _map(ax: Axes, reach: ReachMap, peaks: FloatArray, j: int, title: str) -> None:
     x, z, p = reach.place[..., 0], reach.place[..., 2], peaks[..., j]
     top = float(p.max())
     ax.set_aspect("equal")
@@ -55,7 +53,7 @@ def _map(ax: Axes, reach: ReachMap, peaks: FloatArray, j: int, title: str) -> An
         for side in (1, -1):
             ax.contourf(side * x, z, p, levels=levels, colors=["#46326b"])
         ax.text(0, reach.hub, "nothing", ha="center", va="center", color=MUTED)
-        return None
+        return
     levels = np.linspace(0.0, top, 13)
     for side in (1, -1):
         shown = ax.contourf(side * x, z, p, levels=levels, cmap=CMAP)
@@ -65,18 +63,16 @@ def _map(ax: Axes, reach: ReachMap, peaks: FloatArray, j: int, title: str) -> An
     at = reach.top(peaks, j)
     for side in (1, -1):
         ax.plot(side * at[0], at[2], "o", color=VERMILION, markersize=5, markeredgecolor="white")
-    return shown
 
 
 def rings(study: Study) -> PaperFigure:
     """Joints 2 and 3 by the worst direction, over the turn of joint 2."""
-    reach = study.reach(study.base)
+    reach = study.base.reach
     angle = np.degrees(np.linspace(-1.0, 1.0, len(reach.worst)) * study.printed.arm.limits[1])
     spread = float(np.ptp(reach.worst[:, :, 1:], axis=0).max() / reach.worst[:, :, 1:].max())
     bends = [0, len(reach.bend) // 2, len(reach.bend) - 1]
 
-    def draw() -> Axes:
-        ax = panels(height=3.2)
+    def draw(ax: Axes) -> None:
         for k, b in enumerate(bends):
             for j in (1, 2):
                 bent = abs(np.degrees(reach.bend[b]))
@@ -86,7 +82,6 @@ def rings(study: Study) -> PaperFigure:
                ylabel="peak deflection [mrad]")  # fmt: skip
         ax.set_ylim(0.0, None)
         ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-        return ax  # type: ignore[no-any-return]
 
     return PaperFigure(
         "rings", "Worst-direction maps must be rings",
@@ -95,7 +90,7 @@ def rings(study: Study) -> PaperFigure:
         "be worse than another, as Fig. 10 (b) and (c) are said to show.",
         "Peak deflections over the angle of joint 2: horizontal lines",
         {"angle_deg": rounded(angle), "joint_2": rounded(reach.worst[:, bends, 1]),
-         "joint_3": rounded(reach.worst[:, bends, 2]), "spread": spread}, draw,
+         "joint_3": rounded(reach.worst[:, bends, 2]), "spread": spread}, draw, height=3.2,
     )  # fmt: skip
 
 
@@ -110,18 +105,15 @@ def axis_forces(study: Study) -> tuple[PaperFigure, PaperFigure]:
     }
     worst = 1e3 * world.peaks(poses).peak_deflection
 
-    def draw_x() -> Axes:
-        ax = panels(height=3.0)
+    def draw_x(ax: Axes) -> None:
         for k, axis in enumerate("yxz"):
             ax.plot(angle, straight[axis][:, 0], label=f"force along {axis}", **look(k))
         ax.set(xlabel="joint 2 [°], arm straight; 0: full reach along x",
                ylabel="joint 1, peak [mrad]")  # fmt: skip
         ax.legend(loc="upper right")
         ax.margins(y=0.15)
-        return ax  # type: ignore[no-any-return]
 
-    def draw_z() -> Axes:
-        ax = panels(height=3.0)
+    def draw_z(ax: Axes) -> None:
         for k, axis in enumerate("xz"):
             ax.plot(angle, straight[axis][:, 1], label=f"force along {axis}", **look(k))
         ax.plot(angle, worst[:, 1], color=INK, linewidth=1, label="worst direction")
@@ -129,7 +121,6 @@ def axis_forces(study: Study) -> tuple[PaperFigure, PaperFigure]:
                ylabel="joint 2, peak [mrad]")  # fmt: skip
         ax.legend(loc="lower left")
         ax.set_ylim(0.0, None)
-        return ax  # type: ignore[no-any-return]
 
     x_worst = float(straight["x"][:, 0].max())
     up = float(straight["z"][-1, 1] / straight["x"][-1, 1])
@@ -143,7 +134,7 @@ def axis_forces(study: Study) -> tuple[PaperFigure, PaperFigure]:
             "Peak deflection of joint 1 over joint 2's angle for forces along y, x and z",
             {"angle_deg": rounded(angle),
              "joint_1": {a: rounded(straight[a][:, 0]) for a in "xyz"}},
-            draw_x,
+            draw_x, height=3.0,
         ),
         PaperFigure(
             "z-force", "A force along z and joint 2",
@@ -151,6 +142,6 @@ def axis_forces(study: Study) -> tuple[PaperFigure, PaperFigure]:
             f"joint {plainly(up)} times as much as one along x does. The sentence is right for x.",
             "Peak deflection of joint 2 over its angle for forces along x and z",
             {"angle_deg": rounded(angle), "joint_2": {a: rounded(straight[a][:, 1]) for a in "xz"}},
-            draw_z,
+            draw_z, height=3.0,
         ),
     )  # fmt: skip

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 
 from picchio.paper.arm import rivet_points
-from picchio.paper.figures.base import PaperFigure, panels, rounded
+from picchio.paper.figures.base import PaperFigure, rounded
 from picchio.paper.influence import influences
 from picchio.paper.study import Study
 from picchio.visuals.plots.style import BLUE, INK, MUTED, look
@@ -17,8 +19,7 @@ def figure_12(study: Study) -> PaperFigure:
     given = study.given
     points = rivet_points(given)
 
-    def draw() -> Axes:
-        ax = panels(width=4.6, height=3.0)
+    def draw(ax: Axes) -> None:
         ax.plot(points[:, 1], points[:, 2], color=BLUE, linewidth=1)
         ax.plot(points[:, 1], points[:, 2], "o", color=BLUE, markersize=6)
         for k, (_, y, z) in enumerate(points):
@@ -26,14 +27,13 @@ def figure_12(study: Study) -> PaperFigure:
         ax.set_aspect("equal")
         ax.set(xlabel="y [m]", ylabel="z [m]")
         ax.margins(0.12)
-        return ax  # type: ignore[no-any-return]
 
     return PaperFigure(
         "fig-12", "Fig. 12: rivet pattern and path",
         f"Assumed: {given.rows} rows of {given.columns}, {given.pitch:g} m apart, on a panel at "
         f"x = {given.panel_x:g} m that faces the robot; the numbers are the sequence.",
         f"{len(points)} rivets in {given.rows} rows with the path that joins them",
-        {"points": rounded(points)}, draw,
+        {"points": rounded(points)}, draw, width=4.6, height=3.0,
     )  # fmt: skip
 
 
@@ -43,8 +43,7 @@ def figures_13_to_15(study: Study) -> PaperFigure:
     rows = study.printed.table2
     means = {name: world.rivet_stress.mean(axis=1) for name, world in worlds.items()}
 
-    def draw() -> Axes:
-        axes = panels(3, 2, width=10.6, height=5.4, sharex=True)
+    def draw(axes: Any) -> None:
         for r, (name, world) in enumerate(worlds.items()):
             top = 1.12 * max(float(world.rivet_stress.max()), float(study.printed.stress.max()))
             for d, row in enumerate(rows):
@@ -62,7 +61,6 @@ def figures_13_to_15(study: Study) -> PaperFigure:
                     ax.set_xlabel("rivet")
             axes[r, 0].set_ylabel("peak stress [MPa]")
         axes[0, 0].legend(loc="upper left", fontsize=7.5, ncols=3, handlelength=1.6)
-        return axes[0, 0]  # type: ignore[no-any-return]
 
     return PaperFigure(
         "fig-13-15", "Figs. 13–15: peak stresses over 15 rivets, forward, left, upward",
@@ -70,7 +68,8 @@ def figures_13_to_15(study: Study) -> PaperFigure:
         "nearest to them. They are not the paper's curves, which the text does not hold.",
         "Six panels: peak stress of three joints over the rivets in three directions, two worlds",
         {name: {"stress": rounded(world.rivet_stress, 5), "mean": rounded(means[name])}
-         for name, world in worlds.items()}, draw, wide=True,
+         for name, world in worlds.items()},
+        draw, columns=3, rows=2, width=10.6, height=5.4, sharex=True, wide=True,
     )  # fmt: skip
 
 
@@ -79,8 +78,7 @@ def influence(study: Study) -> PaperFigure:
     rows = influences(study)
     base = rows[0].base_life
 
-    def draw() -> Axes:
-        ax = panels(width=7.6, height=0.6 + 0.34 * len(rows))
+    def draw(ax: Axes) -> None:
         for k, row in enumerate(reversed(rows)):
             low, high = min(row.lives), max(row.lives)
             ax.barh(
@@ -98,12 +96,12 @@ def influence(study: Study) -> PaperFigure:
         ax.set(xlabel="rivets to failure by the paper's method")
         ax.grid(axis="y", visible=False)
         ax.tick_params(axis="y", labelcolor=INK, color=MUTED)
-        return ax  # type: ignore[no-any-return]
 
     return PaperFigure(
         "influence", "What each unreported input does to the life",
         "The life of the paper's task by its own method as one input goes from its least to its "
         "largest value (or through its choices), the others as in the base world (line).",
         "Bars of the life's range for each unreported input, widest first",
-        {row.name: row.to_dict() for row in rows}, draw, wide=True,
+        {row.name: row.to_dict() for row in rows},
+        draw, width=7.6, height=0.6 + 0.34 * len(rows), wide=True,
     )  # fmt: skip

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from picchio.paper.figures.base import PaperFigure, panels, rounded
+from picchio.paper.figures.base import PaperFigure, rounded
 from picchio.paper.study import Study
+from picchio.paper.table2.by_curve import OTHER_CURVE
 from picchio.visuals.plots.style import BLUE, GREY, INK, MUTED, ORANGE, VERMILION
 
 
@@ -19,12 +20,11 @@ def lives(study: Study) -> PaperFigure:
     names = (
         ("the curve as printed", False, GREY, "s"),
         ("as printed, rivets for hits", False, BLUE, "^"),
-        ("another curve S = a N^b", True, VERMILION, "o"),
+        (OTHER_CURVE, True, VERMILION, "o"),
     )
     fits = [(table.fit(name, aside), colour, marker) for name, aside, colour, marker in names]
 
-    def draw() -> Axes:
-        ax = panels(width=8.4, height=3.5)
+    def draw(ax: Axes) -> None:
         for fit, colour, marker in fits:
             label = fit.name + (" (one entry aside)" if fit.aside is not None else "")
             ax.plot(range(8), np.exp(fit.residuals[order]), marker, color=colour, label=label,
@@ -35,23 +35,21 @@ def lives(study: Study) -> PaperFigure:
         ax.set_xticks(range(8), ticks, fontsize=8)
         ax.set(ylabel="printed N over predicted N")
         ax.legend(loc="upper right", ncols=1, fontsize=8)
-        return ax  # type: ignore[no-any-return]
 
-    best = table.fit("another curve S = a N^b", aside=True)
-    assert best.aside is not None
-    kept = np.delete(best.residuals, best.aside)
+    values = table.other.values
     return PaperFigure(
         "table-2-lives", "Table 2's N against its own mean stresses",
         "No arm and no assumption is in this figure. The printed curve would give lives "
         f"{table.over_printed.min():.3g} to {table.over_printed.max():.3g} times as long; on "
-        f"S = {best.values['a']:,.0f} N^{best.values['b']:.4f} seven of eight are right within "
-        f"{100 * np.abs(kept).max():.2g} %, which is their rounding. The eighth is "
-        f"{table.labels[best.aside]}.",
+        f"S = {values['a']:,.0f} N^{values['b']:.4f} seven of eight are right within "
+        f"{100 * table.within:.2g} %, which is their rounding. The eighth is "
+        f"{table.misprint}.",
         "Printed over predicted lives of the eight entries by three hypotheses",
         {"labels": list(table.labels), "stress": rounded(table.stress),
          "cycles": rounded(table.cycles), "over_printed": rounded(table.over_printed),
          "rounding": rounded(table.rounding),
-         "hypotheses": [fit.to_dict() for fit in table.fits]}, draw, wide=True,
+         "hypotheses": [fit.to_dict() for fit in table.fits]},
+        draw, width=8.4, height=3.5, wide=True,
     )  # fmt: skip
 
 
@@ -59,8 +57,7 @@ def hypotheses(study: Study) -> PaperFigure:
     """Each hypothesis's error on entries left out."""
     found = study.comparison.hypotheses
 
-    def draw() -> Axes:
-        ax = panels(width=9.2, height=0.9 + 0.36 * len(found))
+    def draw(ax: Axes) -> None:
         for k, h in enumerate(reversed(found)):
             errors = np.abs(h.left_out_life)
             errors = errors[np.isfinite(errors)]
@@ -80,7 +77,6 @@ def hypotheses(study: Study) -> PaperFigure:
         ax.set(xlabel="error of an entry predicted from the other 15 [% of ln]")
         ax.tick_params(axis="y", color=MUTED)
         ax.legend(loc="upper right", fontsize=8)
-        return ax  # type: ignore[no-any-return]
 
     return PaperFigure(
         "hypotheses", "Nine hypotheses about Table 2, the same freedom for each",
@@ -88,5 +84,6 @@ def hypotheses(study: Study) -> PaperFigure:
         "eight unreported inputs free; then each entry is left out in turn and predicted. Best "
         "(by the penalised likelihood) on top.",
         "Errors of left-out entries for every hypothesis",
-        {"hypotheses": [h.to_dict() for h in found]}, draw, wide=True,
+        {"hypotheses": [h.to_dict() for h in found]},
+        draw, width=9.2, height=0.9 + 0.36 * len(found), wide=True,
     )  # fmt: skip

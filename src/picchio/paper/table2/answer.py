@@ -6,17 +6,13 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from picchio.core.arrays import FloatArray
-from picchio.paper.table2.by_curve import CurveFit, CurveOfTable
+from picchio.paper.table2.by_curve import OTHER_CURVE, CurveOfTable
 from picchio.paper.table2.compare import Comparison
 from picchio.paper.table2.fit import described
 
 if TYPE_CHECKING:
     from picchio.paper.study import Study
-
-_OTHER = "another curve S = a N^b"
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +23,6 @@ class Answer:
         table: the entries against the curves; comparison: the hypotheses with the arm.
         base_stress: (3, 3) MPa, mean peaks in the base world; fitted_stress: in the fitted one.
         base_cycles: (3, 3) cycles of the printed curve at the base world's means.
-        curve: the other curve.
         lead: how much better, in the criterion, the best is than the best that keeps the printed
             curve; by entries alone, and with the arm.
         crossing: (cycles, MPa) where the two curves meet.
@@ -41,36 +36,17 @@ class Answer:
     base_stress: FloatArray
     fitted_stress: FloatArray
     base_cycles: FloatArray
-    curve: CurveFit
     lead: tuple[float, float]
     crossing: tuple[float, float]
     shared: float
     ranges: dict[str, tuple[float, float]]
 
     @property
-    def misprint(self) -> str:
-        """The entry that no curve through the others meets."""
-        assert self.curve.aside is not None
-        return self.table.labels[self.curve.aside]
-
-    @property
-    def misprint_factor(self) -> float:
-        """How far it is off."""
-        assert self.curve.aside is not None
-        return math.exp(abs(float(self.curve.residuals[self.curve.aside])))
-
-    @property
-    def within(self) -> float:
-        """Largest relative error of the entries on the curve."""
-        assert self.curve.aside is not None
-        return float(np.abs(np.delete(self.curve.residuals, self.curve.aside)).max())
-
-    @property
     def slip(self) -> tuple[str, str, float]:
         """The change of one digit that comes nearest to the curve: to, from, ln N that is left."""
-        k = self.curve.aside
+        curve = self.table.other
+        k, a, b = curve.aside, curve.values["a"], curve.values["b"]
         assert k is not None
-        a, b = self.curve.values["a"], self.curve.values["b"]
         stress, cycles = f"{self.table.stress[k]:.2f}", f"{self.table.cycles[k]:.2e}"
         trials = []
         for text in (stress, cycles):
@@ -87,10 +63,10 @@ class Answer:
             "base_mean_stress": self.base_stress,
             "base_cycles": self.base_cycles,
             "fitted_mean_stress": self.fitted_stress,
-            "curve": self.curve.to_dict(),
+            "curve": self.table.other.to_dict(),
             "misprint": {
-                "entry": self.misprint,
-                "factor": self.misprint_factor,
+                "entry": self.table.misprint,
+                "factor": self.table.misprint_factor,
                 "nearest_digit": list(self.slip),
             },
             "lead": {"entries_alone": self.lead[0], "with_the_arm": self.lead[1]},
@@ -117,11 +93,11 @@ def _one_digit_off(text: str) -> list[str]:
 def answer(study: Study) -> Answer:
     """All that can be said of Table 2."""
     table, comparison = study.curve_of_table, study.comparison
-    curve = table.fit(_OTHER, aside=True)
+    curve = table.other
     printed = study.printed.sn_curve
-    keeps = [f for f in table.fits if f.name != _OTHER]
+    keeps = [f for f in table.fits if f.name != OTHER_CURVE]
     kept = next(h for h in comparison.hypotheses if not h.fit.rule.free_exponent)
-    lead = (min(f.bic for f in keeps) - curve.bic, kept.bic - comparison.best.bic)
+    lead = (min(f.bic for f in keeps) - curve.bic, kept.bic - comparison.hypotheses[0].bic)
     a, b = curve.values["a"], curve.values["b"]
     cycles = (a / printed.a) ** (1.0 / (printed.b - b))
     base = study.base.rivet_stress.mean(axis=1)
@@ -134,6 +110,6 @@ def answer(study: Study) -> Answer:
     }  # fmt: skip
     return Answer(
         table, comparison, base, study.fitted.rivet_stress.mean(axis=1),
-        printed.cycles(base), curve, lead, (cycles, printed.a * cycles**printed.b),
+        printed.cycles(base), lead, (cycles, printed.a * cycles**printed.b),
         printed.b / b, ranges,
     )  # fmt: skip

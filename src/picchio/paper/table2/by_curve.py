@@ -18,6 +18,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.paper.printed import Printed
 
+OTHER_CURVE = "another curve S = a N^b"
 _OUT = 3.0  # ln; what a misprint may be off by
 
 
@@ -77,11 +78,6 @@ class CurveOfTable:
     fits: tuple[CurveFit, ...]
     rounding: FloatArray
 
-    @property
-    def best(self) -> CurveFit:
-        """The hypothesis with the least BIC."""
-        return self.fits[0]
-
     def fit(self, name: str, aside: bool = False) -> CurveFit:
         """A hypothesis by its name, with or without an entry aside.
 
@@ -90,6 +86,29 @@ class CurveOfTable:
             aside: whether an entry of the table is left out.
         """
         return next(f for f in self.fits if f.name == name and (f.aside is not None) == aside)
+
+    @property
+    def other(self) -> CurveFit:
+        """Another curve than the printed one, through all entries but the one set aside."""
+        return self.fit(OTHER_CURVE, aside=True)
+
+    @property
+    def misprint(self) -> str:
+        """The entry that no curve through the others meets."""
+        assert self.other.aside is not None
+        return self.labels[self.other.aside]
+
+    @property
+    def misprint_factor(self) -> float:
+        """How far it is off."""
+        assert self.other.aside is not None
+        return math.exp(abs(float(self.other.residuals[self.other.aside])))
+
+    @property
+    def within(self) -> float:
+        """Largest relative error of the entries on the other curve."""
+        assert self.other.aside is not None
+        return float(np.abs(np.delete(self.other.residuals, self.other.aside)).max())
 
 
 Hypothesis = tuple[
@@ -119,7 +138,7 @@ def hypotheses(printed: Printed) -> list[Hypothesis]:
         ("the curve as printed", 0, lambda s, n: (np.array([-m, level]), {})),
         ("as printed, rivets for hits", 0, lambda s, n: (np.array([-m, level - hits]), {})),
         ("as printed, times a factor", 1, factor),
-        ("another curve S = a N^b", 2, strength),
+        (OTHER_CURVE, 2, strength),
     ]
 
 
@@ -158,18 +177,16 @@ def _fit(
 ) -> CurveFit:
     name, count, fit = hypothesis
     every = np.arange(s.size)
-    best: tuple[float, int | None, FloatArray, dict[str, float]] | None = None
-    tries: list[int | None] = [int(k) for k in every] if aside else [None]
-    for out in tries:
-        kept = every if out is None else np.delete(every, out)
-        line, values = fit(s[kept], n[kept])
-        cost = float(((n - np.polyval(line, s))[kept] ** 2).sum())
-        if best is None or cost < best[0]:
-            best = (cost, out, line, values)
-    assert best is not None
-    _, gone, line, values = best
-    residuals = n - np.polyval(line, s)
+
+    def cost(out: int) -> float:
+        rest = np.delete(every, out)
+        line, _ = fit(s[rest], n[rest])
+        return float(((n - np.polyval(line, s))[rest] ** 2).sum())
+
+    gone = min(map(int, every), key=cost) if aside else None
     kept = every if gone is None else np.delete(every, gone)
+    line, values = fit(s[kept], n[kept])
+    residuals = n - np.polyval(line, s)
     # A rounded number is uniform within its half digit.
     known = rounding[kept] ** 2 / 3.0
     error = likely_error(residuals[kept], known)

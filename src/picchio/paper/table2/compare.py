@@ -13,7 +13,7 @@ from picchio.core.arrays import FloatArray
 from picchio.paper.assumptions import Assumptions
 from picchio.paper.printed import Printed
 from picchio.paper.table2.by_curve import penalty, rounding_of
-from picchio.paper.table2.fit import Fit, Target, described, evaluate, refine, whole_target
+from picchio.paper.table2.fit import Fit, Target, described, evaluate, refine
 from picchio.paper.table2.place import FREE, Place, limits
 from picchio.paper.table2.rules import Rule, at_mean, rules
 
@@ -93,18 +93,13 @@ class Comparison:
     hypotheses: tuple[Compared, ...]
     alike: tuple[Fit, ...]
 
-    @property
-    def best(self) -> Compared:
-        """The one with the least BIC."""
-        return self.hypotheses[0]
-
 
 def compare_hypotheses(
     printed: Printed, given: Assumptions, progress: Callable[[int, int], None] | None = None
 ) -> Comparison:
     """Fit every hypothesis with the same freedom and compare."""
     every = rules(printed.task.hits_per_rivet)
-    target = whole_target(printed)
+    target = Target(printed)
     families: dict[tuple[str, str], list[Trial]] = {}
     found = []
     for k, rule in enumerate(every):
@@ -116,7 +111,7 @@ def compare_hypotheses(
             progress(k + 1, len(every))
     found.sort(key=lambda c: c.bic)
     means = Rule("means alone", at_mean, None)
-    blank = Target(printed, target.mean, np.full(8, 1e-9))
+    blank = Target(printed, life=np.full(8, 1e-9))
     return Comparison(tuple(found), tuple(_starts(means, families[("peak", "cg")], blank)))
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.paper.printed import Printed
 from picchio.paper.table2.place import FREE, Place, decode, limits
-from picchio.paper.table2.rules import Rule, predicted_ln_cycles
+from picchio.paper.table2.rules import Rule
 
 _UNREACHABLE = 5.0
 _EXPONENTS = (1.0, 8.0)
@@ -25,8 +26,8 @@ class Target:
     """
 
     printed: Printed
-    mean: FloatArray
-    life: FloatArray
+    mean: FloatArray = field(default_factory=lambda: np.ones(8))
+    life: FloatArray = field(default_factory=lambda: np.ones(8))
 
     @property
     def finite(self) -> FloatArray:
@@ -38,11 +39,6 @@ class Target:
         mean, life = self.mean.copy(), self.life.copy()
         (mean if kind == "mean" else life)[k] = 0.0
         return Target(self.printed, mean, life)
-
-
-def whole_target(printed: Printed) -> Target:
-    """All 16 entries."""
-    return Target(printed, np.ones(8), np.ones(8))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,10 +88,13 @@ def evaluate(
     shift = float((target.mean * (ln_stress - ln_mean)).sum() / target.mean.sum())
     mean_errors = ln_mean + shift - ln_stress
     ln_cycles = np.log(printed.cycles[finite])
-    predicted = predicted_ln_cycles(
-        rule, ln_stress, rule.average(per_joint, exponent), exponent, printed.sn_curve.a,
-        ln_cycles, target.life,
-    )  # fmt: skip
+    # N ~ S^-m over what the rivets' spread adds to the damage at the mean.
+    predicted = -exponent * ln_stress - rule.average(per_joint, exponent)
+    if rule.counts is None:  # the curve's level is free
+        level = float((target.life * (ln_cycles - predicted)).sum() / target.life.sum())
+        predicted = predicted + level
+    else:
+        predicted = predicted + exponent * math.log(printed.sn_curve.a) - math.log(rule.counts)
     life_errors = predicted - ln_cycles
     cost = float((target.mean * mean_errors**2).sum() + (target.life * life_errors**2).sum())
     return Fit(rule, place, np.array(v), mean_errors, life_errors, cost,

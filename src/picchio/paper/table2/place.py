@@ -42,14 +42,6 @@ class Place:
         """The arm; its damping and shafts are not used here."""
         return arm(self.base)
 
-    def assumptions(self, v: FloatArray) -> Assumptions:
-        """The world that a vector stands for.
-
-        Args:
-            v: (unknowns,) of the fit.
-        """
-        return self.base.but(**decode(v))
-
     def deflections(self, v: FloatArray, printed: Printed) -> FloatArray | None:
         """The deflections (3 directions, k rivets, 3 joints) rad; None where one is out of reach.
 
@@ -57,7 +49,7 @@ class Place:
             v: (unknowns,) of the fit.
             printed: what the paper prints.
         """
-        given = self.assumptions(v)
+        given = self.base.but(**decode(v))
         poses = poses_at(rivet_points(given), given.elbow)
         if np.isnan(poses).any():
             return None

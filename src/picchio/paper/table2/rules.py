@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -70,30 +69,3 @@ def rules(hits: float) -> list[Rule]:
         Rule("another curve, at the mean, inertias about the joints", at_mean, None,
              free_exponent=True, inertia_about="joint"),
     ]  # fmt: skip
-
-
-def predicted_ln_cycles(
-    rule: Rule,
-    ln_stress: FloatArray,
-    spread: FloatArray,
-    exponent: float,
-    strength: float,
-    ln_cycles: FloatArray,
-    weight: FloatArray,
-) -> FloatArray:
-    """Ln N of every entry.
-
-    Args:
-        rule: the hypothesis.
-        ln_stress: of the printed mean stresses, MPa.
-        spread: ln of the damage over that at the mean, of `rule.average`.
-        exponent: m of N ~ S^-m.
-        strength: MPa at one cycle; where the level is free it is solved for instead.
-        ln_cycles: printed, for the free level.
-        weight: 1 for the entries that the level may be solved from, 0 for the others.
-    """
-    predicted = -exponent * ln_stress - spread
-    if rule.counts is not None:
-        return np.asarray(predicted + exponent * math.log(strength) - math.log(rule.counts))
-    level = float((weight * (ln_cycles - predicted)).sum() / weight.sum())
-    return np.asarray(predicted + level)

@@ -15,7 +15,7 @@ from picchio.core.errors import PicchioWarning
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.miner import life
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.fatigue.sn.library import PAPER_SN_CURVE, load_sn_curve
+from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, PAPER_SN_CURVE, load_sn_curve
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import Assessment
@@ -106,6 +106,19 @@ def compare_methods(
         Term(name, what, value, joint, against, _ratio(value, lives.get(against or "")))
         for name, what, (value, joint), against in table
     )
+
+
+def method_terms(robot: FlexibleRobot, task: Task, found: Assessment) -> tuple[Term, ...]:
+    """The terms by the default S-N curve; none where no shaft has a curve or nothing is damped.
+
+    Args:
+        robot: with shafts.
+        task: what it does.
+        found: the assessment of that.
+    """
+    known = any(joint.sn_curve for joint in found.joints)
+    damped = all(math.isfinite(check.rest_peak + check.steady_peak) for check in found.steady_state)
+    return compare_methods(robot, task, load_sn_curve(DEFAULT_SN_CURVE)) if known and damped else ()
 
 
 def _ratio(value: float, other: float | None) -> float:

@@ -102,10 +102,12 @@ def plane(
         bounds: (low, high, low, high) in m along the plane's two axes.
 
     Raises:
-        InputError: an unknown plane, bounds or spacing that make no grid.
+        InputError: an unknown plane; position, bounds or spacing that make no grid.
     """
     if name not in PLANES:
         raise InputError("unknown plane", key="plane", value=name, choices=PLANES)
+    if not math.isfinite(at):
+        raise InputError("must be a finite number", key="at", value=at)
     first, second = (_AXES.index(letter) for letter in name)
     low, high = reach_box(robot)
     if bounds is None:

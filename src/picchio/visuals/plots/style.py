@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
 
+from picchio.core.errors import InputError
 from picchio.core.files import atomic_write
 
 INK = "#20262e"
@@ -35,6 +36,7 @@ DASHES: tuple[Any, ...] = (
 CMAP = "viridis"
 """Sequential, even in lightness, safe for the colour-blind."""
 WIDTH, HEIGHT = 6.4, 3.4
+PICTURES = (".png", ".svg", ".pdf")
 
 STYLE: Any = {
     "font.family": ["DejaVu Sans"],
@@ -125,8 +127,10 @@ def save_figure(ax: Axes, path: Path) -> None:
     """Write the figure of some Axes, as the file's ending says (.png, .svg, .pdf).
 
     Raises:
-        InputError: it cannot be written there.
+        InputError: another ending, or it cannot be written there.
     """
+    if path.suffix.lower() not in PICTURES:
+        raise InputError("unknown kind", key="plot", value=path.name, choices=PICTURES)
     figure = ax.get_figure(root=True)
     assert figure is not None
     with atomic_write(path, "wb") as stream:

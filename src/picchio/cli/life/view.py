@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from picchio.cli.inputs import numbers
+from picchio.cli.app import app
 from picchio.cli.options import (
     FlexOption,
     ForceOption,
@@ -18,35 +18,28 @@ from picchio.cli.options import (
     TaskOption,
     ToolOption,
     WidthOption,
+    numbers,
 )
+from picchio.cli.output import check_targets, deliver, progress
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
     from picchio.visuals.scene.scene import Scene
 
-EPILOG = "Example: picchio view fanuc_like_3dof --out scene.html"
 
-
-def register(app: typer.Typer) -> None:
-    """Add the subcommand."""
-    app.command(epilog=EPILOG)(view)
-
-
+@app.command(epilog="Example: picchio view fanuc_like_3dof --out scene.html")
 def view(
     robot: RobotArgument,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="FILE", help="Where the HTML goes.", show_default=False),
-    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Where the HTML goes.")] = None,
     live: Annotated[
-        bool,
-        typer.Option("--live", help="Show it in a live meshcat viewer, until it is interrupted."),
+        bool, typer.Option("--live", help="Show it in a live meshcat viewer until Ctrl-C.")
     ] = False,
     task: TaskOption = None,
     pose: Annotated[
         str | None,
         typer.Option(
-            "--pose", metavar="Q1,Q2,...", help="rad or m; the task's worst pose if not given."
+            metavar="Q1,Q2,...",
+            help="Joint positions, rad or m; the task's worst rivet if not given.",
         ),
     ] = None,
     hits: Annotated[
@@ -58,37 +51,33 @@ def view(
     width: WidthOption = None,
     map_: Annotated[
         Path | None,
-        typer.Option("--map", metavar="FILE", help="A workspace map (picchio map) as a layer."),
+        typer.Option("--map", metavar="FILE", help="Show a workspace map, of `picchio map`."),
     ] = None,
     diagnosis: Annotated[
         Path | None,
         typer.Option(
-            "--diagnosis",
-            metavar="FILE",
-            help="What picchio diagnose --json found: the causes, where they sit.",
+            metavar="FILE", help="Show the causes found, from the JSON of `picchio diagnose`."
         ),
     ] = None,
     joint: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Whose envelope is shown first."),
+        str | None, typer.Option(metavar="NAME", help="The joint whose envelope is shown first.")
     ] = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
     gravity_stiffness: GravityStiffnessOption = False,
     json: JsonOption = None,
 ) -> None:
-    """See it: robot, direction envelopes, rivets and vibration in one HTML file.
+    """The robot in 3-D as HTML: envelopes, rivets and vibration.
 
     The file needs no network. Without --pose the task is assessed and shown at its worst rivet.
     """
     import picchio
-    from picchio.cli.output import check_target, progress, write_json
     from picchio.studies.blows import blows_of
 
     if out is None and not live:
         raise InputError("needs a file", key="--out", hint="--out scene.html, or --live")
-    check_target(out, [flex, task, map_, diagnosis])
     loaded = picchio.load_robot(robot, flex=flex, tool=tool)
+    check_targets((out, json), [*loaded.files, task, map_, diagnosis])
     blows = None
     if pose is not None:
         blows = blows_of(loaded, task, force=force, period=period, width=width)
@@ -112,8 +101,7 @@ def view(
     if out is not None:
         size = scene.save(out).stat().st_size
         typer.echo(f"{out}: {scene.title}, {size / 1e6:.1f} MB; open it in a browser", err=True)
-    if json is not None:
-        write_json(scene.to_dict(), json)
+    deliver(scene.to_dict(), json)
     if live:
         _show_live(scene)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from picchio.cli.app import app
 from picchio.cli.options import (
     FlexOption,
     JsonOption,
@@ -15,20 +16,17 @@ from picchio.cli.options import (
     SNCurveOption,
     TaskOption,
     ToolOption,
+    numbers,
+    task_file,
 )
-from picchio.core.errors import InputError
+from picchio.cli.output import check_targets, console, deliver, progress, table
+from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
     from picchio.studies.placement.result import Placement
 
-EPILOG = "Example: picchio place fanuc_like_3dof --move 0.3,0.3,0.3,30 --out moved.toml"
 
-
-def register(app: typer.Typer) -> None:
-    """Add the subcommand."""
-    app.command(epilog=EPILOG)(place)
-
-
+@app.command(epilog="Example: picchio place fanuc_like_3dof --move 0.3,0.3,0.3,30 --out moved.toml")
 def place(
     robot: RobotArgument,
     task: TaskOption = None,
@@ -36,22 +34,32 @@ def place(
         str | None,
         typer.Option(
             metavar="X,Y,Z,HEADING",
-            help="m, m, m, deg: how far the work may go each way, 0 for not at all. "
-            "By default half the arm's reach, and 180.",
+            help="How far the work may go each way, m, m, m and deg; 0 for not at all. Half the "
+            "arm's reach and 180 if not given.",
         ),
     ] = None,
     period_range: Annotated[
         str | None,
-        typer.Option(metavar="LOW,HIGH", help="s, the periods the gun can be set to."),
+        typer.Option(
+            metavar="LOW,HIGH",
+            help="Periods that the tool can be set to, s; the task's own if not given.",
+        ),
     ] = None,
     margin: Annotated[
-        float, typer.Option(help="m, that the work may stand beside and still be reached.")
+        float,
+        typer.Option(
+            metavar="M", help="Every rivet stays in reach when the work stands so far aside, m."
+        ),
     ] = 0.0,
     off: Annotated[
-        float, typer.Option(help="m: what it costs to stand so far beside the best place.")
+        float,
+        typer.Option(metavar="M", help="Tell what it costs to miss the best place by so much, m."),
     ] = 0.05,
     placements: Annotated[
-        int, typer.Option(help="How many within reach to try all over before going local.")
+        int,
+        typer.Option(
+            metavar="N", help="Placements within reach to try all over, before searching locally."
+        ),
     ] = 400,
     flex: FlexOption = None,
     tool: ToolOption = None,
@@ -59,78 +67,52 @@ def place(
     self_collision: Annotated[
         bool,
         typer.Option(
-            "--self-collision/--no-self-collision", help="Refuse poses whose links touch."
+            "--self-collision/--no-self-collision",
+            help="Whether poses whose links touch are refused.",
         ),
     ] = True,
-    seed: Annotated[int, typer.Option(help="Of the search.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Random seed of the search.")] = 0,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="FILE", help="Write the task with the work moved (TOML)."),
+        Path | None, typer.Option(metavar="FILE", help="Write the task with the work moved (TOML).")
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Where to put the work, with which poses and hit rate, so that the robot lasts longest."""
-    from picchio.cli.inputs import numbers, task_file
-    from picchio.cli.output import check_numbers, check_target, progress, write_json
-    from picchio.robot.loading.load import load_robot
-    from picchio.studies.placement.file import write_task
-    from picchio.studies.placement.run import place as run
-    from picchio.studies.placement.work import Work
-    from picchio.studies.tasks import load_task
+    """Where to put the work so that the robot lasts longest.
 
-    for target in (json, out):
-        check_target(target, [robot, task, flex, sn_curve])
-    check_numbers(margin=margin, off=off)
-    if seed < 0:
-        raise InputError("must not be negative", key="--seed", value=seed)
+    The poses are chosen with the place, and the hit rate where a range of periods is given.
+    """
+    import picchio
+    from picchio.studies.placement.file import write_task
+    from picchio.studies.placement.work import Work
+
     far = None if move is None else numbers(move, "--move", 4)
     if far is not None:
         far[3] = math.radians(far[3])
-    rates = None
-    if period_range is not None:
-        low, high = numbers(period_range, "--period-range", 2)
-        rates = (low, high)
-    loaded = load_robot(robot, flex=flex, tool=tool)
+    rates = None if period_range is None else numbers(period_range, "--period-range", 2)
+    loaded = picchio.load_robot(robot, flex=flex, tool=tool)
     path = task_file(loaded, task)
-    work = load_task(path, loaded)
-    for target in (json, out):
-        check_target(target, [*loaded.files, *work.files])
-    try:
-        with progress("steps of the search") as tick:
-            found = run(
-                loaded, work, move=far, period_range=rates,
-                placements=placements, off=off, margin=margin, sn_curve=sn_curve,
-                self_collision=self_collision, seed=seed, progress=tick,
-            )  # fmt: skip
-    except InputError as error:
-        if error.file is None and error.key in (
-            "move",
-            "off",
-            "margin",
-            "placements",
-            "period-range",
-        ):
-            raise InputError(
-                error.problem, key=f"--{error.key}", value=error.value, hint=error.hint
-            ) from None
-        raise
+    work = picchio.load_task(path, loaded)
+    check_targets((json, out), [*loaded.files, *work.files, sn_curve])
+    with progress("steps of the search") as tick:
+        found = picchio.place(
+            loaded,
+            work,
+            move=far,
+            period_range=None if rates is None else (rates[0], rates[1]),
+            placements=placements,
+            off=off,
+            margin=margin,
+            sn_curve=sn_curve,
+            self_collision=self_collision,
+            seed=seed,
+            progress=tick,
+        )
     if out is not None:
         write_task(found, Work.of(loaded, work), work, path, out)
-    if json is not None:
-        write_json(found.to_dict(), json)
-    if json != "-":
-        _show(found, off)
-        if out is not None:
-            print(f"The task with the work moved: {out}")
+    deliver(found.to_dict(), json, lambda: _show(found, off, out))
 
 
-def _show(found: Placement, off: float) -> None:
-    from rich import box
-    from rich.table import Table
-
-    from picchio.cli.output import console
-    from picchio.studies.assessment.result import format_count
-
+def _show(found: Placement, off: float, moved: Path | None) -> None:
     out = console()
     # Zeros are added for the sake of their sign.
     x, y, z = found.best.spot.move[:3].round(3) + 0.0
@@ -151,22 +133,26 @@ def _show(found: Placement, off: float) -> None:
             out.print(f"  a blow every {1e3 * found.best.spot.period:.4g} ms")
     else:
         out.print("  nothing better than where the work is now was found")
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("joint")
-    for name in ("rivets,\nnow", "utilisation,\nnow, %", "rivets,\nbest", "utilisation,\nbest, %"):
-        table.add_column(name, justify="right")
-    for now, then in zip(found.start.joints, found.best.joints, strict=True):
-        table.add_row(
+    rows = [
+        (
             now.name,
-            format_count(now.rivets_to_failure), f"{100 * now.utilisation:.4g}",
-            format_count(then.rivets_to_failure), f"{100 * then.utilisation:.4g}",
-        )  # fmt: skip
-    out.print(table)
+            format_count(now.rivets_to_failure),
+            f"{100 * now.utilisation:.4g}",
+            format_count(then.rivets_to_failure),
+            f"{100 * then.utilisation:.4g}",
+        )
+        for now, then in zip(found.start.joints, found.best.joints, strict=True)
+    ]
+    heads = ("joint", ">rivets,\nnow", ">utilisation,\nnow, %", ">rivets,\nbest",
+             ">utilisation,\nbest, %")  # fmt: skip
+    out.print(table(heads, rows))
     out.print(_gain(found))
     out.print(_cost_of_off(found, off))
     if found.by_effort:
         out.print("Utilisation: torque over the URDF's effort limit; no shaft or reducer is known.")
     out.print(f"Self-collisions: {found.self_collision}.")
+    if moved is not None:
+        print(f"The task with the work moved: {moved}")
 
 
 def _gain(found: Placement) -> str:

@@ -1,0 +1,1 @@
+"""Commands about the life of a robot, and what it depends on."""

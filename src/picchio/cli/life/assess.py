@@ -1,0 +1,377 @@
+"""`picchio assess`: the main job, the life of every joint on a task."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from picchio.cli.app import app
+from picchio.cli.options import (
+    FlexOption,
+    GravityStiffnessOption,
+    JsonOption,
+    ReportOption,
+    RobotArgument,
+    SNCurveOption,
+    TaskOption,
+    ToolOption,
+    task_file,
+)
+from picchio.cli.output import (
+    check_targets,
+    console,
+    count_of,
+    deliver,
+    progress,
+    table,
+    write_report,
+)
+from picchio.core.errors import InputError
+from picchio.studies.assessment.result import format_count, verdict
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from picchio.studies.assessment.method_comparison import Term
+    from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
+    from picchio.studies.backwards import AllowableLoads
+    from picchio.studies.tasks import Task
+    from picchio.studies.uncertainty import UncertainLife
+
+
+@app.command(epilog="Example: picchio assess fanuc_like_3dof --method paper --json life.json")
+def assess(
+    robot: RobotArgument,
+    task: TaskOption = None,
+    flex: FlexOption = None,
+    tool: ToolOption = None,
+    method: Annotated[
+        str,
+        typer.Option(
+            metavar="METHOD",
+            help="rainflow: each rivet from rest, its cycles counted; paper: steady state, one "
+            "cycle a hit (Nie et al. 2016).",
+        ),
+    ] = "rainflow",
+    sn_curve: SNCurveOption = None,
+    residue: Annotated[
+        str,
+        typer.Option(
+            metavar="RULE",
+            help="What rainflow does with cycles that do not close: half-cycles, repeated or "
+            "discarded.",
+        ),
+    ] = "half-cycles",
+    mean_stress: Annotated[
+        str,
+        typer.Option(
+            metavar="RULE",
+            help="Mean stress correction: none, goodman, gerber, soderberg, morrow, walker, swt or "
+            "fkm.",
+        ),
+    ] = "none",
+    paper_mean_stress: Annotated[
+        bool,
+        typer.Option(
+            "--paper-mean-stress",
+            help="With --method paper: the life at the mean of the poses' stresses (its Table 2).",
+        ),
+    ] = False,
+    for_life: Annotated[
+        float | None,
+        typer.Option(
+            metavar="N", help="Allowable force, hits and shaft radius for a life of N rivets."
+        ),
+    ] = None,
+    survival: Annotated[
+        float | None,
+        typer.Option(metavar="P", help="Probability of survival for --for-life, such as 0.99."),
+    ] = None,
+    uncertainty: Annotated[
+        bool,
+        typer.Option(
+            "--uncertainty", help="The life's P10, P50 and P90, and what they depend on; a minute."
+        ),
+    ] = False,
+    seed: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=0, help="Random seed for --uncertainty; 0 if not given."),
+    ] = None,
+    compare_methods: Annotated[
+        bool,
+        typer.Option(
+            "--compare-methods", help="From the paper's method to this one, step by step."
+        ),
+    ] = False,
+    gravity_stiffness: GravityStiffnessOption = False,
+    gravity_balanced: Annotated[
+        bool,
+        typer.Option("--gravity-balanced", help="The arm is balanced: no gravity in its joints."),
+    ] = False,
+    report: ReportOption = None,
+    json: JsonOption = None,
+) -> None:
+    """How many rivets each joint of a robot survives on a task."""
+    import picchio
+    from picchio.studies.assessment.method_comparison import method_terms
+
+    _check_options(
+        method, residue, mean_stress, for_life, survival, uncertainty=uncertainty, seed=seed
+    )
+    loaded = picchio.load_robot(robot, flex=flex, tool=tool)
+    path = task_file(loaded, task)
+    work = picchio.load_task(path, loaded)
+    check_targets((json, report), [*loaded.files, *work.files, sn_curve])
+    options: dict[str, Any] = {
+        "sn_curve": sn_curve,
+        "residue": residue,
+        "mean_stress": mean_stress,
+        "gravity_stiffness": gravity_stiffness,
+        "gravity_balanced": gravity_balanced,
+    }
+    with progress("poses") as tick:
+        found = picchio.assess(
+            loaded,
+            work,
+            method=method,  # type: ignore[arg-type]
+            paper_mean_stress=paper_mean_stress,
+            progress=tick,
+            **options,
+        )
+    content = found.to_dict()
+    terms = method_terms(loaded, work, found) if compare_methods or report is not None else ()
+    if terms:
+        content["method_terms"] = [term.to_dict() for term in terms]
+    allowed = spread = None
+    if for_life is not None:
+        allowed = picchio.allowable(loaded, work, for_life, survival=survival, **options)
+        content |= allowed.to_dict()
+    if uncertainty:
+        with progress("samples") as tick:
+            spread = picchio.uncertain_life(loaded, work, seed=seed or 0, progress=tick, **options)
+        content["uncertainty"] = spread.to_dict()
+    write_report(
+        found,
+        report,
+        robot=loaded,
+        task=work,
+        gravity_stiffness=gravity_stiffness,
+        sn_curve=sn_curve,
+        allowed=allowed or (),
+        spread=spread,
+        terms=terms,
+    )
+
+    def show_all() -> None:
+        show(found, path, terms)
+        if allowed is not None:
+            _show_allowable(allowed, work)
+        if spread is not None:
+            _show_spread(spread)
+
+    deliver(content, json, show_all)
+
+
+def _check_options(
+    method: str,
+    residue: str,
+    mean_stress: str,
+    for_life: float | None,
+    survival: float | None,
+    *,
+    uncertainty: bool,
+    seed: int | None,
+) -> None:
+    """Refuse options that would be ignored, and numbers out of range."""
+    rainflow_only = {
+        "--for-life": for_life,
+        "--residue": None if residue == "half-cycles" else residue,
+        "--mean-stress": None if mean_stress == "none" else mean_stress,
+        "--uncertainty": uncertainty or None,
+    }
+    for key, given in rainflow_only.items():
+        if method == "paper" and given is not None:
+            raise InputError("belongs to the method rainflow", key=key, value=given)
+    if survival is not None and for_life is None:
+        raise InputError("belongs to --for-life", key="--survival", value=survival)
+    if survival is not None and not 0.0 < survival < 1.0:
+        raise InputError("must lie between 0 and 1", key="--survival", value=survival)
+    if for_life is not None and not (math.isfinite(for_life) and for_life > 0):
+        raise InputError("must be a positive number of rivets", key="--for-life", value=for_life)
+    if seed is not None and not uncertainty:
+        raise InputError("belongs to --uncertainty", key="--seed", value=seed)
+
+
+# Below this a torque in N m or an angle in mrad is rounding, and is printed as 0.
+_ROUNDING = 1e-9
+
+
+def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
+    """Print an assessment."""
+    out = console()
+    passes = sum(len(op.poses) * op.rivets for op in found.operations)
+    out.print(f"[bold]{found.robot}[/bold] on {task.name}: {count_of(passes, 'rivet')} a pass")
+    for blows in dict.fromkeys(_blows(operation) for operation in found.operations):
+        out.print(f"  {blows}")
+        for operation in found.operations:
+            if _blows(operation) == blows:
+                x, y, z = operation.direction
+                out.print(
+                    f"    {operation.name}: {count_of(len(operation.poses), 'pose')}, force along "
+                    f"({x:.3g}, {y:.3g}, {z:.3g})"
+                )
+    out.print()
+    out.print(_life_table(found))
+    reducers = [
+        (j.name, j.reducer, _number(100 * j.reducer_utilisation), j.reducer_governed_by or "-")
+        for j in found.joints
+        if j.reducer
+    ]
+    if reducers:
+        heads = ("joint", "reducer", ">used, %", "the limit that binds")
+        out.print(table(heads, reducers, title="The reducers"))
+        for line in found.reducer_warnings:
+            out.print(f"  {line}", markup=False)
+        out.print()
+    out.print(f"[bold]{verdict(found)}[/bold]\n")
+    if len(found.operations) > 1 and any(joint.damage_share for joint in found.joints):
+        out.print(_share_table(found))
+    if found.steady_state:
+        out.print(_steady_table(found))
+    if terms:
+        out.print(_terms_table(terms))
+    out.print("[dim]How this was computed[/dim]")
+    for line in found.assumptions:
+        out.print(f"[dim]  - {line}[/dim]")
+
+
+def _life_table(found: Assessment) -> Table:
+    shafts = [joint for joint in found.joints if joint.sn_curve]
+    columns: dict[str, Callable[[JointLife], str]] = {
+        "joint": lambda j: j.name,
+        ">peak\ndeflection\nmrad": lambda j: _number(j.peak_deflection * 1e3),
+    }
+    if len(shafts) < len(found.joints):
+        columns[">peak\ntorque\nN m"] = lambda j: _number(j.peak_torque)
+        columns[">gravity\ntorque\nN m"] = lambda j: _number(j.gravity_torque)
+    if shafts:
+        columns[">peak\nstress\nMPa"] = lambda j: _number(j.peak_shear_stress / 1e6)
+        columns[">gravity\nstress\nMPa"] = lambda j: _number(j.gravity_shear_stress / 1e6)
+        columns[">utili-\nsation\n%"] = lambda j: _number(100 * j.utilisation)
+    if any(joint.reducer for joint in found.joints):
+        columns[">reducer\nused\n%"] = lambda j: _number(100 * j.reducer_utilisation)
+    if shafts:
+        columns[">damage\na rivet\n"] = lambda j: f"{j.damage_per_rivet:.4g}" if j.sn_curve else "-"
+        columns[">rivets to\nfailure\n"] = lambda j: (
+            format_count(j.rivets_to_failure) if j.sn_curve else "unknown"
+        )
+    columns["worst at"] = lambda j: f"{j.worst_operation}, pose {j.worst_pose + 1}"
+    slides = [joint.name for joint in found.joints if joint.kind == "prismatic"]
+    made = table(
+        columns,
+        ([cell(joint) for cell in columns.values()] for joint in found.joints),
+        title="Life of the joints" if shafts else "The joints",
+        caption=f"{', '.join(slides)} slides: mm and N, not mrad and N m" if slides else None,
+    )
+    for row, joint in zip(made.rows, found.joints, strict=True):
+        row.style = "bold" if joint.name == found.limiting_joint else None
+    return made
+
+
+def _share_table(found: Assessment) -> Table:
+    names = [operation.name for operation in found.operations]
+    rows = []
+    for joint in found.joints:
+        shares = [joint.damage_share.get(name) for name in names]
+        rows.append([joint.name, *("-" if s is None else f"{100 * s:.3g}" for s in shares)])
+    heads = ["joint", *(f">{name}" for name in names)]
+    return table(heads, rows, title="Share of each joint's damage, %")
+
+
+def _steady_table(found: Assessment) -> Table:
+    title = "The paper's steady state against a rivet as it happens\n(largest over the task"
+    heads = ["joint", ">steady\npeak\nmrad", ">rivet's\npeak\nmrad", ">\nratio\n"]
+    rows = [
+        [c.joint, _number(c.steady_peak * 1e3), _number(c.rest_peak * 1e3), _number(c.peak_ratio)]
+        for c in found.steady_state
+    ]
+    if any(not math.isnan(check.paper_life) for check in found.steady_state):
+        title += "; the paper's S-N curve on both"
+        heads += [
+            ">rivets,\nsteady, one\ncycle a hit",
+            ">rivets,\nfrom rest,\ncounted",
+            ">\nratio\n",
+        ]
+        for row, check in zip(rows, found.steady_state, strict=True):
+            lives = (check.paper_life, check.counted_life)
+            row += [*map(format_count, lives), _number(check.life_ratio)]
+    return table(heads, rows, title=f"{title})")
+
+
+def _terms_table(terms: tuple[Term, ...]) -> Table:
+    rows = []
+    for term in terms:
+        known = math.isfinite(term.factor)
+        compared = (f"{term.factor:.3g}", term.against or "") if known else ("", "")
+        rows.append([term.name, format_count(term.rivets_to_failure), *compared, term.what])
+    return table(
+        ("term", ">rivets to\nfailure", ">times the\nlife of", "", "what changes"),
+        rows,
+        title="How far the paper's method is from the default one, an assumption at a time",
+    )
+
+
+def _show_allowable(found: AllowableLoads, task: Task) -> None:
+    """Print what a target life allows."""
+    out = console()
+    rows = []
+    for joint in found:
+        force = "no end" if math.isinf(joint.force_factor) else f"{joint.force_factor:.4g}"
+        hits = "no end" if joint.hits is None else str(joint.hits)
+        rows.append(
+            [joint.joint, format_count(joint.life), force, hits, f"{1e3 * joint.radius:.4g}"]
+        )
+    sure = "" if found[0].survival is None else f", survival {found[0].survival:g}"
+    out.print(table(
+        ("joint", ">rivets\nas it is", ">force\ntimes", ">hits\na rivet",
+         ">shaft radius\nat least, mm"),
+        rows, title=f"What a life of {format_count(found[0].rivets)} rivets{sure} allows",
+    ))  # fmt: skip
+    factor = min(joint.force_factor for joint in found)
+    if math.isfinite(factor):
+        forces = ", ".join(
+            f"{op.name} {factor * op.excitation.peak_force:.4g} N" for op in task.operations
+        )
+        out.print(f"Allowable force of the blows, all scaled alike: {forces}.\n")
+
+
+def _show_spread(found: UncertainLife) -> None:
+    """Print how sure the lives are."""
+    out = console()
+    rows = []
+    for name, spread in {**found.joints, "robot": found.robot}.items():
+        lives = [format_count(value) for value in (spread.p10, spread.p50, spread.p90)]
+        shares = [f"{100 * max(spread.totals[key], 0.0):.0f}" for key in found.inputs]
+        rows.append([name, *lives, *shares])
+    inputs = (f">{name}".replace("_", "\n") for name in found.inputs)
+    out.print(table(
+        ["", ">P10", ">P50", ">P90", *inputs], rows,
+        title="How sure the life is: rivets that 90, 50 and 10 % exceed, and where the doubt is "
+        "from, %",
+    ))  # fmt: skip
+    for line in found.assumptions:
+        out.print(f"[dim]  - {line}[/dim]")
+
+
+def _number(value: float) -> str:
+    if math.isnan(value):
+        return "-"
+    return "0" if abs(value) < _ROUNDING else f"{value:.4g}"
+
+
+def _blows(operation: OperationResult) -> str:
+    return f"{count_of(operation.hits_per_rivet, 'hit')} a rivet: {operation.excitation}"

@@ -1,0 +1,85 @@
+"""`picchio envelope`: what a force can do to each joint at a pose, by its direction."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from picchio.cli.app import app
+from picchio.cli.options import (
+    FlexOption,
+    ForceOption,
+    GravityStiffnessOption,
+    HitsOption,
+    JsonOption,
+    PeriodOption,
+    RobotArgument,
+    ToolOption,
+    WidthOption,
+    numbers,
+)
+from picchio.cli.output import check_targets, console, deliver, table
+
+if TYPE_CHECKING:
+    from picchio.studies.envelopes import DirectionEnvelope
+
+
+@app.command(epilog="Example: picchio envelope fanuc_like_3dof --pose=0.3,1.1,-1.0")
+def envelope(
+    robot: RobotArgument,
+    pose: Annotated[str, typer.Option(metavar="Q1,Q2,...", help="Joint positions, rad or m.")],
+    force: ForceOption = None,
+    period: PeriodOption = None,
+    width: WidthOption = None,
+    hits: HitsOption = None,
+    flex: FlexOption = None,
+    tool: ToolOption = None,
+    gravity_stiffness: GravityStiffnessOption = False,
+    json: JsonOption = None,
+) -> None:
+    """The worst force direction of every joint at a pose.
+
+    It is exact: no direction is sampled.
+    """
+    import picchio
+    from picchio.robot.dynamics.pose import warn_beyond_limits
+    from picchio.studies.blows import blows_of
+
+    loaded = picchio.load_robot(robot, flex=flex, tool=tool)
+    check_targets([json], loaded.files)
+    blows = blows_of(loaded, force=force, period=period, width=width)
+    at = loaded.pose(numbers(pose, "--pose"))
+    warn_beyond_limits(loaded, [at], "the pose")
+    found = picchio.envelope(loaded, at, blows, hits=hits, gravity_stiffness=gravity_stiffness)
+    deliver(found.to_dict(), json, lambda: _show(found))
+
+
+def _show(found: DirectionEnvelope) -> None:
+    out = console()
+    pose = ", ".join(f"{q:g}" for q in found.pose)
+    how = "steady state" if found.hits is None else f"{found.hits} hits from rest"
+    out.print(f"[bold]{found.robot}[/bold] at ({pose}), {how}")
+    out.print(f"  {found.excitation.describe()}")
+    frequencies = ", ".join(f"{f:.4f}" for f in found.natural_frequencies)
+    out.print(f"  natural frequencies {frequencies} Hz\n")
+    torques, stresses = found.peak("torque"), found.peak("stress") / 1e6
+    rows = [
+        (
+            name,
+            f"{1e3 * found.peak_deflection[j]:.5g}",
+            f"{torques[j]:.4g}",
+            "-" if np.isnan(stresses[j]) else f"{stresses[j]:.4g}",
+            ", ".join(f"{c + 0.0:.3f}" for c in found.worst_direction[j].round(9)),
+        )
+        for j, name in enumerate(found.joint_names)
+    ]
+    heads = ("joint", ">peak\ndeflection\nmrad", ">peak\ntorque\nN m", ">peak\nstress\nMPa",
+             ">worst direction\n(either sign)\nx, y, z")  # fmt: skip
+    out.print(table(heads, rows))
+    x, y, z = found.worst_tool_direction
+    out.print(
+        f"The tool moves most, {found.peak_tool_displacement * 1e3:.4g} mm, under a force along "
+        f"({x:.3f}, {y:.3f}, {z:.3f})."
+    )

@@ -1,0 +1,97 @@
+"""`picchio fit-sn`: an S-N curve from test data, run-outs included."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from picchio.cli.app import app
+from picchio.cli.options import JsonOption
+from picchio.cli.output import check_targets, console, deliver, table
+
+if TYPE_CHECKING:
+    from picchio.fatigue.sn.fit import Estimate, SNFit
+
+
+@app.command(
+    epilog="Example: picchio fit-sn tests.csv --survival 0.99 --out my-steel.toml --plot fit.png"
+)
+def fit_sn(
+    tests: Annotated[
+        Path,
+        typer.Argument(
+            metavar="TESTS.csv",
+            help="A row a specimen: `Stress [MPa]`, `Cycles`, `Comment` (Failure or RunOut).",
+        ),
+    ],
+    survival: Annotated[
+        float, typer.Option(metavar="P", help="Probability of survival of the design curve.")
+    ] = 0.975,
+    level: Annotated[
+        float, typer.Option(metavar="P", help="Level of the two-sided confidence intervals.")
+    ] = 0.90,
+    kind: Annotated[
+        str,
+        typer.Option(
+            metavar="KIND", help="The stress of the tests: shear, or normal (bending, axial)."
+        ),
+    ] = "shear",
+    run_out_cycles: Annotated[
+        float | None,
+        typer.Option(
+            metavar="N", help="Without a `Comment` column: specimens that reached N are run-outs."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the design curve (TOML) for --sn-curve."),
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw tests and curve: .png, .svg or .pdf.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Fit an S-N curve to test data, run-outs included.
+
+    Slope, knee, endurance limit and scatter, each with its confidence interval.
+    """
+    import picchio
+
+    check_targets((out, plot, json), [tests])
+    found = picchio.fit_sn(
+        tests, kind=kind, survival=survival, level=level, run_out_cycles=run_out_cycles
+    )
+    if plot is not None:
+        from picchio.visuals.plots.sn import plot_sn_fit
+        from picchio.visuals.plots.style import blank_figure, save_figure
+
+        save_figure(plot_sn_fit(found, blank_figure(height=3.8)), plot)
+    if out is not None:
+        found.save(out)
+    deliver(found.to_dict(), json, lambda: _show(found, tests))
+
+
+def _show(found: SNFit, tests: Path) -> None:
+    screen = console()
+    screen.print(f"[bold]{tests.name}[/bold]: {found.failures} failures, {found.run_outs} run-outs")
+    limit = (
+        "endurance limit in shear, median, MPa"
+        if found.knee
+        else f"strength in shear at {found.reference_cycles:.3g} cycles, median, MPa"
+    )
+    estimates: list[tuple[str, Estimate, float, str]] = [
+        ("slope", found.slope, 1.0, ".3g"),
+        *([("knee, cycles", found.knee, 1.0, ".3g")] if found.knee else []),
+        (limit, found.endurance_limit, 1e-6, ".4g"),
+        (f"the same, survival {found.design_survival:g}, MPa", found.design, 1e-6, ".4g"),
+        ("scatter of log10 strength", found.scatter, 1.0, ".3g"),
+    ]
+    rows = []
+    for name, value, factor, spec in estimates:
+        low, high = (format(end * factor, spec) for end in (value.low, value.high))
+        rows.append((name, format(value.value * factor, spec), f"{low} to {high}"))
+    screen.print(table(("", ">value", f">{100 * found.level:g} % interval"), rows))
+    for line in found.assumptions:
+        screen.print(f"[dim]  - {line}[/dim]")

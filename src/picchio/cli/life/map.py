@@ -1,0 +1,223 @@
+"""`picchio map`: peaks, worst directions and frequencies all over the workspace."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from picchio.cli.app import app
+from picchio.cli.options import (
+    FlexOption,
+    ForceOption,
+    HitsOption,
+    JsonOption,
+    PeriodOption,
+    RobotArgument,
+    ToolOption,
+    WidthOption,
+    numbers,
+)
+from picchio.cli.output import check_targets, console, deliver, progress, table
+from picchio.core.errors import InputError
+
+if TYPE_CHECKING:
+    from picchio.robot.flexible_robot import FlexibleRobot
+    from picchio.studies.maps.places import Places
+
+
+@app.command(
+    "map", epilog="Example: picchio map fanuc_like_3dof --plane xz --spacing 0.1 --out map.nc"
+)
+def map_(
+    robot: RobotArgument,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="map.nc (netCDF) or map.zarr (Zarr).")],
+    plane: Annotated[
+        str | None,
+        typer.Option(metavar="PLANE", help="Points on a plane: xy, xz or yz; the default is xz."),
+    ] = None,
+    at: Annotated[
+        float, typer.Option(metavar="M", help="Where the plane cuts the third axis, m.")
+    ] = 0.0,
+    box: Annotated[bool, typer.Option("--box", help="Points in a box.")] = False,
+    points: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="CSV",
+            help="Points from columns x [m], y [m], z [m], with normals from nx, ny, nz if there.",
+        ),
+    ] = None,
+    surface: Annotated[
+        Path | None,
+        typer.Option(metavar="MESH", help="Points on a mesh (STL, OBJ, PLY, ...; m, world)."),
+    ] = None,
+    joint_grid: Annotated[
+        str | None, typer.Option(metavar="N[,N...]", help="Poses on a grid of N positions a joint.")
+    ] = None,
+    spacing: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="Distance of points on a plane, in a box or on a mesh, m."),
+    ] = None,
+    bounds: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LOW,HIGH,...", help="Ends along each axis of a plane or box, m; the reach."
+        ),
+    ] = None,
+    direction: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z",
+            help="Of the force; or `worst` (each joint's own), the default; or `normal` (to the "
+            "surface), the default with --surface.",
+        ),
+    ] = None,
+    branch: Annotated[
+        str,
+        typer.Option(
+            metavar="WORD",
+            help="Branches of the inverse kinematics: all, any (one), elbow-up, elbow-down, or "
+            "signs of joints such as joint_3+.",
+        ),
+    ] = "all",
+    hits: HitsOption = None,
+    damage: Annotated[
+        bool,
+        typer.Option(
+            "--damage", help="Count the damage of a rivet, too: --hits blows, or as many as a task."
+        ),
+    ] = False,
+    force: ForceOption = None,
+    period: PeriodOption = None,
+    width: WidthOption = None,
+    flex: FlexOption = None,
+    tool: ToolOption = None,
+    chunk: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Places computed and kept at a time.")
+    ] = 4096,
+    restart: Annotated[
+        bool,
+        typer.Option("--restart", help="Start afresh, though an interrupted map could be resumed."),
+    ] = False,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=0,
+            help="Worker processes; 0 or 1: none. By default one a core for large maps.",
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="A dask scheduler, instead of own processes."),
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Peaks, worst directions and frequencies over the workspace.
+
+    A map that was interrupted resumes when the same command is given again.
+    """
+    import picchio
+    from picchio.studies.blows import blows_of, hits_of_rivet
+
+    loaded = picchio.load_robot(robot, flex=flex, tool=tool)
+    check_targets((out, json), [*loaded.files, points, surface])
+    where = _places(loaded, plane, at, box, points, surface, joint_grid, spacing, bounds)
+    if direction is None:
+        direction = "worst" if surface is None else "normal"
+    along = direction if direction in ("worst", "normal") else numbers(direction, "--direction")
+    blows = blows_of(loaded, force=force, period=period, width=width)
+    with progress("places") as report:
+        found = picchio.workspace_map(
+            loaded,
+            where,
+            blows,
+            out,
+            direction=along,
+            branch=branch,
+            hits=hits,
+            damage=(hits or hits_of_rivet(loaded)) if damage else None,
+            chunk=chunk,
+            workers=workers,
+            scheduler=scheduler,
+            restart=restart,
+            progress=report,
+        )
+    with found:
+        summary = found.to_dict()
+    deliver(summary, json, lambda: _show(summary))
+
+
+def _places(
+    robot: FlexibleRobot,
+    plane: str | None,
+    at: float,
+    box: bool,
+    points: Path | None,
+    surface: Path | None,
+    grid: str | None,
+    spacing: float | None,
+    bounds: str | None,
+) -> Places:
+    from picchio.studies.maps import places
+
+    asked = {"--plane": plane, "--box": box or None, "--points": points, "--surface": surface,
+             "--joint-grid": grid}  # fmt: skip
+    chosen = [key for key, value in asked.items() if value is not None]
+    if len(chosen) > 1:
+        raise InputError("choose one", key=" ".join(chosen), choices=list(asked))
+    if points is not None:
+        return places.points_from_csv(points)
+    if grid is not None:
+        counts = numbers(grid, "--joint-grid")
+        if any(n != round(n) for n in counts):
+            raise InputError("must be whole numbers", key="--joint-grid", value=grid)
+        whole = [round(n) for n in counts]
+        return places.joint_grid(robot, whole[0] if len(whole) == 1 else whole)
+    limits = None if bounds is None else numbers(bounds, "--bounds")
+    if surface is None and not box:
+        return places.plane(robot, plane or "xz", at=at, spacing=spacing, bounds=limits)
+    if spacing is None:
+        raise InputError("a box or a surface needs it", key="--spacing")
+    if surface is not None:
+        return places.surface(surface, spacing=spacing)
+    return places.box(robot, spacing=spacing, bounds=limits)
+
+
+def _show(summary: dict[str, Any]) -> None:
+    out = console()
+    out.print(f"[bold]{summary['robot']}[/bold]: {summary['poses']} poses in {summary['file']}")
+    hits, counted = summary["hits"], summary["hits_of_damage"]
+    when = "steady state" if hits is None else f"{hits} hits from rest"
+    along = {"worst": "each joint's worst direction", "normal": "along the surface's normal"}
+    out.print(
+        f"  {summary['excitation']}; {when}, "
+        f"{along.get(summary['direction'], 'along ' + summary['direction'])}"
+    )
+    # Stresses rank joints; where not every joint has a shaft, torques do.
+    shafts = all(joint["peak_shear_stress"] is not None for joint in summary["joints"])
+    limit = "most stress" if shafts else "most torque"
+    heads = ["joint", ">largest\ndeflection\nmrad", ">torque\nthere\nN m", ">stress\nthere\nMPa",
+             ">where\nm", f">{limit},\n% of\nposes"]  # fmt: skip
+    if counted:
+        heads.append(">damage of\na rivet,\nat most")
+    rows = []
+    for joint in summary["joints"]:
+        stress, damage = joint["peak_shear_stress"], joint.get("damage_per_rivet")
+        cells = [
+            joint["name"],
+            f"{1e3 * joint['peak_deflection']:.4g}",
+            f"{joint['peak_torque']:.4g}",
+            "-" if stress is None else f"{stress / 1e6:.4g}",
+            ", ".join(f"{round(c, 3) + 0.0:.3f}" for c in joint["position"]),
+            f"{100 * joint['limits_poses'] / summary['poses']:.1f}",
+        ]
+        rows.append([*cells, "-" if damage is None else f"{damage:.3g}"][: len(heads)])
+    out.print(table(heads, rows))
+    if counted:
+        none = all(joint.get("damage_per_rivet", 0.0) == 0.0 for joint in summary["joints"])
+        out.print(
+            f"Damage: a rivet of {counted} hits from rest, cycles counted"
+            + ("; no stress is beyond an endurance limit, so none does any." if none else ".")
+        )

@@ -1,0 +1,1 @@
+"""Commands about measured data, and what a simulation gets wrong."""

@@ -1,0 +1,241 @@
+"""`picchio check`: what is in measured data, and what is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from picchio.cli.app import app
+from picchio.cli.options import (
+    FlexOption,
+    GravityStiffnessOption,
+    JsonOption,
+    ReportOption,
+    ToolOption,
+)
+from picchio.cli.output import (
+    check_targets,
+    console,
+    count_of,
+    deliver,
+    progress,
+    say_warning,
+    table,
+    write_report,
+)
+from picchio.core.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from picchio.measurement.quality.report import QualityReport, RecordSummary
+
+_MOST_RECORDS = 16
+_STYLES = {"error": "bold red", "warning": "yellow", "note": "dim"}
+
+
+@app.command(
+    epilog="Example: picchio check measurements/ --robot fanuc_like_3dof --json check.json"
+)
+def check(
+    campaign: Annotated[
+        Path, typer.Argument(metavar="CAMPAIGN", help="Folder with a campaign.toml.")
+    ],
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ROBOT",
+            help="The robot that was measured, as in `picchio robots`; the campaign's own if not "
+            "given.",
+        ),
+    ] = None,
+    no_robot: Annotated[
+        bool, typer.Option("--no-robot", help="Check without a robot: no limits and no axes.")
+    ] = False,
+    flex: FlexOption = None,
+    tool: ToolOption = None,
+    keep_going: Annotated[
+        bool,
+        typer.Option(
+            "--keep-going", help="Where a record cannot be read, list it and check the others."
+        ),
+    ] = False,
+    verbose: Annotated[
+        bool,
+        typer.Option(
+            "--verbose", "-v", help="Show every record, and each finding on a line of its own."
+        ),
+    ] = False,
+    gravity_stiffness: GravityStiffnessOption = True,
+    report: ReportOption = None,
+    json: JsonOption = None,
+) -> None:
+    """What is in measured data, and what is wrong with them.
+
+    Clipping, dropouts, spikes, drift, uneven clocks, swapped or flipped axes, hum, high-passes,
+    delays, records that are too short, aliasing, repeats, and the noise of every channel. --report
+    shows how a simulation of the nominal robot, with gravity's stiffness or without, differs.
+    """
+    import math
+
+    import picchio
+
+    if no_robot and (robot is not None or flex is not None or tool is not None):
+        raise InputError("stands against --robot, --flex and --tool", key="--no-robot")
+    loaded = picchio.load_campaign(campaign, clock_tolerance=math.inf)
+    if report is not None and (no_robot or (robot or loaded.robot) is None):
+        raise InputError("needs a robot", key="--report", hint="name one with --robot")
+    check_targets((json, report), [robot, flex, *loaded.files])
+    with progress("records") as tell:
+        found = picchio.check(
+            loaded, robot, flex=flex, tool=tool, use_robot=not no_robot, keep_going=keep_going,
+            progress=tell,
+        )  # fmt: skip
+    write_report(found, report, gravity_stiffness=gravity_stiffness)
+    deliver(found.to_dict(), json, lambda: _show(found, verbose))
+    if json == "-":  # what people would have read in the table
+        for group in found.groups():
+            if group[0].severity != "note":
+                more = f" (and {len(group) - 1} more like it)" if len(group) > 1 else ""
+                say_warning(f"{group[0]}{more}")
+
+
+def _show(report: QualityReport, verbose: bool) -> None:
+    out = console()
+    _show_contents(report)
+    shown = report.records if verbose else report.records[:_MOST_RECORDS]
+    out.print(_record_table(shown))
+    if len(shown) < len(report.records):
+        out.print(f"... and {len(report.records) - len(shown)} more: --verbose lists them.\n")
+    out.print(_channel_table(report))
+    if report.repeats:
+        worst = max(report.repeats, key=lambda c: c.difference)
+        out.print(
+            f"{len(report.repeats)} records repeat another one; beyond the noise they differ by "
+            f"{100 * np.median([c.difference for c in report.repeats]):.2g} % of the signal "
+            f"(median), at worst by {100 * worst.difference:.2g} % ({worst.first} and "
+            f"{worst.second}, {worst.channel}).\n"
+        )
+    if report.findings:
+        out.print(_finding_table(report, verbose))
+    counts = {word: report.count(word) for word in _STYLES}
+    if counts["error"] or counts["warning"]:
+        out.print(", ".join(count_of(n, word) for word, n in counts.items() if n) + ".")
+    else:
+        out.print(f"Nothing wrong was found ({counts['note']} notes): "
+                  f"{len(report.checks)} kinds of faults were looked for.")  # fmt: skip
+
+
+def _show_contents(report: QualityReport) -> None:
+    from rich.markup import escape
+
+    out = console()
+    campaign, records = report.campaign, report.records
+    name = str(campaign.folder) if campaign.folder is not None else "campaign in memory"
+    robot = report.robot.name if report.robot else "no robot: limits and axes are not checked"
+    out.print(f"[bold]{escape(name)}[/bold]: {count_of(len(records), 'record')}; {escape(robot)}")
+    hits = [r for r in records if r.kind == "percussion"]
+    motions = [r for r in records if r.kind == "motion"]
+    if hits:
+        poses = {tuple(r.pose.items() if isinstance(r.pose, dict) else r.pose or ()) for r in hits}
+        directions = {tuple(np.round(r.direction or [], 6)) for r in hits}
+        levels = sorted({r.excitation["force"] for r in hits if "force" in r.excitation})
+        level = (
+            f"{levels[0]:g}" + (f" to {levels[-1]:g}" if len(levels) > 1 else "") if levels else "?"
+        )
+        steady = sum("hits" not in r.excitation for r in hits)
+        bursts = f"{count_of(len(hits) - steady, 'burst')}, {steady} steady"
+        out.print(
+            f"  percussion: {count_of(len(hits), 'record')} ({bursts}), "
+            f"{count_of(len(poses), 'pose')}, {count_of(len(directions), 'direction')}, "
+            f"{count_of(len(levels), 'level')} ({level} N)"
+        )
+    if motions:
+        seconds = sum(r.end - r.start for r in motions)
+        out.print(f"  motion: {count_of(len(motions), 'record')}, {seconds:.4g} s")
+    rates = sorted({round(r.rate, 2) for r in records})
+    if rates:
+        out.print(f"  sampled at {', '.join(f'{rate:g}' for rate in rates[:6])} Hz")
+    times = sorted(r.time for r in records if r.time)
+    if times:
+        out.print(f"  taken from {times[0]} to {times[-1]}")
+    warm = [r.temperature for r in records if r.temperature is not None]
+    if warm:
+        out.print(f"  at {min(warm):g} to {max(warm):g} degC")
+    out.print()
+
+
+def _record_table(records: Sequence[RecordSummary]) -> Table:
+    from rich.markup import escape
+
+    rows = []
+    for record in records:
+        numbers = list(record.pose.values() if isinstance(record.pose, dict) else record.pose or [])
+        along = "-" if record.direction is None else ", ".join(
+            f"{c + 0.0:.2g}" for c in np.round(record.direction, 6)
+        )  # fmt: skip
+        rows.append((
+            escape(record.file), _done(record), ", ".join(f"{q:.3g}" for q in numbers) or "-",
+            along, f"{record.start:.4g}", f"{record.end:.4g}", str(record.samples),
+            f"{record.rate:.6g}", str(len(record.channels)),
+        ))  # fmt: skip
+    heads = ("record", "what was done", "pose\nrad, m", "force along", ">from\ns", ">to\ns",
+             ">samples", ">rate\nHz", ">channels")  # fmt: skip
+    return table(heads, rows)
+
+
+def _done(record: RecordSummary) -> str:
+    if record.kind == "motion":
+        return "motion"
+    e = record.excitation
+    if "force" not in e or "period" not in e:
+        return record.blows or "percussion"
+    count = f"{e['hits']} x " if "hits" in e else "steady "
+    return f"{count}{e['force']:.4g} N / {1e3 * e['period']:.4g} ms"
+
+
+def _channel_table(report: QualityReport) -> Table:
+    from rich.markup import escape
+
+    sizes: dict[str, list[float]] = {}
+    units = {}
+    for record in report.records:
+        for name, numbers in record.channels.items():
+            sizes.setdefault(name, []).append(float(numbers["rms"]))
+            units[name] = str(numbers["unit"])
+    rows = []
+    for name, rms in sizes.items():
+        noise, ratio = report.noise.get(name), report.signal_to_noise(name)
+        cells = ["-"] * 4 + [""]
+        if noise is not None:
+            hum = ", ".join(f"{h.amplitude:.2g} at {h.frequency:.3g} Hz" for h in noise.hum[:1])
+            colour = "a rough floor" if noise.rough else "white" if noise.white else "coloured"
+            cells = [f"{noise.std:.3g}", f"{100 * noise.error:.2g} %",
+                     "-" if np.isnan(ratio) else f"{ratio:.0f}", hum or "-", colour]  # fmt: skip
+        rows.append((escape(name), units[name], str(len(rms)), f"{min(rms):.3g}",
+                     f"{max(rms):.3g}", *cells))  # fmt: skip
+    heads = ("channel", "unit", ">in records", ">RMS,\nleast", ">RMS,\nmost", ">noise\n(std)",
+             ">known\nto", ">signal over\nnoise, dB", ">hum", "colour")  # fmt: skip
+    return table(heads, rows, title="Channels and their noise")
+
+
+def _finding_table(report: QualityReport, verbose: bool) -> Table:
+    from rich.markup import escape
+
+    rows = []
+    for group in [[finding] for finding in report.findings] if verbose else report.groups():
+        worst = group[0]
+        channels = sorted({f.channel for f in group if f.channel})
+        files = sorted({f.record for f in group if f.record})
+        where = ", ".join(channels[:2]) + (" ..." if len(channels) > 2 else "")
+        if files:
+            count = f"{len(files)} of {len(report.records)} records, worst {worst.record}"
+            where += (": " if where else "") + (files[0] if len(files) == 1 else count)
+        style = _STYLES[worst.severity]
+        rows.append((f"[{style}]{worst.severity}[/{style}]", escape(where or "campaign"),
+                     escape(worst.message), escape(worst.advice)))  # fmt: skip
+    return table(("", "where", "what was seen", "what to do"), rows, title="What was found")

@@ -1,0 +1,225 @@
+"""`picchio diagnose`: what the simulation gets wrong, why, the extended model, the gain."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from picchio.cli.app import app
+from picchio.cli.options import (
+    DataOption,
+    FlexOption,
+    GravityStiffnessOption,
+    JsonOption,
+    ReportOption,
+    RobotArgument,
+    ToolOption,
+)
+from picchio.cli.output import (
+    check_targets,
+    console,
+    count_of,
+    deliver,
+    table,
+    telling,
+    write_report,
+    write_text,
+)
+from picchio.studies.assessment.result import format_count
+
+if TYPE_CHECKING:
+    from picchio.diagnosis.result import Diagnosis
+
+
+@app.command(
+    epilog="Example: picchio diagnose fanuc_like_3dof --data measurements/ --report why.html"
+)
+def diagnose(
+    robot: RobotArgument,
+    data: DataOption,
+    task: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Task whose life is told before and after; the robot's example if not given.",
+        ),
+    ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="EFFECT", help="Leave an effect out, see `picchio effects`; may be repeated."
+        ),
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="OUT.toml", help="Write the extended model; every command takes it as ROBOT."
+        ),
+    ] = None,
+    report: ReportOption = None,
+    plan: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="OUT.toml", help="Write what to measure next, for `picchio simulate`."
+        ),
+    ] = None,
+    flex: FlexOption = None,
+    tool: ToolOption = None,
+    gravity_stiffness: GravityStiffnessOption = True,
+    json: JsonOption = None,
+) -> None:
+    """What a simulation gets wrong about measured data, and why.
+
+    The nominal model is fitted within the campaign's tolerance. What it cannot explain is compared
+    with every effect that picchio knows; whole poses are held out to judge the gain. It is said
+    what the data cannot tell, what to measure to know it, and what the causes do to the life.
+    """
+    import picchio
+    from picchio.model.effects.registry import effect_class
+
+    for name in without or ():
+        effect_class(name)
+    campaign = picchio.load_campaign(data)
+    moves = {record.kind for record in campaign} == {"motion"}
+    loaded = picchio.load_robot(robot, flex=flex, tool=tool, allow_rigid=moves)
+    check_targets((json, report, model, plan), [*loaded.files, *campaign.files, task])
+    with telling() as say:
+        found = picchio.diagnose(
+            robot,
+            campaign,
+            task=task,
+            without=without or (),
+            flex=flex,
+            tool=tool,
+            gravity_stiffness=gravity_stiffness,
+            progress=say,
+        )
+    if model is not None:
+        write_text(model, found.model_text(model.parent))
+    write_report(found, report, folder=None if model is None else model.parent)
+    if plan is not None and found.plan is not None:
+        write_text(plan, found.plan)
+    deliver(found.to_dict(), json, lambda: _show(found, plan))
+
+
+def _show(found: Diagnosis, plan: Path | None) -> None:
+    show_diagnosis(found)
+    if found.life_note:
+        console().print(f"Life: {found.life_note}.")
+    if plan is not None and found.plan is None:
+        console().print(f"Nothing to measure next that a plan could say: {plan} not written.")
+
+
+# What is said of a cause that percussion and motion records could both show.
+_STATUS = {
+    "both": "percussion and motion records agree",
+    "percussion": "by the percussion records; the motion records cannot see it",
+    "motion": "by the motion records; the percussion records cannot see it",
+    "drive": "by the motion records; it acts in the drive, which stands still while the tool hits",
+}
+
+
+def show_diagnosis(found: Diagnosis) -> None:
+    """Print verdict, causes, gain, life and what to measure next."""
+    from picchio.diagnosis.result import VERDICTS, differences, in_words
+    from picchio.model.effects.registry import effect_class
+
+    out = console()
+    out.print(f"[bold]{found.verdict}[/bold]: {found.note or VERDICTS[found.verdict]}.")
+    if found.causes:
+        rows = []
+        for cause in found.causes:
+            heads = [cause.effect, cause.target, f"{cause.confidence:.3f}"]
+            values = [
+                [f"{name} {v.value:.5g}", f"{v.std:.2g}", "" if v.unit == "1" else v.unit]
+                for name, v in cause.parameters.items()
+            ]
+            # The cause is named in its first row alone.
+            rows += [heads + (values or [[]])[0], *(["", "", "", *row] for row in values[1:])]
+        columns = ("cause", "where", "confidence", ">value", ">std", "unit")
+        out.print(table(columns, rows, box=None, header_style="dim"))
+        for name in dict.fromkeys(cause.effect for cause in found.causes):
+            out.print(f"  {name}: {effect_class(name).meaning}")
+    for each in differences(found):
+        out.print(f"  these data cannot tell it from {in_words(each)}")
+    helped = (
+        "would explain it, but is not claimed" if found.note else "helped, but is not the cause"
+    )
+    for effect, target in found.leads:
+        out.print(f"  {helped}: {effect} of {target}")
+    for why in dict.fromkeys(found.not_looked_for.values()):
+        names = ", ".join(name for name, reason in found.not_looked_for.items() if reason == why)
+        out.print(f"  not looked for: {names} ({why})")
+    gain = found.gain
+    if gain is not None:
+        share = "" if gain.explained is None else f"; {100 * gain.explained:.1f} % explained"
+        out.print(
+            f"On {count_of(len(gain.held_out_records), 'record')} held out the residual falls from "
+            f"{100 * gain.baseline_nrmse:.3g} % to {100 * gain.extended_nrmse:.3g} % of the "
+            f"signal; noise alone is {100 * gain.noise_floor_nrmse:.3g} %{share}."
+        )
+    for told in found.shared:
+        if told["status"] in _STATUS:
+            out.print(f"  {told['effect']} of {told['target']}: {_STATUS[told['status']]}")
+    if found.life is not None:
+        _show_life(found.life)
+        _show_other_lives(found, found.life.get("alternatives") or ())
+    ask = found.next_measurement
+    if ask:
+        direction = ", ".join(f"{c:.2f}" for c in ask.get("direction", ()))
+        pose = ", ".join(f"{name} {value:.2f}" for name, value in ask.get("pose", {}).items())
+        out.print(f"Measure next: {ask['why']}", highlight=False)
+        if pose:
+            out.print(f"  pose {pose}; force along ({direction}), {ask.get('force', 0):g} N")
+
+
+def _show_life(life: Mapping[str, Any]) -> None:
+    def used(share: float) -> str:
+        return f"{100 * share:.4g}"
+
+    def between(joint: Mapping[str, Any], key: str, show: Callable[[float], str]) -> str:
+        """The interval, where it says more than the value."""
+        low, high = (show(end) for end in joint.get(key, (math.nan, math.nan)))
+        return "" if low == high else f"[dim]{low} to {high}[/dim]"
+
+    rows = []
+    for name, before in life["baseline"]["joints"].items():
+        sides = (before, life["extended"]["joints"][name])
+        lives = [format_count(side["rivets_to_failure"]) for side in sides]
+        rows.append([name, *lives, *(used(side["utilisation"]) for side in sides)])
+        spans = [between(side, "rivets_interval", format_count) for side in sides]
+        spans += [between(side, "utilisation_interval", used) for side in sides]
+        if any(spans):
+            rows.append(["", *spans])
+    columns = ("joint", ">rivets before", ">after", ">utilisation before %", ">after %")
+    out = console()
+    out.print(table(columns, rows, box=None, header_style="dim", title="Life"))
+    if "interval_level" in life:
+        out.print(
+            f"  [dim]{100 * life['interval_level']:g} % intervals: before, of the stated "
+            "tolerance; after, of what was fitted. The material's scatter is not in them (picchio "
+            "assess --uncertainty)[/dim]"
+        )
+
+
+def _show_other_lives(found: Diagnosis, lives: Sequence[Mapping[str, Any]]) -> None:
+    """The lives with the sets of causes that the data cannot tell from those named."""
+    out = console()
+    for pairs, other in zip(found.alternatives, lives, strict=False):
+        names = " and ".join(f"{effect} of {target}" for effect, target in pairs)
+        instead = other.get("why") or (
+            f"rivets {format_count(other['rivets_to_failure'])}, "
+            f"utilisation {100 * other['utilisation']:.4g} %"
+        )
+        out.print(f"  with {names} instead: {instead}")
+    if lives:
+        out.print("  until the sets are told apart, only the worst of these may be promised")
+    elif found.alternatives:
+        out.print(
+            '  "after" is with the cause named above; with another of the sets the life is '
+            "another: until they are told apart, neither may be promised"
+        )

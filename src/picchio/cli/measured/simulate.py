@@ -1,0 +1,70 @@
+"""`picchio simulate`: the campaign that a test plan would give."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from picchio.cli.app import app
+from picchio.cli.options import (
+    FlexOption,
+    GravityStiffnessOption,
+    JsonOption,
+    RobotArgument,
+    ToolOption,
+)
+from picchio.cli.output import check_targets, deliver, progress
+
+if TYPE_CHECKING:
+    from picchio.prediction.simulation import Simulation
+
+
+@app.command(epilog="Example: picchio simulate fanuc_like_3dof --plan plan.toml --to campaign")
+def simulate(
+    robot: RobotArgument,
+    plan: Annotated[Path, typer.Option(metavar="PLAN.toml", help="The test plan.")],
+    to: Annotated[Path, typer.Option(metavar="CAMPAIGN", help="The folder of the campaign.")],
+    flex: FlexOption = None,
+    tool: ToolOption = None,
+    gravity_stiffness: GravityStiffnessOption = True,
+    seed: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=0, help="Random seed of the noise; the plan's if not given."),
+    ] = None,
+    parquet: Annotated[
+        bool, typer.Option("--parquet", help="Write Parquet files instead of CSV.")
+    ] = False,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a campaign that is there.")
+    ] = False,
+    json: JsonOption = None,
+) -> None:
+    """The measured data that a test plan would give.
+
+    The plan (see `picchio formats plan`) names poses, directions, levels, blows, sample rate and
+    sensors with their noise; [[effect]] tables in it make the world differ from the model.
+    """
+    import picchio
+
+    loaded = picchio.load_robot(robot, flex=flex, tool=tool)
+    check_targets([json], [*loaded.files, plan])
+    with progress("records") as report:
+        made = picchio.simulate(
+            loaded,
+            plan,
+            to,
+            robot_name=robot,
+            seed=seed,
+            gravity_stiffness=gravity_stiffness,
+            parquet=parquet,
+            overwrite=overwrite,
+            progress=report,
+        )
+    deliver(made.to_dict(), json, lambda: _show(made, to))
+
+
+def _show(made: Simulation, to: Path) -> None:
+    typer.echo(f"{to}: {made._headline()}")
+    typer.echo("  " + ", ".join(made.campaign.records[0].channels))

@@ -1,0 +1,1 @@
+"""Commands that print what picchio knows: robots, effects, file formats, the paper."""

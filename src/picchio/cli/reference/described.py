@@ -1,0 +1,138 @@
+"""`picchio effects` and `picchio formats`: what can be written where."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from picchio.cli.app import app
+from picchio.cli.options import JsonOption
+from picchio.cli.output import console, definitions, deliver
+
+if TYPE_CHECKING:
+    from picchio.reference.effects import EffectDescription
+    from picchio.reference.formats import FileFormat, Key
+
+
+@app.command(epilog="Example: picchio effects base_compliance")
+def effects(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Show one effect in full.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """List the effects that a model may have, or show one in full."""
+    import picchio
+
+    found = picchio.effects(name)
+    one, every = partial(_show_effect, found.effects[0]), partial(_list_effects, found.effects)
+    deliver(found.to_dict(), json, one if name else every)
+
+
+@app.command(epilog="Example: picchio formats task")
+def formats(
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Show one format with all its keys.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """List the files that picchio reads and writes, or one's keys."""
+    import picchio
+
+    found = picchio.formats(name)
+    one, every = partial(_show_format, found.formats[0]), partial(_list_formats, found.formats)
+    deliver(found.to_dict(), json, one if name else every)
+
+
+def _list_effects(entries: tuple[EffectDescription, ...]) -> None:
+    from picchio.reference.effects import by_place
+
+    screen = console()
+    for heading, group in by_place(entries).items():
+        screen.print(f"[bold]{heading}[/bold]")
+        rows = [(entry.name, f"{entry.meaning} [dim]({entry.target})[/dim]") for entry in group]
+        screen.print(definitions(rows))
+    screen.print("In brackets: what the effect acts on. `picchio effects NAME` shows one in full.")
+
+
+def _show_effect(entry: EffectDescription) -> None:
+    from rich.markup import escape
+
+    from picchio.reference.effects import shown_bounds, shown_unit, target_meaning
+
+    screen = console()
+    screen.print(f"[bold]{entry.name}[/bold]: {entry.meaning}")
+    screen.print(escape(entry.detail))
+    facts = [("where", entry.where), ("target", target_meaning(entry.target))]
+    if entry.drawn:
+        facts.append(("drawn", f"{entry.drawn}; another in every record"))
+    if entry.source:
+        facts.append(("source", entry.source))
+    screen.print(definitions(facts))
+    screen.print("[bold]Parameters[/bold]")
+    screen.print(
+        definitions(
+            (
+                p.name,
+                f"{shown_unit(p.unit)}; {shown_bounds(p)}; no effect at {p.neutral:g}\n{p.meaning}",
+            )
+            for p in entry.parameters
+        )
+    )
+    screen.print("[bold]Example[/bold], in a picchio-model/1 or picchio-plan/1 file")
+    screen.print("\n" + escape(entry.example), soft_wrap=True)
+
+
+def _list_formats(entries: tuple[FileFormat, ...]) -> None:
+    from rich.markup import escape
+
+    screen = console()
+    for role, title in (("input", "What you write"), ("output", "What picchio writes")):
+        screen.print(f"[bold]{title}[/bold]")
+        rows = []
+        for e in entries:
+            if e.role == role:
+                facts = "; ".join(fact for fact in (e.kind, e.format, e.command) if fact)
+                rows.append((e.name, escape(f"{e.meaning}\n{facts}")))
+        screen.print(definitions(rows))
+    screen.print("`picchio formats NAME` prints every key of one.")
+
+
+def _show_format(entry: FileFormat) -> None:
+    from rich.markup import escape
+
+    from picchio.reference.formats import sections
+
+    screen = console()
+    screen.print(f"[bold]{entry.name}[/bold]: {escape(entry.meaning)}")
+    screen.print(escape("; ".join(x for x in (entry.kind, entry.format, entry.command) if x)))
+    for section, keys in sections(entry).items():
+        if section:
+            screen.print(f"[bold]{escape(_heading(section, entry.kind))}[/bold]")
+        rows = [
+            (key.path.rpartition(".")[2] if section else key.path, _text(key, entry.role))
+            for key in keys
+        ]
+        screen.print(definitions((escape(name), escape(text)) for name, text in rows))
+
+
+def _heading(section: str, kind: str) -> str:
+    """The table as TOML would write it; as a path elsewhere."""
+    if kind != "TOML":
+        return section
+    plain = section.replace("[]", "")
+    return f"[[{plain}]]" if section.endswith("[]") else f"[{plain}]"
+
+
+def _text(key: Key, role: str) -> str:
+    parts = [key.type]
+    if key.unit:
+        parts.append("pure number" if key.unit == "1" else key.unit)
+    if role == "input":
+        needed = "required" if key.required else "optional"
+        parts.append(f"default {key.default}" if key.default else needed)
+    elif not key.required:
+        parts.append("not always there")
+    return f"{'; '.join(parts)}\n{key.meaning}"
