@@ -139,8 +139,6 @@ def try_candidates(
     with Workers(problem.workers, functions) as pool:
         suspects = screen.ranked(pool.map("screen", candidates))
         logarithm = math.log(max(start.samples, 2))
-        if search.log is not None:
-            search.log({s.label: s.gain - s.numbers * logarithm for s in suspects})
         if whole:
             least = max(-logarithm, enough)
             suspects = [s for s in suspects if s.gain - s.numbers * logarithm > least]
