@@ -10,6 +10,7 @@ from dataclasses import replace
 import pytest
 from motion_records import ARM, campaign
 
+import picchio
 from picchio.diagnosis.life import NO_SHAFT
 from picchio.diagnosis.motion.conclude.during_blows import (
     NO_TASK,
@@ -22,7 +23,6 @@ from picchio.diagnosis.result import differences, in_words
 from picchio.robot.loading.load import load_robot
 from picchio.studies.assessment.run import assess
 from picchio.studies.tasks import load_task
-from picchio.visuals.report.motion_diagnosis import motion_diagnosis_report
 
 MAIN = "from picchio.cli.main import main; main()"
 MASS = 8.0
@@ -44,10 +44,14 @@ def diagnosis(robot, heavy):
     return diagnose_motion(robot, heavy)
 
 
-def page_of(diagnosis, robot, **more):
+def page_of(diagnosis, robot, folder=None):
     task = load_task(robot.task_path, robot)
-    return motion_diagnosis_report(diagnosis, life=motion_life(robot, task, diagnosis),
-                                   carried=effects_during_blows(diagnosis), **more)  # fmt: skip
+    details = {
+        "motion": diagnosis, "motion_life": motion_life(robot, task, diagnosis),
+        "during_blows": effects_during_blows(diagnosis), "folder": folder,
+        "saved": {"robot": ARM, "effects": []},
+    }  # fmt: skip
+    return picchio.report(replace(diagnosis, details=details)).text
 
 
 def test_only_what_acts_while_the_tool_hits_is_carried_over(diagnosis):
@@ -114,7 +118,7 @@ class Reader(html.parser.HTMLParser):
 
 
 def test_the_page_has_every_part_and_needs_nothing_from_outside(robot, diagnosis):
-    page = page_of(diagnosis, robot, model_toml="format = ...", folder="logs")
+    page = page_of(diagnosis, robot, folder="logs")
     seen = Reader()
     seen.feed(page)
     assert seen.headings == [

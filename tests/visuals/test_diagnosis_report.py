@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import pytest
 from lxml import html as lxml_html
 
+import picchio
 from picchio.campaign.campaign import Campaign
 from picchio.cli.measured.diagnose import show_diagnosis
 from picchio.core.errors import InputError
@@ -28,10 +29,8 @@ from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.diagnosis.result import Cause, Diagnosis, Value
 from picchio.model.effects.registry import effect_class
 from picchio.robot.loading.load import load_robot
-from picchio.visuals.report.diagnosis import _ask, diagnosis_report
-from picchio.visuals.report.headline import headline
+from picchio.visuals.report.diagnosis import _ask, headline
 from picchio.visuals.report.page import number, spread
-from picchio.visuals.report.residual import residual_report
 from picchio.visuals.scene.diagnosed import diagnosis_scene
 
 OUTSIDE = re.compile(
@@ -95,15 +94,26 @@ def case(repository):
     return SimpleNamespace(found=found, robot=robot, campaign=campaign, mass=mass)
 
 
+def page_of(found, scene=False, **options):
+    """The page of a diagnosis, with all that led to it."""
+    details = {"percussion": found, "folder": None, "saved": {"robot": "x", "effects": []}}
+    answer = replace(found.diagnosis, details=details)
+    return picchio.report(answer, scene=scene, **options).text
+
+
+def with_diagnosis(case, **changed):
+    return replace(case.found, diagnosis=replace(case.found.diagnosis, **changed))
+
+
 @pytest.fixture(scope="module")
 def page(case):
-    return diagnosis_report(case.found, model_toml='format = "picchio-model/1"\n',
-                            command="picchio diagnose x", life=LIFE)  # fmt: skip
+    return page_of(with_diagnosis(case, life=LIFE), command="picchio diagnose x")
 
 
 @pytest.fixture(scope="module")
 def residual_page(case):
-    return residual_report(case.robot, case.campaign, command="picchio check x")
+    checked = picchio.check(case.campaign, robot=case.robot)
+    return picchio.report(checked, command="picchio check x").text
 
 
 def text(page, xpath="//body"):
@@ -148,23 +158,21 @@ def test_nothing_comes_from_outside_and_it_can_be_mailed(request, which):
 
 
 def test_every_name_is_escaped(case):
-    cause = Cause(HOSTILE, HOSTILE, 0.5, {HOSTILE: Value(1.0, 0.1, HOSTILE)})
-    hostile = replace(
-        case.found.diagnosis,
+    cause = Cause("payload", HOSTILE, 0.5, {HOSTILE: Value(1.0, 0.1, HOSTILE)})
+    hostile = with_diagnosis(
+        case,
         verdict="ambiguous",
         causes=(cause,),
         alternatives=(((HOSTILE, HOSTILE),),),
         leads=((HOSTILE, HOSTILE),),
+        life={"baseline": {HOSTILE: HOSTILE}, "extended": {HOSTILE: 1.0}},
         next_measurement={"why": HOSTILE, "pose": {HOSTILE: 0.1}, "direction": [0, 0, 1],
                           "force": 300.0, "sensor": HOSTILE,
                           "rivals": [{"causes": [[HOSTILE, HOSTILE]], "chi_square": 12.0}]},
         scores=({"step": 1, "effect": HOSTILE, "target": HOSTILE, "bic": 1.0,
                  "screened_gain": 1.0, "chi_square_per_sample": 2.0},),
     )  # fmt: skip
-    html = diagnosis_report(
-        replace(case.found, diagnosis=hostile), model_toml=HOSTILE, command=HOSTILE,
-        warnings=[HOSTILE], life={"baseline": {HOSTILE: HOSTILE}, "extended": {HOSTILE: 1.0}},
-    )  # fmt: skip
+    html = page_of(hostile, command=HOSTILE, warnings=[HOSTILE])
     assert "<script" not in html
     assert html.count("&lt;script&gt;") > 10
 
@@ -191,9 +199,9 @@ def test_the_scene_is_at_the_worst_record_and_in_the_page(case):
     poses = {r.name: r.setup.geometry.pose for r in case.found.problem.records}
     assert any((scene.envelope.pose == pose).all() for pose in poses.values())
     assert scene.diagnosis["lines"][0]["text"] == f"payload: mass {case.mass:.3g} kg"
-    html = diagnosis_report(case.found, scene=scene.html())
+    html = page_of(case.found, scene=True)
     (frame,) = lxml_html.fromstring(html).xpath("//iframe")
-    assert frame.get("srcdoc") == scene.html()
+    assert frame.get("srcdoc") == diagnosis_scene(case.found).html()
     assert "<script" not in html  # but for what the frame holds, escaped
     policy = lxml_html.fromstring(html).xpath("//meta[@http-equiv]/@content")[0]
     assert "default-src 'none'" in policy and "script-src 'unsafe-inline'" in policy
@@ -210,7 +218,7 @@ def test_every_verdict_has_its_page(case, verdict):
         diagnosis = replace(diagnosis, scores=(), leads=())
     if verdict == "ambiguous":
         diagnosis = replace(diagnosis, alternatives=((("cable", "link_3"),),))
-    html = diagnosis_report(replace(found, diagnosis=diagnosis))
+    html = page_of(replace(found, diagnosis=diagnosis))
     said = text(html, "//*[@id='verdict']").lower()
     assert {"nothing-wrong": "nothing wrong", "unexplained": "no known cause", "partial": "part of",
             "ambiguous": "cannot tell"}[verdict] in said  # fmt: skip
@@ -220,8 +228,7 @@ def test_every_verdict_has_its_page(case, verdict):
 
 
 def test_a_partial_verdict_without_rivals_says_where_to_look(case):
-    diagnosis = replace(case.found.diagnosis, verdict="partial", next_measurement=None)
-    said = text(diagnosis_report_of(case, diagnosis))
+    said = text(page_of(with_diagnosis(case, verdict="partial", next_measurement=None)))
     assert "there is nothing to tell apart" in said
     assert "No measurement is known" not in said
 
@@ -232,13 +239,9 @@ def test_a_wide_search_shows_its_best(case):
         {**row, "effect": f"effect_{n}", "bic": 100.0 + n, "chi_square_per_sample": 2.0 + n}
         for n in range(22)
     )
-    html = diagnosis_report_of(case, replace(case.found.diagnosis, scores=rows))
+    html = page_of(with_diagnosis(case, scores=rows))
     assert "10 more did no better" in text(html)
     assert "effect 11" in html and "effect 12" not in html
-
-
-def diagnosis_report_of(case, diagnosis):
-    return diagnosis_report(replace(case.found, diagnosis=diagnosis))
 
 
 def test_what_all_sensors_have_alike_is_said_and_not_called_noise(case, capsys):
@@ -247,7 +250,7 @@ def test_what_all_sensors_have_alike_is_said_and_not_called_noise(case, capsys):
     diagnosis = replace(
         case.found.diagnosis, verdict="unexplained", causes=(), leads=leads, note=why
     )
-    html = diagnosis_report(replace(case.found, diagnosis=diagnosis))
+    html = page_of(replace(case.found, diagnosis=diagnosis))
     assert why[1:] in text(html, "//*[@id='verdict']")
     assert "all of the leads together, none of which is claimed" in text(html)
     assert "they are not claimed" in text(html) and "force at the tool" in text(html)
@@ -285,15 +288,17 @@ def test_a_campaign_without_blows_is_refused(case):
 
     time = np.arange(50) / 100.0
     motion = Record.from_arrays("m.csv", time, {"position.joint_1": time}, kind="motion")
+    campaign = Campaign.from_records([motion], robot="fanuc_like_3dof")
     with pytest.raises(InputError, match="neither blows"):
-        residual_report(case.robot, Campaign.from_records([motion], robot="fanuc_like_3dof"))
+        picchio.report(picchio.check(campaign, robot=case.robot))
 
 
 def test_motion_records_have_a_page_too(measured_data):
     """EMPS with inertia and the URDF's viscous friction alone: about 17 % of the force is left."""
     from picchio.datasets import load
 
-    html = residual_report(load_robot("emps"), load("emps", measured_data / "emps"))
+    campaign = load("emps", measured_data / "emps")
+    html = picchio.report(picchio.check(campaign, robot="emps")).text
     share = float(re.search(r"leaves ([\d.]+) %", text(html, "//*[@id='verdict']")).group(1))
     assert 14.0 < share < 20.0
     assert "friction" not in text(html, "//*[@id='verdict']")

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from picchio.campaign.channels import Channel
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.criteria.whiteness import Level
-from picchio.model.effects.registry import catalogue
+from picchio.model.effects.registry import effect_class
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.visuals.kinematics import Frame, frames, world
 from picchio.visuals.plots.style import (
@@ -37,12 +37,12 @@ MEASURED: dict[str, Any] = {"color": INK, "linewidth": 2.6, "alpha": 0.35}
 _BAND = 1.96
 _SHOWN = {"rad": (1e3, "mrad"), "m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
 _LOWEST = 0.5
+_MOST_LABELS = 5
 
 
 def place_in_words(robot: FlexibleRobot, effect: str, target: str) -> str:
     """Where on the robot an effect sits, as a phrase."""
-    known = catalogue().get(effect)
-    kind = known.target_kind if known is not None else ""
+    kind = effect_class(effect).target_kind
     names = robot.flexible_names
     if target in names:
         count = len(names)
@@ -67,6 +67,7 @@ def plot_place(
     ax: Axes | None = None,
     *,
     direction: ArrayLike | None = None,
+    labels: Sequence[str] = (),
 ) -> Axes:
     """The robot at a pose, seen from the side it spreads most, with the causes' places ringed.
 
@@ -76,6 +77,8 @@ def plot_place(
         causes: (effect, target).
         ax: where to draw.
         direction: (3,) of the blows, drawn at the tool.
+        labels: what is written beside each cause's ring; the effect's name if not given. Rings
+            that lie on each other share a text.
     """
     ax = axes_or_new(ax)
     all_frames = frames(robot, pose)
@@ -85,24 +88,14 @@ def plot_place(
     def seen(point: FloatArray) -> tuple[float, float]:
         return float(point @ sideways), float(point[2])
 
-    bones = _bones(all_frames)
-    for parent, frame in bones:
-        (x0, z0), (x1, z1) = seen(at[parent]), seen(at[frame.link])
-        ax.plot(
-            (x0, x1),
-            (z0, z1),
-            color=MUTED,
-            linewidth=5.0,
-            alpha=0.55,
-            solid_capstyle="round",
-            zorder=1,
-        )
+    for parent, frame in _bones(all_frames):
+        ends = np.transpose([seen(at[parent]), seen(at[frame.link])])
+        ax.plot(*ends, color=MUTED, linewidth=5.0, alpha=0.55, solid_capstyle="round", zorder=1)
     for frame in all_frames:
         if frame.joint in robot.flexible_names:
             ax.plot(*seen(at[frame.link]), "o", color=PAPER, markeredgecolor=INK, markersize=7,
                     markeredgewidth=1.4, zorder=3)  # fmt: skip
-    base = seen(at[all_frames[0].link])
-    ax.plot(*base, "s", color=MUTED, markersize=9, zorder=2)
+    ax.plot(*seen(at[all_frames[0].link]), "s", color=MUTED, markersize=9, zorder=2)
     tip = at[robot.link_of(robot.tool_frame)]
     ax.plot(*seen(tip), ">", color=INK, markersize=6, zorder=3)
     size = max(np.ptp([seen(p) for p in at.values()], axis=0).max(), 1e-3)
@@ -114,22 +107,25 @@ def plot_place(
                     arrowprops={"arrowstyle": "-|>", "color": BLUE, "linewidth": 1.6})  # fmt: skip
     across = [seen(p)[0] for p in at.values()]
     middle = 0.5 * (min(across) + max(across))
-    taken: list[tuple[float, float]] = []
-    for effect, target in causes:
-        points = _points(robot, effect, target, all_frames, at)
+    marked: list[tuple[tuple[float, float], list[str]]] = []
+    for (effect, target), label in zip(causes, labels or [e for e, _ in causes], strict=True):
+        points = [seen(point) for point in _points(robot, effect, target, all_frames, at)]
         for point in points:
-            ax.plot(*seen(point), "o", color="none", markeredgecolor=VERMILION, markersize=19,
+            ax.plot(*point, "o", color="none", markeredgecolor=VERMILION, markersize=19,
                     markeredgewidth=2.4, zorder=4)  # fmt: skip
         if points:
-            x, z = seen(points[-1])
-            shift = sum(abs(x - a) + abs(z - b) < 0.1 * size for a, b in taken)
-            taken.append((x, z))
-            # On the side where there is room for it.
-            side = 1 if x <= middle else -1
-            ax.annotate(plain(effect.replace("_", " ")), (x, z), xytext=(15 * side, 9 - 12 * shift),
-                        textcoords="offset points", ha="left" if side > 0 else "right",
-                        color=VERMILION, fontsize=9, fontweight="bold", zorder=5,
-                        path_effects=[withStroke(linewidth=3.0, foreground=PAPER)])  # fmt: skip
+            x, z = points[-1]
+            near = [text for (a, b), text in marked if abs(x - a) + abs(z - b) < 0.12 * size]
+            near[0].append(label) if near else marked.append((points[-1], [label]))
+    for (x, z), texts in marked:
+        told = [plain(text.replace("_", " "), 24) for text in texts[:_MOST_LABELS]]
+        told += ["\N{HORIZONTAL ELLIPSIS}"] * (len(texts) > _MOST_LABELS)
+        # On the side where there is room for it.
+        side = 1 if x <= middle else -1
+        ax.annotate("\n".join(told), (x, z), xytext=(15 * side, 9), textcoords="offset points",
+                    ha="left" if side > 0 else "right", color=VERMILION, fontsize=9,
+                    fontweight="bold", zorder=5,
+                    path_effects=[withStroke(linewidth=3.0, foreground=PAPER)])  # fmt: skip
     ax.set_aspect("equal", adjustable="datalim")
     ax.margins(0.22)
     ax.grid(False)
@@ -159,8 +155,7 @@ def _points(
     at: dict[str, FloatArray],
 ) -> list[FloatArray]:
     """World positions that an effect's target stands for."""
-    known = catalogue().get(effect)
-    kind = known.target_kind if known is not None else ""
+    kind = effect_class(effect).target_kind
     joints = [at[f.link] for f in all_frames if f.joint in robot.flexible_names]
     tip = at[robot.link_of(robot.tool_frame)]
     for frame in all_frames:
@@ -300,7 +295,6 @@ def plot_scores(
     start = math.sqrt(max(without[1], 1e-6))
     low, high = 0.6 * min(1.0, *left), max(start, *left, 1.3)
     for place, (row, value) in enumerate(zip(rows, left, strict=True)):
-        stands = (row["effect"], row["target"]) in chosen
         fall = without[0] - row["bic"]
         if not math.isfinite(fall):
             note = "far behind early on: dropped"
@@ -308,8 +302,7 @@ def plot_scores(
             note = "does not pay for its numbers"
         else:
             note = f"evidence {fall:,.0f}"
-        ax.barh(place, value - low, left=low, height=0.62, color=BLUE if stands else GREY,
-                alpha=1.0 if stands else 0.6)  # fmt: skip
+        stands = _candidate_bar(ax, place, row, chosen, value - low, low)
         ax.text(value * 1.04, place, f"{value:.3g}", va="center", fontsize=8)
         ax.text(1.01, place, note, va="center", fontsize=8, transform=ax.get_yaxis_transform(),
                 color=INK if stands else MUTED)  # fmt: skip
@@ -320,18 +313,69 @@ def plot_scores(
                 transform=ax.get_xaxis_transform())  # fmt: skip
     ax.set_xscale("log")
     ax.set_xlim(low, high * (high / low) ** 0.12)
-    ax.set_ylim(len(rows) - 0.4, -0.6)
-    ax.set_yticks(
-        range(len(rows)),
-        [plain(f"{row['effect'].replace('_', ' ')}, {row['target']}", 40) for row in rows],
-    )
-    for label, row in zip(ax.get_yticklabels(), rows, strict=True):
-        if (row["effect"], row["target"]) in chosen:
-            label.set_fontweight("bold")
-    ax.grid(False, axis="y")
+    _name_candidates(ax, rows, chosen)
     plain_numbers(ax.xaxis, low, high)
     ax.set(xlabel="residual that is left once fitted [× noise, RMS]")
     return ax
+
+
+@styled
+def plot_motion_scores(
+    scores: Sequence[Mapping[str, Any]],
+    ax: Axes | None = None,
+    *,
+    chosen: Collection[tuple[str, str]] = (),
+) -> Axes:
+    """What each candidate takes of the residual on stretches that it was not fitted to.
+
+    Args:
+        scores: of one step of the search: dicts with effect, target, share, rank; best first.
+        ax: where to draw.
+        chosen: (effect, target) of those that were added.
+    """
+    ax = axes_or_new(ax)
+    for place, row in enumerate(scores):
+        share = 100.0 * max(row["share"], 0.0)
+        stands = _candidate_bar(ax, place, row, chosen, share)
+        note = f"{share:.3g} %; evidence {row['rank']:,.0f}".replace("-", "\N{MINUS SIGN}")
+        ax.text(share + 1.2, place, note, va="center", fontsize=8, color=INK if stands else MUTED)
+    ax.set_xlim(0.0, 128.0)
+    ax.set_xticks(range(0, 101, 20))
+    _name_candidates(ax, scores, chosen)
+    ax.set(xlabel="share of what is left in its channels that it takes, on stretches held out [%]")
+    return ax
+
+
+def _candidate_bar(
+    ax: Axes,
+    place: int,
+    row: Mapping[str, Any],
+    chosen: Collection[tuple[str, str]],
+    length: float,
+    start: float = 0.0,
+) -> bool:
+    """A candidate's bar; whether it is one of those chosen."""
+    stands = (row["effect"], row["target"]) in chosen
+    ax.barh(place, length, left=start, height=0.62, color=BLUE if stands else GREY,
+            alpha=1.0 if stands else 0.6)  # fmt: skip
+    return stands
+
+
+def _name_candidates(
+    ax: Axes, rows: Sequence[Mapping[str, Any]], chosen: Collection[tuple[str, str]]
+) -> None:
+    """Candidates down the vertical axis, those chosen in bold."""
+    ax.set_ylim(len(rows) - 0.4, -0.6)
+    ax.grid(False, axis="y")
+    names = []
+    for row in rows:
+        order = row.get("parameters", {}).get("order")
+        name = f"{row['effect'].replace('_', ' ')}, {row['target']}"
+        names.append(plain(name if order is None else f"{name}, order {order:.4g}", 44))
+    ax.set_yticks(range(len(rows)), names)
+    for label, row in zip(ax.get_yticklabels(), rows, strict=True):
+        if (row["effect"], row["target"]) in chosen:
+            label.set_fontweight("bold")
 
 
 def plain_numbers(axis: Axis, low: float, high: float) -> None:

@@ -9,12 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
-from picchio.core.arrays import FloatArray
-from picchio.visuals.plots.diagnosis import plain_numbers
+from picchio.core.arrays import BoolArray, FloatArray
+from picchio.visuals.plots.diagnosis import AFTER, BEFORE, plain_numbers
 from picchio.visuals.plots.style import (
     BLUE,
     CMAP,
     COLOURS,
+    INK,
     MUTED,
     VERMILION,
     axes_or_new,
@@ -26,7 +27,9 @@ from picchio.visuals.plots.style import (
 _MOST_HARMONICS = 60
 _MOST_ROWS = 60
 _MOST_DOTS = 700
-_BINS = 15
+_BINS, _FINE_BINS = 15, 25
+_FEWEST = 8  # samples of a bin
+_PLOTTED = 1500  # lines of a spectrum
 
 
 @styled
@@ -228,18 +231,107 @@ def plot_restoring(
     step = max(1, x.size // _MOST_DOTS)
     ax.plot(x[::step], y[::step], ".", color=BLUE, markersize=2.0 if x.size > 300 else 4.0,
             alpha=0.35)  # fmt: skip
-    edges = np.quantile(x, np.linspace(0.0, 1.0, _BINS + 1))
-    place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, _BINS - 1)
-    bins = [k for k in range(_BINS) if (place == k).sum() >= 8]
-    ax.plot([np.median(x[place == k]) for k in bins], [np.median(y[place == k]) for k in bins],
+    bins = bins_of(x, _BINS)
+    ax.plot([np.median(x[k]) for k in bins], [np.median(y[k]) for k in bins],
             "o-", color=VERMILION, markersize=3.5, linewidth=1.6, label="median")  # fmt: skip
-    ax.axhline(0.0, color=MUTED, linewidth=0.8)
     ax.axvline(0.0, color=MUTED, linewidth=0.8)
+    _frame_most(ax, y)
     length = ("" if whole else "m") + ("m" if prismatic else "rad")
     unit = f"{length}/s" if over == "velocity" else length
-    low, high = np.quantile(y, [0.002, 0.998])
-    room = 0.15 * max(high - low, 1e-12)
-    ax.set_ylim(low - room, high + room)
     ax.set(xlabel=f"{over} of {plain(joint)} [{unit}]",
            ylabel=f"missing {'force [N]' if prismatic else 'torque [N m]'}")  # fmt: skip
+    return ax
+
+
+def bins_of(x: FloatArray, count: int) -> list[BoolArray]:
+    """`count` bins of x with as many samples each, as masks; those with few samples left out."""
+    edges = np.quantile(x, np.linspace(0.0, 1.0, count + 1))
+    place = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, count - 1)
+    found = [place == k for k in range(count)]
+    return [mask for mask in found if mask.sum() >= _FEWEST]
+
+
+def _frame_most(ax: Axes, values: FloatArray) -> None:
+    """The zero line, and limits that leave out what is rarest."""
+    ax.axhline(0.0, color=MUTED, linewidth=0.8)
+    low, high = np.quantile(values, [0.002, 0.998])
+    room = 0.15 * max(high - low, 1e-12)
+    ax.set_ylim(low - room, high + room)
+
+
+@styled
+def plot_clouds(
+    x: FloatArray,
+    before: FloatArray,
+    after: FloatArray | None,
+    x_label: str,
+    y_label: str,
+    ax: Axes | None = None,
+) -> Axes:
+    """What is left over something of the motion: every sample, and the running median.
+
+    Args:
+        x: (m,) in the label's unit.
+        before: (m,) left by the baseline.
+        after: (m,) left by the extended model, or None.
+        x_label: with its unit.
+        y_label: with its unit.
+        ax: where to draw.
+    """
+    ax = axes_or_new(ax)
+    step = max(1, x.size // _MOST_DOTS)
+    bins = bins_of(x, _FINE_BINS)
+    for values, style, label in ((before, BEFORE, "before"), (after, AFTER, "after")):
+        if values is None:
+            continue
+        ax.plot(x[::step], values[::step], ".", color=style["color"], markersize=2.0, alpha=0.3)
+        ax.plot([np.median(x[k]) for k in bins], [np.median(values[k]) for k in bins],
+                label=label if after is not None else "median", linewidth=1.8, **style)  # fmt: skip
+    _frame_most(ax, before)
+    ax.set(xlabel=x_label, ylabel=y_label)
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+    return ax
+
+
+@styled
+def plot_orders(
+    orders: FloatArray,
+    before: FloatArray,
+    after: FloatArray,
+    found: Sequence[float],
+    ax: Axes | None = None,
+    *,
+    geared: bool = True,
+) -> Axes:
+    """A residual's power over its neighbourhood's, by the order; 1 is noise.
+
+    Args:
+        orders: (k,) cycles a turn.
+        before: (k,).
+        after: (k,).
+        found: orders of the ripples that were found.
+        ax: where to draw.
+        geared: whether turns are the motor's.
+    """
+    ax = axes_or_new(ax)
+    # Of every few lines the highest, so that none of the narrow ones is lost.
+    step = max(1, orders.size // _PLOTTED)
+    rows = np.arange(orders.size // step) * step
+    for values, style, label in ((before, BEFORE, "before"), (after, AFTER, "after")):
+        parts = values[: rows.size * step].reshape(rows.size, step)
+        ax.plot(orders[rows + parts.argmax(axis=1)], np.maximum(parts.max(axis=1), 0.3),
+                label=label, linewidth=1.0, color=style["color"])  # fmt: skip
+    ax.axhline(1.0, color=MUTED, linewidth=1.2, label="noise")
+    ax.set_yscale("log")
+    high = float(before.max())
+    ax.set_ylim(0.5, 4.0 * high)
+    ax.set_xlim(0.0, float(orders[-1]))
+    for order in found:
+        top = before[np.abs(orders - order) <= 0.1].max(initial=0.0) or 1.0
+        ax.annotate(f"{order:.4g}", (order, top), xytext=(0, 3),
+                    textcoords="offset points", ha="center", fontsize=8, color=INK)  # fmt: skip
+    plain_numbers(ax.yaxis, 0.5, 4.0 * high)
+    ax.set(xlabel=f"cycles a turn of the {'motor' if geared else 'joint'}",
+           ylabel="power / its neighbourhood's")  # fmt: skip
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     return ax

@@ -1,26 +1,320 @@
-"""From a diagnosis of percussion records to one self-contained HTML file."""
+"""From a diagnosis to one self-contained HTML file: of percussion records, motion, or both."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 
 from picchio.core.provenance import provenance
+from picchio.diagnosis.motion.conclude.during_blows import BlowEffects, MotionLife
+from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 from picchio.diagnosis.percussion.follow_up.plan import when
-from picchio.diagnosis.result import Cause, Diagnosis
+from picchio.diagnosis.result import Cause, Diagnosis, Value, differences, in_words
 from picchio.model.effects.registry import catalogue
+from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import format_count
 from picchio.visuals.plots.diagnosis import place_in_words
 from picchio.visuals.plots.style import direction_label
-from picchio.visuals.report.diagnosis_figures import DiagnosisFigures
-from picchio.visuals.report.headline import headline
-from picchio.visuals.report.page import number, percent, render, spread, words
+from picchio.visuals.report.motion_figures import MotionFigures
+from picchio.visuals.report.page import number, percent, render, signed, spread, words
+from picchio.visuals.report.percussion_figures import PercussionFigures
+from picchio.visuals.scene.diagnosed import diagnosis_scene
+
+_DASH = "\N{EN DASH}"
+_TONE = {"nothing-wrong": "good", "unexplained": "bad", "partial": "bad"}
+
+
+def diagnosis_page(
+    found: Diagnosis,
+    *,
+    command: str | None = None,
+    warnings: Sequence[str] = (),
+    folder: Path | None = None,
+    scene: bool = True,
+) -> str:
+    """What the simulation gets wrong, why, and what is gained, as a page to read and print.
+
+    The page needs nothing from outside, follows the reader's light or dark theme, and escapes
+    every name.
+
+    Args:
+        found: of `picchio.diagnose`.
+        command: the command line that gave this, to reproduce it.
+        warnings: what was warned of on the way, a sentence each.
+        folder: where the extended model will stand; paths in it are relative to that.
+        scene: whether the causes of percussion records are shown in 3-D, which adds about 1 MB.
+
+    Returns:
+        the HTML.
+
+    Raises:
+        InputError: a diagnosis without what led to it.
+    """
+    text = found.model_text(folder)
+    details = found.details
+    told = list(dict.fromkeys(warnings))
+
+    def drawn(template: str, of: Diagnosis, robot: FlexibleRobot, content: dict[str, Any]) -> str:
+        gain = of.gain
+        return render(
+            template,
+            robot=robot.name,
+            d=of,
+            headline=headline(of),
+            tone=_TONE.get(of.verdict, ""),
+            claimed=bool(of.causes),
+            held_out=gain is not None and gain.held_out_records not in ((), gain.train_records),
+            leads=[f"{words(effect)}, {target}" for effect, target in of.leads],
+            command=command
+            or f"picchio diagnose {robot.name} --data {details['folder'] or 'CAMPAIGN'}",
+            folder=details["folder"] or "in memory",
+            provenance=found.extra.get("provenance") or provenance([]),
+            **content,
+        )
+
+    hits: PercussionDiagnosis | None = details.get("percussion")
+    moves: Diagnosis | None = details.get("motion")
+    page = {"layout": "page.html.j2", "warnings": told, "model_toml": text}
+    of_moves = ""
+    if moves is not None:
+        system = moves.details["systems"]["train"]
+        shown = _motion(moves, system, details["motion_life"], details["during_blows"])
+        if hits is not None:
+            shown |= {"layout": "part.html.j2", "level": 3, "at": "motion-", "model_toml": ""}
+        else:
+            shown |= page | ({} if found.causes else {"model_toml": ""})
+        of_moves = drawn("motion.html.j2", moves, system.robot, shown)
+    if hits is None:
+        return of_moves
+    # Candidates are shown by each kind's own search.
+    hits = replace(hits, diagnosis=replace(found, scores=hits.diagnosis.scores))
+    shown = page | _percussion(hits, moves is not None)
+    shown |= {"moves": Markup(of_moves), "scene": diagnosis_scene(hits).html() if scene else None}
+    return drawn("percussion.html.j2", hits.diagnosis, hits.problem.robot, shown)
+
+
+def _percussion(found: PercussionDiagnosis, also_motion: bool) -> dict[str, Any]:
+    """What only the page of percussion records shows."""
+    diagnosis, problem = found.diagnosis, found.problem
+    figures = PercussionFigures(found)
+    poses = f"{problem.n_poses} pose{'s' if problem.n_poses != 1 else ''}"
+    others = " and of motion records" if also_motion else ""
+    return {
+        "figures": figures,
+        "changed": figures.changed,
+        "taken": f"{len(problem.records)} percussion records at {poses}{others}",
+        "cards": [_card(problem.robot, cause) for cause in diagnosis.causes],
+        "before": found.before,
+        "after": found.after,
+        "nuisances": _nuisances(found),
+        "poses": _poses(found, figures.changed),
+        "tells_life": bool(diagnosis.life),
+        "life": _life_rows(diagnosis.life),
+        "life_joints": life_by_joint(diagnosis.life),
+        "life_sets": _life_by_set(diagnosis),
+        "ask": _ask(diagnosis),
+        "sets": [set_words(each) for each in diagnosis.alternatives],
+        "shared": _shared(diagnosis),
+        "channels": problem.groups,
+    }
+
+
+def _motion(
+    diagnosis: Diagnosis, system: System, life: MotionLife, carried: BlowEffects
+) -> dict[str, Any]:
+    """What only the page of motion records shows."""
+    figures = MotionFigures(diagnosis)
+    details = diagnosis.details
+    logs = {log.file for each in details["systems"].values() for log in each.logs}
+    return {
+        "figures": figures,
+        "changed": figures.changed,
+        "taken": f"{len(logs)} motion record{'s' if len(logs) != 1 else ''}",
+        "cards": _cards(diagnosis, system.robot),
+        "stiffness": [
+            f"{joint}: {number(told['ratio'], 3)} times the documented stiffness; with no delay in "
+            f"the model it would come out as {number(told['ratio_without_delay'], 3)} times."
+            for joint, told in details.get("stiffness", {}).items()
+        ],
+        "rows": _channels(diagnosis, figures.changed),
+        "cutoff": number(system.cutoff, 3),
+        "nuisances": [(_said(name), value_text(v)) for name, v in diagnosis.nuisances.items()],
+        "instruments": [
+            f"{words(s.effect)}, {s.target}, {words(s.parameter)}: {number(s.least_squares)} by "
+            f"least squares, {number(s.instrumental)} with the command as instrument"
+            for s in details.get("instruments", ()) if s.significant
+        ],
+        "tells_life": True,
+        "why": life.why,
+        "life": [(joint, *cells[4:], *cells[2:4]) for joint, *cells in life_by_joint(life.life)],
+        "blows": _blows(life),
+        "left_out": list({
+            (e.name, e.target): (f"{words(e.name)}, {e.target}", why) for e, why in carried.left
+        }.values()),
+        "sets": [in_words(each) for each in differences(diagnosis)],
+    }  # fmt: skip
+
+
+# The verdict in a sentence or two.
+
+_DETAILED = 3  # causes of one kind whose numbers a headline gives
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """The verdict in a sentence or two; many causes of a kind are counted."""
+    named = "; and ".join(_phrase(kind, causes) for kind, causes in by_kind(diagnosis).items())
+    gain = diagnosis.gain
+    effect = ""
+    if gain is not None and diagnosis.causes:
+        seen = "held out" if gain.held_out_records != gain.train_records else "fitted"
+        effect = (
+            f" On records {seen} the error falls from {percent(gain.baseline_nrmse)} % of the "
+            f"signal to {percent(gain.extended_nrmse)} %; noise alone leaves "
+            f"{percent(gain.noise_floor_nrmse)} %."
+        )
+    match diagnosis.verdict:
+        case "nothing-wrong":
+            return (
+                "Nothing wrong: within its stated tolerance the simulation leaves nothing but "
+                "noise."
+            )
+        case "named":
+            return f"What is wrong: {named}.{effect}"
+        case "ambiguous":
+            return (
+                f"What is wrong: {named}; or something that these data cannot tell from it.{effect}"
+            )
+        case "partial":
+            share = gain.explained if gain is not None else None
+            most = "most" if share is None else f"{percent(min(share, 1.0))} %"
+            return (
+                f"Part of what is wrong: {named}; or something that acts much like it. It explains "
+                f"{most} of the error; more than noise is left, and nothing known explains "
+                f"that.{effect}"
+            )
+    if diagnosis.note:
+        return f"The simulation is wrong. {diagnosis.note[:1].upper()}{diagnosis.note[1:]}."
+    lead = f" What helped stands below: {len(diagnosis.leads)} leads, no more."
+    return "The simulation is wrong, and no known cause explains most of it: none is claimed." + (
+        lead if len(diagnosis.leads) > 1 else ""
+    )
+
+
+def by_kind(diagnosis: Diagnosis) -> dict[str, list[Cause]]:
+    """Effect -> its causes."""
+    found: dict[str, list[Cause]] = {}
+    for cause in diagnosis.causes:
+        found.setdefault(cause.effect, []).append(cause)
+    return found
+
+
+def _phrase(kind: str, causes: Sequence[Cause]) -> str:
+    if len(causes) >= _DETAILED:
+        places = len({c.target for c in causes})
+        what = f"{words(kind)} in {places} joint{'s' if places > 1 else ''}"
+        return f"{what}, {len(causes)} harmonics" if catalogue()[kind].periodic else what
+    said = []
+    for cause in causes:
+        parts = ", ".join(f"{words(name)} {value_text(v)}" for name, v in _shown(cause).items())
+        where = "" if cause.target in ("robot", "tool") else f" of {cause.target}"
+        said.append(f"{words(kind)}{where}, {parts}" if parts else f"{words(kind)}{where}")
+    return "; ".join(said)
+
+
+def _shown(cause: Cause) -> dict[str, Value]:
+    """Without the two parts of a wave, whose amplitude is given."""
+    parts = dict(cause.parameters)
+    if "amplitude" in parts:
+        parts = {k: v for k, v in parts.items() if k not in ("cosine", "sine")}
+    return parts
+
+
+def value_text(v: Value) -> str:
+    """Value and standard deviation."""
+    # Delays are told in milliseconds.
+    if v.unit == "s":
+        return spread(1e3 * v.value, 1e3 * v.std, "ms")
+    return spread(v.value, v.std, v.unit)
+
+
+def set_words(pairs: Sequence[tuple[str, str]]) -> str:
+    """Causes as a phrase."""
+    return " and ".join(f"{words(effect)}, {target}" for effect, target in pairs)
+
+
+# The causes, each with its meaning: heads and rows of a table, and what stands above and below.
+
+
+def _card(robot: FlexibleRobot, cause: Cause) -> dict[str, Any]:
+    """One cause, a row a parameter."""
+    kind = catalogue()[cause.effect]
+    meanings = {p.name: p.meaning for p in kind.parameters}
+    place = place_in_words(robot, cause.effect, cause.target)
+    return {
+        "title": f"{words(cause.effect)}, {cause.target}",
+        "lines": [f"{_start(kind.meaning)}.",
+                  f"It sits {place}. Confidence {_confidence(cause)}\N{NO-BREAK SPACE}%."],
+        "heads": [],
+        "rows": [(words(name), value_text(v), meanings.get(name, ""))
+                 for name, v in _shown(cause).items()],
+        "source": kind.source,
+    }  # fmt: skip
+
+
+_DERIVED = {"amplitude": "of the wave", "stiffness": "of the joint"}
+
+
+def _cards(diagnosis: Diagnosis, robot: FlexibleRobot) -> list[dict[str, Any]]:
+    """All causes of a kind together, a row a place."""
+    made = []
+    for name, causes in by_kind(diagnosis).items():
+        kind = catalogue()[name]
+        meaning = f"{_start(kind.motion_meaning or kind.meaning)}."
+        if len(causes) == 1:
+            meaning += f" It sits {place_in_words(robot, name, causes[0].target)}."
+        columns = list(dict.fromkeys(key for cause in causes for key in _shown(cause)))
+        meanings = _DERIVED | {p.name: p.meaning for p in kind.parameters}
+        made.append({
+            "title": words(name),
+            "lines": [meaning],
+            "heads": ["", *(f"{words(key)}|{meanings.get(key, '')}" for key in columns),
+                      "confidence|%"],
+            "rows": [
+                (cause.target,
+                 *(value_text(cause.parameters[key]) if key in cause.parameters else _DASH
+                   for key in columns),
+                 _confidence(cause))
+                for cause in sorted(causes, key=_place)
+            ],
+            "source": kind.source,
+        })  # fmt: skip
+    return made
+
+
+def _confidence(cause: Cause) -> str:
+    return "over 99.9" if cause.confidence > 0.999 else percent(cause.confidence)
+
+
+def _place(cause: Cause) -> tuple[str, float]:
+    order = cause.parameters.get("order")
+    return cause.target, order.value if order is not None else 0.0
+
+
+def _start(text: str) -> str:
+    """With a capital, and names as they are."""
+    return text[:1].upper() + text[1:]
+
+
+def _said(name: str) -> str:
+    what, _, where = name.partition(".")
+    return f"{words(what)} of {where}" if where else words(what)
+
 
 # The life that a diagnosis tells, as rows of a report's tables.
 
@@ -34,7 +328,7 @@ _LIFE = {
 }
 
 
-def life_rows(life: Mapping[str, Any] | None) -> list[tuple[str, str, str]]:
+def _life_rows(life: Mapping[str, Any] | None) -> list[tuple[str, str, str]]:
     """Quantity, before, after."""
     if not life:
         return []
@@ -56,12 +350,11 @@ def _open(side: Mapping[str, Any], key: str) -> bool:
     return bool(low != high)
 
 
-def life_by_set(
-    life: Mapping[str, Any] | None, diagnosis: Diagnosis
-) -> list[tuple[str, str, str, str]]:
+def _life_by_set(diagnosis: Diagnosis) -> list[tuple[str, str, str, str]]:
     """Every set of causes that the data cannot tell apart: causes, rivets, utilisation, joint."""
-    others = (life or {}).get("alternatives") or ()
-    if not life or not others:
+    life = diagnosis.life or {}
+    others = life.get("alternatives")
+    if not others:
         return []
     claimed = tuple((cause.effect, cause.target) for cause in diagnosis.causes)
     sets = [
@@ -71,44 +364,46 @@ def life_by_set(
     return [
         (
             set_words(pairs),
-            _life_cell("rivets_to_failure", side.get("why", side.get("rivets_to_failure")), True),
+            _life_cell("rivets_to_failure", side.get("why", side.get("rivets_to_failure"))),
             _life_cell("utilisation", side.get("utilisation"), "why" not in side),
-            str(side.get("limiting_joint") or "\N{EN DASH}"),
+            str(side.get("limiting_joint") or _DASH),
         )
         for pairs, side in sets
     ]
 
 
-def life_by_joint(life: Mapping[str, Any] | None) -> list[tuple[str, list[tuple[str, str]]]]:
+def life_by_joint(life: Mapping[str, Any] | None) -> list[tuple[str, ...]]:
     """Joint; peak deflection, utilisation, rivets, each before and after, with its interval."""
-    if not life:
-        return []
     before, after = (
-        (life.get(side) or {}).get("joints") or {} for side in ("baseline", "extended")
+        ((life or {}).get(side) or {}).get("joints") or {} for side in ("baseline", "extended")
     )
     rows = []
     for joint in before:
-        cells: list[tuple[str, str]] = []
+        cells: list[str] = []
         for key in ("peak_deflection", "utilisation", "rivets_to_failure"):
             for side in (before[joint], after.get(joint, {})):
                 value = side.get(key)
                 if key == "peak_deflection":
-                    cells.append((number(None if value is None else 1e3 * value), ""))
+                    cells.append(number(None if value is None else 1e3 * value))
                     continue
+                cell = _life_cell(key, value, key in side)
                 span = "rivets_interval" if "rivets" in key else f"{key}_interval"
-                told = _life_cell(span, side[span], True) if _open(side, span) else ""
-                cells.append((_life_cell(key, value, key in side), told))
-        rows.append((joint, cells))
+                if _open(side, span):
+                    cell = Markup('{}<span class="span">{}</span>').format(
+                        cell, _life_cell(span, side[span])
+                    )
+                cells.append(cell)
+        rows.append((joint, *cells))
     return rows
 
 
-def _life_cell(key: str, value: Any, given: bool) -> str:
+def _life_cell(key: str, value: Any, given: bool = True) -> str:
     if not given:
-        return "\N{EN DASH}"
+        return _DASH
     if value is None:
-        return "no end" if "rivets" in key else "\N{EN DASH}"
+        return "no end" if "rivets" in key else _DASH
     if isinstance(value, (list, tuple)):
-        return " to ".join(_life_cell(key, part, True) for part in value)
+        return " to ".join(_life_cell(key, part) for part in value)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return str(value)
     if "rivets" in key:
@@ -116,142 +411,17 @@ def _life_cell(key: str, value: Any, given: bool) -> str:
     return percent(value) if key.startswith("utilisation") else number(float(value))
 
 
-def set_words(pairs: Sequence[tuple[str, str]]) -> str:
-    """Causes as a phrase."""
-    return " and ".join(f"{words(effect)}, {target}" for effect, target in pairs)
+def _blows(life: MotionLife) -> list[tuple[str, str, str, str]]:
+    """Joint; peak deflection before and after, and the change in per cent."""
+    after = life.blows.get("extended", {})
+    return [
+        (name, number(1e3 * was), number(1e3 * after[name]),
+         signed(100.0 * (after[name] / was - 1.0), 1) if was > 0.0 and np.isfinite(was) else _DASH)
+        for name, was in life.blows.get("baseline", {}).items()
+    ]  # fmt: skip
 
 
-def diagnosis_page(
-    found: Diagnosis,
-    *,
-    command: str | None = None,
-    warnings: Sequence[str] = (),
-    folder: Path | None = None,
-) -> str:
-    """The page of `picchio.diagnose`'s answer, whichever records it is of.
-
-    Args:
-        found: the answer.
-        command: the command line that gave this, to reproduce it.
-        warnings: what was warned of on the way.
-        folder: where the extended model will stand; paths in it are relative to that.
-
-    Raises:
-        InputError: a diagnosis without what led to it.
-    """
-    from picchio.visuals.report.motion_diagnosis import motion_diagnosis_report
-    from picchio.visuals.scene.diagnosed import diagnosis_scene
-
-    text = found.model_text(folder)
-    details = found.details
-    moves = ""
-    if "motion" in details:
-        moves = motion_diagnosis_report(
-            details["motion"],
-            life=details["motion_life"],
-            carried=details["during_blows"],
-            model_toml=text if found.causes and "percussion" not in details else "",
-            command=command,
-            folder=found.details["folder"],
-            warnings=warnings if "percussion" not in details else (),
-        )
-    if "percussion" not in details:
-        return moves
-    own = details["percussion"]
-    # Candidates are shown by each kind's own search.
-    hits = replace(own, diagnosis=replace(found, scores=own.diagnosis.scores))
-    return diagnosis_report(
-        hits,
-        model_toml=text,
-        command=command,
-        life=found.life,
-        warnings=warnings,
-        scene=diagnosis_scene(hits).html(),
-        moves=_section_of(moves),
-    )
-
-
-def _section_of(page: str) -> str:
-    """A page's main part, to stand in another page: its headings one level lower, ids its own."""
-    if not page:
-        return ""
-    main = page.partition("<main>")[2].rpartition("</main>")[0]
-    main = re.sub(r"<(/?)h3\b", r"<\1h4", main)
-    main = re.sub(r"<(/?)h2\b", r"<\1h3", main)
-    main = re.sub(r'\b(id|aria-labelledby)="', r'\1="motion-', main)
-    return re.sub(r'href="#', 'href="#motion-', main)
-
-
-def diagnosis_report(
-    found: PercussionDiagnosis,
-    *,
-    model_toml: str = "",
-    command: str | None = None,
-    life: Mapping[str, Any] | None = None,
-    warnings: Sequence[str] = (),
-    scene: str | None = None,
-    moves: str = "",
-) -> str:
-    """What the simulation gets wrong, why, and what is gained, as a page to read and print.
-
-    The page needs nothing from outside, follows the reader's light or dark theme, and escapes
-    every name.
-
-    Args:
-        found: with all that led to the answer.
-        model_toml: the extended model as a `picchio-model/1` file.
-        command: the command line that gave this, to reproduce it.
-        life: {"baseline": {...}, "extended": {...}} as in the JSON; the diagnosis's own if None.
-        warnings: what was warned of on the way, a sentence each.
-        scene: HTML of `picchio.visuals.scene.diagnosis_scene`, to be shown in the report; it adds
-            its own size.
-        moves: HTML of what the motion records of the same campaign say.
-
-    Returns:
-        the HTML.
-    """
-    diagnosis, problem = found.diagnosis, found.problem
-    figures = DiagnosisFigures(found)
-    campaign = problem.campaign
-    name = problem.robot.name
-    return render(
-        "diagnosis.html.j2",
-        robot=name,
-        d=diagnosis,
-        headline=headline(diagnosis),
-        tone={"nothing-wrong": "good", "unexplained": "bad", "partial": "bad"}.get(
-            diagnosis.verdict, ""
-        ),
-        causes=[_card(found, cause) for cause in diagnosis.causes],
-        figures=figures,
-        changed=figures.changed,
-        claimed=bool(diagnosis.causes),
-        nuisances=_nuisances(found),
-        poses=_poses(found),
-        life=life_rows(life if life is not None else diagnosis.life),
-        life_joints=life_by_joint(life if life is not None else diagnosis.life),
-        life_others=life_by_set(life if life is not None else diagnosis.life, diagnosis),
-        interval_level=((life if life is not None else diagnosis.life) or {}).get("interval_level"),
-        ask=_ask(diagnosis),
-        plan=(diagnosis.next_measurement or {}).get("plan"),
-        sets=[set_words(each) for each in diagnosis.alternatives],
-        leads=[f"{words(effect)}, {target}" for effect, target in diagnosis.leads],
-        warnings=list(dict.fromkeys(warnings)),
-        model_toml=model_toml,
-        scene=scene,
-        moves=Markup(moves),
-        shared=_shared(diagnosis),
-        kinds=diagnosis.kinds,
-        command=command or f"picchio diagnose {name} --data {campaign.folder or 'CAMPAIGN'}",
-        folder="in memory" if campaign.folder is None else campaign.folder.name,
-        records=len(problem.records),
-        n_poses=problem.n_poses,
-        groups=problem.groups,
-        provenance=provenance(
-            [] if campaign.folder is None else [campaign.folder / "campaign.toml"]
-        ),
-    )
-
+# What the two kinds of records say of a cause.
 
 _AGREEMENT = {
     "both": "both kinds of records agree",
@@ -267,10 +437,10 @@ def _shared(diagnosis: Diagnosis) -> list[tuple[str, str, str, str]]:
 
     def values(told: Mapping[str, Any] | None) -> str:
         shown = [
-            f"{words(name)} {spread(v['value'], v['std'], v['unit'])}"
+            f"{words(name)} {value_text(Value(**v))}"
             for name, v in (told or {}).items() if v["std"] > 0.0
         ]  # fmt: skip
-        return ", ".join(shown) or "\N{EN DASH}"
+        return ", ".join(shown) or _DASH
 
     return [
         (f"{words(each['effect'])}, {each['target']}", values(each["percussion"]),
@@ -279,34 +449,7 @@ def _shared(diagnosis: Diagnosis) -> list[tuple[str, str, str, str]]:
     ]  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Card:
-    """A cause for people."""
-
-    title: str
-    place: str
-    meaning: str
-    confidence: str
-    rows: list[tuple[str, str, str]]
-    source: str
-
-
-def _card(found: PercussionDiagnosis, cause: Cause) -> _Card:
-    kind = catalogue().get(cause.effect)
-    meanings = {p.name: p.meaning for p in kind.parameters} if kind is not None else {}
-    rows = [
-        (words(name), spread(v.value, v.std, v.unit), meanings.get(name, ""))
-        for name, v in cause.parameters.items()
-    ]
-    meaning = kind.meaning if kind is not None else ""
-    return _Card(
-        f"{words(cause.effect)}, {cause.target}",
-        place_in_words(found.problem.robot, cause.effect, cause.target),
-        f"{meaning[:1].upper()}{meaning[1:]}.",
-        "over 99.9" if cause.confidence > 0.999 else percent(cause.confidence),
-        rows,
-        kind.source if kind is not None else "",
-    )
+# What was fitted, and what is left.
 
 
 def _nuisances(found: PercussionDiagnosis) -> list[tuple[str, str, str, str]]:
@@ -322,29 +465,34 @@ def _nuisances(found: PercussionDiagnosis) -> list[tuple[str, str, str, str]]:
             continue
         change = 100.0 * (next(iter(effect.values.values())) - 1.0)
         tolerance = 200.0 * getattr(hypothesis.tolerance, key)
-        rows.append(
-            (
-                name.replace("_", " ", 1)
-                if key != "stiffness"
-                else f"stiffness of {effect.target}",
-                spread(value.value, value.std, value.unit),
-                f"{change:+.2f} %".replace("-", "\N{MINUS SIGN}"),
-                f"± {tolerance:g} %",
-            )
-        )
+        said = f"stiffness of {effect.target}" if key == "stiffness" else name.replace("_", " ", 1)
+        rows.append((said, value_text(value), f"{signed(change, 2)} %", f"± {tolerance:g} %"))
     return rows
 
 
-def _poses(found: PercussionDiagnosis) -> list[tuple[str, str, str, str]]:
-    """Group, pose, power before and after."""
-    after = {(level.group, level.part): level for level in found.after.poses}
+def _poses(found: PercussionDiagnosis, changed: bool) -> list[tuple[str, ...]]:
+    """Group, pose, power before and, if it is another model, after."""
+    after = {(level.group, level.part): number(level.power, 3) for level in found.after.poses}
+    return [
+        (level.group, level.part, number(level.power, 3),
+         *([after.get((level.group, level.part), _DASH)] if changed else []))
+        for level in found.before.poses
+    ]  # fmt: skip
+
+
+def _channels(diagnosis: Diagnosis, changed: bool) -> list[tuple[str, ...]]:
+    """Record, channel, and RMS: measured, before, after if it is another model, noise."""
+    names = ("measured", "baseline", "extended", "noise")
+    keys = [key for key in names if changed or key != "extended"]
     rows = []
-    for level in found.before.poses:
-        then = after.get((level.group, level.part))
-        rows.append(
-            (level.group, level.part, number(level.power, 3),
-             number(then.power if then is not None else None, 3))
-        )  # fmt: skip
+    for row in diagnosis.details["held_out"]:
+        kind, _, joint = row["channel"].partition(".")
+        if kind == "ripple":
+            continue
+        scale = 1e3 if kind == "windup" else 1.0
+        cells = [number(scale * row[key], 4 if scale * row[key] >= 1e3 else 3) for key in keys]
+        name = f"torque, {joint}" if kind == "torque" else f"link less motor, {joint} (mrad, mm)"
+        rows.append((row["record"], name, *cells))
     return rows
 
 

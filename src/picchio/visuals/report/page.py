@@ -29,7 +29,7 @@ _ID = re.compile(r'\bid="([^"]+)"')
 _REFERENCE = re.compile(r"(?P<before>xlink:href=\"#|url\(#)(?P<id>[^\")]+)")
 
 
-def inline_svg(ax: Axes, alt: str, name: str) -> Markup:
+def inline_svg(ax: Axes, alt: str, name: str, *, themed: bool = False) -> Markup:
     """The figure of some Axes as an `<svg>` element.
 
     Text and axes get the page's own colours (`currentColor`, `--muted`), so that a dark page
@@ -39,6 +39,7 @@ def inline_svg(ax: Axes, alt: str, name: str) -> Markup:
         ax: of a figure that is drawn whole.
         alt: what the figure shows, in words; escaped here.
         name: unique on the page, letters and digits.
+        themed: blue and vermilion, too, become the page's own, which differ by theme.
     """
     stream = io.StringIO()
     with mpl.rc_context({**cast(Any, STYLE), "svg.fonttype": "path"}):
@@ -58,6 +59,8 @@ def inline_svg(ax: Axes, alt: str, name: str) -> Markup:
     body = _REFERENCE.sub(rf"\g<before>{name}-\g<id>", body)
     body = body.replace("xlink:href", "href")
     body = body.replace(INK, "currentColor").replace(MUTED, "var(--muted)")
+    if themed:
+        body = body.replace(BLUE, "var(--accent)").replace(VERMILION, "var(--bad)")
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{found["box"]}" role="img" '
         f'aria-label="{escape(alt)}">'
@@ -70,7 +73,8 @@ def render(template: str, **content: Any) -> str:
 
     Args:
         template: its file's name.
-        **content: what the template names; style sheet and version are given.
+        **content: what the template names, but for style sheet and version; what most pages leave
+            empty (a scene, headings below another's) may be left out.
     """
     from jinja2 import BaseLoader, Environment, StrictUndefined
 
@@ -87,17 +91,38 @@ def render(template: str, **content: Any) -> str:
         lstrip_blocks=True,
         loader=Folder(),
     )
-    environment.filters.update(number=number, percent=percent, spread=spread, words=words)
-    style = Markup((folder / "style.css").read_text("utf-8"))
-    return environment.get_template(template).render(
-        style=style, version=package_version(), **content
-    )
+    environment.filters.update(number=number, percent=percent)
+    # What most pages leave empty.
+    nothing = ("at", "tone", "scene", "moves", "ask", "stiffness", "channels", "warnings")
+    environment.globals.update(dict.fromkeys(nothing, ""), level=2, version=package_version())
+    environment.globals["style"] = Markup((folder / "style.css").read_text("utf-8"))
+    return environment.get_template(template).render(**content)
 
 
-def themed_svg(ax: Axes, alt: str, name: str) -> Markup:
-    """As `inline_svg`; blue and vermilion, too, become the page's own, which differ by theme."""
-    drawn = str(inline_svg(ax, alt, name))
-    return Markup(drawn.replace(BLUE, "var(--accent)").replace(VERMILION, "var(--bad)"))
+@dataclass(frozen=True)
+class Picture:
+    """An inline SVG and what is written under it."""
+
+    svg: Markup
+    caption: str
+
+
+class Pictures:
+    """Draws the pictures of a page.
+
+    Attributes:
+        PREFIX: a letter that no other pictures of the page have; their ids begin with it.
+    """
+
+    PREFIX = "p"
+
+    def __init__(self) -> None:
+        self._made = 0
+
+    def picture(self, ax: Axes, alt: str, caption: str) -> Picture:
+        """The figure of some Axes with its alt text and caption."""
+        self._made += 1
+        return Picture(inline_svg(ax, alt, f"{self.PREFIX}{self._made}", themed=True), caption)
 
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -116,6 +141,11 @@ def number(value: float | None, digits: int = 4) -> str:
     sign = "-" if power.startswith("\N{MINUS SIGN}") else ""
     exponent = f"{sign}{int(power.lstrip('+' + chr(0x2212)))}"
     return f"{mantissa} × 10{exponent.translate(_RAISED)}"
+
+
+def signed(value: float, places: int) -> str:
+    """A change, with its sign."""
+    return f"{value:+.{places}f}".replace("-", "\N{MINUS SIGN}")
 
 
 def percent(value: float | None, digits: int = 3) -> str:
@@ -206,7 +236,7 @@ def plain_page(result: Result, *, command: str | None = None, warnings: Sequence
     """The page of a result that has none of its own: what a notebook shows, and its inputs."""
     return render(
         "plain.html.j2",
-        title=result._headline(),
+        headline=result._headline(),
         body=Markup(result._repr_html_()),
         command=command,
         warnings=warnings,

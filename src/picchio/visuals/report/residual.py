@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
-from picchio.campaign.campaign import Campaign
 from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
+from picchio.diagnosis.motion.residual import motion_residual
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.residual import Spectra, percussion_residual
+from picchio.diagnosis.percussion.residual import PercussionResidual, percussion_residual
 from picchio.measurement.quality.report import QualityReport
-from picchio.prediction.residual import ChannelResidual, Together, growth_with_level, together
-from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.prediction.residual import ChannelResidual, growth_with_level, together
 from picchio.visuals.plots.style import direction_label
-from picchio.visuals.report.page import number, percent, render
-from picchio.visuals.report.residual_figures import ResidualFigures
+from picchio.visuals.report.motion_figures import MotionResidualFigures
+from picchio.visuals.report.page import number, percent, render, signed, words
+from picchio.visuals.report.percussion_figures import ResidualFigures
 
+_DASH = "\N{EN DASH}"
 # Standard error of the power above which it tells nothing.
 _UNSURE = 0.3
+# Findings of a check that the page tells.
+_MOST_FINDINGS = 12
 
 
 def check_page(
@@ -28,37 +32,15 @@ def check_page(
     warnings: Sequence[str] = (),
     gravity_stiffness: bool = True,
 ) -> str:
-    """The page of `residual_report` for the campaign and the robot of a check.
-
-    Raises:
-        InputError: as `residual_report`; the check had no robot.
-    """
-    if found.robot is None:
-        raise InputError("needs a robot", key="report", hint="name one with --robot")
-    return residual_report(found.robot, found.campaign, quality=found, command=command,
-                           warnings=warnings, gravity_stiffness=gravity_stiffness)  # fmt: skip
-
-
-def residual_report(
-    robot: FlexibleRobot,
-    campaign: Campaign,
-    *,
-    quality: QualityReport | None = None,
-    command: str | None = None,
-    warnings: Sequence[str] = (),
-    gravity_stiffness: bool = True,
-) -> str:
     """How the nominal simulation differs from a campaign's percussion records.
 
-    A campaign of motion records alone gets the page of `motion_report`.
-
-    Stiffness, damping and force are fitted within the campaign's tolerance first, so that what
-    is left is more than that. The page needs nothing from outside and escapes every name.
+    A campaign of motion records alone gets a page of those. What the tolerances allow is fitted
+    first, so that what is left is more than that: stiffness, damping and force of percussion
+    records; of motion records, which take a gear as rigid, each joint's torque and the friction
+    that the URDF states. The page needs nothing from outside and escapes every name.
 
     Args:
-        robot: as its files have it.
-        campaign: the records; beside percussion records those of motion are left out.
-        quality: what `picchio.check` saw; its errors and warnings are told on the page.
+        found: of `picchio.check` with a robot; its errors and warnings are told on the page.
         command: the command line that gave this.
         warnings: what was warned of on the way.
         gravity_stiffness: whether gravity's change with the deflection counts.
@@ -67,60 +49,94 @@ def residual_report(
         the HTML.
 
     Raises:
-        InputError: no record that can be predicted for this robot.
+        InputError: the check had no robot; no record that can be predicted for this one.
     """
-    told = list(dict.fromkeys([*warnings, *_findings(quality)]))
-    if not any(record.kind == "percussion" for record in campaign.records):
-        from picchio.visuals.report.residual_motion import motion_report
-
-        return motion_report(robot, campaign, command=command, warnings=told)
-    left = percussion_residual(robot, campaign, gravity_stiffness=gravity_stiffness)
-    evidence, parts, problem = left.evidence, left.parts, left.problem
-    whole = together(parts)
-    figures = ResidualFigures(left)
-    others = sum(record.kind == "motion" for record in campaign.records)
-    if others:
-        told.append(f"{others} motion records are not on this page; picchio diagnose uses both.")
+    robot, campaign = found.robot, found.campaign
+    if robot is None:
+        raise InputError("needs a robot", key="report", hint="name one with --robot")
+    serious = [f for f in found.findings if f.severity in ("error", "warning")]
+    told = [*warnings, *(f"{f}." for f in serious[:_MOST_FINDINGS])]
+    kinds = [record.kind for record in campaign.records]
+    if "percussion" in kinds:
+        template = "residual.html.j2"
+        shown = _percussion(
+            percussion_residual(robot, campaign, gravity_stiffness=gravity_stiffness)
+        )
+        if others := kinds.count("motion"):
+            more = "motion records are not on this page; picchio diagnose uses both."
+            told.append(f"{others} {more}")
+    else:
+        template = "residual_motion.html.j2"
+        shown = _motion(MotionResidualFigures(motion_residual(robot, campaign)))
+    folder = campaign.folder
     return render(
-        "residual.html.j2",
+        template,
         robot=robot.name,
-        headline=_headline(whole, evidence, parts, left.spectra),
-        tone="good" if evidence.is_noise else "bad",
-        whole=whole,
-        figures=figures,
-        groups=[(g, together([p for p in parts if p.group == g])) for g in figures.groups],
-        scaling=_scaling(parts, evidence),
-        rows=_rows(parts),
-        fitted=_fitted(left.fit.hypothesis),
-        warnings=told,
-        records=len(problem.records),
-        n_poses=problem.n_poses,
-        folder="in memory" if campaign.folder is None else campaign.folder.name,
+        warnings=list(dict.fromkeys(told)),
+        folder="in memory" if folder is None else folder.name,
         command=command
-        or f"picchio check {campaign.folder or 'CAMPAIGN'} --robot {robot.name} --report OUT.html",
+        or f"picchio check {folder or 'CAMPAIGN'} --robot {robot.name} --report OUT.html",
         provenance=provenance(
-            [
-                *robot.files,
-                *([] if campaign.folder is None else [campaign.folder / "campaign.toml"]),
-            ]
+            [*robot.files, *([] if folder is None else [folder / "campaign.toml"])]
         ),
+        **shown,
     )
 
 
-def _headline(
-    whole: Together, evidence: Evidence, parts: Sequence[ChannelResidual], found: Spectra
-) -> str:
-    share = f"{percent(whole.nrmse)} % of the signal; noise alone would leave "
-    share += f"{percent(whole.floor)} %."
-    if evidence.is_noise:
-        return f"The simulation leaves {share} Nothing stands out of the noise."
-    worst = max(parts, key=lambda p: p.times)
-    _, frequency, _ = found.worst
-    return (
-        f"The simulation leaves {share} It shows most in {worst.channel} "
-        f"({number(worst.times, 3)} times its noise in {worst.record}) and near "
-        f"{number(frequency, 3)} Hz."
+def _percussion(left: PercussionResidual) -> dict[str, Any]:
+    """What the page of percussion records shows."""
+    figures = ResidualFigures(left)
+    parts, whole = left.parts, together(left.parts)
+    headline = (
+        f"The simulation leaves {percent(whole.nrmse)} % of the signal; noise alone would leave "
+        f"{percent(whole.floor)} %. "
     )
+    if left.evidence.is_noise:
+        headline += "Nothing stands out of the noise."
+    else:
+        worst = max(parts, key=lambda p: p.times)
+        headline += (
+            f"It shows most in {worst.channel} ({number(worst.times, 3)} times its noise in "
+            f"{worst.record}) and near {number(left.spectra.worst[1], 3)} Hz."
+        )
+    return {
+        "headline": headline,
+        "tone": "good" if left.evidence.is_noise else "bad",
+        "whole": whole,
+        "figures": figures,
+        "groups": [(g, together([p for p in parts if p.group == g])) for g in figures.groups],
+        "scaling": _scaling(parts, left.evidence),
+        "rows": _rows(parts),
+        "fitted": _fitted(left.fit.hypothesis),
+        "records": len(left.problem.records),
+        "n_poses": left.problem.n_poses,
+    }
+
+
+def _motion(figures: MotionResidualFigures) -> dict[str, Any]:
+    """What the page of motion records shows."""
+    groups = figures.left.groups
+    worst = max(groups, key=lambda g: g.left / max(g.noise, 1e-300))
+
+    def shown(value: float, unit: str) -> str:
+        scale, name = (1e3, f"m{unit}") if unit in ("rad", "m") else (1.0, unit.replace("*", " "))
+        return f"{number(scale * value, 3)} {name}"
+
+    return {
+        "headline": (
+            f"The simulation leaves {percent(worst.share)} % of the {worst.name}; noise alone "
+            f"would leave {percent(worst.noise / max(worst.measured, 1e-300))} %."
+        ),
+        "tone": "good" if all(g.left < 1.2 * g.noise for g in groups) else "bad",
+        "groups": [
+            (g.name, shown(g.measured, g.unit), shown(g.left, g.unit), percent(g.share),
+             shown(g.noise, g.unit), number(g.left / g.noise, 3) if g.noise else _DASH)
+            for g in groups
+        ],
+        "sections": [figures.section(g) for g in groups],
+        "cutoff": number(figures.left.system.cutoff, 3),
+        "records": len(figures.left.system.logs),
+    }  # fmt: skip
 
 
 def _scaling(parts: Sequence[ChannelResidual], evidence: Evidence) -> str:
@@ -139,9 +155,7 @@ def _scaling(parts: Sequence[ChannelResidual], evidence: Evidence) -> str:
         return text + ", too unsure to say whether it scales."
     if abs(power - 1.0) <= max(2.0 * error, 0.1):
         return text + ": it scales, as the error of a linear model does."
-    if power < 1.0:
-        return text + ": more slowly than the force."
-    return text + ": faster than the force."
+    return text + (": more slowly than the force." if power < 1.0 else ": faster than the force.")
 
 
 def _rows(parts: Sequence[ChannelResidual]) -> list[tuple[str, ...]]:
@@ -152,8 +166,8 @@ def _rows(parts: Sequence[ChannelResidual]) -> list[tuple[str, ...]]:
             f"{p.pose + 1}",
             direction_label(p.direction),
             number(p.level),
-            "\N{EN DASH}" if p.temperature is None else number(p.temperature, 3),
-            "\N{EN DASH}" if p.taken is None else p.taken.strftime("%Y-%m-%d %H:%M"),
+            number(p.temperature, 3),
+            _DASH if p.taken is None else p.taken.strftime("%Y-%m-%d %H:%M"),
             percent(p.nrmse),
             number(p.times, 3),
             percent(p.above_noise),
@@ -166,13 +180,6 @@ def _fitted(hypothesis: Hypothesis) -> list[tuple[str, str]]:
     rows = []
     for effect in hypothesis.effects[: hypothesis.n_nuisances]:
         change = 100.0 * (next(iter(effect.values.values())) - 1.0)
-        name = effect.name.replace("_", " ")
         target = "" if effect.target in ("robot", "tool") else f" of {effect.target}"
-        rows.append((f"{name}{target}", f"{change:+.2f} %".replace("-", "\N{MINUS SIGN}")))
+        rows.append((f"{words(effect.name)}{target}", f"{signed(change, 2)} %"))
     return rows
-
-
-def _findings(quality: QualityReport | None) -> list[str]:
-    if quality is None:
-        return []
-    return [f"{f}." for f in quality.findings if f.severity in ("error", "warning")][:12]
