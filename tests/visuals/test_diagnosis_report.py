@@ -31,7 +31,7 @@ from picchio.model.effects.registry import effect_class
 from picchio.robot.loading.load import load_robot
 from picchio.visuals.report.diagnosis import _ask, headline
 from picchio.visuals.report.page import number, spread
-from picchio.visuals.scene.diagnosed import diagnosis_scene
+from picchio.visuals.scene.build import diagnosis_scene
 
 OUTSIDE = re.compile(
     r"""(?:src|href|action|data)\s*=\s*["']\s*(?:https?:)?//|url\(\s*["']?https?:|@import"""

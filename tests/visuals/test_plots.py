@@ -17,8 +17,14 @@ from picchio.fatigue.counting.counter import rainflow
 from picchio.fatigue.sn.fit import fit_sn
 from picchio.fatigue.sn.test_table import SNTests
 from picchio.studies.envelopes import envelope as envelope_of
-from picchio.visuals import plots
-from picchio.visuals.plots.polar import cut_directions
+from picchio.visuals.plots.force import plot_force_spectrum, plot_force_train
+from picchio.visuals.plots.frequency import plot_frequency_response, plot_mode_shapes
+from picchio.visuals.plots.life import plot_damage, plot_life_spread, plot_utilisation
+from picchio.visuals.plots.polar import cut_directions, plot_polar_envelope
+from picchio.visuals.plots.response import plot_response
+from picchio.visuals.plots.sn import plot_sn_curve, plot_sn_fit
+from picchio.visuals.plots.stress import plot_counted_cycles, plot_stress_history
+from picchio.visuals.plots.workspace import plot_workspace_map
 
 BLOWS = PulseTrain(300.0, 0.040, 0.004, preload=20.0)
 
@@ -54,7 +60,7 @@ def drawn(ax) -> None:
 
 @pytest.mark.parametrize("kind", [PulseTrain, HalfSineTrain])
 def test_force_train_has_the_height_and_the_impulse_of_the_blows(kind) -> None:
-    ax = plots.plot_force_train(kind(300.0, 0.040, 0.004), hits=3)
+    ax = plot_force_train(kind(300.0, 0.040, 0.004), hits=3)
     time, force = line(ax, "blows")
     impulse = {PulseTrain: 1.0, HalfSineTrain: 2.0 / np.pi}[kind] * 300.0 * 0.004
     # 24 chords of a half-sine keep all but 0.2 % of its area.
@@ -65,7 +71,7 @@ def test_force_train_has_the_height_and_the_impulse_of_the_blows(kind) -> None:
 
 
 def test_spectrum_is_the_papers_fourier_series() -> None:
-    ax = plots.plot_force_spectrum(BLOWS, natural_frequencies=np.array([5.0, 9.0]))
+    ax = plot_force_spectrum(BLOWS, natural_frequencies=np.array([5.0, 9.0]))
     frequency, amplitude = line(ax, "harmonics")
     j = np.arange(1, len(frequency))
     np.testing.assert_allclose(frequency, np.arange(len(frequency)) * 25.0)
@@ -81,7 +87,7 @@ def test_spectrum_is_the_papers_fourier_series() -> None:
 def test_modes_are_those_of_the_eigenproblem(arm: SimpleNamespace) -> None:
     system = picchio.Model(arm.robot).linear_system(arm.worst.pose)
     _, shapes = scipy.linalg.eigh(np.diag(arm.robot.stiffness), system.mass_matrix)
-    ax = plots.plot_mode_shapes(arm.worst.modes)
+    ax = plot_mode_shapes(arm.worst.modes)
     heights = np.array([[bar.get_height() for bar in group] for group in ax.containers])
     expected = shapes / shapes[np.abs(shapes).argmax(axis=0), range(3)]
     np.testing.assert_allclose(heights, expected, atol=1e-9)
@@ -91,7 +97,7 @@ def test_modes_are_those_of_the_eigenproblem(arm: SimpleNamespace) -> None:
 def test_frequency_response_solves_the_equations_of_motion(arm: SimpleNamespace) -> None:
     system = picchio.Model(arm.robot).linear_system(arm.worst.pose)
     n = np.array([0.0, 0.6, 0.8])
-    ax = plots.plot_frequency_response(arm.worst.modes, n, excitation=BLOWS)
+    ax = plot_frequency_response(arm.worst.modes, n, excitation=BLOWS)
     for j, name in enumerate(arm.robot.flexible_names):
         frequency, gain = line(ax, name)
         for k in range(0, len(frequency), 97):
@@ -107,7 +113,7 @@ def test_frequency_response_solves_the_equations_of_motion(arm: SimpleNamespace)
 def test_response_line_and_peaks(arm: SimpleNamespace, which: str) -> None:
     response = getattr(arm.worst, which)
     n = np.array([0.6, 0.0, 0.8])
-    ax = plots.plot_response(response, n)
+    ax = plot_response(response, n)
     peaks = response.peaks(n)
     for j, name in enumerate(arm.robot.flexible_names):
         time, value = line(ax, name)
@@ -123,7 +129,7 @@ def test_response_line_and_peaks(arm: SimpleNamespace, which: str) -> None:
 
 def test_steady_band_is_the_steady_states_range(arm: SimpleNamespace) -> None:
     n = arm.worst.operation.direction
-    ax = plots.plot_response(arm.worst.rest, n, joints=["joint_2"], steady=arm.worst.steady)
+    ax = plot_response(arm.worst.rest, n, joints=["joint_2"], steady=arm.worst.steady)
     low, high = sorted(patch.get_y() + k * patch.get_height()
                        for patch in ax.patches if "steady" in patch.get_label()
                        for k in (0, 1))  # fmt: skip
@@ -133,7 +139,7 @@ def test_steady_band_is_the_steady_states_range(arm: SimpleNamespace) -> None:
 
 def test_response_refuses_an_unknown_joint(arm: SimpleNamespace) -> None:
     with pytest.raises(picchio.InputError, match=r"joint_9.*joint_1"):
-        plots.plot_response(arm.worst.rest, [0, 0, 1], joints=["joint_9"])
+        plot_response(arm.worst.rest, [0, 0, 1], joints=["joint_9"])
 
 
 def test_stress_and_cycles(arm: SimpleNamespace) -> None:
@@ -141,12 +147,12 @@ def test_stress_and_cycles(arm: SimpleNamespace) -> None:
     assert np.abs(stress).max() == pytest.approx(
         arm.assessment.joint(arm.worst.joint.name).peak_shear_stress
     )
-    ax = plots.plot_stress_history(time, stress, turning_points=(time, stress), joint="a$b")
+    ax = plot_stress_history(time, stress, turning_points=(time, stress), joint="a$b")
     np.testing.assert_allclose(line(ax, "stress of the vibration")[1], stress / 1e6)
     np.testing.assert_allclose(line(ax, "turning points")[1], stress / 1e6)
     drawn(ax)
     cycles = rainflow(stress)
-    ax = plots.plot_counted_cycles(cycles, allowable=260e6)
+    ax = plot_counted_cycles(cycles, allowable=260e6)
     values, edges, _ = next(patch.get_data() for patch in ax.patches if hasattr(patch, "get_data"))
     assert edges[-1] == pytest.approx(cycles.total)
     np.testing.assert_allclose(
@@ -154,13 +160,13 @@ def test_stress_and_cycles(arm: SimpleNamespace) -> None:
     )
     assert (np.diff(values) <= 0).all()
     drawn(ax)
-    drawn(plots.plot_counted_cycles(rainflow(np.zeros(3))))
+    drawn(plot_counted_cycles(rainflow(np.zeros(3))))
 
 
 def test_points_lie_on_the_sn_curve_or_at_its_right_edge() -> None:
     curve = picchio.load_sn_curve("42CrMo4-QT-shaft")
     above, below = 1.3 * curve.allowable, 0.4 * curve.allowable
-    ax = plots.plot_sn_curve(curve, amplitudes={"joint": [above, below, np.nan]})
+    ax = plot_sn_curve(curve, amplitudes={"joint": [above, below, np.nan]})
     life, amplitude = line(ax, "joint")
     np.testing.assert_allclose(amplitude, np.array([above, below]) / 1e6)
     assert curve.amplitude(life[0]) == pytest.approx(above)
@@ -172,34 +178,34 @@ def test_points_lie_on_the_sn_curve_or_at_its_right_edge() -> None:
 
 
 def test_utilisation_and_damage_are_the_assessments(arm: SimpleNamespace) -> None:
-    ax = plots.plot_utilisation(arm.assessment)
+    ax = plot_utilisation(arm.assessment)
     for bars, operation in zip(ax.containers, arm.assessment.operations, strict=True):
         widths = [bar.get_width() for bar in bars]
         np.testing.assert_allclose(widths, 100 * operation.utilisation.max(axis=0))
     drawn(ax)
-    told = [text.get_text() for text in plots.plot_damage(arm.assessment).texts]
+    told = [text.get_text() for text in plot_damage(arm.assessment).texts]
     assert any("no damage" in text for text in told)
     paper = picchio.assess(arm.robot, arm.task, method="paper")
-    ax = plots.plot_damage(paper)
+    ax = plot_damage(paper)
     total = np.sum([[bar.get_width() for bar in bars] for bars in ax.containers], axis=0)
     np.testing.assert_allclose(total, [joint.damage_per_rivet for joint in paper.joints])
     drawn(ax)
 
 
 def test_without_shafts_torques_are_shown_and_damage_says_why(ur10: SimpleNamespace) -> None:
-    ax = plots.plot_utilisation(ur10.assessment)
+    ax = plot_utilisation(ur10.assessment)
     assert "torque" in ax.get_xlabel()
     widths = [bar.get_width() for bar in ax.containers[0]]
     np.testing.assert_allclose(widths, [joint.peak_torque for joint in ur10.assessment.joints])
     drawn(ax)
-    told = [text.get_text() for text in plots.plot_damage(ur10.assessment).texts]
+    told = [text.get_text() for text in plot_damage(ur10.assessment).texts]
     assert any("no joint has a shaft" in text for text in told)
 
 
 @pytest.mark.parametrize("plane", ["xy", "xz", "yz"])
 def test_polar_cut_is_the_support_function(arm: SimpleNamespace, plane) -> None:
     envelope = envelope_of(picchio.Model(arm.robot), arm.worst.pose, BLOWS)
-    ax = plots.plot_polar_envelope(envelope, plane, count=24)
+    ax = plot_polar_envelope(envelope, plane, count=24)
     angle, directions = cut_directions(plane, 24)
     time = np.linspace(0.0, 0.04, 4001)
     g = envelope.response.unit_deflection(time)
@@ -215,14 +221,14 @@ def test_polar_cut_is_the_support_function(arm: SimpleNamespace, plane) -> None:
 def test_polar_refuses_an_unknown_plane(arm: SimpleNamespace) -> None:
     envelope = envelope_of(picchio.Model(arm.robot), arm.worst.pose, BLOWS)
     with pytest.raises(picchio.InputError, match=r"plane.*xy, xz, yz"):
-        plots.plot_polar_envelope(envelope, "ab")
+        plot_polar_envelope(envelope, "ab")
 
 
 def test_axes_given_are_axes_returned(arm: SimpleNamespace) -> None:
     ax = Figure().add_subplot()
     before = plt.get_fignums()
-    assert plots.plot_force_train(BLOWS, ax) is ax
-    assert plots.plot_utilisation(arm.assessment, Figure().add_subplot()) is not ax
+    assert plot_force_train(BLOWS, ax) is ax
+    assert plot_utilisation(arm.assessment, Figure().add_subplot()) is not ax
     assert plt.get_fignums() == before
 
 
@@ -240,7 +246,7 @@ def workspace():
 
 
 def test_map_shows_every_place_once_at_its_best(workspace) -> None:
-    ax = plots.plot_workspace_map(workspace, "a")
+    ax = plot_workspace_map(workspace, "a")
     dots = ax.collections[0]
     shown = {tuple(np.round(p, 9)): v for p, v in
              zip(dots.get_offsets().tolist(), dots.get_array().tolist(), strict=True)}  # fmt: skip
@@ -249,13 +255,13 @@ def test_map_shows_every_place_once_at_its_best(workspace) -> None:
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [m]", "z [m]")
     drawn(ax)
     with pytest.raises(picchio.InputError, match=r"'c'.*a, b"):
-        plots.plot_workspace_map(workspace, "c")
+        plot_workspace_map(workspace, "c")
 
 
 def test_life_spread_draws_the_percentiles() -> None:
     sure = SimpleNamespace(p10=1e5, p50=1e6, p90=1e7, endless=0.0)
     open_ended = SimpleNamespace(p10=2e5, p50=3e6, p90=np.inf, endless=0.3)
-    ax = plots.plot_life_spread(SimpleNamespace(joints={"a": sure}, robot=open_ended))
+    ax = plot_life_spread(SimpleNamespace(joints={"a": sure}, robot=open_ended))
     bars = [found.get_xdata() for found in ax.get_lines() if found.get_linewidth() == 5]
     np.testing.assert_allclose(bars[0], [1e5, 1e7])
     assert bars[1][0] == 2e5
@@ -265,7 +271,7 @@ def test_life_spread_draws_the_percentiles() -> None:
     assert any("30 % infinite" in text.get_text() for text in ax.texts)
     drawn(ax)
     endless = SimpleNamespace(p10=np.inf, p50=np.inf, p90=np.inf, endless=1.0)
-    ax = plots.plot_life_spread(SimpleNamespace(joints={"a": endless}, robot=endless))
+    ax = plot_life_spread(SimpleNamespace(joints={"a": endless}, robot=endless))
     assert any("infinite life" in text.get_text() for text in ax.texts)
 
 
@@ -277,7 +283,7 @@ def test_sn_fit_shows_tests_lines_band_and_knee() -> None:
     life = np.where(broken, 1e6 * (stress / strength) ** -8.0, 1e7)
     tests = SNTests(stress, life * 10 ** (0.1 * rng.standard_normal(30) * broken), broken)
     fit = fit_sn(tests)
-    ax = plots.plot_sn_fit(fit)
+    ax = plot_sn_fit(fit)
     assert len(line(ax, "failure")[0]) == tests.failed.sum()
     np.testing.assert_allclose(sorted(line(ax, "run-out")[1]), sorted(stress[~tests.failed] / 1e6))
     arrows = [text for text in ax.texts if text.arrow_patch is not None]
@@ -309,7 +315,7 @@ def test_sn_fit_shows_a_knee_that_the_tests_do_not_bound() -> None:
     fit = fit_sn(tests)
     assert fit.knee is not None
     assert fit.knee.high > 1e9
-    ax = plots.plot_sn_fit(fit)
+    ax = plot_sn_fit(fit)
     left, right = ax.get_xlim()
     assert left > 1e3
     assert right < 1e9

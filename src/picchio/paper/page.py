@@ -11,8 +11,7 @@ from picchio.paper.assumptions import INPUTS
 from picchio.paper.run import Reproduction
 from picchio.paper.verdict import Verdict
 from picchio.studies.assessment.result import format_count
-from picchio.visuals.report.assessment import number
-from picchio.visuals.report.page import inline_svg
+from picchio.visuals.report.page import inline_svg, number
 
 _MARKS = {"holds": "good", "holds only if": "partly", "does not hold": "bad",
           "cannot be known": "open"}  # fmt: skip

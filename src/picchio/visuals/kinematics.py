@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
+from picchio.model.rotation import exp3
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.urdf.tree import MOVABLE, UrdfJoint
 
@@ -39,13 +41,8 @@ class Frame:
 
 def placement(xyz: ArrayLike, rpy: ArrayLike) -> FloatArray:
     """(4, 4) of a URDF origin: fixed-axis roll, pitch, yaw."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
     matrix = np.eye(4)
-    matrix[:3, :3] = [
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ]
+    matrix[:3, :3] = pin.rpy.rpyToMatrix(np.asarray(rpy, dtype=float))
     matrix[:3, 3] = xyz
     return matrix
 
@@ -100,11 +97,8 @@ def joint_motion(frame: Frame) -> FloatArray:
         return matrix
     if frame.prismatic:
         matrix[:3, 3] = frame.axis * frame.position
-        return matrix
-    x, y, z = frame.axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    c, s = np.cos(frame.position), np.sin(frame.position)
-    matrix[:3, :3] = np.eye(3) + s * cross + (1.0 - c) * cross @ cross
+    else:
+        matrix[:3, :3] = exp3(frame.axis * frame.position)
     return matrix
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
@@ -74,22 +74,14 @@ def view(
         diagnosis = read_diagnosis(diagnosis, loaded)
     if isinstance(workspace, (str, Path)):
         workspace = open_map(workspace)
+    layers: dict[str, Any] = {"joint": joint, "workspace": workspace, "diagnosis": diagnosis}
     if pose is not None:
         if excitation is None:
             if isinstance(task, Task):
                 raise InputError("needs its blows, too: a task's may differ by operation",
                                  key="pose", hint="give `excitation`")  # fmt: skip
             excitation = blows_of(loaded, task)
-        at = loaded.pose(pose)
-        return build_scene(
-            model,
-            at,
-            excitation,
-            hits=hits,
-            joint=joint,
-            workspace=workspace,
-            diagnosis=diagnosis,
-        )
+        return build_scene(model, pose, excitation, hits=hits, **layers)
     for key, value in (("excitation", excitation), ("hits", hits)):
         if value is not None:
             raise InputError("needs --pose: a task says its blows itself", key=key, value=value)
@@ -110,7 +102,5 @@ def view(
         hits=worst.operation.hits_per_rivet,
         direction=worst.operation.direction,
         assessment=life,
-        joint=joint,
-        workspace=workspace,
-        diagnosis=diagnosis,
+        **layers,
     )

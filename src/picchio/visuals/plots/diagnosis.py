@@ -427,8 +427,7 @@ def plot_bands(
     for k, frequency in enumerate(inside):
         ax.axvline(frequency, color=MUTED, linewidth=0.8, linestyle=":", zorder=0.5,
                    label="modes" if k == 0 else None)  # fmt: skip
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    ax.set(xscale="log", yscale="log")
     low, high = ax.get_ylim()
     low, high = min(low, 0.5), max(high, 4.0)
     ax.set_ylim(low, high)

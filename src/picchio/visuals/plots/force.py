@@ -78,16 +78,14 @@ def plot_force_spectrum(
     ax: Axes | None = None,
     *,
     natural_frequencies: FloatArray | None = None,
-    up_to: float | None = None,
     model: Model | None = None,
 ) -> Axes:
-    """Amplitude of every harmonic of the blows, N over Hz, and where the robot's modes lie.
+    """Amplitude of the blows' first twenty harmonics, N over Hz, and where the robot's modes lie.
 
     Args:
         excitation: the blows.
         ax: where to draw.
         natural_frequencies: (n,) Hz, drawn as marks at the top.
-        up_to: Hz; some twenty harmonics, or all modes, if not given.
         model: takes the blows with its effects in them.
 
     Raises:
@@ -97,7 +95,7 @@ def plot_force_spectrum(
     period = excitation.one_period() if model is None else model.force(excitation, None)
     first = 1.0 / float(period.end)
     modes = np.zeros(0) if natural_frequencies is None else np.asarray(natural_frequencies)
-    top = up_to or max(22.0 * first, 1.08 * float(modes.max(initial=0.0)))
+    top = max(22.0 * first, 1.08 * float(modes.max(initial=0.0)))
     count = max(1, int(top / first))
     coefficients = period.fourier_coefficients(count)
     amplitude = np.abs(coefficients) * np.where(np.arange(count + 1) > 0, 2.0, 1.0)

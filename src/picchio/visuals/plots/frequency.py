@@ -23,6 +23,7 @@ from picchio.visuals.plots.style import (
 )
 
 _MOST_HARMONICS = 16
+_POINTS = 900
 
 
 @styled
@@ -60,7 +61,6 @@ def plot_frequency_response(
     ax: Axes | None = None,
     *,
     excitation: Excitation | None = None,
-    points: int = 900,
 ) -> Axes:
     """Deflection per newton of every joint (microradians per newton) over frequency (Hz).
 
@@ -69,15 +69,12 @@ def plot_frequency_response(
         direction: (3,) of the force.
         ax: where to draw.
         excitation: blows whose harmonics to mark.
-        points: of each curve.
     """
     ax = axes_or_new(ax)
     f = modes.natural_frequencies
     # Resonances are narrow: half of the points sit on them.
-    spread = np.concatenate(
-        [fk * (1 + np.linspace(-0.2, 0.2, points // 8) ** 3 / 0.04) for fk in f]
-    )
-    frequency = np.union1d(np.geomspace(f[0] / 6.0, 2.2 * f[-1], points), spread)
+    near = 1 + np.linspace(-0.2, 0.2, _POINTS // 8) ** 3 / 0.04
+    frequency = np.union1d(np.geomspace(f[0] / 6.0, 2.2 * f[-1], _POINTS), np.outer(f, near))
     gain = np.abs(
         np.einsum("mdk,d->mk", modes.frequency_response(2 * np.pi * frequency),
                   unit_vector(direction))
@@ -122,8 +119,7 @@ def plot_transfer(
     inside = (f > 0.0) & (f <= (highest or float(f[-1])))
     ax.plot(f[inside], scale * np.abs(found.measured[inside]), label="measured", **MEASURED)
     ax.plot(f[inside], scale * np.abs(found.simulated[inside]), label="simulated", **BEFORE)
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    ax.set(xscale="log", yscale="log")
     right = ax.twinx()
     right.plot(f[inside], found.coherence[inside], color=GREEN, linewidth=1.0, linestyle=":")
     ax.plot([], [], color=GREEN, linewidth=1.0, linestyle=":", label="coherence (right)")

@@ -69,11 +69,7 @@ def plot_damage(assessment: Assessment, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax, height=_height(len(joints), 1))
     ax.set(xlabel="damage a rivet, by operation [\N{EN DASH}]", title="Where the life goes")
     total = np.array([joint.damage_per_rivet for joint in joints])
-    names = [joint.name for joint in joints]
-    rows = np.arange(len(joints))
-    ax.set_yticks(rows, [plain(name) for name in names])
-    ax.set_ylim(len(joints) - 0.4, -0.6)
-    ax.grid(axis="y", visible=False)
+    rows = _rows(ax, [joint.name for joint in joints])
     if not np.nansum(total) > 0.0:
         known = any(joint.sn_curve for joint in joints)
         note(ax, "no damage: every stress stays below the endurance limit" if known
@@ -100,12 +96,20 @@ def _height(joints: int, operations: int) -> float:
     return 0.95 + joints * max(0.3, 0.17 * operations + 0.1)
 
 
+def _rows(ax: Axes, names: list[str]) -> np.ndarray:
+    """A row for each name, from the top."""
+    ax.set_yticks(range(len(names)), [plain(name) for name in names])
+    ax.set_ylim(len(names) - 0.4, -0.6)
+    ax.grid(axis="y", visible=False)
+    return np.arange(len(names))
+
+
 def _bars(
     ax: Axes, joints: list[str], operations: list[str], values: np.ndarray, missing: str
 ) -> None:
     """Grouped horizontal bars of values (operation, joint); NaN becomes a word."""
     height = 0.8 / len(operations)
-    rows = np.arange(len(joints))
+    rows = _rows(ax, joints)
     for k, (name, row) in enumerate(zip(operations, values, strict=True)):
         y = rows + (k - (len(operations) - 1) / 2) * height
         known = np.isfinite(row)
@@ -117,11 +121,8 @@ def _bars(
     for row in rows[~np.isfinite(values).any(axis=0)]:
         ax.annotate(missing, (0.0, row), xytext=(5, 0), textcoords="offset points", va="center",
                     fontsize=8.5, color=MUTED, style="italic")  # fmt: skip
-    ax.set_yticks(rows, [plain(name) for name in joints])
-    ax.set_ylim(len(joints) - 0.45, -0.55)
     top = float(np.nanmax(values)) if np.isfinite(values).any() else 1.0
     ax.set_xlim(0.0, 1.12 * top or 1.0)
-    ax.grid(axis="y", visible=False)
     if len(operations) > 1:
         ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
@@ -136,9 +137,7 @@ def plot_life_spread(spread: UncertainLife, ax: Axes | None = None) -> Axes:
     rows = {**spread.joints, "robot": spread.robot}
     ax = axes_or_new(ax, height=1.1 + 0.36 * len(rows))
     ax.set(xlabel="rivets to failure [\N{EN DASH}]", title="Uncertainty of the life, P10 to P90")
-    ax.set_yticks(range(len(rows)), [plain(name) for name in rows])
-    ax.set_ylim(len(rows) - 0.4, -0.6)
-    ax.grid(axis="y", visible=False)
+    _rows(ax, list(rows))
     lives = np.array([[life.p10, life.p50, life.p90] for life in rows.values()])
     finite = lives[np.isfinite(lives)]
     if not finite.size:

@@ -110,8 +110,7 @@ def plot_residual_spectrum(
     ax.axhline(1.0, color=MUTED, linewidth=1.2)
     ax.text(1.0, 1.0, " noise", transform=ax.get_yaxis_transform(), va="center", fontsize=8,
             color=MUTED)  # fmt: skip
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    ax.set(xscale="log", yscale="log")
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, 0.3), max(high, 4.0))
     ax.set_xlim(edges[0], edges[-1])

@@ -37,21 +37,17 @@ def plot_response(
     ax: Axes | None = None,
     *,
     joints: Sequence[str] | None = None,
-    until: float | None = None,
     steady: Response | SampledResponse | None = None,
-    peaks: bool = True,
     unit: str = "mrad",
 ) -> Axes:
     """Deflection of the joints (mrad) over time (s), with the largest marked.
 
     Args:
-        response: from rest, or steady (two periods are shown).
+        response: from rest (the first part of its ring-down is shown), or steady (two periods).
         direction: (3,) of the force.
         ax: where to draw.
         joints: names; all if not given.
-        until: s; the ring-down's first part if not given.
         steady: a steady state to show beside a response from rest, as its band.
-        peaks: mark the largest absolute deflection of each joint.
         unit: "mrad", or "mm" for prismatic joints.
 
     Raises:
@@ -64,13 +60,11 @@ def plot_response(
         if name not in names:
             raise InputError("no such joint", key="joints", value=name, choices=names)
     last_blow = 2.0 * response.force.end if response.periodic else float(response.force.start[-1])
-    end = until or (last_blow if response.periodic else _first_part(response, last_blow))
+    end = last_blow if response.periodic else _first_part(response, last_blow)
     time = response_times(response, end)
     values = response.deflection(time, direction)
-    marks = response.peaks(direction) if peaks else []
-    largest = (
-        max((abs(marks[names.index(name)].value) for name in chosen), default=0.0) if marks else 0
-    )
+    marks = response.peaks(direction)
+    largest = max((abs(marks[names.index(name)].value) for name in chosen), default=0.0)
     if not response.periodic:
         ax.axvspan(0.0, last_blow, color=MUTED, alpha=0.09, linewidth=0)
         ax.text(last_blow, 0.01, "last blow ", transform=ax.get_xaxis_transform(), ha="right",
@@ -80,10 +74,10 @@ def plot_response(
         style = look(j) if len(chosen) > 1 else {**look(j), "linestyle": "-"}
         ax.plot(time, values[j] * 1e3, label=plain(name), **style)
         if steady is not None:
-            low, high = _band(steady, direction, j)
-            ax.axhspan(low * 1e3, high * 1e3, color=style["color"], alpha=0.18, linewidth=0,
+            band = 1e3 * steady.turning_points(direction)[j][1]
+            ax.axhspan(band.min(), band.max(), color=style["color"], alpha=0.18, linewidth=0,
                        label=f"{plain(name)}, steady state")  # fmt: skip
-        if marks and marks[j].time <= end and abs(marks[j].value) >= _WORTH_A_LABEL * largest:
+        if marks[j].time <= end and abs(marks[j].value) >= _WORTH_A_LABEL * largest:
             ax.plot(marks[j].time, marks[j].value * 1e3, "o", color=style["color"], markersize=5)
             ax.annotate(f"{abs(marks[j].value) * 1e3:.3g}",
                         (marks[j].time, marks[j].value * 1e3),
@@ -105,8 +99,3 @@ def _first_part(response: Response | SampledResponse, last_blow: float) -> float
     if slowest <= 0.0:
         return 3.0 * last_blow
     return min(last_blow + 3.0 / slowest, 3.0 * last_blow + 0.2 / slowest)
-
-
-def _band(steady: Response | SampledResponse, direction: ArrayLike, j: int) -> tuple[float, float]:
-    _, values = steady.turning_points(direction)[j]
-    return float(values.min()), float(values.max())

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from statistics import NormalDist
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -126,22 +126,13 @@ def plot_sn_fit(fit: SNFit, ax: Axes | None = None) -> Axes:
                 label=f"knee, {100 * fit.level:g} % interval")  # fmt: skip
         ax.plot(fit.knee.value, limit, "o", color=INK, markersize=4, zorder=5, label="_knee")
     stress, broken = tests.amplitude / 1e6, tests.failed
-    dot: dict[str, Any] = {
-        "markersize": 5,
-        "markeredgecolor": "white",
-        "markeredgewidth": 0.6,
-        "zorder": 4,
-    }
-    ring: dict[str, Any] = {
-        "markersize": 5.5,
-        "markerfacecolor": "none",
-        "markeredgewidth": 1.3,
-        "zorder": 4,
-    }
-    ax.plot(tests.cycles[broken], stress[broken], "o", color=VERMILION, label="failure", **dot)
-    if not broken.all():
-        ax.plot(tests.cycles[~broken], stress[~broken], "o", color=ORANGE, label="run-out", **ring)
-    for place, many in _together(tests.cycles[~broken], stress[~broken]).items():
+    ax.plot(tests.cycles[broken], stress[broken], "o", color=VERMILION, label="failure",
+            markersize=5, markeredgecolor="white", markeredgewidth=0.6, zorder=4)  # fmt: skip
+    unbroken = list(zip(tests.cycles[~broken], stress[~broken], strict=True))
+    if unbroken:
+        ax.plot(*np.transpose(unbroken), "o", color=ORANGE, label="run-out", markersize=5.5,
+                markerfacecolor="none", markeredgewidth=1.3, zorder=4)  # fmt: skip
+    for place, many in Counter(unbroken).items():
         ax.annotate("", (1.75 * place[0], place[1]), xytext=(1.12 * place[0], place[1]),
                     arrowprops={"arrowstyle": "->", "color": ORANGE, "lw": 1.2})  # fmt: skip
         if many > 1:
@@ -153,14 +144,6 @@ def plot_sn_fit(fit: SNFit, ax: Axes | None = None) -> Axes:
            title=f"S-N fit: {fit.failures} failures, {fit.run_outs} run-outs")  # fmt: skip
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax
-
-
-def _together(cycles: np.ndarray, stress: np.ndarray) -> dict[tuple[float, float], int]:
-    """How many tests lie on one another, by place."""
-    count: dict[tuple[float, float], int] = {}
-    for place in zip(cycles.tolist(), stress.tolist(), strict=True):
-        count[place] = count.get(place, 0) + 1
-    return count
 
 
 def _few_stress_ticks(ax: Axes) -> None:

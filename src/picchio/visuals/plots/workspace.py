@@ -1,4 +1,4 @@
-"""The workspace map: where the blows deflect a joint most."""
+"""The workspace map: one value a place, of its best branch, and where blows deflect most."""
 
 from __future__ import annotations
 
@@ -7,12 +7,58 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
 from picchio.studies.maps.result import WorkspaceMap
 from picchio.visuals.plots.style import CMAP, axes_or_new, plain, styled
-from picchio.visuals.workspace import best_branch, spacing
 
 if TYPE_CHECKING:
     import xarray
+
+
+def dataset_of(workspace: WorkspaceMap | xarray.Dataset) -> xarray.Dataset:
+    """The dataset of a map."""
+    return workspace.dataset if isinstance(workspace, WorkspaceMap) else workspace
+
+
+def best_branch(
+    workspace: WorkspaceMap | xarray.Dataset, joint: str
+) -> tuple[FloatArray, FloatArray]:
+    """Every place of a map once, with the smallest peak over the poses that reach it.
+
+    Args:
+        workspace: of `picchio.workspace_map`, or its dataset.
+        joint: whose peak deflection.
+
+    Returns:
+        positions (p, 3) m and peaks (p,) rad or m; places with no value are left out.
+
+    Raises:
+        InputError: an unknown joint, a map without any value.
+    """
+    workspace = dataset_of(workspace)
+    names = [str(name) for name in workspace["joint"].values]
+    if joint not in names:
+        raise InputError("no such joint in the map", key="joint", value=joint, choices=names)
+    position = np.asarray(workspace["position"].values, dtype=float)
+    values = np.asarray(workspace["peak_deflection"].values, dtype=float)[:, names.index(joint)]
+    known = np.isfinite(values) & np.isfinite(position).all(axis=1)
+    if not known.any():
+        raise InputError("the map has no value for this joint", key="joint", value=joint)
+    places, home = np.unique(np.round(position[known], 9), axis=0, return_inverse=True)
+    best = np.full(len(places), np.inf)
+    np.minimum.at(best, home.ravel(), values[known])
+    return places, best
+
+
+def spacing(places: FloatArray) -> float:
+    """m, from a place to its nearest neighbour, the median over the places."""
+    from scipy.spatial import cKDTree
+
+    if len(places) < 2:
+        return 0.1
+    distance, _ = cKDTree(places).query(places, k=2)
+    return float(np.median(distance[:, 1]))
 
 
 @styled

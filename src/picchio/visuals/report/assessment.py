@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from importlib.resources import files
 
 import numpy as np
-from markupsafe import Markup
+from matplotlib.axes import Axes
 
 from picchio.fatigue.shaft_stress import shear_stress
 from picchio.fatigue.sn.curve import SNCurve
@@ -16,7 +14,7 @@ from picchio.fatigue.sn.library import load_sn_curve
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.method_comparison import Term
-from picchio.studies.assessment.result import Assessment, format_count, verdict
+from picchio.studies.assessment.result import Assessment, verdict
 from picchio.studies.backwards import Allowable
 from picchio.studies.envelopes import envelope
 from picchio.studies.tasks import Task
@@ -29,19 +27,10 @@ from picchio.visuals.plots.response import plot_response, response_times
 from picchio.visuals.plots.sn import plot_sn_curve
 from picchio.visuals.plots.stress import plot_counted_cycles, plot_stress_history
 from picchio.visuals.plots.style import blank_figure
-from picchio.visuals.report.page import inline_svg
+from picchio.visuals.report.page import Picture, inline_svg, render
 from picchio.visuals.worst_rivet import WorstRivet, worst_rivet
 
 # The report's plots, each with an alt text that says what it shows.
-
-
-@dataclass(frozen=True)
-class Figure:
-    """An inline SVG, its caption, and whether it opens the report or is folded away."""
-
-    svg: Markup
-    caption: str
-    main: bool
 
 
 def report_figures(
@@ -50,12 +39,13 @@ def report_figures(
     curve: SNCurve | None,
     *,
     spread: UncertainLife | None = None,
-) -> list[Figure]:
-    """All plots of an assessment report, the most telling first."""
-    made: list[Figure] = []
+) -> dict[str, list[Picture]]:
+    """All plots of an assessment report: "main" ones open it, "more" are folded away."""
+    made: dict[str, list[Picture]] = {"main": [], "more": []}
 
-    def add(ax: object, alt: str, caption: str, *, main: bool = False) -> None:
-        made.append(Figure(inline_svg(ax, alt, f"f{len(made)}"), caption, main))  # type: ignore[arg-type]
+    def add(ax: Axes, alt: str, caption: str, *, main: bool = False) -> None:
+        svg = inline_svg(ax, alt, f"f{sum(map(len, made.values()))}")
+        made["main" if main else "more"].append(Picture(svg, caption))
 
     joint, operation = worst.joint, worst.operation
     where = f"{operation.name}, pose {worst.pose_number}"
@@ -193,57 +183,35 @@ def assessment_report(
     Returns:
         the HTML.
     """
-    from jinja2 import Environment, StrictUndefined
-    from markupsafe import Markup
-
     worst = worst_rivet(assessment, robot, task, gravity_stiffness=gravity_stiffness)
     robot = worst.rivet.model.robot
     life = assessment.joint(worst.joint.name)
     curve = _curve(sn_curve, robot, life.sn_curve)
-    figures = report_figures(assessment, worst, curve, spread=spread)
     over_limit = any(joint.reducer_utilisation > 1.0 for joint in assessment.joints)
-    folder = files("picchio.visuals.report")
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters.update(number=number, count=format_count, percent=percent)
-    template = environment.from_string((folder / "assessment.html.j2").read_text("utf-8"))
-    return template.render(
-        style=Markup((folder / "style.css").read_text("utf-8")),
+    bad = math.isfinite(assessment.rivets_to_failure) or over_limit
+    estimated = ", ".join(joint.name for joint in robot.flexible_joints if joint.estimated)
+    guessed = f"Stiffness and damping of {estimated} are estimates, not measurements."
+    return render(
+        "assessment.html.j2",
         a=assessment,
         robot=robot,
         task=task,
-        worst=worst,
         life=life,
         curve=curve,
-        figures=figures,
+        figures=report_figures(assessment, worst, curve, spread=spread),
         headline=verdict(assessment),
-        bad=math.isfinite(assessment.rivets_to_failure) or over_limit,
+        tone="bad" if bad else "good" if assessment.limiting_joint else "",
         reducers=any(joint.reducer for joint in assessment.joints),
         allowed=list(allowed),
         spread=spread,
         spread_rows=[*spread.joints.items(), ("robot", spread.robot)] if spread else [],
         terms=list(terms),
         shafts=any(joint.sn_curve for joint in assessment.joints),
-        warnings=list(dict.fromkeys(warnings)),
-        estimates=[joint.name for joint in robot.flexible_joints if joint.estimated],
+        warnings=list(dict.fromkeys([*([guessed] if estimated else []), *warnings])),
         slides=any(joint.kind == "prismatic" for joint in robot.flexible_joints),
         command=command or f"picchio assess {robot.name}",
         scene=scene,
     )
-
-
-def number(value: float, digits: int = 4) -> str:
-    """A number with few digits; a dash where there is none."""
-    if not math.isfinite(value):
-        return "\N{EN DASH}" if math.isnan(value) else "no end"
-    # Below this it is rounding.
-    return "0" if abs(value) < 1e-9 else f"{value:.{digits}g}"
-
-
-def percent(value: float) -> str:
-    """A share as a percentage without its sign."""
-    return number(100.0 * value, 3)
 
 
 def _curve(given: str | SNCurve | None, robot: FlexibleRobot, name: str) -> SNCurve | None:

@@ -24,7 +24,7 @@ from picchio.visuals.plots.style import direction_label
 from picchio.visuals.report.motion_figures import MotionFigures
 from picchio.visuals.report.page import number, percent, render, signed, spread, words
 from picchio.visuals.report.percussion_figures import PercussionFigures
-from picchio.visuals.scene.diagnosed import diagnosis_scene
+from picchio.visuals.scene.build import diagnosis_scene
 
 _DASH = "\N{EN DASH}"
 _TONE = {"nothing-wrong": "good", "unexplained": "bad", "partial": "bad"}

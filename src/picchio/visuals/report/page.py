@@ -20,6 +20,7 @@ from picchio.core.errors import InputError
 from picchio.core.html import Page
 from picchio.core.provenance import package_version
 from picchio.core.results import Result
+from picchio.studies.assessment.result import format_count
 from picchio.visuals.plots.style import BLUE, INK, MUTED, STYLE, VERMILION
 
 # A matplotlib figure as inline SVG that takes the page's text colour and has an alt text.
@@ -91,7 +92,7 @@ def render(template: str, **content: Any) -> str:
         lstrip_blocks=True,
         loader=Folder(),
     )
-    environment.filters.update(number=number, percent=percent)
+    environment.filters.update(number=number, percent=percent, count=format_count)
     # What most pages leave empty.
     nothing = ("at", "tone", "scene", "moves", "ask", "stiffness", "channels", "warnings")
     environment.globals.update(dict.fromkeys(nothing, ""), level=2, version=package_version())
@@ -125,6 +126,7 @@ class Pictures:
         return Picture(inline_svg(ax, alt, f"{self.PREFIX}{self._made}", themed=True), caption)
 
 
+_ROUNDING = 1e-9  # what is smaller, in any unit that a page uses, is rounding
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -134,6 +136,8 @@ def number(value: float | None, digits: int = 4) -> str:
         return "\N{EN DASH}"
     if math.isinf(value):
         return "no end"
+    if abs(value) < _ROUNDING:
+        return "0"
     text = f"{value:.{digits}g}".replace("-", "\N{MINUS SIGN}")
     mantissa, e, power = text.partition("e")
     if not e:

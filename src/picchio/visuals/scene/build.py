@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
 from picchio.diagnosis.result import Diagnosis
 from picchio.excitation.excitation import Excitation
+from picchio.excitation.measured import MeasuredForce
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import Assessment
@@ -20,6 +22,7 @@ from picchio.studies.maps.result import WorkspaceMap
 from picchio.vibration.closed_form.response import unit_vector
 from picchio.visuals.kinematics import frames, world
 from picchio.visuals.plots.style import direction_label
+from picchio.visuals.plots.workspace import best_branch, dataset_of, spacing
 from picchio.visuals.scene.causes.causes import add_causes
 from picchio.visuals.scene.causes.site import Site
 from picchio.visuals.scene.motion import vibration
@@ -33,10 +36,11 @@ from picchio.visuals.scene.overlay import (
 from picchio.visuals.scene.robot.body import Body, build_body
 from picchio.visuals.scene.robot.mesh import Mesh, arrow, ring, sphere, turned_to
 from picchio.visuals.scene.scene import Item, Scene
-from picchio.visuals.workspace import best_branch, dataset_of, spacing
 
 if TYPE_CHECKING:
     import xarray
+
+    from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 
 
 def build_scene(
@@ -103,6 +107,36 @@ def build_scene(
     return scene
 
 
+def diagnosis_scene(found: PercussionDiagnosis, **options: Any) -> Scene:
+    """The robot with the causes where they sit; in a notebook the cell shows it.
+
+    Pose, blows and direction are those of the record that the nominal model explains worst.
+
+    Args:
+        found: a diagnosis of percussion records.
+        **options: of `build_scene`: joint, subdivisions, ...
+    """
+    levels = [float(np.mean(residual**2)) for residual in found.baseline.residuals]
+    setup = found.baseline.records[int(np.argmax(levels))].setup
+    record = found.problem.campaign[setup.name]
+    blows, hits = record.blows(), record.hits
+    if blows is None:
+        # Only measured: what the tool did from the first blow on.
+        data = record.read(["force"])
+        after = data["time"] >= -1e-12
+        blows, hits = MeasuredForce(data["time"][after], data["force"][after]), 1
+    return build_scene(
+        found.problem.robot,
+        setup.geometry.pose,
+        blows,
+        hits=hits,
+        direction=setup.blows.direction,
+        diagnosis=found.diagnosis,
+        gravity_stiffness=found.problem.model.gravity_stiffness,
+        **options,
+    )
+
+
 def _against_the_tool(robot: FlexibleRobot, pose: FloatArray) -> FloatArray:
     """(3,) the force on a tool that hits along its own axis."""
     axis = np.array(robot.tool.axis)
@@ -110,8 +144,6 @@ def _against_the_tool(robot: FlexibleRobot, pose: FloatArray) -> FloatArray:
 
 
 def _first(envelope: DirectionEnvelope, assessment: Assessment | None, joint: str | None) -> int:
-    from picchio.core.errors import InputError
-
     names = envelope.joint_names
     if joint is not None:
         if joint not in names:
@@ -136,7 +168,7 @@ def _add_rings(scene: Scene, body: Body, assessment: Assessment | None, units: l
     values, scale = joint_values(assessment, scene.envelope, slides)
     scene.layers.append(("joints", scale.title, True))
     scene.scales["joints"] = scale
-    by_joint = {frame.joint: frame for frame in scene.frames if frame.joint}
+    by_joint = {frame.joint: frame for frame in scene.frames}
     for k, (name, value) in enumerate(zip(scene.envelope.joint_names, values, strict=True)):
         frame = by_joint.get(name)
         if frame is None or frame.axis is None:

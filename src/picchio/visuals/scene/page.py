@@ -104,17 +104,7 @@ def scene_data(scene: Scene, packer: Packer) -> dict[str, Any]:
         "title": scene.title,
         "frames": [_frame(frame) for frame in scene.frames],
         "meshes": [packer.add_mesh(mesh) for mesh in scene.meshes],
-        "items": [
-            {
-                "mesh": item.mesh,
-                "layer": item.layer,
-                "node": item.node,
-                "matrix": _matrix(item.matrix),
-                "colour": item.colour,
-                "joint": item.joint,
-            }
-            for item in scene.items
-        ],
+        "items": [{**vars(item), "matrix": _matrix(item.matrix)} for item in scene.items],
         "layers": [{"id": i, "text": text, "on": on} for i, text, on in scene.layers],
         "labels": scene.labels,
         "joints": scene.joints,

@@ -52,11 +52,10 @@ def coil(
     length: float,
     thickness: float,
     colour: str,
-    turns: float = 4.0,
 ) -> Mesh:
-    """A coil spring about an axis."""
-    s = np.linspace(0.0, 1.0, int(28 * turns))
-    angle = 2.0 * np.pi * turns * s
+    """A coil spring of four turns about an axis."""
+    s = np.linspace(0.0, 1.0, 112)
+    angle = 8.0 * np.pi * s
     own = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), length * (s - 0.5)])
     return moved(tube(own, thickness, colour), turned_to(axis, centre))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,10 +61,7 @@ def decimate(mesh: Mesh, cell: float) -> Mesh:
     if mesh.colours is not None:
         kept = np.column_stack([np.bincount(home, mesh.colours[:, k]) / count for k in range(3)])
         colours = kept[used]
-    return Mesh(
-        vertices[used], renumbered.reshape(-1, 3), colours, mesh.colour, mesh.opacity, mesh.exact,
-        mesh.crease,
-    )  # fmt: skip
+    return replace(mesh, vertices=vertices[used], faces=renumbered.reshape(-1, 3), colours=colours)
 
 
 @dataclass(frozen=True, eq=False)

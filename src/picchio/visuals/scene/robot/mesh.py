@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray, IndexArray
+
+GREY = "#b8c0c8"
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +29,7 @@ class Mesh:
     vertices: FloatArray
     faces: IndexArray
     colours: FloatArray | None = None
-    colour: str = "#b8c0c8"
+    colour: str = GREY
     opacity: float = 1.0
     exact: bool = False
     crease: float = 40.0
@@ -46,56 +49,45 @@ def moved(mesh: Mesh, matrix: FloatArray) -> Mesh:
     """The mesh after a (4, 4) transform; a mirror image keeps its outside outside."""
     vertices = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
     faces = mesh.faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else mesh.faces
-    return Mesh(vertices, faces, mesh.colours, mesh.colour, mesh.opacity, mesh.exact, mesh.crease)
+    return replace(mesh, vertices=vertices, faces=faces)
 
 
-def box(size: FloatArray, colour: str = "#b8c0c8") -> Mesh:
+def box(size: FloatArray, colour: str = GREY) -> Mesh:
     """A box of (3,) side lengths about the origin."""
-    from trimesh.creation import box as shape
-
-    return _from(shape(extents=size), colour)
+    return _shape("box", colour, extents=size)
 
 
-def sphere(radius: float, colour: str = "#b8c0c8", subdivisions: int = 2) -> Mesh:
+def sphere(radius: float, colour: str = GREY, subdivisions: int = 2) -> Mesh:
     """A sphere about the origin."""
-    from trimesh.creation import icosphere as shape
-
-    return _from(shape(subdivisions=subdivisions, radius=radius), colour)
+    return _shape("icosphere", colour, subdivisions=subdivisions, radius=radius)
 
 
-def cylinder(radius: float, length: float, colour: str = "#b8c0c8") -> Mesh:
+def cylinder(radius: float, length: float, colour: str = GREY, sections: int = 40) -> Mesh:
     """A cylinder along z about the origin."""
-    from trimesh.creation import cylinder as shape
-
-    return _from(shape(radius=radius, height=length, sections=40), colour)
+    return _shape("cylinder", colour, radius=radius, height=length, sections=sections)
 
 
-def rod(start: FloatArray, end: FloatArray, radius: float, colour: str = "#b8c0c8") -> Mesh:
+def rod(start: FloatArray, end: FloatArray, radius: float, colour: str = GREY) -> Mesh:
     """A cylinder between two points."""
     along = end - start
     mesh = cylinder(radius, float(np.linalg.norm(along)), colour)
     return moved(mesh, turned_to(along, 0.5 * (start + end)))
 
 
-def arrow(
-    length: float, radius: float, colour: str = "#b8c0c8", *, head: float | None = None
-) -> Mesh:
+def arrow(length: float, radius: float, colour: str = GREY, *, head: float | None = None) -> Mesh:
     """An arrow from the origin along +z, its tip at `length`."""
-    from trimesh.creation import cone, cylinder
-
     tip = min(head or 5.0 * radius, 0.7 * length)
-    point = cone(radius=0.42 * tip, height=tip, sections=32)
-    point.apply_translation([0, 0, length - tip])
-    shaft = cylinder(radius=radius, height=length - tip, sections=20)
-    shaft.apply_translation([0, 0, 0.5 * (length - tip)])
-    return merged([_from(shaft, colour), _from(point, colour)])
+    shaft = cylinder(radius, length - tip, colour, sections=20)
+    point = _shape("cone", colour, radius=0.42 * tip, height=tip, sections=32)
+    shaft.vertices[:, 2] += 0.5 * (length - tip)
+    point.vertices[:, 2] += length - tip
+    return merged([shaft, point])
 
 
 def ring(radius: float, thickness: float, colour: str) -> Mesh:
     """A torus about z."""
-    from trimesh.creation import torus
-
-    return _from(torus(radius, thickness, major_sections=56, minor_sections=12), colour)
+    return _shape("torus", colour, major_radius=radius, minor_radius=thickness, major_sections=56,
+                  minor_sections=12)  # fmt: skip
 
 
 def turned_to(axis: FloatArray, position: FloatArray) -> FloatArray:
@@ -119,9 +111,9 @@ def _uniform(mesh: Mesh) -> FloatArray:
     return np.tile(rgb(mesh.colour), (len(mesh.vertices), 1))
 
 
-def _from(shape: object, colour: str) -> Mesh:
-    return Mesh(
-        np.array(shape.vertices, dtype=float),  # type: ignore[attr-defined]
-        np.array(shape.faces, dtype=np.intp),  # type: ignore[attr-defined]
-        colour=colour,
-    )
+def _shape(kind: str, colour: str, **sizes: Any) -> Mesh:
+    """What trimesh makes."""
+    from trimesh import creation
+
+    made = getattr(creation, kind)(**sizes)
+    return Mesh(np.array(made.vertices, dtype=float), np.array(made.faces), colour=colour)
