@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import tomllib
 
 import motion_records
@@ -108,6 +109,8 @@ def test_the_extended_model_and_the_json_are_whole(found, tmp_path):
         assert after[joint.name]["utilisation"] == pytest.approx(joint.utilisation, rel=1e-9)
     page = picchio.report(found).text
     assert "The motion records" in page and "viscous friction" in page
+    ids = re.findall(r'\bid="([^"]+)"', page)
+    assert "motion-left" in ids and len(ids) == len(set(ids))
     assert repr(found).startswith("<Diagnosis: named, ") and "payload" in found._repr_html_()
 
 

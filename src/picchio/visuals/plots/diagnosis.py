@@ -233,22 +233,20 @@ def plot_overlay(
 @styled
 def plot_left_over(
     time: ArrayLike,
-    before: ArrayLike,
+    before: ArrayLike | None,
     after: ArrayLike | None = None,
     ax: Axes | None = None,
     *,
     blows: ArrayLike = (),
-    zoom: bool = False,
 ) -> Axes:
     """What a simulation leaves, in units of the noise, with the band that noise keeps to.
 
     Args:
         time: (m,) s.
-        before: (m,) whitened residual.
+        before: (m,) whitened residual; None to draw `after` alone, on its own scale.
         after: (m,) of the better model.
         ax: where to draw.
         blows: s, when each blow begins.
-        zoom: draw `after` alone, on its own scale.
     """
     ax = axes_or_new(ax)
     t = np.asarray(time)
@@ -256,7 +254,7 @@ def plot_left_over(
     if starts.size:
         ax.plot(starts, np.zeros(starts.size), "|", color=MUTED, markersize=9, zorder=0.5,
                 transform=ax.get_xaxis_transform(), clip_on=False, label="blows")  # fmt: skip
-    if not zoom:
+    if before is not None:
         ax.plot(t, np.asarray(before), label="before" if after is not None else "residual",
                 linewidth=1.0, color=BEFORE["color"])  # fmt: skip
     if after is not None:
@@ -264,8 +262,7 @@ def plot_left_over(
     ax.axhspan(-_BAND, _BAND, color=MUTED, alpha=0.28, linewidth=0, label="95 % of noise")
     ax.set(xlabel="time [s]", ylabel="residual\n[noise std]")
     ax.set_xlim(float(t[0]), float(t[-1]))
-    if zoom:
-        assert after is not None
+    if before is None:
         most = max(5.0, 1.1 * float(np.abs(np.asarray(after)).max()))
         ax.set_ylim(-most, most)
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4)

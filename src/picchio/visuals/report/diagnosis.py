@@ -22,7 +22,7 @@ from picchio.studies.assessment.result import format_count
 from picchio.visuals.plots.diagnosis import place_in_words
 from picchio.visuals.plots.style import direction_label
 from picchio.visuals.report.motion_figures import MotionFigures
-from picchio.visuals.report.page import number, percent, render, signed, spread, words
+from picchio.visuals.report.page import capitalised, number, percent, render, signed, spread, words
 from picchio.visuals.report.percussion_figures import PercussionFigures
 from picchio.visuals.scene.build import diagnosis_scene
 
@@ -151,7 +151,7 @@ def _motion(
             for s in details.get("instruments", ()) if s.significant
         ],
         "tells_life": True,
-        "why": life.why,
+        "why": capitalised(life.why),
         "life": [(joint, *cells[4:], *cells[2:4]) for joint, *cells in life_by_joint(life.life)],
         "blows": _blows(life),
         "left_out": list({
@@ -199,7 +199,7 @@ def headline(diagnosis: Diagnosis) -> str:
                 f"that.{effect}"
             )
     if diagnosis.note:
-        return f"The simulation is wrong. {diagnosis.note[:1].upper()}{diagnosis.note[1:]}."
+        return f"The simulation is wrong. {capitalised(diagnosis.note)}."
     lead = f" What helped stands below: {len(diagnosis.leads)} leads, no more."
     return "The simulation is wrong, and no known cause explains most of it: none is claimed." + (
         lead if len(diagnosis.leads) > 1 else ""
@@ -251,14 +251,17 @@ def set_words(pairs: Sequence[tuple[str, str]]) -> str:
 # The causes, each with its meaning: heads and rows of a table, and what stands above and below.
 
 
+_DERIVED = {"amplitude": "of the wave", "stiffness": "of the joint"}
+
+
 def _card(robot: FlexibleRobot, cause: Cause) -> dict[str, Any]:
     """One cause, a row a parameter."""
     kind = catalogue()[cause.effect]
-    meanings = {p.name: p.meaning for p in kind.parameters}
+    meanings = _DERIVED | {p.name: p.meaning for p in kind.parameters}
     place = place_in_words(robot, cause.effect, cause.target)
     return {
         "title": f"{words(cause.effect)}, {cause.target}",
-        "lines": [f"{_start(kind.meaning)}.",
+        "lines": [f"{capitalised(kind.meaning)}.",
                   f"It sits {place}. Confidence {_confidence(cause)}\N{NO-BREAK SPACE}%."],
         "heads": [],
         "rows": [(words(name), value_text(v), meanings.get(name, ""))
@@ -267,15 +270,12 @@ def _card(robot: FlexibleRobot, cause: Cause) -> dict[str, Any]:
     }  # fmt: skip
 
 
-_DERIVED = {"amplitude": "of the wave", "stiffness": "of the joint"}
-
-
 def _cards(diagnosis: Diagnosis, robot: FlexibleRobot) -> list[dict[str, Any]]:
     """All causes of a kind together, a row a place."""
     made = []
     for name, causes in by_kind(diagnosis).items():
         kind = catalogue()[name]
-        meaning = f"{_start(kind.motion_meaning or kind.meaning)}."
+        meaning = f"{capitalised(kind.motion_meaning or kind.meaning)}."
         if len(causes) == 1:
             meaning += f" It sits {place_in_words(robot, name, causes[0].target)}."
         columns = list(dict.fromkeys(key for cause in causes for key in _shown(cause)))
@@ -304,11 +304,6 @@ def _confidence(cause: Cause) -> str:
 def _place(cause: Cause) -> tuple[str, float]:
     order = cause.parameters.get("order")
     return cause.target, order.value if order is not None else 0.0
-
-
-def _start(text: str) -> str:
-    """With a capital, and names as they are."""
-    return text[:1].upper() + text[1:]
 
 
 def _said(name: str) -> str:

@@ -27,7 +27,7 @@ from picchio.visuals.plots.diagnosis import (
 )
 from picchio.visuals.plots.residual import bins_of, plot_clouds, plot_orders, plot_restoring
 from picchio.visuals.plots.style import blank_figure, plain
-from picchio.visuals.report.page import Picture, Pictures, number, percent, words
+from picchio.visuals.report.page import Picture, Pictures, capitalised, number, percent, words
 
 _BINS = 20
 _SHOWN = 8.0  # s that an overlay shows
@@ -204,7 +204,7 @@ class MotionFigures(Pictures):
         for view in self._worst(self.train):
             missed = percent(rms(view.before) / rms(view.measured))
             caption = (
-                f"{_start(view.words)} in {view.file}: the nominal model, "
+                f"{capitalised(view.words)} in {view.file}: the nominal model, "
                 f"{_NOMINAL[view.group[0]]}. It misses {missed} % of the signal, "
                 f"{number(rms(view.before) / view.noise, 3)} times the noise."
             )
@@ -233,7 +233,7 @@ class MotionFigures(Pictures):
                              f"left of the {view.words.split()[0]}\n[{unit.replace('*', ' ')}]",
                              blank_figure(5.2, 3.2))  # fmt: skip
             caption = (
-                f"{_start(view.words)}, all fitted records: what is left goes with the {over} "
+                f"{capitalised(view.words)}, all fitted records: what is left goes with the {over} "
                 f"more than with anything else of the motion ({_READ[name]})."
             )
             alt = f"What is left of the {view.words} over the {over}"
@@ -281,8 +281,8 @@ class MotionFigures(Pictures):
             simulated = {"before": view.measured - view.before, "after": view.measured - view.after}
             was, now = (rms(x) / rms(view.measured) for x in (view.before, view.after))
             caption = (
-                f"{_start(view.words)} in {view.file}, which neither model has seen: the error "
-                f"falls from {percent(was)} % of the signal to {percent(now)} %."
+                f"{capitalised(view.words)} in {view.file}, which neither model has seen: the "
+                f"error falls from {percent(was)} % of the signal to {percent(now)} %."
             )
             made.append(self._overlay(view, simulated, ", before and after", caption))
         return made
@@ -355,7 +355,7 @@ class MotionResidualFigures(Pictures):
         ax = plot_overlay(view.time, view.measured, simulated, view.channel,
                           blank_figure(9.0, 2.7))  # fmt: skip
         over = self.picture(ax, f"{view.words} as measured and as simulated", caption)
-        return _start(view.words), over, self._clouds(views)
+        return capitalised(view.words), over, self._clouds(views)
 
     def _clouds(self, views: Sequence[View]) -> list[Picture]:
         """What is left of all records over position, velocity or torque."""
@@ -378,8 +378,3 @@ class MotionResidualFigures(Pictures):
             made.append(self.picture(ax, f"What is left of the {view.words} over the {name}",
                                      f"Over the {name}, all records{hint}."))  # fmt: skip
         return made
-
-
-def _start(text: str) -> str:
-    """With a capital, and names as they are."""
-    return text[:1].upper() + text[1:]

@@ -174,6 +174,11 @@ def spread(value: float, std: float, unit: str = "") -> str:
     return text.replace("-", "\N{MINUS SIGN}")
 
 
+def capitalised(text: str) -> str:
+    """With a capital, and names as they are."""
+    return text[:1].upper() + text[1:]
+
+
 def words(name: str) -> str:
     """An effect's name as people say it."""
     return name.replace("_", " ")

@@ -126,7 +126,7 @@ class _Percussion(Pictures):
         self.baseline = baseline
         self.worst = worst_view(baseline)
 
-    def overlay(
+    def _overlay(
         self, view: View, simulated: dict[str, FloatArray], shown: str, caption: str
     ) -> Picture:
         """A channel and its simulations, where the first of these is furthest away."""
@@ -163,15 +163,14 @@ class PercussionFigures(_Percussion):
             ": the nominal model, stiffness, damping and force fitted within their tolerance. Its "
             f"residual is {view.times:.3g} times the noise (RMS), more than in any other channel."
         )
-        made = [self.overlay(view, {"simulated": predicted}, " and as simulated", caption)]
+        made = [self._overlay(view, {"simulated": predicted}, " and as simulated", caption)]
         before = self.baseline.residuals[view.index][view.row]
         after = self.found.extended.residuals[view.index][view.row] if self.changed else None
         said = "what the simulation leaves of this channel, in standard deviations of its noise"
         ax = plot_left_over(view.time, before, after, blank_figure(9.0, 2.5), blows=view.blows)
         made.append(self.picture(ax, said, f"{said.capitalize()}."))
         if after is not None:
-            ax = plot_left_over(view.time, before, after, blank_figure(9.0, 2.1),
-                                blows=view.blows, zoom=True)  # fmt: skip
+            ax = plot_left_over(view.time, None, after, blank_figure(9.0, 2.1), blows=view.blows)
             rms = float(np.sqrt(np.mean(after**2)))
             made.append(self.picture(ax, "the residual after, on its own scale",
                         f"After, on its own scale: {rms:.3g} times the noise (RMS)."))  # fmt: skip
@@ -193,7 +192,7 @@ class PercussionFigures(_Percussion):
                   else "neither model has seen this record")  # fmt: skip
         if gain.held_out_records == gain.train_records:
             fitted = "too few records to hold any out: this one was fitted"
-        return [self.overlay(view, simulated, ", before and after", f"; {fitted}.")]
+        return [self._overlay(view, simulated, ", before and after", f"; {fitted}.")]
 
     def scores(self) -> list[Picture]:
         """The candidates, a picture a step of the search."""
@@ -260,7 +259,7 @@ class PercussionFigures(_Percussion):
         return sorted(np.sqrt(squared[squared > 0.0]) / (2.0 * np.pi))
 
 
-class ResidualFigures(_Percussion):
+class PercussionResidualFigures(_Percussion):
     """Draws what a baseline leaves.
 
     Args:
@@ -280,7 +279,7 @@ class ResidualFigures(_Percussion):
         view = self.worst
         simulated = {"simulated": view.aligned(self.left.predictions[view.index])}
         caption = ": where the simulation is furthest from the measurement, in units of its noise."
-        made = [self.overlay(view, simulated, " and as simulated", caption)]
+        made = [self._overlay(view, simulated, " and as simulated", caption)]
         ax = plot_left_over(view.time, self.baseline.residuals[view.index][view.row], None,
                             blank_figure(9.0, 2.4), blows=view.blows)  # fmt: skip
         made.append(self.picture(ax, "Residual of this channel over time",

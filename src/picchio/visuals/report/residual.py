@@ -16,7 +16,7 @@ from picchio.prediction.residual import ChannelResidual, growth_with_level, toge
 from picchio.visuals.plots.style import direction_label
 from picchio.visuals.report.motion_figures import MotionResidualFigures
 from picchio.visuals.report.page import number, percent, render, signed, words
-from picchio.visuals.report.percussion_figures import ResidualFigures
+from picchio.visuals.report.percussion_figures import PercussionResidualFigures
 
 _DASH = "\N{EN DASH}"
 # Standard error of the power above which it tells nothing.
@@ -85,7 +85,7 @@ def check_page(
 
 def _percussion(left: PercussionResidual) -> dict[str, Any]:
     """What the page of percussion records shows."""
-    figures = ResidualFigures(left)
+    figures = PercussionResidualFigures(left)
     parts, whole = left.parts, together(left.parts)
     headline = (
         f"The simulation leaves {percent(whole.nrmse)} % of the signal; noise alone would leave "

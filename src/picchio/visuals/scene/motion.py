@@ -49,17 +49,14 @@ def vibration(
     count = int(np.clip(end * fastest * _SAMPLES_PER_CYCLE, 200, _MOST_SAMPLES))
     step = end / count
     samples = response.unit_deflection(np.arange(count) * step)
-    directions: list[dict[str, Any]] = []
-
-    def offer(words: str, along: FloatArray) -> None:
-        text = f"{words}, {direction_label(along)}"
-        directions.append({"text": text, "along": along.tolist()})
-
-    if direction is not None:
-        offer("the task's", direction)
+    offered = [] if direction is None else [("the task's", direction)]
     for k in [chosen, *(k for k in range(len(envelope.joint_names)) if k != chosen)]:
-        offer(f"worst for {envelope.joint_names[k]}", envelope.worst_direction[k])
-    offer("worst for the tool", envelope.worst_tool_direction)
+        offered.append((f"worst for {envelope.joint_names[k]}", envelope.worst_direction[k]))
+    offered.append(("worst for the tool", envelope.worst_tool_direction))
+    directions = [
+        {"text": f"{words}, {direction_label(along)}", "along": along.tolist()}
+        for words, along in offered
+    ]
     first = np.asarray(directions[0]["along"])
     jacobian = robot.state(envelope.pose).jacobian
     tool = np.linalg.norm(jacobian @ np.einsum("ndk,d->nk", samples, first), axis=0).max()

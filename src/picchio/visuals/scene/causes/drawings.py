@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -10,6 +11,7 @@ import pinocchio as pin
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.model.effects.registry import effect_class
+from picchio.visuals.kinematics import Frame
 from picchio.visuals.plots.style import BLUE
 from picchio.visuals.scene.causes.site import Drawn, Site, check_place
 from picchio.visuals.scene.causes.symbols import (
@@ -41,19 +43,33 @@ def draw(site: Site) -> list[Drawn]:
 
 
 def _ring(site: Site) -> list[Drawn]:
-    frame, axis = site.joint(site.target)
-    at = site.position(frame.link)
-    radius = 1.12 * ring_radius(frame, site.body)
-    shape = ring(radius, 0.011 * site.reach, site.colour)
-    return [Drawn(frame.link, [moved(shape, turned_to(axis, at))], at + _above(radius))]
+    return [_ring_about(site, site.target, 0.011)]
+
+
+def _whole(site: Site) -> list[Drawn]:
+    """A thin ring at every flexible joint; the first has the label."""
+    first, *others = (_ring_about(site, name, 0.006) for name in site.robot.flexible_names)
+    return [first, *(replace(other, at=None) for other in others)]
+
+
+def _ring_about(site: Site, joint: str, thickness: float) -> Drawn:
+    frame, axis, at, radius = _around(site, joint)
+    shape = ring(radius, thickness * site.reach, site.colour)
+    return Drawn(frame.link, [moved(shape, turned_to(axis, at))], at + _above(radius))
+
+
+def _around(
+    site: Site, joint: str, wider: float = 1.12
+) -> tuple[Frame, FloatArray, FloatArray, float]:
+    """A joint's frame, its axis (3,) and place (3,) in the world, and a radius about its link."""
+    frame, axis = site.joint(joint)
+    return frame, axis, site.position(frame.link), wider * ring_radius(frame, site.body)
 
 
 def _spring(site: Site) -> list[Drawn]:
-    frame, axis = site.joint(site.target)
-    at = site.position(frame.link)
-    radius = (0.035 * site.reach) if frame.prismatic else 1.12 * ring_radius(frame, site.body)
-    length = (0.2 if frame.prismatic else 0.1) * site.reach
-    shape = coil(at, axis, radius, length, 0.006 * site.reach, site.colour)
+    frame, axis, at, radius = _around(site, site.target)
+    radius, length = (0.035 * site.reach, 0.2) if frame.prismatic else (radius, 0.1)
+    shape = coil(at, axis, radius, length * site.reach, 0.006 * site.reach, site.colour)
     return [Drawn(frame.link, [shape], at + _above(radius))]
 
 
@@ -66,10 +82,8 @@ def _bending(site: Site) -> list[Drawn]:
     """Turning about the two axes across the joint's own; of a link, about those of its frame."""
     if site.target not in site.robot.joint_names:
         return _link(site)
-    frame, axis = site.joint(site.target)
-    at = site.position(frame.link)
+    frame, axis, at, radius = _around(site, site.target, 1.25)
     across = turned_to(axis, at)[:3, :2].T
-    radius = 1.25 * ring_radius(frame, site.body)
     shapes = [turning(at, side, radius, 0.006 * site.reach, site.colour) for side in across]
     return [Drawn(frame.link, shapes, at + _above(radius))]
 
@@ -178,20 +192,6 @@ def _workpiece(site: Site) -> list[Drawn]:
         box(np.array([0.15, 0.15, 0.01]) * site.reach, site.colour), turned_to(site.direction, at)
     )
     return [Drawn(None, [plate], at)]
-
-
-def _whole(site: Site) -> list[Drawn]:
-    """A thin ring at every flexible joint."""
-    found: list[Drawn] = []
-    for frame in site.frames:
-        if frame.joint in site.robot.flexible_names:
-            _, axis = site.joint(frame.joint)
-            at = site.position(frame.link)
-            radius = 1.12 * ring_radius(frame, site.body)
-            shape = ring(radius, 0.006 * site.reach, site.colour)
-            label = at + _above(radius) if not found else None
-            found.append(Drawn(frame.link, [moved(shape, turned_to(axis, at))], label))
-    return found
 
 
 def _base(site: Site) -> list[Drawn]:
