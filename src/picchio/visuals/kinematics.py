@@ -9,7 +9,6 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
-from picchio.model.rotation import exp3
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.urdf.tree import MOVABLE, UrdfJoint
 
@@ -98,7 +97,7 @@ def joint_motion(frame: Frame) -> FloatArray:
     if frame.prismatic:
         matrix[:3, 3] = frame.axis * frame.position
     else:
-        matrix[:3, :3] = exp3(frame.axis * frame.position)
+        matrix[:3, :3] = pin.exp3(frame.axis * frame.position)
     return matrix
 
 

@@ -38,6 +38,7 @@ _BAND = 1.96
 _SHOWN = {"rad": (1e3, "mrad"), "m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
 _LOWEST = 0.5
 _MOST_LABELS = 5
+_LONG = 12  # letters of a label
 
 
 def place_in_words(robot: FlexibleRobot, effect: str, target: str) -> str:
@@ -106,9 +107,9 @@ def plot_place(
         ax.annotate("", (x, z), xytext=(x - dx, z - dz), zorder=2,
                     arrowprops={"arrowstyle": "-|>", "color": BLUE, "linewidth": 1.6})  # fmt: skip
     across = [seen(p)[0] for p in at.values()]
-    middle = 0.5 * (min(across) + max(across))
+    names = [effect.replace("_", " ") for effect, _ in causes]
     marked: list[tuple[tuple[float, float], list[str]]] = []
-    for (effect, target), label in zip(causes, labels or [e for e, _ in causes], strict=True):
+    for (effect, target), label in zip(causes, labels or names, strict=True):
         points = [seen(point) for point in _points(robot, effect, target, all_frames, at)]
         for point in points:
             ax.plot(*point, "o", color="none", markeredgecolor=VERMILION, markersize=19,
@@ -118,10 +119,11 @@ def plot_place(
             near = [text for (a, b), text in marked if abs(x - a) + abs(z - b) < 0.12 * size]
             near[0].append(label) if near else marked.append((points[-1], [label]))
     for (x, z), texts in marked:
-        told = [plain(text.replace("_", " "), 24) for text in texts[:_MOST_LABELS]]
+        told = [plain(text, 24) for text in texts[:_MOST_LABELS]]
         told += ["\N{HORIZONTAL ELLIPSIS}"] * (len(texts) > _MOST_LABELS)
-        # On the side where there is room for it.
-        side = 1 if x <= middle else -1
+        # On the side where there is room for it: a short name has room right of the middle, too.
+        share = 0.6 if max(map(len, texts)) < _LONG else 0.5
+        side = 1 if x <= min(across) + share * np.ptp(across) else -1
         ax.annotate("\n".join(told), (x, z), xytext=(15 * side, 9), textcoords="offset points",
                     ha="left" if side > 0 else "right", color=VERMILION, fontsize=9,
                     fontweight="bold", zorder=5,
