@@ -33,7 +33,7 @@ from picchio.visuals.worst_rivet import WorstRivet, worst_rivet
 # The report's plots, each with an alt text that says what it shows.
 
 
-def report_figures(
+def _figures(
     assessment: Assessment,
     worst: WorstRivet,
     curve: SNCurve | None,
@@ -198,7 +198,7 @@ def assessment_report(
         task=task,
         life=life,
         curve=curve,
-        figures=report_figures(assessment, worst, curve, spread=spread),
+        figures=_figures(assessment, worst, curve, spread=spread),
         headline=verdict(assessment),
         tone="bad" if bad else "good" if assessment.limiting_joint else "",
         reducers=any(joint.reducer for joint in assessment.joints),

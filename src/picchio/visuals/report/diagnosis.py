@@ -116,10 +116,10 @@ def _percussion(found: PercussionDiagnosis, also_motion: bool) -> dict[str, Any]
         "poses": _poses(found, figures.changed),
         "tells_life": bool(diagnosis.life),
         "life": _life_rows(diagnosis.life),
-        "life_joints": life_by_joint(diagnosis.life),
+        "life_joints": _life_by_joint(diagnosis.life),
         "life_sets": _life_by_set(diagnosis),
         "ask": _ask(diagnosis),
-        "sets": [set_words(each) for each in diagnosis.alternatives],
+        "sets": [_set_words(each) for each in diagnosis.alternatives],
         "shared": _shared(diagnosis),
         "channels": problem.groups,
     }
@@ -144,7 +144,7 @@ def _motion(
         ],
         "rows": _channels(diagnosis, figures.changed),
         "cutoff": number(system.cutoff, 3),
-        "nuisances": [(_said(name), value_text(v)) for name, v in diagnosis.nuisances.items()],
+        "nuisances": [(_said(name), _value_text(v)) for name, v in diagnosis.nuisances.items()],
         "instruments": [
             f"{words(s.effect)}, {s.target}, {words(s.parameter)}: {number(s.least_squares)} by "
             f"least squares, {number(s.instrumental)} with the command as instrument"
@@ -152,7 +152,7 @@ def _motion(
         ],
         "tells_life": True,
         "why": capitalised(life.why),
-        "life": [(joint, *cells[4:], *cells[2:4]) for joint, *cells in life_by_joint(life.life)],
+        "life": [(joint, *cells[4:], *cells[2:4]) for joint, *cells in _life_by_joint(life.life)],
         "blows": _blows(life),
         "left_out": list({
             (e.name, e.target): (f"{words(e.name)}, {e.target}", why) for e, why in carried.left
@@ -168,7 +168,7 @@ _DETAILED = 3  # causes of one kind whose numbers a headline gives
 
 def headline(diagnosis: Diagnosis) -> str:
     """The verdict in a sentence or two; many causes of a kind are counted."""
-    named = "; and ".join(_phrase(kind, causes) for kind, causes in by_kind(diagnosis).items())
+    named = "; and ".join(_phrase(kind, causes) for kind, causes in _by_kind(diagnosis).items())
     gain = diagnosis.gain
     effect = ""
     if gain is not None and diagnosis.causes:
@@ -206,7 +206,7 @@ def headline(diagnosis: Diagnosis) -> str:
     )
 
 
-def by_kind(diagnosis: Diagnosis) -> dict[str, list[Cause]]:
+def _by_kind(diagnosis: Diagnosis) -> dict[str, list[Cause]]:
     """Effect -> its causes."""
     found: dict[str, list[Cause]] = {}
     for cause in diagnosis.causes:
@@ -221,7 +221,7 @@ def _phrase(kind: str, causes: Sequence[Cause]) -> str:
         return f"{what}, {len(causes)} harmonics" if catalogue()[kind].periodic else what
     said = []
     for cause in causes:
-        parts = ", ".join(f"{words(name)} {value_text(v)}" for name, v in _shown(cause).items())
+        parts = ", ".join(f"{words(name)} {_value_text(v)}" for name, v in _shown(cause).items())
         where = "" if cause.target in ("robot", "tool") else f" of {cause.target}"
         said.append(f"{words(kind)}{where}, {parts}" if parts else f"{words(kind)}{where}")
     return "; ".join(said)
@@ -235,7 +235,7 @@ def _shown(cause: Cause) -> dict[str, Value]:
     return parts
 
 
-def value_text(v: Value) -> str:
+def _value_text(v: Value) -> str:
     """Value and standard deviation."""
     # Delays are told in milliseconds.
     if v.unit == "s":
@@ -243,7 +243,7 @@ def value_text(v: Value) -> str:
     return spread(v.value, v.std, v.unit)
 
 
-def set_words(pairs: Sequence[tuple[str, str]]) -> str:
+def _set_words(pairs: Sequence[tuple[str, str]]) -> str:
     """Causes as a phrase."""
     return " and ".join(f"{words(effect)}, {target}" for effect, target in pairs)
 
@@ -264,7 +264,7 @@ def _card(robot: FlexibleRobot, cause: Cause) -> dict[str, Any]:
         "lines": [f"{capitalised(kind.meaning)}.",
                   f"It sits {place}. Confidence {_confidence(cause)}\N{NO-BREAK SPACE}%."],
         "heads": [],
-        "rows": [(words(name), value_text(v), meanings.get(name, ""))
+        "rows": [(words(name), _value_text(v), meanings.get(name, ""))
                  for name, v in _shown(cause).items()],
         "source": kind.source,
     }  # fmt: skip
@@ -273,7 +273,7 @@ def _card(robot: FlexibleRobot, cause: Cause) -> dict[str, Any]:
 def _cards(diagnosis: Diagnosis, robot: FlexibleRobot) -> list[dict[str, Any]]:
     """All causes of a kind together, a row a place."""
     made = []
-    for name, causes in by_kind(diagnosis).items():
+    for name, causes in _by_kind(diagnosis).items():
         kind = catalogue()[name]
         meaning = f"{capitalised(kind.motion_meaning or kind.meaning)}."
         if len(causes) == 1:
@@ -287,7 +287,7 @@ def _cards(diagnosis: Diagnosis, robot: FlexibleRobot) -> list[dict[str, Any]]:
                       "confidence|%"],
             "rows": [
                 (cause.target,
-                 *(value_text(cause.parameters[key]) if key in cause.parameters else _DASH
+                 *(_value_text(cause.parameters[key]) if key in cause.parameters else _DASH
                    for key in columns),
                  _confidence(cause))
                 for cause in sorted(causes, key=_place)
@@ -358,7 +358,7 @@ def _life_by_set(diagnosis: Diagnosis) -> list[tuple[str, str, str, str]]:
     ]
     return [
         (
-            set_words(pairs),
+            _set_words(pairs),
             _life_cell("rivets_to_failure", side.get("why", side.get("rivets_to_failure"))),
             _life_cell("utilisation", side.get("utilisation"), "why" not in side),
             str(side.get("limiting_joint") or _DASH),
@@ -367,7 +367,7 @@ def _life_by_set(diagnosis: Diagnosis) -> list[tuple[str, str, str, str]]:
     ]
 
 
-def life_by_joint(life: Mapping[str, Any] | None) -> list[tuple[str, ...]]:
+def _life_by_joint(life: Mapping[str, Any] | None) -> list[tuple[str, ...]]:
     """Joint; peak deflection, utilisation, rivets, each before and after, with its interval."""
     before, after = (
         ((life or {}).get(side) or {}).get("joints") or {} for side in ("baseline", "extended")
@@ -432,7 +432,7 @@ def _shared(diagnosis: Diagnosis) -> list[tuple[str, str, str, str]]:
 
     def values(told: Mapping[str, Any] | None) -> str:
         shown = [
-            f"{words(name)} {value_text(Value(**v))}"
+            f"{words(name)} {_value_text(Value(**v))}"
             for name, v in (told or {}).items() if v["std"] > 0.0
         ]  # fmt: skip
         return ", ".join(shown) or _DASH
@@ -461,7 +461,7 @@ def _nuisances(found: PercussionDiagnosis) -> list[tuple[str, str, str, str]]:
         change = 100.0 * (next(iter(effect.values.values())) - 1.0)
         tolerance = 200.0 * getattr(hypothesis.tolerance, key)
         said = f"stiffness of {effect.target}" if key == "stiffness" else name.replace("_", " ", 1)
-        rows.append((said, value_text(value), f"{signed(change, 2)} %", f"± {tolerance:g} %"))
+        rows.append((said, _value_text(value), f"{signed(change, 2)} %", f"± {tolerance:g} %"))
     return rows
 
 
@@ -518,5 +518,5 @@ def _ask(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         if most > 2.0 * least:
             fall += f" or {most:.3g}, by what it is"
         told = _TOLD.get(rival.get("told", ""), "tells it from")
-        rows.append((told, f"{set_words(pairs)} ({fall})"))
+        rows.append((told, f"{_set_words(pairs)} ({fall})"))
     return rows
