@@ -80,7 +80,7 @@ def plot_force_spectrum(
     natural_frequencies: FloatArray | None = None,
     model: Model | None = None,
 ) -> Axes:
-    """Amplitude of the blows' first twenty harmonics, N over Hz, and where the robot's modes lie.
+    """The amplitude (N) of the blows' harmonics (Hz), some twenty of them, and the robot's modes.
 
     Args:
         excitation: the blows.

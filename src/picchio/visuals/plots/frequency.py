@@ -28,7 +28,7 @@ _POINTS = 900
 
 @styled
 def plot_mode_shapes(modes: Modes, ax: Axes | None = None) -> Axes:
-    """Deflection of every joint in every mode, the largest set to 1 (no unit).
+    """The deflection of every joint in every mode, the largest set to 1 (no unit).
 
     Args:
         modes: of the robot at a pose.
@@ -62,7 +62,7 @@ def plot_frequency_response(
     *,
     excitation: Excitation | None = None,
 ) -> Axes:
-    """Deflection per newton of every joint (microradians per newton) over frequency (Hz).
+    """The deflection per newton of every joint (microradians per newton) over frequency (Hz).
 
     Args:
         modes: of the robot at a pose.
@@ -105,7 +105,7 @@ def plot_transfer(
     *,
     highest: float | None = None,
 ) -> Axes:
-    """Magnitude of response over force, measured and simulated; coherence on the right.
+    """The magnitude of response over force, measured and simulated; coherence on the right.
 
     Args:
         found: of one channel.

@@ -26,6 +26,10 @@ def plot_utilisation(assessment: Assessment, ax: Axes | None = None) -> Axes:
 
     A joint without a shaft has no stress, and its row says so. A reducer, where it is known, is
     a diamond: its largest torque, gravity and blows together, over the limit that binds.
+
+    Args:
+        assessment: of a task.
+        ax: where to draw.
     """
     joints, operations = assessment.joints, assessment.operations
     ax = axes_or_new(ax, height=_height(len(joints), len(operations)))
@@ -64,7 +68,12 @@ def plot_peak_torque(assessment: Assessment, ax: Axes | None = None) -> Axes:
 
 @styled
 def plot_damage(assessment: Assessment, ax: Axes | None = None) -> Axes:
-    """Damage of a rivet (Miner's sum, mean over the task), stacked by operation."""
+    """The damage of a rivet (Miner's sum, mean over the task), stacked by operation.
+
+    Args:
+        assessment: of a task.
+        ax: where to draw.
+    """
     joints, operations = assessment.joints, assessment.operations
     ax = axes_or_new(ax, height=_height(len(joints), 1))
     ax.set(xlabel="damage a rivet, by operation [\N{EN DASH}]", title="Where the life goes")
@@ -129,10 +138,14 @@ def _bars(
 
 @styled
 def plot_life_spread(spread: UncertainLife, ax: Axes | None = None) -> Axes:
-    """Life of every joint and of the robot (rivets): P10 to P90 as a bar, the median as a dot.
+    """The life of every joint and of the robot (rivets): P10 to P90 as a bar, the median as a dot.
 
     P10 is the life that 90 % of the samples exceed. A bar whose P90 is infinite ends in an arrow
     at the right edge.
+
+    Args:
+        spread: the life and its uncertainty.
+        ax: where to draw.
     """
     rows = {**spread.joints, "robot": spread.robot}
     ax = axes_or_new(ax, height=1.1 + 0.36 * len(rows))

@@ -43,7 +43,7 @@ def plot_polar_envelope(
     quantity: Quantity = "deflection",
     count: int = 180,
 ) -> Axes:
-    """Peak of each joint by the force's direction within a plane through the tool.
+    """The peak of each joint by the force's direction within a plane through the tool.
 
     Args:
         envelope: at a pose.

@@ -40,7 +40,7 @@ def plot_response(
     steady: Response | SampledResponse | None = None,
     unit: str = "mrad",
 ) -> Axes:
-    """Deflection of the joints (mrad) over time (s), with the largest marked.
+    """The deflection of the joints (mrad) over time (s), with the largest marked.
 
     Args:
         response: from rest (the first part of its ring-down is shown), or steady (two periods).

@@ -37,7 +37,7 @@ def plot_sn_curve(
     *,
     amplitudes: Mapping[str, ArrayLike] | None = None,
 ) -> Axes:
-    """Shear stress amplitude (MPa) over cycles to failure, with a task's amplitudes on it.
+    """The shear stress amplitude (MPa) over cycles to failure, with a task's amplitudes on it.
 
     An amplitude with a finite life sits on the curve at its life. One without is an arrow at
     the right edge: it could go on for ever.

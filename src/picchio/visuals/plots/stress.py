@@ -21,7 +21,7 @@ def plot_stress_history(
     allowable: float | None = None,
     joint: str = "",
 ) -> Axes:
-    """Shear stress of the vibration (MPa) over time (s).
+    """The shear stress of the vibration (MPa) over time (s).
 
     Args:
         time: (k,) s.

@@ -65,7 +65,7 @@ def spacing(places: FloatArray) -> float:
 def plot_workspace_map(
     workspace: WorkspaceMap | xarray.Dataset, joint: str, ax: Axes | None = None
 ) -> Axes:
-    """Peak deflection of a joint (mrad) over the plane that the map spans (m).
+    """The peak deflection of a joint (mrad) over the plane that the map spans (m).
 
     Of several poses that reach a place the one with the smallest peak counts. A map of a box is
     seen along its shortest side, the smallest peak in front.
