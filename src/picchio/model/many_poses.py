@@ -10,7 +10,7 @@ from picchio.model.expansion import link_inertia
 from picchio.model.model import Model
 from picchio.model.plant import Changes
 from picchio.robot.dynamics.rigid_model import Body, RigidModel
-from picchio.robot.dynamics.statics import balancing
+from picchio.robot.dynamics.statics import balancing, stiffness_at_torque
 
 
 class ManyPoses:
@@ -38,12 +38,8 @@ class ManyPoses:
         self._joint_inertia = np.zeros(len(robot.flexible_joints))
         self.damping_ratio = robot.damping_ratio
         self.stiffness = np.tile(robot.stiffness, (len(poses), 1))
-        curves = [joint.stiffness_curve for joint in robot.flexible_joints]
-        if any(curve is not None for curve in curves):
-            held = self._held(robot.rigid)
-            for j, curve in enumerate(curves):
-                if curve is not None:
-                    self.stiffness[:, j] = curve.tangent(held[:, j])
+        if any(joint.stiffness_curve is not None for joint in robot.flexible_joints):
+            self.stiffness = stiffness_at_torque(robot.flexible_joints, self._held(robot.rigid))
         self.compiled = not model.gravity_stiffness
         if model.changes_structure:
             self._change()

@@ -81,41 +81,18 @@ class Motion:
         """
         self.body[joint] = self.body[joint] + torque
 
-    def add_rotor_torque(self, joint: str, torque: FloatArray) -> None:
-        """Add a torque that follows from the motion of a rotor, N m: before the gear.
+    def add(self, kind: str, joint: str, values: FloatArray) -> None:
+        """Add to what a joint's drive or encoders read.
 
         Args:
+            kind: of what is added: TORQUE, on the motor's side of the gear (friction, an offset);
+                ROTOR, the torque of a rotor's motion, before the gear; RIPPLE, a torque that may be
+                faster than the band in which the rest is judged; WINDUP, the link side's angle less
+                the motor side's.
             joint: its name.
-            torque: (m,) N m or N.
+            values: (m,) N m or N; of WINDUP rad or m.
         """
-        self.added.append((ROTOR, joint, torque))
-
-    def add_drive_torque(self, joint: str, torque: FloatArray) -> None:
-        """Add a torque on the motor's side of the gear, N m: friction, or an offset.
-
-        Args:
-            joint: its name.
-            torque: (m,) N m or N.
-        """
-        self.added.append((TORQUE, joint, torque))
-
-    def add_ripple(self, joint: str, torque: FloatArray) -> None:
-        """Add a torque that may be faster than the band in which the rest is judged, N m.
-
-        Args:
-            joint: its name.
-            torque: (m,) N m or N.
-        """
-        self.added.append((RIPPLE, joint, torque))
-
-    def add_windup(self, joint: str, angle: FloatArray) -> None:
-        """Add to the link side's angle less the motor side's, rad or m.
-
-        Args:
-            joint: its name.
-            angle: (m,) rad or m.
-        """
-        self.added.append((WINDUP, joint, angle))
+        self.added.append((kind, joint, values))
 
     def scale_torque(self, joint: str, gain: float) -> None:
         """Let the drive report `gain` times its torque.

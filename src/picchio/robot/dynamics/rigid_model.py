@@ -270,9 +270,7 @@ class RigidModel:
                 v, a = self._follow @ v, self._follow @ a
             pin.forwardKinematics(model, data, q, v, a)
             linear = pin.getFrameClassicalAcceleration(model, data, frame, world).linear - gravity
-            jacobian = np.array(pin.computeFrameJacobian(model, data, q, frame, world))
-            torque = linear @ jacobian.reshape(6, self._all)[:3]
-            found[i] = torque if self._plain else torque @ self._follow
+            found[i] = linear @ self.jacobian(pose, frame)[:3]
         return found
 
     def placement(self, pose: Array, frame: int) -> tuple[Array, Array]:

@@ -62,12 +62,9 @@ def balancing(joints: Sequence[Joint], tree: UrdfTree, positions: Array) -> tupl
 
 
 def stiffness_at_torque(joints: Sequence[Joint], torque: Array) -> Array:
-    """Stiffness (n,) of n joints under a torque (n,): curves give their slope there."""
-    return np.array(
-        [
-            joint.stiffness
-            if joint.stiffness_curve is None
-            else float(joint.stiffness_curve.tangent(load))
-            for joint, load in zip(joints, torque, strict=True)
-        ]
-    )
+    """Stiffness (..., n) of n joints under torques (..., n): curves give their slope there."""
+    found = np.empty(torque.shape)
+    for k, joint in enumerate(joints):
+        curve = joint.stiffness_curve
+        found[..., k] = joint.stiffness if curve is None else curve.tangent(torque[..., k])
+    return found

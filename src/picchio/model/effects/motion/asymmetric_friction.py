@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from picchio.model.effects.effect import Effect, Parameter
-from picchio.model.motion import Motion
+from picchio.model.motion import TORQUE, Motion
 
 
 class AsymmetricFriction(Effect):
@@ -31,4 +31,4 @@ class AsymmetricFriction(Effect):
         velocity = motion.velocity[self.target]
         moves = np.abs(motion.direction(self.target))
         torque = self.values["torque"] + self.values["coefficient"] * np.abs(velocity)
-        motion.add_drive_torque(self.target, moves * torque)
+        motion.add(TORQUE, self.target, moves * torque)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from picchio.model.effects.effect import Effect, Parameter
-from picchio.model.motion import Motion
+from picchio.model.motion import TORQUE, Motion
 
 
 class LoadFriction(Effect):
@@ -27,4 +27,4 @@ class LoadFriction(Effect):
         """Add it to the drive's torque."""
         load = np.abs(motion.body[self.target])
         friction = self.values["coefficient"] * load * motion.direction(self.target)
-        motion.add_drive_torque(self.target, friction)
+        motion.add(TORQUE, self.target, friction)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from picchio.model.effects.effect import Effect, Parameter
-from picchio.model.motion import Motion
+from picchio.model.motion import TORQUE, Motion
 
 
 class StribeckFriction(Effect):
@@ -29,7 +29,7 @@ class StribeckFriction(Effect):
         """Add it to the drive's torque."""
         ratio = motion.velocity[self.target] / self.values["velocity"]
         falling = self.values["torque"] * np.exp(-np.minimum(ratio**2, 700.0))
-        motion.add_drive_torque(self.target, falling * motion.direction(self.target))
+        motion.add(TORQUE, self.target, falling * motion.direction(self.target))
 
     def motion_trials(self, motion: Motion) -> list[dict[str, float]]:
         """Velocities from well above standstill up to the record's fastest."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from picchio.model.effects.effect import Effect, Parameter
-from picchio.model.motion import Motion
+from picchio.model.motion import TORQUE, Motion
 
 
 class TorqueOffset(Effect):
@@ -22,4 +22,4 @@ class TorqueOffset(Effect):
     def motion(self, motion: Motion) -> None:
         """Add it."""
         constant = np.full_like(motion.velocity[self.target], self.values["torque"])
-        motion.add_drive_torque(self.target, constant)
+        motion.add(TORQUE, self.target, constant)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from picchio.model.effects.effect import Effect, Parameter
-from picchio.model.motion import Motion
+from picchio.model.motion import RIPPLE, Motion
 
 
 class TorqueRipple(Effect):
@@ -33,7 +33,7 @@ class TorqueRipple(Effect):
         turns = self.values["order"] * motion.gear_ratio[self.target]
         phase = turns * motion.angle[self.target]
         wave = self.values["cosine"] * np.cos(phase) + self.values["sine"] * np.sin(phase)
-        motion.add_ripple(self.target, wave)
+        motion.add(RIPPLE, self.target, wave)
 
     def motion_trials(self, motion: Motion) -> list[dict[str, float]]:
         """None: orders are searched for in the residual (`diagnosis.motion.orders`)."""

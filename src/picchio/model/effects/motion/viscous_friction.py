@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from picchio.model.effects.effect import Effect, Parameter
-from picchio.model.motion import Motion
+from picchio.model.motion import TORQUE, Motion
 
 
 class ViscousFriction(Effect):
@@ -26,6 +26,5 @@ class ViscousFriction(Effect):
 
     def motion(self, motion: Motion) -> None:
         """Add it to the drive's torque."""
-        motion.add_drive_torque(
-            self.target, self.values["coefficient"] * motion.velocity[self.target]
-        )
+        friction = self.values["coefficient"] * motion.velocity[self.target]
+        motion.add(TORQUE, self.target, friction)

@@ -8,7 +8,7 @@ import numpy as np
 
 from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.motion import Motion
+from picchio.model.motion import WINDUP, Motion
 from picchio.model.plant import Changes
 from picchio.model.system import ElementKind
 
@@ -41,4 +41,4 @@ class Backlash(Effect):
     def motion(self, motion: Motion) -> None:
         """The link side lies at the edge of the gap towards which the load pushes it."""
         side = np.sign(motion.body[self.target])
-        motion.add_windup(self.target, -0.5 * self.values["gap"] * side)
+        motion.add(WINDUP, self.target, -0.5 * self.values["gap"] * side)

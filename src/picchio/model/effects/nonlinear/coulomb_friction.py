@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.motion import Motion
+from picchio.model.motion import TORQUE, Motion
 from picchio.model.plant import Changes
 from picchio.model.system import ElementKind
 
@@ -50,4 +50,4 @@ class CoulombFriction(Effect):
     def motion(self, motion: Motion) -> None:
         """Add it to the drive's torque, against the velocity."""
         friction = self.values["torque"] * motion.direction(self.target)
-        motion.add_drive_torque(self.target, friction)
+        motion.add(TORQUE, self.target, friction)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.motion import Motion
+from picchio.model.motion import ROTOR, Motion
 from picchio.model.plant import Changes
 
 
@@ -44,4 +44,4 @@ class JointInertia(Effect):
         which turns before the gear: it is not taken to wind the gear up.
         """
         torque = self.values["inertia"] * motion.acceleration[self.target]
-        motion.add_rotor_torque(self.target, torque)
+        motion.add(ROTOR, self.target, torque)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from picchio.model.effects.effect import Effect, factor
 from picchio.model.effects.evidence import Evidence
-from picchio.model.motion import Motion
+from picchio.model.motion import WINDUP, Motion
 from picchio.model.plant import Changes
 
 
@@ -44,4 +44,4 @@ class JointStiffness(Effect):
     def motion(self, motion: Motion) -> None:
         """Let the link side yield; a motion's baseline takes the drive as rigid."""
         compliance = 1.0 / (self.values["scale"] * motion.stiffness[self.target])
-        motion.add_windup(self.target, -compliance * motion.body[self.target])
+        motion.add(WINDUP, self.target, -compliance * motion.body[self.target])
