@@ -24,14 +24,14 @@ _UsageError: Any = typer.BadParameter.__mro__[1]
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line; exit 0 on success, 2 on bad input with one line on stderr."""
+    """Run the command line; exit 0 on success, else as `run` says, with one line on stderr."""
     warnings.showwarning = lambda message, *_, **__: say_warning(str(message))
     warnings.simplefilter("default")
     sys.exit(run(arguments))
 
 
 def run(arguments: list[str] | None = None) -> int:
-    """Run the command line and return the exit code."""
+    """Run the command line: 0, 2 on bad input, 1 without memory, 130 where it was interrupted."""
     given = sys.argv[1:] if arguments is None else arguments
     begin(given)
     if given and given[-1] == "--version":  # of every subcommand, too
@@ -45,10 +45,9 @@ def run(arguments: list[str] | None = None) -> int:
         where = error.ctx.command_path if error.ctx else "picchio"
         return _fail(f"{error.format_message()} See {where} --help")
     except (typer.Abort, KeyboardInterrupt):
-        _fail("interrupted")
-        return 130
+        return _fail("interrupted", 130)
     except MemoryError:
-        return _fail("there is not enough memory for this: ask for less at a time")
+        return _fail("there is not enough memory for this: ask for less at a time", 1)
     except BrokenPipeError:
         # The reader has gone: keep Python from complaining at exit, too.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -66,6 +65,6 @@ def _as_typed(error: PicchioError, given: Sequence[str]) -> PicchioError:
     return error.placed(key=option) if option in options else error
 
 
-def _fail(problem: str) -> int:
+def _fail(problem: str, code: int = 2) -> int:
     print(f"picchio: error: {' '.join(problem.split())}", file=sys.stderr)
-    return 2
+    return code

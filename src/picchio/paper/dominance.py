@@ -44,7 +44,7 @@ class Dominance:
             return ""
         given = self.example.given
         return (
-            f"several inputs must match, for instance T = {1e3 * given.period:.3g} ms, "
+            f"several inputs match, for instance T = {1e3 * given.period:.3g} ms, "
             f"Td/T = {given.duty:.2g}, damping ratio {given.damping_ratio:.2g}, "
             f"x = {given.path_x:.3g} m, elbow {given.elbow}, inertias about the "
             f"{given.inertia_about}; there the closest of the four leads by "

@@ -174,14 +174,14 @@ def across(
     spoken = f"true in {count} of {len(worlds)} worlds"
     if count < _RARE:
         condition = (
-            f"several inputs must match, which is rare: {spoken}, too few for a rule "
+            f"several inputs match, which is rare: {spoken}, too few for a rule "
             f"(nearest to one: {words})"
         )
     elif right >= _TELLING:
         condition = f"{words} (right for {100 * right:.0f} % of the worlds; {spoken})"
     else:
         condition = (
-            f"several inputs must match: {spoken}, and no single input decides "
+            f"several inputs match: {spoken}, and no single input decides "
             f"(best: {words}, {100 * right:.0f} %)"
         )
     return Finding(Verdict.CONDITIONAL, test, decides, float(numbers[0]), condition)

@@ -27,7 +27,7 @@ class World:
 
     Attributes:
         given: the assumptions.
-        fine: whether Fig. 10's maps are drawn from, and not just searched.
+        fine: whether Fig. 10's maps are fine enough to be drawn.
     """
 
     given: Assumptions

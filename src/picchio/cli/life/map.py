@@ -62,15 +62,15 @@ def map_(
     bounds: Annotated[
         str | None,
         typer.Option(
-            metavar="LOW,HIGH,...", help="Ends along each axis of a plane or box, m; the reach."
+            metavar="LOW,HIGH,...", help="Ends along each axis, m; all within reach if not given."
         ),
     ] = None,
     direction: Annotated[
         str | None,
         typer.Option(
             metavar="X,Y,Z",
-            help="Of the force; or `worst` (each joint's own), the default; or `normal` (to the "
-            "surface), the default with --surface.",
+            help="Direction of the force; or `worst` (each joint's own), the default; or `normal` "
+            "(to the surface), the default with --surface.",
         ),
     ] = None,
     branch: Annotated[
@@ -85,7 +85,7 @@ def map_(
     damage: Annotated[
         bool,
         typer.Option(
-            "--damage", help="Count the damage of a rivet, too: --hits blows, or as many as a task."
+            "--damage", help="Count the damage of a rivet, too: --hits blows, or the task's."
         ),
     ] = False,
     force: ForceOption = None,

@@ -42,6 +42,7 @@ def identify(
 
     if str(out) == "-":
         raise InputError("must be a file", key="--out", value=str(out))
+    check_targets((out, json), [flex])
     campaign = picchio.load_campaign(data)
     moves = any(record.kind == "motion" for record in campaign)
     loaded = picchio.load_robot(robot, flex=flex, tool=tool, allow_rigid=moves)

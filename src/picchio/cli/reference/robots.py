@@ -37,7 +37,6 @@ def annotate(
     """
     import picchio
 
-    check_targets((out, json), [flex])
     made = picchio.annotate(robot, flex=flex)
     check_targets((out, json), [made.urdf, made.sidecar])
     made.save(out)

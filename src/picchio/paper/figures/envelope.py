@@ -114,7 +114,7 @@ def dominance(study: Study) -> tuple[PaperFigure, ...]:
         made.append(envelopes(
             found.example, "fig-9-found", "Fig. 9 in a world that has the paper's sequence",
             "The clearest of the worlds found: "
-            + found.words.removeprefix("several inputs must match, for instance ") + ".",
+            + found.words.removeprefix("several inputs match, for instance ") + ".",
         ))  # fmt: skip
     return tuple(made)
 

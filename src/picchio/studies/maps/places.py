@@ -253,12 +253,10 @@ def reach_box(robot: FlexibleRobot) -> tuple[FloatArray, FloatArray]:
 
 
 def _steps(low: float, high: float, step: float) -> FloatArray:
-    if not (np.isfinite([low, high, step]).all() and high >= low and step > 0):
-        raise InputError(
-            "bounds must ascend and the spacing be positive",
-            key="bounds",
-            value=[float(low), float(high), float(step)],
-        )
+    if not (np.isfinite([low, high]).all() and high >= low):
+        raise InputError("bounds must ascend", key="bounds", value=[float(low), float(high)])
+    if not (math.isfinite(step) and step > 0):
+        raise InputError("must be positive", key="spacing", value=float(step))
     if (high - low) / step > _MOST_STEPS:
         raise InputError(
             f"{(high - low) / step:.3g} points along one axis are too many",
