@@ -6,7 +6,7 @@ import tomllib
 import types
 import typing
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -16,7 +16,23 @@ from picchio.core.files import read_text
 T = TypeVar("T", bound=BaseModel)
 
 
-class StrictModel(BaseModel):
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)
+
+
+class _Checked(ModelMetaclass):
+    """Values given in Python are refused as those of a file are: by an InputError."""
+
+    def __call__(cls, *args: Any, **kwargs: Any) -> Any:
+        try:
+            return super().__call__(*args, **kwargs)
+        except ValidationError as error:
+            raise _as_input_error(error, cls, None) from None  # type: ignore[arg-type]
+
+
+class StrictModel(BaseModel, metaclass=_Checked):
     """Base of every record in a file that users edit: frozen; unknown keys, NaN and inf refused."""
 
     model_config = ConfigDict(
