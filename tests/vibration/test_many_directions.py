@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import picchio
-from picchio.excitation.half_sine_train import HalfSineTrain
-from picchio.excitation.pulse_train import PulseTrain
+from picchio.excitation.pulse_train import HalfSineTrain, PulseTrain
 from picchio.vibration.closed_form.many_directions import peak_deflections
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.core.files import read_text
+from picchio.core.files import read_columns
 from picchio.robot.flexible_robot import FlexibleRobot
 
 PLANES = ("xy", "xz", "yz")
@@ -160,31 +158,11 @@ def points_from_csv(path: str | Path) -> Listed:
     Raises:
         InputError: a missing column, or a cell that is no finite number, with its line.
     """
-    rows = list(csv.reader(io.StringIO(read_text(path))))
-    header = [cell.strip() for cell in rows[0]] if rows else []
-    wanted = ["x [m]", "y [m]", "z [m]"]
-    for name in wanted:
-        if name not in header:
-            raise InputError("the header lacks a column", file=path, key=name, value=header)
-    with_normals = all(name in header for name in ("nx", "ny", "nz"))
-    columns = [header.index(name) for name in wanted + (["nx", "ny", "nz"] if with_normals else [])]
-    values = []
-    for line, row in enumerate(rows[1:], start=2):
-        if not row:
-            continue
-        try:
-            numbers = [float(row[c]) for c in columns]
-            if not np.isfinite(numbers).all():
-                raise ValueError
-        except (ValueError, IndexError):
-            raise InputError(
-                f"line {line} does not hold finite numbers", file=path, value=",".join(row)
-            ) from None
-        values.append(numbers)
-    if not values:
+    rows = read_columns(path, ("x [m]", "y [m]", "z [m]"), ("nx", "ny", "nz"))
+    if not rows:
         raise InputError("holds no point", file=path)
-    table = np.array(values)
-    return Listed("point", table[:, :3], table[:, 3:] if with_normals else None)
+    table = np.array(rows)
+    return Listed("point", table[:, :3], table[:, 3:] if table.shape[1] > 3 else None)
 
 
 def surface(path: str | Path, *, spacing: float) -> Listed:
