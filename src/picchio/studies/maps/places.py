@@ -108,12 +108,8 @@ def plane(
         raise InputError("must be a finite number", key="at", value=at)
     first, second = (_AXES.index(letter) for letter in name)
     low, high = reach_box(robot)
-    if bounds is None:
-        limits = np.array([low[first], high[first], low[second], high[second]])
-    else:
-        limits = np.asarray(bounds, dtype=float)
-        if limits.shape != (4,) or not np.isfinite(limits).all():
-            raise InputError("must be four numbers in metres", key="bounds", value=bounds)
+    own = (low[first], high[first], low[second], high[second])
+    limits = _limits(own if bounds is None else bounds, 4)
     step = (limits[1] - limits[0]) / 50 if spacing is None else float(spacing)
     axes = [np.array([float(at)])] * 3
     axes[first] = _steps(limits[0], limits[1], step)
@@ -124,14 +120,19 @@ def plane(
 def box(robot: FlexibleRobot, *, spacing: float, bounds: ArrayLike | None = None) -> Grid:
     """Points in a box; bounds are (x low, x high, y low, y high, z low, z high) in m."""
     low, high = reach_box(robot)
-    limits = np.stack([low, high], axis=1).ravel() if bounds is None else np.asarray(bounds, float)
-    if limits.shape != (6,) or not np.isfinite(limits).all():
-        raise InputError("must be six numbers in metres", key="bounds", value=bounds)
+    limits = _limits(np.stack([low, high], axis=1).ravel() if bounds is None else bounds, 6)
     return Grid("point", tuple(_steps(limits[2 * k], limits[2 * k + 1], spacing) for k in range(3)))
 
 
+def _limits(bounds: ArrayLike, count: int) -> FloatArray:
+    limits = np.asarray(bounds, dtype=float)
+    if limits.shape != (count,) or not np.isfinite(limits).all():
+        raise InputError(f"must be {count} numbers in metres", key="bounds", value=bounds)
+    return limits
+
+
 def joint_grid(robot: FlexibleRobot, counts: int | list[int]) -> Grid:
-    """Poses on a regular grid over the joints' ranges; joints that do not end go once round.
+    """Poses on a regular grid over the joints' ranges; continuous joints make one turn.
 
     Args:
         robot: the robot.
@@ -203,15 +204,8 @@ def surface(path: str | Path, *, spacing: float) -> Listed:
         i, j = np.mgrid[0:n, 0:n]
         up = i + j < n
         down = i + j < n - 1
-        share = (
-            np.concatenate(
-                [
-                    np.stack([i[up], j[up]], axis=1) + 1.0 / 3.0,
-                    np.stack([i[down], j[down]], 1) + 2 / 3,
-                ]
-            )
-            / n
-        )
+        corner = np.stack([i, j], axis=-1)
+        share = np.concatenate([corner[up] + 1.0 / 3.0, corner[down] + 2.0 / 3.0]) / n
         first, second = triangle[1] - triangle[0], triangle[2] - triangle[0]
         middles.append(triangle[0] + share[:, :1] * first + share[:, 1:] * second)
         normals.append(np.tile(normal, (len(share), 1)))
