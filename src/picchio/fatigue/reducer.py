@@ -84,6 +84,9 @@ class Reducer:
         Args:
             peak: N m, largest magnitude: a number, or an array (...).
             held: N m, magnitude of gravity's alone, likewise.
+
+        Returns:
+            {limit: share}, of the limits that are known.
         """
         limits = {
             "repeated peak torque": (peak, self.repeated_peak_torque),

@@ -13,7 +13,15 @@ from picchio.robot.joint import Joint, Shaft
 
 
 def stress_per_torque(joints: Iterable[Joint], without: float = math.nan) -> FloatArray:
-    """(n,) 1/m^3: r / Jp of every joint's shaft, and `without` for a joint that has none."""
+    """The shear stress of a unit torque: r / Jp of every joint's shaft.
+
+    Args:
+        joints: n of them.
+        without: the number for a joint without a shaft.
+
+    Returns:
+        (n,) 1/m^3.
+    """
     shafts = [joint.shaft for joint in joints]
     return np.array([s.radius / s.polar_moment if s else without for s in shafts])
 

@@ -126,6 +126,9 @@ class SampledResponse:
 def need_springs(robot: FlexibleRobot) -> None:
     """Refuse a robot without a flexible joint.
 
+    Args:
+        robot: to be studied.
+
     Raises:
         InputError: no joint has a stiffness.
     """

@@ -266,7 +266,13 @@ class Response:
 
 
 def ring_down(modes: Modes) -> float:
-    """How long the slowest mode takes to fall to `RING_DOWN_LEVEL`, s.
+    """How long the slowest mode takes to fall to `RING_DOWN_LEVEL`.
+
+    Args:
+        modes: of the system.
+
+    Returns:
+        s.
 
     Raises:
         InputError: an undamped mode rings for ever.

@@ -63,7 +63,7 @@ def packed(inverse, gradient, curvature):
 
 
 @njit(cache=True, nogil=True)
-def prepared(mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, same):
+def _prepared(mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, same):
     """What `integrate` needs of the equations, M^-1 on all, and room for steps of other lengths."""
     n = b.size
     inverse = np.linalg.inv(mass)
@@ -194,7 +194,7 @@ def integrate(
     (2N + elements,), the last state.
     """
     n = b.size
-    equations, pushed, others, room = prepared(
+    equations, pushed, others, room = _prepared(
         mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, same
     )
     ik, ic, held, quadratic, tilts = equations
@@ -316,7 +316,7 @@ def integrate_with_friction(
 ):  # fmt: skip
     """As `integrate`, where there is friction among the elements."""
     n, elements = b.size, kinds.size
-    equations, pushed, others, room = prepared(
+    equations, pushed, others, room = _prepared(
         mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, same
     )
     ik, ic, held, quadratic, tilts = equations
