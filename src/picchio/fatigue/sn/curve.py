@@ -244,9 +244,10 @@ class SNCurve:
         return values | {"endurance_limit": self.endurance_limit, "allowable": self.allowable}
 
     def lines(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Cycles and amplitude (Pa) of a point on each line, and the line's slope, each (k,).
+        """The curve as lines; beyond an endurance limit lies one more, as `miner` has it.
 
-        Beyond an endurance limit lies one line more, as `miner` has it.
+        Returns:
+            cycles and amplitude (Pa) of a point on each line, and the line's slope, each (k,).
         """
         slopes, knots = list(self.slopes), self._knots
         if len(self.knees) == len(self.slopes):

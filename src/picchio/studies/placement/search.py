@@ -180,12 +180,15 @@ class Search:
     def costs(
         self, candidates: Candidates, period: float | None, *, compiled: bool = True
     ) -> tuple[FloatArray, FloatArray]:
-        """Damage and utilisation (k, b, c, n); infinite where there is no pose.
+        """What candidates cost each of the n joints.
 
         Args:
             candidates: the poses, c of them for each of k rivet places at b placements.
             period: s, of the blows, or None.
             compiled: as in `Loads.at`.
+
+        Returns:
+            damage and utilisation, each (k, b, c, n); infinite where there is no pose.
         """
         work = self.work
         n = len(self.loads.joints)
