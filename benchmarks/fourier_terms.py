@@ -13,7 +13,7 @@ import time
 import numpy as np
 
 import picchio
-from picchio.vibration.closed_form.fourier import truncated_fourier_response
+from picchio.vibration.closed_form.response import truncated_fourier_response
 
 
 def main() -> None:

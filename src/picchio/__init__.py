@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from picchio.core.errors import PicchioWarning as PicchioWarning
     from picchio.diagnosis.diagnose import diagnose as diagnose
     from picchio.diagnosis.identify import identify as identify
-    from picchio.excitation.half_sine_train import HalfSineTrain as HalfSineTrain
     from picchio.excitation.measured import MeasuredForce as MeasuredForce
+    from picchio.excitation.pulse_train import HalfSineTrain as HalfSineTrain
     from picchio.excitation.pulse_train import PulseTrain as PulseTrain
     from picchio.fatigue.sn.fit import fit_sn as fit_sn
     from picchio.fatigue.sn.library import load_sn_curve as load_sn_curve
@@ -76,7 +76,7 @@ _HOME = {
     "workspace_map": "studies.maps.run",
     # What they work on, from files and from Python.
     "Campaign": "campaign.campaign",
-    "HalfSineTrain": "excitation.half_sine_train",
+    "HalfSineTrain": "excitation.pulse_train",
     "MeasuredForce": "excitation.measured",
     "Model": "model.model",
     "PulseTrain": "excitation.pulse_train",

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from picchio.core.errors import InputError
-from picchio.excitation.half_sine_train import HalfSineTrain
 from picchio.excitation.measured import MeasuredForce
-from picchio.excitation.pulse_train import PulseTrain
+from picchio.excitation.pulse_train import HalfSineTrain, PulseTrain
 
 MEASURED = MeasuredForce(
     np.array([0.0, 0.001, 0.003, 0.004, 0.02]), np.array([0.0, 310.0, 80.0, -20.0, 0.0]), 0.04
@@ -119,7 +118,7 @@ def test_reading_a_measured_force(tmp_path):
         ("time [s],force [kgf]\n0,1\n1,2\n", "force [N]"),
         ("time [s],force [N]\n0,1\n", "two or more samples"),
         ("time [s],force [N]\n0,1\n1,x\n", "line 3"),
-        ("time [s],force [N]\n0,1\n1,nan\n", "sample 2"),
+        ("time [s],force [N]\n0,1\n1,nan\n", "line 3"),
         ("time [s],force [N]\n0,1\n0,2\n", "does not ascend"),
         ("time [s],force [N]\n0,1\n1\n", "line 3"),
     ],

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from picchio.core.errors import InputError
+from picchio.core.results import plain
 from picchio.fatigue.counting.counter import RESIDUE_RULES, RainflowCounter, Residue, rainflow
 from picchio.fatigue.counting.cycles import Cycles
 
@@ -95,13 +96,13 @@ def test_no_cut_loses_a_cycle(history: list[float], cuts: list[int], rule: Resid
     for chunk in np.split(np.array(history), sorted(cuts)):
         counter.add(chunk)
     whole = rainflow(history, rule)
-    assert counter.cycles(rule).to_dict() == whole.to_dict()
+    assert plain(vars(counter.cycles(rule))) == plain(vars(whole))
     # Asking in between changes nothing.
     counter = RainflowCounter()
     for chunk in np.split(np.array(history), sorted(cuts)):
         counter.add(chunk)
         counter.cycles(rule)
-    assert counter.cycles(rule).to_dict() == whole.to_dict()
+    assert plain(vars(counter.cycles(rule))) == plain(vars(whole))
 
 
 @given(histories)
@@ -146,9 +147,9 @@ def test_constants_and_two_points() -> None:
     for rule in RESIDUE_RULES:
         assert len(rainflow([3.0], rule)) == 0
         assert len(rainflow([3.0, 3.0, 3.0], rule)) == 0
-    assert rainflow([1.0, 4.0]).to_dict() == {"range": [3.0], "mean": [2.5], "count": [0.5]}
+    assert plain(vars(rainflow([1.0, 4.0]))) == {"range": [3.0], "mean": [2.5], "count": [0.5]}
     whole = rainflow([1.0, 4.0], "repeated")
-    assert whole.to_dict() == {"range": [3.0], "mean": [2.5], "count": [1.0]}
+    assert plain(vars(whole)) == {"range": [3.0], "mean": [2.5], "count": [1.0]}
     assert len(rainflow([1.0, 4.0], "discarded")) == 0
     assert rainflow(np.array([0, 3, 0], dtype=np.uint8)).range.tolist() == [3.0, 3.0]
 

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from pylife.strength.fkm_linear.constants import consts_fkm, fw_t
 
 from picchio.core.errors import InputError
-from picchio.fatigue.allowable_load import largest_factor
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.mean_stress import Rule, fkm_sensitivity
 from picchio.fatigue.miner import damage
 from picchio.fatigue.sn.curve import MinerRule, SNCurve
 from picchio.fatigue.sn.library import load_sn_curve
+from picchio.studies.backwards import largest_factor
 
 assert pylife.materiallaws.woehlercurve  # registers the accessor used below
 

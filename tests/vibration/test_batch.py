@@ -6,9 +6,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from picchio.core.errors import InputError
-from picchio.excitation.half_sine_train import HalfSineTrain
 from picchio.excitation.measured import MeasuredForce
-from picchio.excitation.pulse_train import PulseTrain
+from picchio.excitation.pulse_train import HalfSineTrain, PulseTrain
 from picchio.model.linear_system import LinearSystem, modal_damping_matrix
 from picchio.vibration.batch.peaks import batch_peaks
 from picchio.vibration.closed_form.modes import modal_analysis

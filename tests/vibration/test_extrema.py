@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from picchio.core.errors import InputError
-from picchio.excitation.half_sine_train import HalfSineTrain
-from picchio.excitation.pulse_train import PulseTrain
+from picchio.excitation.pulse_train import HalfSineTrain, PulseTrain
 from picchio.vibration.closed_form.modes import modal_analysis
 from picchio.vibration.closed_form.response import response_from_rest, steady_state
 

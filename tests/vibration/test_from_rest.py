@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from picchio.core.errors import InputError
-from picchio.excitation.half_sine_train import HalfSineTrain
 from picchio.excitation.measured import MeasuredForce
-from picchio.excitation.pulse_train import PulseTrain
+from picchio.excitation.pulse_train import HalfSineTrain, PulseTrain
 from picchio.model.linear_system import LinearSystem
 from picchio.vibration.closed_form.modes import modal_analysis
 from picchio.vibration.closed_form.response import response_from_rest

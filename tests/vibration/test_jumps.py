@@ -12,7 +12,7 @@ from picchio.campaign.record import Record
 from picchio.model.effects.registry import effect_class
 from picchio.prediction import percussion as percussion_setup
 from picchio.prediction.percussion import predict
-from picchio.vibration.integration.jumps import jump_corrections
+from picchio.vibration.integration.integrate import jump_corrections
 
 STEP = 1e-4
 FREQUENCY, DAMPING = 140.0, 0.05

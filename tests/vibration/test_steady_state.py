@@ -6,12 +6,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from picchio.core.errors import InputError
-from picchio.excitation.half_sine_train import HalfSineTrain
 from picchio.excitation.measured import MeasuredForce
-from picchio.excitation.pulse_train import PulseTrain
-from picchio.vibration.closed_form.fourier import truncated_fourier_response
+from picchio.excitation.pulse_train import HalfSineTrain, PulseTrain
 from picchio.vibration.closed_form.modes import modal_analysis
-from picchio.vibration.closed_form.response import response_from_rest, steady_state
+from picchio.vibration.closed_form.response import (
+    response_from_rest,
+    steady_state,
+    truncated_fourier_response,
+)
 
 PULSES = PulseTrain(300.0, 0.04, 0.004)
 TRAINS = {

@@ -11,8 +11,7 @@ import scipy.linalg
 from matplotlib.figure import Figure
 
 import picchio
-from picchio.excitation.half_sine_train import HalfSineTrain
-from picchio.excitation.pulse_train import PulseTrain
+from picchio.excitation.pulse_train import HalfSineTrain, PulseTrain
 from picchio.fatigue.counting.counter import rainflow
 from picchio.fatigue.sn.fit import fit_sn
 from picchio.fatigue.sn.test_table import SNTests

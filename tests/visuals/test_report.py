@@ -104,7 +104,7 @@ def test_without_shafts_no_life_is_told(ur10: SimpleNamespace) -> None:
         ur10.assessment, ur10.robot, ur10.task, warnings=[*ur10.warnings, "<b>bold</b>"]
     )
     tree = lxml_html.fromstring(page)
-    assert "no life can be told" in text_of(tree, "//*[@id='verdict']")
+    assert "no life can be given" in text_of(tree, "//*[@id='verdict']")
     warned = text_of(tree, "//section[@class='warnings']")
     assert "no shaft is given for" in warned
     assert "estimates, not measurements" in warned

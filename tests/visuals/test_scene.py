@@ -17,8 +17,7 @@ from hypothesis import strategies as st
 from lxml import html as lxml_html
 
 import picchio
-from picchio.excitation.half_sine_train import HalfSineTrain
-from picchio.excitation.pulse_train import PulseTrain
+from picchio.excitation.pulse_train import HalfSineTrain, PulseTrain
 from picchio.studies.envelopes import envelope as envelope_of
 from picchio.studies.envelopes import icosphere
 from picchio.visuals.kinematics import frames, world

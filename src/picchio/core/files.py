@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import hashlib
+import io
+import math
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -107,3 +110,44 @@ def read_bytes(path: str | Path, *, limit: int = LARGEST) -> bytes:
         raise InputError("no such file", file=source) from None
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", file=source) from None
+
+
+def read_columns(
+    path: str | Path, needed: Sequence[str], optional: Sequence[str] = ()
+) -> list[list[float]]:
+    """Columns of numbers from a CSV file, found by their names in its header.
+
+    Args:
+        path: the file.
+        needed: names of columns.
+        optional: further ones, which are read where the header has all of them.
+
+    Returns:
+        a list a row, in the order of the names.
+
+    Raises:
+        InputError: no such file, a column that is missing or there twice, or a cell that is no
+            finite number, with its line.
+    """
+    rows = list(csv.reader(io.StringIO(read_text(path))))
+    header = [cell.strip() for cell in rows[0]] if rows else []
+    names = [*needed, *(optional if set(optional) <= set(header) else ())]
+    for name in names:
+        if header.count(name) != 1:
+            raise InputError(f"the header must name one column {name!r}", file=path, value=header)
+    found = []
+    for line, row in enumerate(rows[1:], start=2):
+        if not row:
+            continue
+        try:
+            numbers = [float(row[header.index(name)]) for name in names]
+        except (ValueError, IndexError):
+            numbers = [math.nan]
+        if not all(map(math.isfinite, numbers)):
+            raise InputError(
+                f"line {line} does not hold {len(names)} finite numbers",
+                file=path,
+                value=",".join(row),
+            )
+        found.append(numbers)
+    return found

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -77,6 +78,12 @@ class Excitation(ABC):
         """
         return None
 
+    @cached_property
+    def unit_blows(self) -> tuple[PiecewiseForce, PiecewiseForce | None]:
+        """`blow` and `other_blow` over the peak force; as they are where that is 0."""
+        peak, other = self.peak_force or 1.0, self.other_blow()
+        return self.blow().over(peak), None if other is None else other.over(peak)
+
     def one_period(self) -> PiecewiseForce:
         """The force over one period: the blow, then silence."""
         return self.blow().padded(self.period)
@@ -90,7 +97,7 @@ class Excitation(ABC):
         Returns:
             the force from t = 0 on.
         """
-        return self.one_period().repeat(hits, then_silence=True)
+        return self.one_period().burst(hits)
 
     @property
     def peak_force(self) -> float:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
@@ -12,7 +10,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.core.files import read_text
+from picchio.core.files import read_columns
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
 
@@ -50,12 +48,13 @@ class MeasuredForce(Excitation):
         where = {"file": self.source}
         if time.ndim != 1 or time.shape != samples.shape or time.size < 2:
             raise InputError("needs two or more samples, one force for each time", **where)
-        if not (np.isfinite(time).all() and np.isfinite(samples).all()):
-            bad = int(np.flatnonzero(~(np.isfinite(time) & np.isfinite(samples)))[0])
-            raise InputError(f"sample {bad + 1} is not a finite number", **where)
-        if not (np.diff(time) > 0).all():
-            bad = int(np.flatnonzero(np.diff(time) <= 0)[0])
-            raise InputError(f"the time of sample {bad + 2} does not ascend", **where)
+        finite = np.isfinite(time) & np.isfinite(samples)
+        if not finite.all():
+            raise InputError(f"sample {finite.argmin() + 1} is not a finite number", **where)
+        ascends = np.diff(time) > 0.0
+        if not ascends.all():
+            problem = f"the time of sample {ascends.argmin() + 2} does not ascend"
+            raise InputError(problem, **where)
         time = time - time[0]
         period = float(self.period) or float(time[-1])
         # The last sample closes the record, so a record as long as the period is allowed.
@@ -97,26 +96,7 @@ class MeasuredForce(Excitation):
         Raises:
             InputError: missing file, header or number, with its line.
         """
-        rows = list(csv.reader(io.StringIO(read_text(path))))
-        header = [cell.strip() for cell in rows[0]] if rows else []
-        wanted = ("time [s]", "force [N]")
-        for name in wanted:
-            if header.count(name) != 1:
-                raise InputError(
-                    f"the header must name one column {name!r}", file=path, value=header
-                )
-        columns = [header.index(name) for name in wanted]
-        values = []
-        for line, row in enumerate(rows[1:], start=2):
-            if not row:
-                continue
-            try:
-                values.append([float(row[c]) for c in columns])
-            except (ValueError, IndexError):
-                raise InputError(
-                    f"line {line} does not hold two numbers", file=path, value=",".join(row)
-                ) from None
-        table = np.array(values).reshape(-1, 2)
+        table = np.reshape(read_columns(path, ("time [s]", "force [N]")), (-1, 2))
         return cls(table[:, 0], table[:, 1], period or 0.0, preload, str(path))
 
     @property
@@ -141,16 +121,6 @@ class MeasuredForce(Excitation):
         if width != 1.0:
             raise InputError("a measured force states no width to vary", key="width")
         return self if force == 1.0 else replace(self, samples=force * self.samples)
-
-    def with_period(self, period: float) -> Self:
-        """The same history at another rate.
-
-        Raises:
-            InputError: the history is longer than the period.
-        """
-        if period < self.time[-1]:
-            raise InputError("is shorter than the measured blow", key="period", value=period)
-        return replace(self, period=period)
 
     def describe(self) -> str:
         """One line for people."""

@@ -74,13 +74,16 @@ class PiecewiseForce:
     angular_frequency: FloatArray
 
     def __post_init__(self) -> None:
-        for name in ("start", "constant", "slope", "angular_frequency"):
-            object.__setattr__(self, name, _frozen(getattr(self, name), np.float64))
-        object.__setattr__(self, "amplitude", _frozen(self.amplitude, np.complex128))
-        shapes = {getattr(self, n).shape for n in _PER_PIECE}
-        if shapes != {self.start.shape} or self.start.ndim != 1 or not self.start.size:
+        arrays = []
+        for name in _PER_PIECE:
+            array = np.array(getattr(self, name), complex if name == "amplitude" else float)
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+            arrays.append(array)
+        shape = self.start.shape
+        if len(shape) != 1 or not shape[0] or any(array.shape != shape for array in arrays):
             raise InputError("the pieces of a force must be arrays of one common length")
-        if not all(np.isfinite(getattr(self, name)).all() for name in _PER_PIECE):
+        if not np.isfinite(np.concatenate(arrays)).all():
             raise InputError("a force history holds a value that is not finite")
         if self.start[0] != 0.0 or not (self.duration > 0.0).all():
             raise InputError("the pieces of a force must start at 0 and follow one another")
@@ -88,7 +91,7 @@ class PiecewiseForce:
     @property
     def duration(self) -> FloatArray:
         """(m,) s, length of each piece; the last may be infinite."""
-        return np.diff(self.start, append=self.end)
+        return np.concatenate((self.start[1:], (self.end,))) - self.start
 
     def __call__(self, time: ArrayLike) -> FloatArray:
         """The force (N) at times within [0, end); zero outside.
@@ -225,12 +228,11 @@ class PiecewiseForce:
         """The mean force over [0, end), N."""
         return float(self.fourier_coefficients(0)[0].real)
 
-    def repeat(self, count: int, *, then_silence: bool = False) -> PiecewiseForce:
-        """The history `count` times in a row, then silence for ever if asked.
+    def burst(self, count: int) -> PiecewiseForce:
+        """The history `count` times in a row, then silence for ever.
 
         Args:
             count: at least 1.
-            then_silence: no force ever after, instead of a period.
 
         Raises:
             InputError: a count below 1.
@@ -240,8 +242,7 @@ class PiecewiseForce:
         offset = np.repeat(np.arange(count) * self.end, self.start.size)
         pieces = {name: np.tile(getattr(self, name), count) for name in _PER_PIECE}
         pieces["start"] = pieces["start"] + offset
-        found = PiecewiseForce(end=count * self.end, **pieces)
-        return found.padded(np.inf) if then_silence else found
+        return PiecewiseForce(end=count * self.end, **pieces).padded(np.inf)
 
 
 def superposed(
@@ -260,14 +261,14 @@ def superposed(
     Raises:
         InputError: two sines of different frequencies at one time, which no piece can hold.
     """
-    edges = np.concatenate(
-        [[0.0], *((start[:, None] + np.append(f.start, f.end)).ravel() for _, f in parts)]
-    )
+    ends = [(start[:, None] + (*force.start, force.end)).ravel() for _, force in parts]
+    edges = np.concatenate([(0.0,), *ends])
     edges = np.unique(np.round(edges[(edges >= 0.0) & (edges < end)], 12))
     since = edges[:, None] - start
     # Just after an edge it is clear which piece holds, whatever the rounding did.
     late = since + _AFTER
-    constant, slope, omega = (np.zeros(edges.size) for _ in range(3))
+    constant, slope, highest = np.zeros((3, edges.size))
+    lowest = np.full(edges.size, np.inf)  # rad/s, as `highest`: of the sines of one moment
     amplitude = np.zeros(edges.size, dtype=np.complex128)
     for factor, force in parts:
         on = np.where((late >= 0.0) & (late < force.end), factor, 0.0)
@@ -276,27 +277,20 @@ def superposed(
         if force.constant.any():
             constant += (on * force.constant[piece]).sum(axis=1)
         if force.slope.any():
-            constant += (on * force.slope[piece] * u).sum(axis=1)
-            slope += (on * force.slope[piece]).sum(axis=1)
+            rate = on * force.slope[piece]
+            constant += (rate * u).sum(axis=1)
+            slope += rate.sum(axis=1)
         if force.amplitude.any():
             own = force.angular_frequency[piece]
             wave = on * force.amplitude[piece] * np.exp(1j * own * u)
             amplitude += wave.sum(axis=1)
-            fast = np.where(wave != 0.0, own, omega[:, None]).max(axis=1)
-            others = np.where(wave != 0.0, own, fast[:, None]).min(axis=1)
-            others = np.where(omega > 0.0, np.minimum(others, omega), others)
-            if np.any(fast - others > 1e-9 * fast):
-                raise InputError("blows that overlap hold sines of different frequencies")
-            omega = fast
-    return PiecewiseForce(edges, end, constant, slope, amplitude, omega)
+            highest = np.maximum(highest, np.where(wave, own, 0.0).max(axis=1))
+            lowest = np.minimum(lowest, np.where(wave, own, np.inf).min(axis=1))
+    if np.any(highest - lowest > 1e-9 * highest):
+        raise InputError("blows that overlap hold sines of different frequencies")
+    return PiecewiseForce(edges, end, constant, slope, amplitude, highest)
 
 
 _AFTER = 1e-9  # s
 _FORCES = ("constant", "slope", "amplitude")
 _PER_PIECE = ("start", "constant", "slope", "amplitude", "angular_frequency")
-
-
-def _frozen(values: ArrayLike, dtype: type) -> FloatArray:
-    array: FloatArray = np.array(values, dtype=dtype)
-    array.flags.writeable = False
-    return array

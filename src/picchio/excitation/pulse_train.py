@@ -1,8 +1,9 @@
-"""Rectangular pulses: the paper's blows."""
+"""Blows of one height and width, one a period: rectangular pulses (the paper's) and half-sines."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,11 +13,12 @@ from picchio.excitation.piecewise import PiecewiseForce
 
 
 @dataclass(frozen=True)
-class PulseTrain(Excitation):
-    """Rectangular pulses, the paper's Fig. 4 and eq. 12.
+class Train(Excitation):
+    """Equal blows, one a period: what every such kind states, and how it is checked.
 
     Attributes:
-        force: N, height of the pulse, F0.
+        words: how one blow is described, with `force` in braces.
+        force: N, height of a pulse or peak of a blow, F0.
         period: s, T.
         width: s, T_d, less than the period.
         preload: N, steady feed force.
@@ -26,9 +28,7 @@ class PulseTrain(Excitation):
             width that is not less than the period.
     """
 
-    kind = "pulse_train"
-    meaning = "rectangular pulses of one height and width, one a period"
-    flat = True
+    words: ClassVar[str]
 
     force: float
     period: float
@@ -36,60 +36,68 @@ class PulseTrain(Excitation):
     preload: float = 0.0
 
     def __post_init__(self) -> None:
-        check_train(self.force, self.period, self.width, self.preload)
-
-    def blow(self) -> PiecewiseForce:
-        """The pulse."""
-        return rectangle(self.force, self.width)
-
-    def other_blow(self) -> PiecewiseForce:
-        """A half-sine of the same peak and width."""
-        return half_sine(self.force, self.width)
+        for key in ("force", "period", "width", "preload"):
+            value = getattr(self, key)
+            if not np.isfinite(value):
+                raise InputError("must be a finite number", key=key, value=value)
+            if key in ("period", "width") and value <= 0.0:
+                raise InputError("must be positive", key=key, value=value)
+        if self.width >= self.period:
+            raise InputError(
+                f"the blow must be shorter than its period ({self.period:g} s)",
+                key="width",
+                value=self.width,
+            )
 
     def describe(self) -> str:
         """One line for people."""
-        return (
-            f"rectangular pulses of {self.force:g} N, {self.width * 1e3:g} ms wide, "
-            f"every {self.period * 1e3:g} ms"
-        )
+        blow = self.words.format(force=f"{self.force:g} N")
+        return f"{blow}, {self.width * 1e3:g} ms wide, every {self.period * 1e3:g} ms"
 
 
-def rectangle(force: float, width: float) -> PiecewiseForce:
-    """`force` N for `width` s."""
+class PulseTrain(Train):
+    """Rectangular pulses, the paper's Fig. 4 and eq. 12; attributes and errors as of `Train`."""
+
+    kind = "pulse_train"
+    meaning = "rectangular pulses of one height and width, one a period"
+    words = "rectangular pulses of {force}"
+    flat = True
+
+    def blow(self) -> PiecewiseForce:
+        """The pulse."""
+        return _rectangle(self)
+
+    def other_blow(self) -> PiecewiseForce:
+        """A half-sine of the same peak and width."""
+        return _half_sine(self)
+
+
+class HalfSineTrain(Train):
+    """Half-sine blows: F0 sin(pi t / T_d) for 0 <= t < T_d; attributes and errors as of `Train`.
+
+    Nearer to what a hammer's blow looks like than a rectangle is.
+    """
+
+    kind = "half_sine_train"
+    meaning = "half-sine blows of one peak and width, one a period"
+    words = "half-sine blows of {force} peak"
+
+    def blow(self) -> PiecewiseForce:
+        """The half-sine."""
+        return _half_sine(self)
+
+    def other_blow(self) -> PiecewiseForce:
+        """A rectangle of the same peak and width."""
+        return _rectangle(self)
+
+
+def _rectangle(train: Train) -> PiecewiseForce:
     zero = np.zeros(1)
-    return PiecewiseForce(zero, width, np.array([force]), zero, zero, zero)
+    return PiecewiseForce(zero, train.width, np.array([train.force]), zero, zero, zero)
 
 
-def half_sine(force: float, width: float) -> PiecewiseForce:
-    """F0 sin(pi t / T_d): `force` N at its peak, `width` s long."""
+def _half_sine(train: Train) -> PiecewiseForce:
     zero = np.zeros(1)
     # Re(-1j F0 exp(1j w u)) = F0 sin(w u)
-    return PiecewiseForce(
-        zero, width, zero, zero, np.array([-1j * force]), np.array([np.pi / width])
-    )
-
-
-def check_train(force: float, period: float, width: float, preload: float) -> None:
-    """Whether numbers can be those of equal blows, one a period.
-
-    Args:
-        force: N.
-        period: s.
-        width: s.
-        preload: N.
-
-    Raises:
-        InputError: as `PulseTrain`.
-    """
-    for key, value in (("force", force), ("period", period), ("width", width)):
-        if not np.isfinite(value):
-            raise InputError("must be a finite number", key=key, value=value)
-    for key, value in (("period", period), ("width", width)):
-        if value <= 0.0:
-            raise InputError("must be positive", key=key, value=value)
-    if not np.isfinite(preload):
-        raise InputError("must be a finite number", key="preload", value=preload)
-    if width >= period:
-        raise InputError(
-            f"the blow must be shorter than its period ({period:g} s)", key="width", value=width
-        )
+    amplitude, omega = np.array([-1j * train.force]), np.array([np.pi / train.width])
+    return PiecewiseForce(zero, train.width, zero, zero, amplitude, omega)

@@ -89,12 +89,15 @@ class MeanStress:
         if self.rule == "none":
             return a.copy()
         if self.rule in ("swt", "walker"):
-            gamma = (
-                0.5 if self.rule == "swt" else self._need(self.walker_exponent, "walker_exponent")
-            )
+            given = 0.5 if self.rule == "swt" else self.walker_exponent
+            gamma = self._need(given, "walker_exponent")
             return np.asarray((a + m) ** (1.0 - gamma) * a**gamma)
         if self.rule == "fkm":
-            return _fkm(a, m, self._sensitivity(sn_curve))
+            big = self.sensitivity
+            if big is None:
+                key = f"{sn_curve.name}.tensile_strength"
+                big = fkm_sensitivity(self._need(sn_curve.tensile_strength, key))
+            return _fkm(a, m, big)
         if self.rule == "morrow":
             key, strength = "fatigue_strength_coefficient", self.fatigue_strength_coefficient
         elif self.rule == "soderberg":
@@ -118,13 +121,6 @@ class MeanStress:
         if value is None:
             raise InputError(f"the mean stress rule {self.rule} needs it", key=key)
         return float(value)
-
-    def _sensitivity(self, sn_curve: SNCurve) -> float:
-        if self.sensitivity is not None:
-            return self.sensitivity
-        return fkm_sensitivity(
-            self._need(sn_curve.tensile_strength, f"{sn_curve.name}.tensile_strength")
-        )
 
 
 def fkm_sensitivity(tensile_strength: float) -> float:

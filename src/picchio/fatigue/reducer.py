@@ -13,17 +13,18 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Literal, TypeVar, get_args
 
-from picchio.core.arrays import as_floats
+from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError
 from picchio.core.toml import Positive, StrictModel, parse_toml
 
 Kind = Literal["strain-wave", "cycloidal"]
+Torque = TypeVar("Torque", float, FloatArray)
 
 REDUCER_FORMAT = "picchio-reducers/1"
 _RPM = 2.0 * math.pi / 60.0
@@ -77,6 +78,24 @@ class Reducer:
             if not (math.isfinite(number) and number > 0):
                 raise InputError("must be positive", key=f"{self.name}.{key}", value=value)
 
+    def shares(self, peak: Torque, held: Torque) -> dict[str, Torque]:
+        """Torque over limit, by limit.
+
+        Args:
+            peak: N m, largest magnitude: a number, or an array (...).
+            held: N m, magnitude of gravity's alone, likewise.
+
+        Returns:
+            {limit: share}, of the limits that are known.
+        """
+        limits = {
+            "repeated peak torque": (peak, self.repeated_peak_torque),
+            "momentary peak torque": (peak, self.momentary_peak_torque),
+            "ratcheting torque": (peak, self.ratcheting_torque),
+            "rated torque, held": (held, self.rated_torque),
+        }
+        return {k: torque / limit for k, (torque, limit) in limits.items() if limit is not None}
+
     def check_blows(self, peak_torque: float, holding_torque: float = 0.0) -> ReducerCheck:
         """Check a joint that stands still under blows.
 
@@ -93,33 +112,15 @@ class Reducer:
         """
         peak = abs(float(as_floats(peak_torque, "peak_torque")))
         hold = abs(float(as_floats(holding_torque, "holding_torque")))
-        limits = {
-            "repeated peak torque": (peak, self.repeated_peak_torque),
-            "momentary peak torque": (peak, self.momentary_peak_torque),
-            "ratcheting torque": (peak, self.ratcheting_torque),
-            "rated torque, held": (hold, self.rated_torque),
-        }
-        shares = {k: torque / limit for k, (torque, limit) in limits.items() if limit is not None}
-        governed = max(shares, key=lambda key: shares[key])
-        return ReducerCheck(
-            reducer=self.name,
-            peak_torque=peak,
-            holding_torque=hold,
-            utilisations=shares,
-            governed_by=governed,
-            utilisation=shares[governed],
-            warnings=self._warnings(shares),
-        )
-
-    def _warnings(self, shares: dict[str, float]) -> tuple[str, ...]:
-        lines = [
+        shares = self.shares(peak, hold)
+        warnings = [
             f"{self.name}: the catalogue life presumes turning; a joint that stands still under "
             "blows risks false brinelling, which no catalogue covers"
         ]
         for limit, text in _EXCEEDED.items():
             if shares.get(limit, 0.0) > 1.0:
-                lines.append(f"{self.name}: {text} ({shares[limit]:.2f} times)")
-        return tuple(lines)
+                warnings.append(f"{self.name}: {text} ({shares[limit]:.2f} times)")
+        return ReducerCheck(shares, tuple(warnings))
 
 
 @dataclass(frozen=True)
@@ -127,31 +128,22 @@ class ReducerCheck:
     """Torques of a joint that stands still under blows, against its reducer's limits.
 
     Attributes:
-        reducer: its name.
-        peak_torque: N m, gravity and vibration together.
-        holding_torque: N m, gravity alone.
-        utilisations: torque over limit, by limit.
-        governed_by: the limit that binds.
-        utilisation: torque over that limit; above 1 is too much.
+        utilisations: torque over limit, by limit; above 1 is too much.
         warnings: what the catalogue does not promise, and which limits are exceeded.
     """
 
-    reducer: str
-    peak_torque: float
-    holding_torque: float
     utilisations: dict[str, float]
-    governed_by: str
-    utilisation: float
     warnings: tuple[str, ...]
 
     @property
-    def passed(self) -> bool:
-        """Whether no limit is exceeded."""
-        return self.utilisation <= 1.0
+    def governed_by(self) -> str:
+        """The limit that binds."""
+        return max(self.utilisations, key=lambda limit: self.utilisations[limit])
 
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {**asdict(self), "warnings": list(self.warnings), "passed": self.passed}
+    @property
+    def utilisation(self) -> float:
+        """Torque over that limit."""
+        return self.utilisations[self.governed_by]
 
 
 class ReducerEntry(StrictModel):
@@ -218,8 +210,7 @@ def load_reducer(name: str, *, catalogues: Iterable[str | Path] = ()) -> Reducer
         return known[name]
     found = re.fullmatch(r"(.+?)-(\d+(?:\.\d+)?)", name)
     if found and found.group(1) in known and known[found.group(1)].ratio is None:
-        values = {f: getattr(known[found.group(1)], f) for f in Reducer.__dataclass_fields__}
-        return Reducer(**{**values, "name": name, "ratio": float(found.group(2))})
+        return replace(known[found.group(1)], name=name, ratio=float(found.group(2)))
     raise InputError("no such reducer", key="reducer", value=name, choices=known)
 
 

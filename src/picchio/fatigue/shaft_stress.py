@@ -2,10 +2,28 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
+
+import numpy as np
 import numpy.typing as npt
 
 from picchio.core.arrays import FloatArray, as_floats
-from picchio.robot.joint import Shaft
+from picchio.robot.joint import Joint, Shaft
+
+
+def stress_per_torque(joints: Iterable[Joint], without: float = math.nan) -> FloatArray:
+    """The shear stress of a unit torque: r / Jp of every joint's shaft.
+
+    Args:
+        joints: n of them.
+        without: the number for a joint without a shaft.
+
+    Returns:
+        (n,) 1/m^3.
+    """
+    shafts = [joint.shaft for joint in joints]
+    return np.array([s.radius / s.polar_moment if s else without for s in shafts])
 
 
 def shear_stress(torque: npt.ArrayLike, shaft: Shaft) -> FloatArray:

@@ -5,10 +5,9 @@ Nothing here knows a robot: `picchio.studies.uncertainty` runs the model on the 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +15,7 @@ import numpy.typing as npt
 from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError
 
-Samples = dict[str, FloatArray]
+Shape = Literal["normal", "lognormal", "uniform"]
 
 
 @dataclass(frozen=True)
@@ -32,15 +31,12 @@ class Uncertain:
 
     median: float
     spread: float
-    shape: Literal["normal", "lognormal", "uniform"] = "lognormal"
+    shape: Shape = "lognormal"
 
     def __post_init__(self) -> None:
-        if self.shape not in ("normal", "lognormal", "uniform"):
+        if self.shape not in get_args(Shape):
             raise InputError(
-                "unknown shape",
-                key="shape",
-                value=self.shape,
-                choices=("normal", "lognormal", "uniform"),
+                "unknown shape", key="shape", value=self.shape, choices=get_args(Shape)
             )
         as_floats(self.median, "median")
         if float(as_floats(self.spread, "spread")) < 0:
@@ -85,15 +81,6 @@ class LifeSpread:
     totals: dict[str, float]
     samples: int
 
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON; an infinite life is None."""
-        lives = {
-            k: (v if math.isfinite(v) else None)
-            for k, v in (("p10", self.p10), ("p50", self.p50), ("p90", self.p90))
-        }
-        return {**lives, "endless": self.endless, "shares": self.shares, "totals": self.totals,
-                "samples": self.samples}  # fmt: skip
-
 
 @dataclass(frozen=True, eq=False)
 class Design:
@@ -104,7 +91,7 @@ class Design:
         samples: of each block.
     """
 
-    values: Samples
+    values: dict[str, FloatArray]
     samples: int
 
     def summarise(self, lives: npt.ArrayLike, measure: npt.ArrayLike) -> LifeSpread:

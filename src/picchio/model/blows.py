@@ -59,13 +59,13 @@ class Blows:
         """
         count = hits or 1
         height = excitation.peak_force or 1.0
-        other = excitation.other_blow()
+        shape, other = excitation.unit_blows
         return cls(
             start=excitation.period * np.arange(count),
             height=np.full(count, float(height)),
             hit=np.arange(count, dtype=float),
-            shape=excitation.blow().over(height),
-            other=None if other is None else other.over(height),
+            shape=shape,
+            other=other,
             width=excitation.width,
             period=None if hits else excitation.period,
             direction=direction,

@@ -25,9 +25,12 @@ from picchio.paper.printed import Printed
 from picchio.paper.study import Study
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.run import assess
-from picchio.vibration.closed_form.fourier import truncated_fourier_response
 from picchio.vibration.closed_form.modes import modal_analysis
-from picchio.vibration.closed_form.response import Response, response_from_rest
+from picchio.vibration.closed_form.response import (
+    Response,
+    response_from_rest,
+    truncated_fourier_response,
+)
 
 
 @dataclass(frozen=True)

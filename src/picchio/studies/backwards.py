@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -13,7 +13,6 @@ import numpy as np
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
-from picchio.fatigue.allowable_load import largest_factor
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.mean_stress import Rule
@@ -251,3 +250,36 @@ def _largest(load: Load) -> float:
         if len(cycles):
             largest = max(largest, float((np.abs(steady + cycles.mean) + cycles.amplitude).max()))
     return largest
+
+
+def largest_factor(spent: Callable[[float], float], limit: float, tolerance: float = 0.0) -> float:
+    """The largest factor whose damage is within a limit, by bisection.
+
+    Args:
+        spent: damage at a factor, never falling; an InputError (above the static strength)
+            counts as endless damage.
+        limit: what may be spent.
+        tolerance: relative, of the factor; 0: to the last bit.
+
+    Raises:
+        InputError: even a vanishing factor spends more, so what does not scale breaks the part.
+    """
+
+    def too_much(factor: float) -> bool:
+        try:
+            return spent(factor) > limit
+        except InputError:
+            return True
+
+    low, high = 1.0, 1.0
+    while too_much(low):
+        high, low = low, low / 2.0
+        if low < 1e-12:
+            raise InputError("the steady stress alone breaks the part", key="steady_stress")
+    while not too_much(high):
+        low, high = high, high * 2.0
+    while True:
+        middle = 0.5 * (low + high)
+        if middle in (low, high) or high - low <= tolerance * high:
+            return low
+        low, high = (low, middle) if too_much(middle) else (middle, high)

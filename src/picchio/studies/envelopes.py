@@ -15,11 +15,11 @@ from picchio.core.html import sheet
 from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
 from picchio.excitation.excitation import Excitation
+from picchio.fatigue.shaft_stress import stress_per_torque
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.rivet.pose import ModelAtPose
-from picchio.vibration.closed_form.many_directions import peak_deflections
-from picchio.vibration.closed_form.response import Response
+from picchio.vibration.closed_form.response import Response, peak_deflections
 
 FORMAT = "picchio-envelope/1"
 Quantity = Literal["deflection", "torque", "stress"]
@@ -114,13 +114,10 @@ class DirectionEnvelope(TableResult):
         """
         j = self.joint_names.index(joint) if isinstance(joint, str) else joint
         directions, faces = icosphere(subdivisions)
-        # The envelope is the same both ways along a line, so half of the sphere is computed.
-        half = _upper_half(directions)
-        radius = np.empty(len(directions))
-        radius[half] = self.support(directions[half], quantity)[j]
-        mirror = {tuple(np.round(v, 9) + 0.0): i for i, v in enumerate(directions)}
-        for i in np.flatnonzero(~half):
-            radius[i] = radius[mirror[tuple(np.round(-directions[i], 9) + 0.0)]]
+        # The envelope is the same both ways along a line, so each line is computed once.
+        line = np.where(_upper_half(directions)[:, None], directions, -directions).round(9)
+        _, first, which = np.unique(line, axis=0, return_index=True, return_inverse=True)
+        radius = self.support(directions[first], quantity)[j][which.ravel()]
         return directions * radius[:, None], faces
 
     def _headline(self) -> str:
@@ -148,14 +145,13 @@ class DirectionEnvelope(TableResult):
         return sheet(f"Direction envelope of {self.robot}", facts, columns, rows)
 
     def _content(self) -> dict[str, Any]:
-        joints = zip(
-            self.joint_names,
-            self.peak_deflection,
-            self.worst_direction,
-            self.peak("torque"),
-            self.peak("stress"),
-            strict=True,
-        )
+        joints = {
+            "name": self.joint_names,
+            "peak_deflection": self.peak_deflection,
+            "worst_direction": self.worst_direction,
+            "peak_torque": self.peak("torque"),
+            "peak_shear_stress": self.peak("stress"),
+        }
         return {
             "format": FORMAT,
             "robot": self.robot,
@@ -164,14 +160,7 @@ class DirectionEnvelope(TableResult):
             "excitation": {**self.excitation.to_dict(), "hits": self.hits},
             "natural_frequencies": self.natural_frequencies,
             "joints": [
-                {
-                    "name": joint,
-                    "peak_deflection": peak,
-                    "worst_direction": direction,
-                    "peak_torque": torque,
-                    "peak_shear_stress": stress,
-                }
-                for joint, peak, direction, torque, stress in joints
+                dict(zip(joints, row, strict=True)) for row in zip(*joints.values(), strict=True)
             ],
             "tool": {
                 "peak_displacement": self.peak_tool_displacement,
@@ -214,11 +203,6 @@ def envelope(
     if not all(np.isfinite(w.value) for w in worst):
         raise InputError("the deflections overflow", key="force", value=excitation.peak_force)
     tool, direction = at.tool_response(excitation, hits).worst_combination(np.eye(3))
-    joints = model.robot.flexible_joints
-    stress = [
-        k * joint.shaft.radius / joint.shaft.polar_moment if joint.shaft else np.nan
-        for joint, k in zip(joints, at.stiffness, strict=True)
-    ]
     return DirectionEnvelope(
         robot=model.robot.name,
         joint_names=model.robot.flexible_names,
@@ -232,7 +216,7 @@ def envelope(
         peak_tool_displacement=tool,
         worst_tool_direction=direction,
         torque_factor=np.array(at.stiffness),
-        stress_factor=np.array(stress),
+        stress_factor=at.stiffness * stress_per_torque(model.robot.flexible_joints),
         response=response,
         notes=model.without_load(),
         origin=provenance(model.robot.files),
@@ -241,40 +225,10 @@ def envelope(
 
 def icosphere(subdivisions: int) -> tuple[FloatArray, IndexArray]:
     """Unit vectors (v, 3) and faces (f, 3) of a subdivided icosahedron, v = 10 4^s + 2."""
-    golden = (1.0 + np.sqrt(5.0)) / 2.0
-    corners = [
-        [a, b * golden, 0.0][k:] + [a, b * golden, 0.0][:k]
-        for k in range(3)
-        for a in (-1.0, 1.0)
-        for b in (-1.0, 1.0)
-    ]
-    vertices = [np.array(c) / np.linalg.norm(c) for c in corners]
-    edge = 2.0 / np.sqrt(1.0 + golden**2) * 1.01
-    faces = [
-        (i, j, k) if np.linalg.det([vertices[i], vertices[j], vertices[k]]) > 0 else (i, k, j)
-        for i in range(12)
-        for j in range(i + 1, 12)
-        for k in range(j + 1, 12)
-        if max(np.linalg.norm(vertices[p] - vertices[q]) for p, q in ((i, j), (j, k), (i, k)))
-        < edge
-    ]
-    for _ in range(subdivisions):
-        middle: dict[tuple[int, int], int] = {}
+    from trimesh.creation import icosphere as ball
 
-        def halfway(p: int, q: int, middle: dict[tuple[int, int], int] = middle) -> int:
-            key = (min(p, q), max(p, q))
-            if key not in middle:
-                point = vertices[p] + vertices[q]
-                middle[key] = len(vertices)
-                vertices.append(point / np.linalg.norm(point))
-            return middle[key]
-
-        finer = []
-        for i, j, k in faces:
-            a, b, c = halfway(i, j), halfway(j, k), halfway(k, i)
-            finer += [(i, a, c), (a, j, b), (c, b, k), (a, b, c)]
-        faces = finer
-    return np.array(vertices), np.array(faces)
+    mesh = ball(subdivisions)
+    return np.array(mesh.vertices), np.array(mesh.faces)
 
 
 def _upper_half(directions: FloatArray) -> FloatArray:

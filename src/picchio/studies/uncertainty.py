@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from statistics import NormalDist
@@ -76,9 +75,9 @@ class UncertainLife(TableResult):
 
     def _content(self) -> dict[str, Any]:
         return {
-            "joints": {name: spread.to_dict() for name, spread in self.joints.items()},
-            "robot": self.robot.to_dict(),
-            "inputs": {name: dataclasses.asdict(value) for name, value in self.inputs.items()},
+            "joints": {name: vars(spread) for name, spread in self.joints.items()},
+            "robot": vars(self.robot),
+            "inputs": {name: vars(value) for name, value in self.inputs.items()},
             "assumptions": list(self.assumptions),
             "seed": self.seed,
         }

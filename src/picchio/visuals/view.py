@@ -15,10 +15,9 @@ from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
 from picchio.studies.assessment.run import assess
-from picchio.studies.blows import blows_of
 from picchio.studies.maps.result import WorkspaceMap
 from picchio.studies.maps.run import open_map
-from picchio.studies.tasks import Task, load_task
+from picchio.studies.tasks import Task, blows_of, load_task
 from picchio.visuals.diagnosis_file import read_diagnosis
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.scene import Scene

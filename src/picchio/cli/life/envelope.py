@@ -45,7 +45,7 @@ def envelope(
     """
     import picchio
     from picchio.robot.dynamics.pose import warn_beyond_limits
-    from picchio.studies.blows import blows_of
+    from picchio.studies.tasks import blows_of
 
     loaded = picchio.load_robot(robot, flex=flex, tool=tool)
     check_targets([json], loaded.files)

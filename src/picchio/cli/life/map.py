@@ -119,7 +119,7 @@ def map_(
     A map that was interrupted resumes when the same command is given again.
     """
     import picchio
-    from picchio.studies.blows import blows_of, hits_of_rivet
+    from picchio.studies.tasks import blows_of, hits_of_rivet
 
     loaded = picchio.load_robot(robot, flex=flex, tool=tool)
     check_targets((out, json), [*loaded.files, points, surface])

@@ -72,7 +72,7 @@ def view(
     The file needs no network. Without --pose the task is assessed and shown at its worst rivet.
     """
     import picchio
-    from picchio.studies.blows import blows_of
+    from picchio.studies.tasks import blows_of
 
     if out is None and not live:
         raise InputError("needs a file", key="--out", hint="--out scene.html, or --live")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -82,10 +81,6 @@ class Cycles:
             factor: of the history.
         """
         return Cycles(self.range * abs(float(factor)), self.mean * float(factor), self.count)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The three arrays as plain lists, for JSON."""
-        return {name: getattr(self, name).tolist() for name in ("range", "mean", "count")}
 
     @classmethod
     def trusted(cls, range: FloatArray, mean: FloatArray, count: FloatArray) -> Cycles:

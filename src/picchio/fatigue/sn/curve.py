@@ -77,8 +77,32 @@ class SNCurve:
     def __post_init__(self) -> None:
         for name in ("slopes", "knees", "assumptions"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        check_curve(self)
+        self._check()
         object.__setattr__(self, "_knots", self._knot_amplitudes())
+
+    def _check(self) -> None:
+        if self.kind != "shear":
+            raise InputError("must be a shear curve", key="kind", value=self.kind)
+        if self.miner not in MINER_RULES:
+            raise InputError("unknown rule", key="miner", value=self.miner, choices=MINER_RULES)
+        for name in _POSITIVE:
+            value = getattr(self, name)
+            if value is not None and (as_floats(value, name) <= 0).any():
+                raise InputError("must be positive", key=name, value=value)
+        if self.scatter is not None and float(as_floats(self.scatter, "scatter")) < 0:
+            raise InputError("must not be negative", key="scatter", value=self.scatter)
+        if self.survival is not None:
+            check_probability(self.survival)
+        if not self.slopes or len(self.slopes) - len(self.knees) not in (0, 1):
+            raise InputError(
+                "needs as many knees as slopes (endurance limit) or one fewer",
+                key="knees",
+                value=self.knees,
+            )
+        if any(b <= a for a, b in zip(self.knees, self.knees[1:], strict=False)):
+            raise InputError("must ascend", key="knees", value=self.knees)
+        if len(self.knees) == len(self.slopes) and self.cycles > self.knees[-1]:
+            raise InputError("lies beyond the last knee", key="cycles", value=self.cycles)
 
     @property
     def endurance_limit(self) -> float | None:
@@ -106,7 +130,7 @@ class SNCurve:
         stress = as_floats(amplitude, "amplitude", finite=False)
         if (stress < 0).any():
             raise InputError("must not be negative", key="amplitude", value=float(stress.min()))
-        anchors, amplitudes, slopes = self._lines()
+        anchors, amplitudes, slopes = self.lines()
         # Knot amplitudes fall; a stress equal to one still belongs to the line above it.
         line = np.searchsorted(-self._knots, -stress, side="left")
         with np.errstate(divide="ignore", over="ignore"):
@@ -128,7 +152,7 @@ class SNCurve:
         life = as_floats(cycles, "cycles", finite=False)
         if (life <= 0).any():
             raise InputError("must be positive", key="cycles", value=float(life.min()))
-        anchors, amplitudes, slopes = self._lines()
+        anchors, amplitudes, slopes = self.lines()
         line = np.searchsorted(np.array(self.knees), life, side="left")
         return np.asarray(amplitudes[line] * _power(life / anchors[line], -1.0 / slopes[line]))
 
@@ -219,8 +243,12 @@ class SNCurve:
         values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.init}
         return values | {"endurance_limit": self.endurance_limit, "allowable": self.allowable}
 
-    def _lines(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Cycles and amplitude of a point on each line, and the line's slope."""
+    def lines(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The curve as lines; beyond an endurance limit lies one more, as `miner` has it.
+
+        Returns:
+            cycles and amplitude (Pa) of a point on each line, and the line's slope, each (k,).
+        """
         slopes, knots = list(self.slopes), self._knots
         if len(self.knees) == len(self.slopes):
             last = slopes[-1]
@@ -245,36 +273,6 @@ class SNCurve:
             stress *= (knees[i] / at) ** (-1.0 / slopes[i + 1])
             knots[i], at = stress, knees[i]
         return knots
-
-
-def check_curve(curve: SNCurve) -> None:
-    """Refuse values that do not make a curve.
-
-    Raises:
-        InputError: names the attribute.
-    """
-    if curve.kind != "shear":
-        raise InputError("must be a shear curve", key="kind", value=curve.kind)
-    if curve.miner not in MINER_RULES:
-        raise InputError("unknown rule", key="miner", value=curve.miner, choices=MINER_RULES)
-    for name in _POSITIVE:
-        value = getattr(curve, name)
-        if value is not None and (as_floats(value, name) <= 0).any():
-            raise InputError("must be positive", key=name, value=value)
-    if curve.scatter is not None and float(as_floats(curve.scatter, "scatter")) < 0:
-        raise InputError("must not be negative", key="scatter", value=curve.scatter)
-    if curve.survival is not None:
-        check_probability(curve.survival)
-    if not curve.slopes or len(curve.slopes) - len(curve.knees) not in (0, 1):
-        raise InputError(
-            "needs as many knees as slopes (endurance limit) or one fewer",
-            key="knees",
-            value=curve.knees,
-        )
-    if any(b <= a for a, b in zip(curve.knees, curve.knees[1:], strict=False)):
-        raise InputError("must ascend", key="knees", value=curve.knees)
-    if len(curve.knees) == len(curve.slopes) and curve.cycles > curve.knees[-1]:
-        raise InputError("lies beyond the last knee", key="cycles", value=curve.cycles)
 
 
 def check_probability(value: float) -> float:

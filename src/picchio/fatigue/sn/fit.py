@@ -18,8 +18,7 @@ from picchio.core.html import sheet
 from picchio.core.results import TableResult
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import write_sn_curve
-from picchio.fatigue.sn.likelihood import Likelihood, maximise
-from picchio.fatigue.sn.profile import Profile
+from picchio.fatigue.sn.likelihood import Likelihood, Profile, maximise
 from picchio.fatigue.sn.test_table import SNTests, read_sn_tests
 
 METHOD = (
@@ -28,8 +27,8 @@ METHOD = (
     "adjusted profile"
 )
 
-# What shear stress a tested stress stands for, and how that is told. Distortion energy: the shear
-# strength of ductile steel is 1 / sqrt(3) of the normal one.
+# What shear stress a tested stress stands for, and the note that says so. Distortion energy: the
+# shear strength of ductile steel is 1 / sqrt(3) of the normal one.
 _TO_SHEAR = {
     "shear": (1.0, "the tests' stresses are taken as shear (--kind)"),
     "normal": (3.0**-0.5, "normal stresses were divided by sqrt(3) to shear"),
@@ -43,13 +42,6 @@ class Estimate:
     value: float
     low: float
     high: float
-
-    def to_dict(self) -> dict[str, float | None]:
-        """For JSON; an infinite end is None."""
-        return {
-            name: (float(v) if np.isfinite(v) else None)
-            for name, v in (("value", self.value), ("low", self.low), ("high", self.high))
-        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,18 +97,10 @@ class SNFit(TableResult):
         )
 
     def _rows(self) -> list[dict[str, Any]]:
-        told = {
-            "slope": (self.slope, ""),
-            "knee": (self.knee, "cycles"),
-            "endurance_limit": (self.endurance_limit, "Pa"),
-            "design": (self.design, "Pa"),
-            "scatter": (self.scatter, ""),
-        }
-        return [
-            {"name": name, "value": e.value, "low": e.low, "high": e.high, "unit": unit}
-            for name, (e, unit) in told.items()
-            if e is not None
-        ]
+        units = {"slope": "", "knee": "cycles", "endurance_limit": "Pa", "design": "Pa",
+                 "scatter": ""}  # fmt: skip
+        told = {name: getattr(self, name) for name in units}
+        return [{"name": n, **vars(e), "unit": units[n]} for n, e in told.items() if e is not None]
 
     def _repr_html_(self) -> str:
         told = {
@@ -193,8 +177,8 @@ class SNFit(TableResult):
         return {
             "format": "picchio-sn/1",
             "method": METHOD,
-            **{name: getattr(self, name).to_dict() for name in names},
-            "knee": None if self.knee is None else self.knee.to_dict(),
+            **{name: vars(getattr(self, name)) for name in names},
+            "knee": None if self.knee is None else vars(self.knee),
             "strength_share": self.strength_share,
             "design_survival": self.design_survival,
             "reference_cycles": self.reference_cycles,

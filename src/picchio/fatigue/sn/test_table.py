@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 import warnings
 from dataclasses import dataclass
@@ -60,17 +61,32 @@ def read_sn_tests(path: str | Path, *, run_out_cycles: float | None = None) -> S
     cycles = _column(header, path, "cycles", "life")
     outcome = _find(header, "outcome", "failed", "result", "comment")
     factor = _unit(header[stress], path)
-    table = [
-        (_number(row, stress, path, i), _number(row, cycles, path, i))
-        for i, row in enumerate(rows[1:], start=2)
-    ]
-    values = np.array(table, dtype=float).reshape(-1, 2)
+    values, outcomes = [], []
+    for line, row in enumerate(rows[1:], start=2):
+        cells = [cell.strip() for cell in row] + [""] * len(header)
+        where = f"row {line}"
+        for text in (cells[stress], cells[cycles]):
+            try:
+                value = float(text)
+            except ValueError:
+                value = math.nan
+            if not 0.0 < value < math.inf:
+                raise InputError("must be a positive number", file=path, key=where, value=text)
+            values.append(value)
+        if outcome is not None:
+            word = cells[outcome].lower()
+            if word not in _FAILED | _ALIVE:
+                choices = ("Failure", "RunOut")
+                raise InputError(
+                    "unknown outcome", file=path, key=where, value=word, choices=choices
+                )
+            outcomes.append(word in _FAILED)
+    amplitude, life = np.reshape(values, (-1, 2)).T
     notes: tuple[str, ...] = ()
-    if outcome is not None:
-        failed = np.array([_failed(row, outcome, path, i) for i, row in enumerate(rows[1:], 2)])
-    else:
-        failed, notes = _by_cycles(values[:, 1], run_out_cycles)
-    return SNTests(values[:, 0] * factor, values[:, 1], failed, notes, Path(path))
+    failed = np.array(outcomes)
+    if outcome is None:
+        failed, notes = _by_cycles(life, run_out_cycles)
+    return SNTests(amplitude * factor, life, failed, notes, Path(path))
 
 
 def _rows(path: str | Path) -> list[list[str]]:
@@ -104,28 +120,6 @@ def _unit(name: str, path: str | Path) -> float:
             "the stress needs a unit in brackets", file=path, key=name, value=unit, choices=_UNITS
         )
     return _UNITS[unit]
-
-
-def _number(row: list[str], index: int, path: str | Path, line: int) -> float:
-    text = row[index].strip() if index < len(row) else ""
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not (np.isfinite(value) and value > 0):
-        raise InputError("must be a positive number", file=path, key=f"row {line}", value=text)
-    return value
-
-
-def _failed(row: list[str], index: int, path: str | Path, line: int) -> bool:
-    text = row[index].strip().lower() if index < len(row) else ""
-    if text in _FAILED:
-        return True
-    if text in _ALIVE:
-        return False
-    raise InputError(
-        "unknown outcome", file=path, key=f"row {line}", value=text, choices=("Failure", "RunOut")
-    )
 
 
 def _by_cycles(

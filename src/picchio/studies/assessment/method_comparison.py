@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import PicchioWarning
+from picchio.core.results import plain
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.miner import life
 from picchio.fatigue.sn.curve import SNCurve
@@ -45,10 +46,7 @@ class Term:
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON; a life or factor without end is None."""
-        return {
-            key: None if isinstance(value, float) and not math.isfinite(value) else value
-            for key, value in asdict(self).items()
-        }
+        return {key: plain(value) for key, value in vars(self).items()}
 
 
 def compare_methods(

@@ -66,11 +66,6 @@ class OperationResult:
     reducer_utilisation: FloatArray
     damage_per_rivet: FloatArray
 
-    def to_dict(self) -> dict[str, Any]:
-        """The operation's results as plain values, arrays as (pose, joint)."""
-        names = list(self.__dataclass_fields__)
-        return {name: getattr(self, name) for name in names}
-
 
 @dataclass(frozen=True)
 class JointLife:
@@ -129,10 +124,6 @@ class JointLife:
         """The larger of shaft's and reducer's."""
         return float(np.nanmax([self.utilisation, self.reducer_utilisation, 0.0]))
 
-    def to_dict(self) -> dict[str, Any]:
-        """The joint's results as plain values."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
-
 
 @dataclass(frozen=True)
 class SteadyStateCheck:
@@ -166,8 +157,7 @@ class SteadyStateCheck:
 
     def to_dict(self) -> dict[str, Any]:
         """The check's results as plain values, the ratios included."""
-        own = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return own | {"peak_ratio": self.peak_ratio, "life_ratio": self.life_ratio}
+        return vars(self) | {"peak_ratio": self.peak_ratio, "life_ratio": self.life_ratio}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -236,7 +226,7 @@ class Assessment(TableResult):
     def _rows(self) -> list[dict[str, Any]]:
         left_out = ("damage_share", "reducer_warnings")
         return [
-            {key: value for key, value in joint.to_dict().items() if key not in left_out}
+            {key: value for key, value in vars(joint).items() if key not in left_out}
             for joint in self.joints
         ]
 
@@ -267,8 +257,8 @@ class Assessment(TableResult):
             "robot": self.robot,
             "method": self.method,
             "sn_curve": self.sn_curve,
-            "joints": [joint.to_dict() for joint in self.joints],
-            "operations": [operation.to_dict() for operation in self.operations],
+            "joints": [vars(joint) for joint in self.joints],
+            "operations": [vars(operation) for operation in self.operations],
             "limiting_joint": self.limiting_joint,
             "rivets_to_failure": self.rivets_to_failure,
             "steady_state": [check.to_dict() for check in self.steady_state],
@@ -282,7 +272,7 @@ def verdict(found: Assessment) -> str:
     """The result in a sentence."""
     if found.limiting_joint is None:
         return (
-            "No joint has a shaft or a reducer, so no life can be told; give them in the sidecar."
+            "No joint has a shaft or a reducer, so no life can be given; state them in the sidecar."
         )
     joint = next(j for j in found.joints if j.name == found.limiting_joint)
     if math.isfinite(joint.life):

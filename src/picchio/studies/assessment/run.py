@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -22,8 +22,8 @@ from picchio.fatigue.sn.library import PAPER_SN_CURVE, load_sn_curve
 from picchio.model.model import Model
 from picchio.robot.dynamics.pose import warn_beyond_limits
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.studies.assessment.assumptions import assumptions_of
 from picchio.studies.assessment.checks import (
+    assumptions_of,
     reducer_checks,
     reducer_of,
     steady_state_checks,
@@ -32,11 +32,16 @@ from picchio.studies.assessment.checks import (
 )
 from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
 from picchio.studies.rivet.life_rules import LifeRule, PaperRule, RainflowRule, curves_of, peak
-from picchio.studies.rivet.pose import Rivet
+from picchio.studies.rivet.pose import Rivet, need_springs
 from picchio.studies.tasks import Operation, Task
 
 Method = Literal["rainflow", "paper"]
 METHODS: tuple[Method, ...] = ("rainflow", "paper")
+# Given for a joint as the largest value over all poses.
+_LARGEST = (
+    "peak_deflection", "peak_torque", "gravity_torque", "peak_shear_stress",
+    "gravity_shear_stress", "peak_total_stress", "utilisation", "reducer_utilisation",
+)  # fmt: skip
 
 
 def assess(
@@ -68,8 +73,8 @@ def assess(
         paper_mean_stress: the paper's life at the mean of the poses' peak stresses (Table 2).
         gravity_stiffness: add dg/dq to the springs; as the model has it if not given.
         gravity_balanced: gravity leaves no torque in the joints; see `Model`; likewise.
-        steady_check: tell, too, what the steady state misjudges; False leaves NaN there and
-            takes about half the time.
+        steady_check: also say what the steady state misjudges; False leaves NaN there and takes
+            about half the time.
         progress: called with (poses done, poses in all).
 
     Returns:
@@ -85,12 +90,7 @@ def assess(
         raise InputError("belongs to the method paper", key="paper_mean_stress", value=True)
     model = Model.of(robot, gravity_stiffness=gravity_stiffness, gravity_balanced=gravity_balanced)
     robot = model.robot
-    if not robot.flexible_joints:
-        raise InputError(
-            "no joint has a stiffness, so nothing can vibrate",
-            file=robot.source,
-            hint="annotate the URDF, or give a sidecar with --flex",
-        )
+    need_springs(robot)
     rule: LifeRule = PaperRule() if method == "paper" else RainflowRule(residue, mean_stress, miner)
     if sn_curve is None and method == "paper":
         sn_curve = PAPER_SN_CURVE
@@ -156,7 +156,8 @@ class _Job:
         loads = rivet.loads(self.rule.needs, both=self.both)
         n = len(loads)
         columns = ("peak_deflection", "peak_shear_stress", "utilisation", "damage_per_rivet")
-        out = {key: np.full(n, np.nan) for key in columns}
+        others = ("gravity_shear_stress", "reducer_utilisation", "peak_total_stress")
+        out = {key: np.full(n, np.nan) for key in (*columns, *others)}
         out["steady_peak_deflection"] = np.array([peak(load.steady) for load in loads])
         out["rest_peak_deflection"] = np.array([peak(load.rest) for load in loads])
         out["check"], out["reducer_torques"] = np.full((2, n, 2), np.nan)
@@ -164,9 +165,6 @@ class _Job:
         out["peak_deflection"] = own.copy()
         out["peak_torque"] = rivet.stiffness * own
         out["gravity_torque"] = np.abs(rivet.gravity_torque)
-        out["gravity_shear_stress"] = np.full(n, np.nan)
-        out["reducer_utilisation"] = np.full(n, np.nan)
-        out["peak_total_stress"] = np.full(n, np.nan)
         hits = operation.hits_per_rivet
         for j, (joint, load) in enumerate(zip(robot.flexible_joints, loads, strict=True)):
             reducer = self.reducers[j]
@@ -179,12 +177,11 @@ class _Job:
                 continue
             for key, value in zip(columns, self.rule(joint, load, hits, curve), strict=True):
                 out[key][j] = value
-            out["gravity_shear_stress"][j] = (
-                out["gravity_torque"][j] * joint.shaft.radius / joint.shaft.polar_moment
-            )
+            out["gravity_shear_stress"][j] = shear_stress(out["gravity_torque"][j], joint.shaft)
             if load.rest is not None:
-                total = float(shear_stress(load.peak_torque_with_gravity, joint.shaft))
-                out["peak_total_stress"][j] = total
+                out["peak_total_stress"][j] = shear_stress(
+                    load.peak_torque_with_gravity, joint.shaft
+                )
             if load.steady is not None and load.rest is not None:
                 # The paper's curve on both, so that only the steady state's share shows.
                 out["check"][j] = (
@@ -219,8 +216,7 @@ def _at_mean_stress(
         if curve is not None:
             mean = float(result.peak_shear_stress[:, j].mean())
             changed[:, j] = peak_damage(mean, result.hits_per_rivet, curve)
-    values = {name: getattr(result, name) for name in result.__dataclass_fields__}
-    return OperationResult(**(values | {"damage_per_rivet": changed}))
+    return replace(result, damage_per_rivet=changed)
 
 
 def _joint_life(
@@ -240,18 +236,15 @@ def _joint_life(
     ranked = [r.utilisation if curve is not None else r.peak_deflection for r in results]
     k = int(np.argmax([column[:, j].max() for column in ranked]))
     shares = {name: value / total for name, value in spent.items()} if total > 0.0 else {}
+    largest = {
+        name: float(max(getattr(result, name)[:, j].max() for result in results))
+        for name in _LARGEST
+    }
     return JointLife(
         name=joint.name,
         kind=joint.kind,
-        peak_deflection=float(max(r.peak_deflection[:, j].max() for r in results)),
-        peak_torque=float(max(r.peak_torque[:, j].max() for r in results)),
-        gravity_torque=float(max(r.gravity_torque[:, j].max() for r in results)),
-        peak_shear_stress=float(max(r.peak_shear_stress[:, j].max() for r in results)),
-        gravity_shear_stress=float(max(r.gravity_shear_stress[:, j].max() for r in results)),
-        peak_total_stress=float(max(r.peak_total_stress[:, j].max() for r in results)),
-        utilisation=float(max(r.utilisation[:, j].max() for r in results)),
+        **largest,
         reducer=reducer,
-        reducer_utilisation=float(max(r.reducer_utilisation[:, j].max() for r in results)),
         damage_per_rivet=per_rivet,
         rivets_to_failure=life(per_rivet) if curve is not None else math.nan,
         sn_curve=curve.name if curve is not None else "",

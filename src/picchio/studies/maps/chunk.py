@@ -10,6 +10,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.excitation.excitation import Excitation
+from picchio.fatigue.shaft_stress import stress_per_torque
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.maps.places import Listed, Places
@@ -135,23 +136,20 @@ class MapJob:
         )
         position = tool_places(robot, poses)
         torque = stiffness * found.peak_deflection
-        factor = [
-            joint.shaft.radius / joint.shaft.polar_moment if joint.shaft else np.nan
-            for joint in robot.flexible_joints
-        ]
-        stress = torque * np.array(factor)
+        stress = torque * stress_per_torque(robot.flexible_joints)
         rank = np.where(np.isfinite(stress).all(axis=1)[:, None], stress, torque)
         columns = {
             "place": place,
             "position": position,
             "pose": poses,
-            "branch": branch_codes(poses),
+            # The joints' signs as one number: bit k is set where joint k's position is negative.
+            "branch": ((poses < 0.0) @ (1 << np.arange(poses.shape[1]))).astype(np.int32),
             "natural_frequency": found.natural_frequencies,
             "peak_deflection": found.peak_deflection,
             "peak_torque": torque,
             "peak_shear_stress": stress,
             "worst_direction": found.direction,
-            "limiting_joint": _argmax(rank),
+            "limiting_joint": np.nan_to_num(rank, nan=-np.inf).argmax(axis=1).astype(np.int32),
         }
         if self.damage is not None:
             own = self._direction(place)
@@ -207,13 +205,3 @@ def tool_places(robot: FlexibleRobot, poses: FloatArray) -> FloatArray:
     found = np.empty((len(poses), 3))
     places_of(chain.tables, np.ascontiguousarray(poses[:, chain.index]), found)
     return found
-
-
-def branch_codes(poses: FloatArray) -> FloatArray:
-    """Signs of the joints as one number: bit k is set where joint k's position is negative."""
-    return ((poses < 0.0) @ (1 << np.arange(poses.shape[1]))).astype(np.int32)
-
-
-def _argmax(rank: FloatArray) -> FloatArray:
-    known = np.where(np.isnan(rank), -np.inf, rank)
-    return known.argmax(axis=1).astype(np.int32) if len(rank) else np.empty(0, np.int32)

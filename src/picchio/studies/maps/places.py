@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.core.files import read_text
+from picchio.core.files import read_columns
 from picchio.robot.flexible_robot import FlexibleRobot
 
 PLANES = ("xy", "xz", "yz")
@@ -110,12 +108,8 @@ def plane(
         raise InputError("must be a finite number", key="at", value=at)
     first, second = (_AXES.index(letter) for letter in name)
     low, high = reach_box(robot)
-    if bounds is None:
-        limits = np.array([low[first], high[first], low[second], high[second]])
-    else:
-        limits = np.asarray(bounds, dtype=float)
-        if limits.shape != (4,) or not np.isfinite(limits).all():
-            raise InputError("must be four numbers in metres", key="bounds", value=bounds)
+    own = (low[first], high[first], low[second], high[second])
+    limits = _limits(own if bounds is None else bounds, 4)
     step = (limits[1] - limits[0]) / 50 if spacing is None else float(spacing)
     axes = [np.array([float(at)])] * 3
     axes[first] = _steps(limits[0], limits[1], step)
@@ -126,14 +120,19 @@ def plane(
 def box(robot: FlexibleRobot, *, spacing: float, bounds: ArrayLike | None = None) -> Grid:
     """Points in a box; bounds are (x low, x high, y low, y high, z low, z high) in m."""
     low, high = reach_box(robot)
-    limits = np.stack([low, high], axis=1).ravel() if bounds is None else np.asarray(bounds, float)
-    if limits.shape != (6,) or not np.isfinite(limits).all():
-        raise InputError("must be six numbers in metres", key="bounds", value=bounds)
+    limits = _limits(np.stack([low, high], axis=1).ravel() if bounds is None else bounds, 6)
     return Grid("point", tuple(_steps(limits[2 * k], limits[2 * k + 1], spacing) for k in range(3)))
 
 
+def _limits(bounds: ArrayLike, count: int) -> FloatArray:
+    limits = np.asarray(bounds, dtype=float)
+    if limits.shape != (count,) or not np.isfinite(limits).all():
+        raise InputError(f"must be {count} numbers in metres", key="bounds", value=bounds)
+    return limits
+
+
 def joint_grid(robot: FlexibleRobot, counts: int | list[int]) -> Grid:
-    """Poses on a regular grid over the joints' ranges; joints that do not end go once round.
+    """Poses on a regular grid over the joints' ranges; continuous joints make one turn.
 
     Args:
         robot: the robot.
@@ -160,31 +159,11 @@ def points_from_csv(path: str | Path) -> Listed:
     Raises:
         InputError: a missing column, or a cell that is no finite number, with its line.
     """
-    rows = list(csv.reader(io.StringIO(read_text(path))))
-    header = [cell.strip() for cell in rows[0]] if rows else []
-    wanted = ["x [m]", "y [m]", "z [m]"]
-    for name in wanted:
-        if name not in header:
-            raise InputError("the header lacks a column", file=path, key=name, value=header)
-    with_normals = all(name in header for name in ("nx", "ny", "nz"))
-    columns = [header.index(name) for name in wanted + (["nx", "ny", "nz"] if with_normals else [])]
-    values = []
-    for line, row in enumerate(rows[1:], start=2):
-        if not row:
-            continue
-        try:
-            numbers = [float(row[c]) for c in columns]
-            if not np.isfinite(numbers).all():
-                raise ValueError
-        except (ValueError, IndexError):
-            raise InputError(
-                f"line {line} does not hold finite numbers", file=path, value=",".join(row)
-            ) from None
-        values.append(numbers)
-    if not values:
+    rows = read_columns(path, ("x [m]", "y [m]", "z [m]"), ("nx", "ny", "nz"))
+    if not rows:
         raise InputError("holds no point", file=path)
-    table = np.array(values)
-    return Listed("point", table[:, :3], table[:, 3:] if with_normals else None)
+    table = np.array(rows)
+    return Listed("point", table[:, :3], table[:, 3:] if table.shape[1] > 3 else None)
 
 
 def surface(path: str | Path, *, spacing: float) -> Listed:
@@ -225,15 +204,8 @@ def surface(path: str | Path, *, spacing: float) -> Listed:
         i, j = np.mgrid[0:n, 0:n]
         up = i + j < n
         down = i + j < n - 1
-        share = (
-            np.concatenate(
-                [
-                    np.stack([i[up], j[up]], axis=1) + 1.0 / 3.0,
-                    np.stack([i[down], j[down]], 1) + 2 / 3,
-                ]
-            )
-            / n
-        )
+        corner = np.stack([i, j], axis=-1)
+        share = np.concatenate([corner[up] + 1.0 / 3.0, corner[down] + 2.0 / 3.0]) / n
         first, second = triangle[1] - triangle[0], triangle[2] - triangle[0]
         middles.append(triangle[0] + share[:, :1] * first + share[:, 1:] * second)
         normals.append(np.tile(normal, (len(share), 1)))

@@ -97,7 +97,10 @@ class WorkspaceMap(TableResult):
                         "worst_direction": row["worst_direction"].values[j],
                     }
             if "damage_per_rivet" in part:
-                _add_damage(best, part["damage_per_rivet"].values)
+                for entry, damage in zip(best, part["damage_per_rivet"].values.T, strict=True):
+                    if np.isfinite(damage).any():
+                        largest = float(damage[np.isfinite(damage)].max())
+                        entry["damage_per_rivet"] = max(entry.get("damage_per_rivet", 0.0), largest)
         for entry, poses in zip(best, limits, strict=True):
             entry["limits_poses"] = int(poses)
         attrs = found.attrs
@@ -113,10 +116,3 @@ class WorkspaceMap(TableResult):
             "joints": best,
             "notes": [str(note) for note in np.atleast_1d(attrs["notes"]) if str(note)],
         }
-
-
-def _add_damage(best: list[dict[str, Any]], damage: Any) -> None:
-    for j, entry in enumerate(best):
-        known = damage[:, j][np.isfinite(damage[:, j])]
-        if len(known):
-            entry["damage_per_rivet"] = max(entry.get("damage_per_rivet", 0.0), float(known.max()))

@@ -26,6 +26,7 @@ from picchio.studies.maps.chunk import Columns, MapJob
 from picchio.studies.maps.files import join_chunks
 from picchio.studies.maps.places import Places
 from picchio.studies.maps.result import WorkspaceMap
+from picchio.studies.rivet.pose import need_springs
 from picchio.vibration.closed_form.response import unit_vector
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def workspace_map(
         workers: processes; up to one, this process does the work itself. As many as cores, and
             none for small maps, if not given.
         scheduler: address of a dask scheduler to use instead.
-        restart: throw away what an interrupted map has left, instead of going on.
+        restart: discard what an interrupted map has left, instead of resuming it.
         progress: called with (places done, places in all).
 
     Returns:
@@ -87,8 +88,7 @@ def workspace_map(
         raise InputError("unknown ending", key="out", value=target.name, choices=ENDINGS)
     if not target.parent.is_dir():
         raise InputError("the folder does not exist", file=target)
-    if not robot.flexible_joints:
-        raise InputError("no joint has a stiffness, so nothing can vibrate", file=robot.source)
+    need_springs(robot)
     if not isinstance(direction, str):
         direction = tuple(float(c) for c in unit_vector(direction))
     elif direction not in ("worst", "normal"):
@@ -119,7 +119,7 @@ def workspace_map(
         raise InputError("must be at least 1", key="damage", value=damage)
     if damage is not None and all(joint.shaft is None for joint in robot.flexible_joints):
         raise InputError(
-            "no joint has a shaft, so no damage can be told",
+            "no joint has a shaft, so damage cannot be computed",
             key="damage",
             hint="give shafts in a sidecar",
         )
@@ -186,7 +186,7 @@ def _open_folder(target: Path, job: MapJob, chunk: int) -> Path:
         raise InputError(
             "holds the unfinished chunks of another map",
             file=folder,
-            hint="--restart throws them away; or write to another file",
+            hint="--restart discards them; or write to another file",
         )
     folder.mkdir(exist_ok=True)
     if not label.exists():

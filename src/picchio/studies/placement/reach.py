@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,7 +21,7 @@ def spread_evenly(count: int, dims: int, seed: int = 0) -> FloatArray:
     """(count, dims) points in the unit box, the middle first.
 
     The additive recurrence of generalised golden ratios: M. Roberts, "The unreasonable
-    effectiveness of quasirandom sequences" (2018). Another seed goes on where this one ends.
+    effectiveness of quasirandom sequences" (2018). Another seed continues where this one ends.
     """
     ratio = 2.0
     for _ in range(60):
@@ -46,29 +46,26 @@ class Candidates:
     poses: tuple[FloatArray, ...]
 
 
-@dataclass(eq=False)
 class Reach:
     """What an arm can reach of a work, wherever that stands.
 
-    Attributes:
+    Args:
         robot: the arm.
+        work: what is moved.
+
+    Attributes:
         work: what is moved.
         chain: the arm's joints as tables.
     """
 
-    robot: FlexibleRobot
-    work: Work
-    chain: Chain = field(init=False)
-    _middle: FloatArray = field(init=False)
-    _groups: list[IndexArray] = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.chain = tool_chain(self.robot)
+    def __init__(self, robot: FlexibleRobot, work: Work) -> None:
+        self.work = work
+        self.chain: Chain = tool_chain(robot)
         ends = self.chain.lower + self.chain.upper
         self._middle = np.where(np.isfinite(ends), 0.5 * ends, 0.0)
         # The outermost first: where a placement is out of reach they tell.
-        groups = [np.flatnonzero(self.work.group == g) for g in np.unique(self.work.group)]
-        gap = np.linalg.norm(self.work.position - self.work.centre, axis=1)
+        groups: list[IndexArray] = [np.flatnonzero(work.group == g) for g in np.unique(work.group)]
+        gap = np.linalg.norm(work.position - work.centre, axis=1)
         self._groups = sorted(groups, key=lambda members: -gap[members[0]])
 
     @property
@@ -77,7 +74,7 @@ class Reach:
         return len(self.chain.index) > (3 if self.work.axis is None else 5)
 
     def everywhere(self, times: int = 1, seed: int = 0) -> FloatArray:
-        """The first guesses (s, joints) all over the joints' ranges; angles at most once round.
+        """The first guesses (s, joints) all over the joints' ranges; at most one turn of each.
 
         Args:
             times: so many times as many.

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,11 +25,13 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.ik.chain import tool_chain
 from picchio.studies.assessment.checks import reducer_of
 from picchio.studies.placement.loads import Loads
+from picchio.studies.placement.reach import Candidates
 from picchio.studies.placement.result import JointUse, Off, Placement, Standing
 from picchio.studies.placement.search import ROUNDS, SHIFTS, Search, Spot, descend
 from picchio.studies.placement.self_collision import SelfCollision
 from picchio.studies.placement.work import Work
 from picchio.studies.rivet.life_rules import curves_of
+from picchio.studies.rivet.pose import need_springs
 from picchio.studies.tasks import Task
 
 PLACEMENTS = 400
@@ -88,8 +91,7 @@ def place(
             value=effects,
             hint="place the work by a model without it, then assess the place with it",
         )
-    if not robot.flexible_joints:
-        raise InputError("no joint has a stiffness, so nothing can vibrate", file=robot.source)
+    need_springs(robot)
     if placements < 1:
         raise InputError("must be at least 1", key="placements", value=placements)
     if not (math.isfinite(off) and off > 0.0):
@@ -97,7 +99,7 @@ def place(
     if not (math.isfinite(margin) and margin >= 0.0):
         raise InputError("must not be negative", key="margin", value=margin)
     curves = curves_of(robot, sn_curve)
-    loads = Loads.of(model, task, curves, tuple(reducer_of(j) for j in robot.flexible_joints))
+    loads = Loads(model, task, curves, tuple(reducer_of(j) for j in robot.flexible_joints))
     work = Work.of(robot, task)
     half = _half(robot, move)
     periods = _periods(task, period_range)
@@ -105,7 +107,8 @@ def place(
     if self_collision:
         meshes = SelfCollision.of(robot, work.pose[0])
     search = Search(work, loads, meshes if isinstance(meshes, SelfCollision) else None, margin)
-    start = _start(search)
+    damage, used = _costs(search, np.zeros(4), None, work.pose, compiled=True)
+    start = Spot(np.zeros(4), None, work.pose, float(damage.max()), float(used.max()))
     beyond = any(robot.limit_violations(pose) for pose in work.pose)
     valid = not beyond and not search.colliding(work.pose)
     if not valid:
@@ -174,27 +177,13 @@ def _periods(task: Task, wanted: tuple[float, float] | None) -> tuple[float, flo
     return low, high
 
 
-def _start(search: Search) -> Spot:
-    """The work where it is, poses as given."""
-    damage, used = _costs(search, np.zeros(4), None, search.work.pose, compiled=True)
-    total = (damage * search.work.share[:, None]).sum(axis=0)
-    return Spot(np.zeros(4), None, search.work.pose, float(total.max()), float(used.max()))
-
-
 def _costs(
     search: Search, move: FloatArray, period: float | None, poses: FloatArray, *, compiled: bool
 ) -> tuple[FloatArray, FloatArray]:
-    """Damage and utilisation (k, n) of every rivet place."""
-    work = search.work
-    along = work.direction @ work.turn(move[3]).T
-    damage = np.empty((len(poses), len(search.loads.model.robot.flexible_joints)))
-    used = np.empty_like(damage)
-    for operation in np.unique(work.operation):
-        own = work.operation == operation
-        damage[own], used[own] = search.loads.at(
-            int(operation), poses[own], along[own], period, compiled=compiled
-        )
-    return damage, used
+    """Of given poses: each joint's damage by a rivet of the mix, (n,); utilisation, (k, n)."""
+    only = Candidates(move[None], tuple(pose[None, None] for pose in poses))
+    damage, used = (table[:, 0, 0] for table in search.costs(only, period, compiled=compiled))
+    return (damage * search.work.share[:, None]).sum(axis=0), used
 
 
 def _search(
@@ -219,7 +208,7 @@ def _search(
     if start is not None and periods is not None:
         own = search.loads.task.operations[0].excitation.period
         if periods[0] <= own <= periods[1]:
-            chosen = [_with_period(start, own)]
+            chosen = [replace(start, period=own)]
     for spot in found:
         if len(chosen) > _DESCENTS:
             break
@@ -240,10 +229,6 @@ def _search(
     return min(ended, key=lambda s: (s.damage, s.utilisation), default=None)
 
 
-def _with_period(spot: Spot, period: float) -> Spot:
-    return Spot(spot.move, period, spot.poses, spot.damage, spot.utilisation)
-
-
 def _near(one: Spot, other: Spot, half: FloatArray) -> bool:
     gap = np.abs(one.move - other.move)
     gap[3] = min(gap[3], 2.0 * np.pi - gap[3])
@@ -252,7 +237,7 @@ def _near(one: Spot, other: Spot, half: FloatArray) -> bool:
 
 def _settle(search: Search, spot: Spot, seed: int) -> Spot | None:
     """The spot, checked; with other poses where links would touch; None where none are left."""
-    worst = Spot(spot.move, spot.period, spot.poses, math.inf, math.inf)
+    worst = replace(spot, damage=math.inf, utilisation=math.inf)
     everywhere = search.reach.everywhere(4, seed)
     for seeds in (
         [q[None, search.reach.chain.index] for q in spot.poses],
@@ -267,10 +252,9 @@ def _settle(search: Search, spot: Spot, seed: int) -> Spot | None:
 def _standing(search: Search, spot: Spot) -> Standing:
     """The same spot by the exact path."""
     damage, used = _costs(search, spot.move, spot.period, spot.poses, compiled=False)
-    total = (damage * search.work.share[:, None]).sum(axis=0)
     joints = tuple(
-        JointUse(joint.name, life(float(total[j])), float(used[:, j].max()))
-        for j, joint in enumerate(search.loads.model.robot.flexible_joints)
+        JointUse(joint.name, life(float(damage[j])), float(used[:, j].max()))
+        for j, joint in enumerate(search.loads.joints)
     )
     mounting = search.loads.model.robot.mounting
     base, heading = search.work.base_move(spot.move, np.asarray(mounting.xyz, dtype=float))
@@ -278,9 +262,9 @@ def _standing(search: Search, spot: Spot) -> Standing:
 
 
 def _exact(standing: Standing) -> Spot:
-    spot, rivets = standing.spot, standing.rivets_to_failure
+    rivets = standing.rivets_to_failure
     damage = 1.0 / rivets if rivets > 0.0 else math.inf
-    return Spot(spot.move, spot.period, spot.poses, damage, standing.utilisation)
+    return replace(standing.spot, damage=damage, utilisation=standing.utilisation)
 
 
 def _beside(search: Search, spot: Spot, off: float) -> tuple[Off, ...]:
@@ -306,7 +290,7 @@ def _assumptions(loads: Loads, meshes: SelfCollision | str) -> tuple[str, ...]:
     if loads.by_effort:
         lines.append(
             "no joint has a shaft or a reducer: utilisation is the largest torque, gravity and "
-            "blows together, over the URDF's effort limit, and no life can be told"
+            "blows together, over the URDF's effort limit, and no life is given"
         )
     if isinstance(meshes, str):
         lines.append(f"self-collisions are not checked: {meshes}")

@@ -51,74 +51,6 @@ class Spot:
 _SWEEPS = 3
 
 
-def cost_tables(
-    work: Work, loads: Loads, candidates: Candidates, period: float | None
-) -> tuple[FloatArray, FloatArray]:
-    """Damage and utilisation (k, b, c, n); infinite where there is no pose."""
-    n = len(loads.model.robot.flexible_joints)
-    shape = (len(work.group), *candidates.poses[0].shape[:2], n)
-    damage, used = np.full(shape, np.inf), np.full(shape, np.inf)
-    for operation in np.unique(work.operation):
-        places = np.flatnonzero(work.operation == operation)
-        stacked = np.stack([candidates.poses[k] for k in places])
-        there = ~np.isnan(stacked).any(axis=-1)
-        if not there.any():
-            continue
-        turned = np.stack([work.directions(candidates.moves, work.direction[k]) for k in places])
-        along = np.broadcast_to(turned[:, :, None], (*there.shape, 3))[there]
-        cost = loads.at(int(operation), stacked[there], along, period)
-        for table, values in zip((damage, used), cost, strict=True):
-            own = np.full((*there.shape, n), np.inf)
-            own[there] = np.where(np.isfinite(values), values, np.inf)
-            table[places] = own
-    return damage, used
-
-
-def choose(
-    share: FloatArray,
-    b: int,
-    move: FloatArray,
-    period: float | None,
-    candidates: Candidates,
-    damage: FloatArray,
-    used: FloatArray,
-) -> tuple[Spot | None, FloatArray]:
-    """The best pose of every rivet place at one placement, and which candidates they are.
-
-    Args:
-        share: (k,) of the mix's rivets that are set at each place.
-        b: which placement.
-        move: (4,) of it.
-        period: s, of the blows, or None.
-        candidates: the poses.
-        damage: (k, b, c, n), see `cost_tables`.
-        used: likewise.
-
-    Returns:
-        the spot, None where a place has no pose; (k,) indices.
-    """
-    worst_used = used[:, b].max(axis=-1)
-    spent = np.where(np.isfinite(worst_used), damage[:, b].max(axis=-1), np.inf)
-    least = spent.min(axis=-1, keepdims=True) if spent.size else np.full((1, 1), np.inf)
-    pick = np.where(spent <= least, worst_used, np.inf).argmin(axis=-1)
-    rows = np.arange(len(pick))
-    if not spent.size or not np.isfinite(spent[rows, pick]).all():
-        return None, pick
-    own = damage[:, b] * share[:, None, None]
-    own[~np.isfinite(worst_used)] = np.inf
-    total = own[rows, pick].sum(axis=0)
-    if total.max() > 0.0:
-        pick, total = _exchange(own, worst_used, pick, total)
-    spot = Spot(
-        np.array(move),
-        period,
-        np.array([candidates.poses[k][b, pick[k]] for k in rows]),
-        float(total.max()),
-        float(worst_used[rows, pick].max()),
-    )
-    return spot, pick
-
-
 def _exchange(
     own: FloatArray, used: FloatArray, pick: FloatArray, total: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -228,12 +160,11 @@ class Search:
             period: s, of the blows; None for the task's own.
             beat: the spot to be bettered.
         """
-        damage, used = cost_tables(self.work, self.loads, candidates, period)
-        share = self.work.share
+        damage, used = self.costs(candidates, period)
         result: list[Spot | None] = []
-        for b, move in enumerate(candidates.moves):
+        for b in range(len(candidates.moves)):
             while True:
-                spot, pick = choose(share, b, move, period, candidates, damage, used)
+                spot, pick = self._choose(candidates, b, period, damage, used)
                 if spot is None or beat is None or not spot.better_than(beat):
                     break
                 bad = self.colliding(spot.poses)
@@ -245,6 +176,73 @@ class Search:
                     used[k, b, pick[k]] = np.inf
             result.append(spot)
         return result
+
+    def costs(
+        self, candidates: Candidates, period: float | None, *, compiled: bool = True
+    ) -> tuple[FloatArray, FloatArray]:
+        """What candidates cost each of the n joints.
+
+        Args:
+            candidates: the poses, c of them for each of k rivet places at b placements.
+            period: s, of the blows, or None.
+            compiled: as in `Loads.at`.
+
+        Returns:
+            damage and utilisation, each (k, b, c, n); infinite where there is no pose.
+        """
+        work = self.work
+        n = len(self.loads.joints)
+        shape = (len(work.group), *candidates.poses[0].shape[:2], n)
+        damage, used = np.full(shape, np.inf), np.full(shape, np.inf)
+        for operation in np.unique(work.operation):
+            places = np.flatnonzero(work.operation == operation)
+            stacked = np.stack([candidates.poses[k] for k in places])
+            there = ~np.isnan(stacked).any(axis=-1)
+            if not there.any():
+                continue
+            turned = np.stack(
+                [work.directions(candidates.moves, work.direction[k]) for k in places]
+            )
+            along = np.broadcast_to(turned[:, :, None], (*there.shape, 3))[there]
+            cost = self.loads.at(int(operation), stacked[there], along, period, compiled=compiled)
+            for table, values in zip((damage, used), cost, strict=True):
+                own = np.full((*there.shape, n), np.inf)
+                own[there] = np.where(np.isfinite(values), values, np.inf)
+                table[places] = own
+        return damage, used
+
+    def _choose(
+        self,
+        candidates: Candidates,
+        b: int,
+        period: float | None,
+        damage: FloatArray,
+        used: FloatArray,
+    ) -> tuple[Spot | None, FloatArray]:
+        """The best pose of every rivet place at placement b, and which candidates they are.
+
+        `damage` and `used` are as of `costs`. The spot is None where a place has no pose.
+        """
+        worst_used = used[:, b].max(axis=-1)
+        spent = np.where(np.isfinite(worst_used), damage[:, b].max(axis=-1), np.inf)
+        least = spent.min(axis=-1, keepdims=True) if spent.size else np.full((1, 1), np.inf)
+        pick = np.where(spent <= least, worst_used, np.inf).argmin(axis=-1)
+        rows = np.arange(len(pick))
+        if not spent.size or not np.isfinite(spent[rows, pick]).all():
+            return None, pick
+        own = damage[:, b] * self.work.share[:, None, None]
+        own[~np.isfinite(worst_used)] = np.inf
+        total = own[rows, pick].sum(axis=0)
+        if total.max() > 0.0:
+            pick, total = _exchange(own, worst_used, pick, total)
+        spot = Spot(
+            np.array(candidates.moves[b]),
+            period,
+            np.array([candidates.poses[k][b, pick[k]] for k in rows]),
+            float(total.max()),
+            float(worst_used[rows, pick].max()),
+        )
+        return spot, pick
 
     def colliding(self, poses: FloatArray) -> list[int]:
         """Which of the poses have links that touch.

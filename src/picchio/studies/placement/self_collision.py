@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from picchio.core.arrays import FloatArray
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -19,13 +20,8 @@ _ALWAYS = 0.95
 
 @dataclass(frozen=True, eq=False)
 class SelfCollision:
-    """Collision pairs of a robot: all but neighbours and links that touch nearly always.
+    """Collision pairs of a robot: all but neighbours and links that touch nearly always."""
 
-    Attributes:
-        pairs: how many are checked.
-    """
-
-    pairs: int
     _model: Any
     _geometry: Any
     _columns: dict[str, int]
@@ -38,8 +34,6 @@ class SelfCollision:
             robot: whose URDF is read.
             rest: (nv,) where joints stand that do not move the tool, such as fingers.
         """
-        import pinocchio as pin
-
         try:
             model = pin.buildModelFromUrdf(str(robot.source))
             geometry = pin.buildGeomFromUrdf(
@@ -52,7 +46,7 @@ class SelfCollision:
             return "the URDF has no collision meshes"
         geometry.addAllCollisionPairs()
         columns = {name: k for k, name in enumerate(robot.joint_names)}
-        found = cls(0, model, geometry, columns)
+        found = cls(model, geometry, columns)
         found._forget(_touching_by_design(model, geometry))
         lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
         upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
@@ -61,11 +55,16 @@ class SelfCollision:
         poses[:, own] = np.random.default_rng(0).uniform(
             lower[own], upper[own], (_SAMPLES, len(own))
         )
-        hits = np.array([found._each(pose) for pose in poses]).reshape(_SAMPLES, -1)
+        hits = np.array([found._touching(pose) for pose in poses]).reshape(_SAMPLES, -1)
         found._forget(np.flatnonzero(hits.mean(axis=0) >= _ALWAYS).tolist())
-        if not len(geometry.collisionPairs):
+        if not found.pairs:
             return "no two links of the URDF could collide"
-        return cls(len(geometry.collisionPairs), model, geometry, columns)
+        return found
+
+    @property
+    def pairs(self) -> int:
+        """How many are checked."""
+        return len(self._geometry.collisionPairs)
 
     def collides(self, pose: FloatArray) -> bool:
         """Whether two links touch at a pose (nv,).
@@ -73,23 +72,16 @@ class SelfCollision:
         Args:
             pose: (nv,) rad or m.
         """
-        import pinocchio as pin
+        return any(self._touching(pose, until_one_does=True))
 
+    def _touching(self, pose: FloatArray, *, until_one_does: bool = False) -> list[bool]:
+        """Whether each pair touches; pairs after the first that does may be left out."""
         data, shapes = self._model.createData(), self._geometry.createData()
         q = self._configuration(pose)
-        return bool(pin.computeCollisions(self._model, data, self._geometry, shapes, q, True))
-
-    def _each(self, pose: FloatArray) -> list[bool]:
-        import pinocchio as pin
-
-        data, shapes = self._model.createData(), self._geometry.createData()
-        q = self._configuration(pose)
-        pin.computeCollisions(self._model, data, self._geometry, shapes, q, False)
+        pin.computeCollisions(self._model, data, self._geometry, shapes, q, until_one_does)
         return [result.isCollision() for result in shapes.collisionResults]
 
     def _forget(self, pairs: list[int]) -> None:
-        import pinocchio as pin
-
         # Copies: what the vector hands out refers into it, and moves as pairs are removed.
         ends = [(p.first, p.second) for p in self._geometry.collisionPairs]
         for k in pairs:
@@ -97,8 +89,6 @@ class SelfCollision:
 
     def _configuration(self, pose: FloatArray) -> FloatArray:
         """Pinocchio's q: a continuous joint is a cosine and a sine; mimics stay at rest."""
-        import pinocchio as pin
-
         q = pin.neutral(self._model)
         for joint in range(1, self._model.njoints):
             column = self._columns.get(self._model.names[joint])

@@ -7,9 +7,8 @@ from numba import njit, prange
 
 from picchio.core.arrays import FloatArray
 from picchio.fatigue.counting.kernel import finish, push
-from picchio.vibration.batch.modal_kernel import coefficients, modes_of
-from picchio.vibration.batch.turning_kernel import most_samples, turning_values
-from picchio.vibration.closed_form.response import RING_DOWN_LEVEL
+from picchio.vibration.batch.modal_kernel import modes_of
+from picchio.vibration.batch.turning_kernel import turns_from_rest
 
 _BLOCK = 16
 
@@ -93,10 +92,8 @@ def damages(  # type: ignore[no-untyped-def]
     for block in prange((poses + _BLOCK - 1) // _BLOCK):
         work, vectors, shapes = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
         omega, ratio = np.empty(n), np.empty(n)
-        weights, limit, count = np.empty((n, n)), np.empty(n), np.empty(n)
+        weights, limit = np.empty((n, n)), np.empty(n)
         poles = np.empty(n, dtype=np.complex128)
-        rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
-        length = duration.copy()
         for s in range(block * _BLOCK, min(poses, (block + 1) * _BLOCK)):
             frequency[s, :] = np.nan
             lowest[s, :] = np.nan
@@ -104,11 +101,10 @@ def damages(  # type: ignore[no-untyped-def]
                 mass[s], stiffness[s], joint_ratio, work, vectors, omega, ratio, shapes
             ):
                 continue
-            under, slowest = True, np.inf
+            under = True
             for i in range(n):
                 frequency[s, i] = omega[i] / (2.0 * np.pi)
                 under = under and 0.0 < ratio[i] < 1.0 - 1e-6
-                slowest = min(slowest, ratio[i] * omega[i])
             if not under:
                 continue
             for i in range(n):
@@ -122,16 +118,13 @@ def damages(  # type: ignore[no-untyped-def]
             for j in range(n):
                 stress = factor[j] * stiffness[s, j]
                 limit[j] = 2.0 * enough[j] / stress if stress > 0.0 else np.inf
-            coefficients(poles, duration, constant, slope, amplitude, wave, False, rows)
-            length[-1] = -np.log(RING_DOWN_LEVEL) / slowest
-            size = most_samples(poles, wave, length)
-            turns = np.empty((n, size))
-            turning_values(
-                poles, rows, wave, length, constant, slope, amplitude, weights, limit, turns, count
+            turns, count = turns_from_rest(
+                poles, weights, limit, duration, constant, slope, amplitude, wave
             )
+            size = turns.shape[1]
             stack, ranges, means = np.empty(size), np.empty(size), np.empty(size)
             for j in range(n):
-                own = turns[j, : int(count[j])]
+                own = turns[j, : count[j]]
                 lowest[s, j], highest[s, j] = own.min(), own.max()
                 damage[s, j] = 0.0
                 if known[j] >= 0 and highest[s, j] - lowest[s, j] >= limit[j]:

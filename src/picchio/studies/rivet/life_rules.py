@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol
+from typing import ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
 from picchio.studies.rivet.pose import JointLoad
 
+Needed = Literal["rest", "steady"]
+
 
 class JointDamage(NamedTuple):
     """Peak deflection (rad), peak stress (Pa), utilisation and damage of one rivet."""
@@ -29,11 +31,13 @@ class JointDamage(NamedTuple):
 
 
 class LifeRule(Protocol):
-    """A method that turns a joint's load into damage."""
+    """A method that turns a joint's load into damage.
 
-    @property
-    def needs(self) -> Literal["rest", "steady"]:
-        """Which response it looks at."""
+    Attributes:
+        needs: which response it looks at.
+    """
+
+    needs: ClassVar[Needed]
 
     def __call__(self, joint: Joint, load: JointLoad, hits: int, sn_curve: SNCurve) -> JointDamage:
         """Damage of one rivet of `hits` blows; the joint has a shaft."""
@@ -57,14 +61,11 @@ class RainflowRule:
         miner: what cycles below the endurance limit do; None leaves it to the curve.
     """
 
+    needs: ClassVar[Needed] = "rest"
+
     residue: Residue = "half-cycles"
     mean_stress: Rule = "none"
     miner: MinerRule | None = None
-
-    @property
-    def needs(self) -> Literal["rest", "steady"]:
-        """The rivet as it happens."""
-        return "rest"
 
     def __call__(self, joint: Joint, load: JointLoad, hits: int, sn_curve: SNCurve) -> JointDamage:
         """Damage of one rivet; the hits are in the load already."""
@@ -93,10 +94,7 @@ class RainflowRule:
 class PaperRule:
     """Nie et al. 2016: steady state, peak stress as amplitude, one cycle a hit."""
 
-    @property
-    def needs(self) -> Literal["rest", "steady"]:
-        """The paper looks at the steady state alone."""
-        return "steady"
+    needs: ClassVar[Needed] = "steady"
 
     def __call__(self, joint: Joint, load: JointLoad, hits: int, sn_curve: SNCurve) -> JointDamage:
         """Damage of one rivet."""

@@ -26,14 +26,15 @@ from picchio.model.model import Model
 from picchio.model.plant import Plant
 from picchio.model.system import ElementKind, VibratingSystem
 from picchio.robot.dynamics.statics import RobotState
+from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
 from picchio.studies.tasks import Operation
 from picchio.vibration.closed_form.modes import Modes, modal_analysis
 from picchio.vibration.closed_form.response import (
-    RING_DOWN_LEVEL,
     Peak,
     Response,
     response_from_rest,
+    ring_down,
     steady_state,
     unit_vector,
 )
@@ -122,6 +123,23 @@ class SampledResponse:
             )
 
 
+def need_springs(robot: FlexibleRobot) -> None:
+    """Refuse a robot without a flexible joint.
+
+    Args:
+        robot: to be studied.
+
+    Raises:
+        InputError: no joint has a stiffness.
+    """
+    if not robot.flexible_joints:
+        raise InputError(
+            "no joint has a stiffness, so nothing can vibrate",
+            file=robot.source,
+            hint="annotate the URDF, or give a sidecar with --flex",
+        )
+
+
 class ModelAtPose:
     """A model at a pose: its linear system, modes and springs, computed when they are asked for.
 
@@ -136,12 +154,7 @@ class ModelAtPose:
 
     def __init__(self, model: Model, pose: FloatArray, geometry: Geometry | None = None) -> None:
         robot = model.robot
-        if not robot.flexible_joints:
-            raise InputError(
-                "no joint has a stiffness, so nothing can vibrate",
-                file=robot.source,
-                hint="annotate the URDF, or give a sidecar with --flex",
-            )
+        need_springs(robot)
         self.model = model
         self.state: RobotState = robot.state(pose)
         self._given_geometry = geometry
@@ -306,15 +319,7 @@ class ModelAtPose:
         if np.isfinite(force.end):
             count = max(int(np.ceil(force.end / step)), 64)
             return Samples(0.0, force.end / count, count + 1)
-        slowest = -float(self.modes.poles.real.max())
-        if slowest <= 0.0:
-            raise InputError(
-                "a mode has no damping: after the blows it rings for ever, and a rivet has no end",
-                key="damping_ratio",
-                value=0.0,
-                hint="give the joints a damping ratio above 0",
-            )
-        ring = min(-float(np.log(RING_DOWN_LEVEL)) / slowest, _LONGEST_RING)
+        ring = min(ring_down(self.modes), _LONGEST_RING)
         return Samples(0.0, step, int((float(force.start[-1]) + ring) / step) + 1)
 
 

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.excitation.excitation import Excitation
+from picchio.fatigue.shaft_stress import stress_per_torque
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model
-from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.rivet.life_rules import RainflowRule
 from picchio.studies.rivet.pose import ModelAtPose, Rivet
 from picchio.studies.tasks import Operation
@@ -86,12 +86,13 @@ def damage_at(
     if compiled and many.compiled:
         from picchio.studies.rivet.damage_kernel import damages
 
+        factor = stress_per_torque(model.robot.flexible_joints, 0.0)
         mass, jacobian = many.mass_and_jacobian()
         damages(
             force.start, force.duration, force.constant, force.slope, force.amplitude,
             force.angular_frequency, mass, jacobian, many.stiffness, many.damping_ratio, along,
-            stress_per_torque(model.robot), *curve_tables(curves), found.natural_frequencies,
-            found.lowest, found.highest, found.damage,
+            factor, *curve_tables(curves), found.natural_frequencies, found.lowest, found.highest,
+            found.damage,
         )  # fmt: skip
         left = np.isnan(found.lowest[:, 0]) & ~np.isnan(found.natural_frequencies[:, 0])
     for s in np.flatnonzero(left):
@@ -167,13 +168,6 @@ def peaks_at(
     return found, many.stiffness
 
 
-def stress_per_torque(robot: FlexibleRobot) -> FloatArray:
-    """(n,) 1/m^3: r / Jp of every joint's shaft; zero without one."""
-    return np.array(
-        [j.shaft.radius / j.shaft.polar_moment if j.shaft else 0.0 for j in robot.flexible_joints]
-    )
-
-
 def curve_tables(
     curves: Sequence[SNCurve | None],
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -186,21 +180,9 @@ def curve_tables(
     for j, curve in enumerate(curves):
         if curve is None:
             continue
-        knees, slopes = np.array(curve.knees), list(curve.slopes)
-        at = curve.amplitude(knees) if len(knees) else np.empty(0)
-        if len(knees) == len(slopes):  # beyond the last knee lies the endurance limit
-            last = slopes[-1]
-            slopes.append(
-                {"elementary": last, "haibach": 2.0 * last - 1.0}.get(curve.miner, np.inf)
-            )
-        count = len(at)
-        known[j], knots[j, :count] = count, at
-        if count:
-            # A line is anchored at the knee it ends in; the last one at the knee it starts from.
-            ends = [*range(count), count - 1]
-            lines[j, : count + 1, 0], lines[j, : count + 1, 1] = knees[ends], at[ends]
-        else:
-            lines[j, 0, :2] = curve.cycles, curve.strength
-        lines[j, : count + 1, 2] = slopes
-        enough[j] = at[-1] if np.isinf(slopes[-1]) else -1.0
+        anchors, amplitudes, slopes = curve.lines()
+        count = len(curve.knees)
+        known[j], knots[j, :count] = count, amplitudes[:count]
+        lines[j, : count + 1] = np.stack([anchors, amplitudes, slopes], axis=1)
+        enough[j] = amplitudes[-1] if np.isinf(slopes[-1]) else -1.0
     return enough, knots, lines, known

@@ -13,10 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
-import numba
 import numpy as np
 
-from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
@@ -33,10 +32,8 @@ from picchio.robot.joint import Joint
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.pose import JointLoad, Rivet
 from picchio.studies.tasks import Task
-from picchio.vibration.batch.modal_kernel import coefficients
-from picchio.vibration.batch.turning_kernel import most_samples, turning_values
+from picchio.vibration.batch.turning_kernel import turns_from_rest
 from picchio.vibration.closed_form.modes import Modes
-from picchio.vibration.closed_form.response import RING_DOWN_LEVEL
 
 _NEARLY_CRITICAL = 1.0 - 1e-6
 
@@ -107,9 +104,11 @@ class VariedRivet(Rivet):
             return None
         if self.plant is not None and not self.plant.joints_only:
             return None
-        return (
-            FastRest(self.modes, self.operation.direction) if FastRest.suits(self.modes) else None
-        )
+        # Every mode must be an oscillator of its own that swings and dies.
+        ratio = self.modes.damping_ratios
+        if not (self.modes.decoupled and ((ratio > 0.0) & (ratio < _NEARLY_CRITICAL)).all()):
+            return None
+        return FastRest(self.modes, self.operation.direction)
 
 
 @dataclass(frozen=True)
@@ -195,12 +194,6 @@ class FastRest:
         self.ratio = -modes.poles.real / self.omega
         self.weights = np.ascontiguousarray(-along.imag * modes.poles.imag)
 
-    @staticmethod
-    def suits(modes: Modes) -> bool:
-        """Whether every mode is an oscillator of its own that swings and dies."""
-        ratio = modes.damping_ratios
-        return modes.decoupled and bool(((ratio > 0.0) & (ratio < _NEARLY_CRITICAL)).all())
-
     def turns(
         self, stiffness: float, damping: float, force: PiecewiseForce
     ) -> list[FloatArray] | None:
@@ -219,32 +212,8 @@ class FastRest:
             return None
         omega = math.sqrt(stiffness) * self.omega
         poles = omega * (-ratio + 1j * np.sqrt(1.0 - ratio**2))
-        turns, count = _turns(
-            poles, self.weights, force.duration, force.constant, force.slope, force.amplitude,
-            force.angular_frequency,
+        turns, count = turns_from_rest(
+            poles, self.weights, np.full(len(self.weights), -1.0), force.duration, force.constant,
+            force.slope, force.amplitude, force.angular_frequency,
         )  # fmt: skip
-        return [row[: int(k)] for row, k in zip(turns, count, strict=True)]
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _turns(
-    poles: ComplexArray,
-    weights: FloatArray,
-    duration: FloatArray,
-    constant: FloatArray,
-    slope: FloatArray,
-    amplitude: ComplexArray,
-    wave: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Turning values (m, k) and how many each joint has (m,)."""
-    outputs = weights.shape[0]
-    rows = np.empty((poles.shape[0], duration.shape[0], 7), dtype=np.complex128)
-    coefficients(poles, duration, constant, slope, amplitude, wave, False, rows)
-    length = duration.copy()
-    length[-1] = -np.log(RING_DOWN_LEVEL) / (-poles.real).min()
-    turns, count = np.empty((outputs, most_samples(poles, wave, length))), np.empty(outputs)
-    all_of_it = np.full(outputs, -1.0)
-    turning_values(
-        poles, rows, wave, length, constant, slope, amplitude, weights, all_of_it, turns, count
-    )
-    return turns, count
+        return [row[:k] for row, k in zip(turns, count, strict=True)]

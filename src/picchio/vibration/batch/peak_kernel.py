@@ -9,7 +9,6 @@ from picchio.core.arrays import ComplexArray, FloatArray
 from picchio.vibration.batch.modal_kernel import coefficients, exponential, modes_of
 from picchio.vibration.batch.top_kernel import (
     TERMS,
-    Samples,
     highest,
     joint_norms,
     room_for,
@@ -18,72 +17,6 @@ from picchio.vibration.batch.top_kernel import (
 )
 
 _BLOCK = 128
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _pose_peaks(
-    periodic: bool,
-    start: FloatArray,
-    duration: FloatArray,
-    constant: FloatArray,
-    slope: FloatArray,
-    amplitude: ComplexArray,
-    wave: FloatArray,
-    omega: FloatArray,
-    ratio: FloatArray,
-    shapes: FloatArray,
-    push: FloatArray,
-    poles: ComplexArray,
-    rows: ComplexArray,
-    peak: FloatArray,
-    direction: FloatArray,
-    dims: int,
-    g: FloatArray,
-    terms: FloatArray,
-    room: Samples,
-) -> Samples:
-    """Peaks of one pose; returns the room for samples, which may have grown."""
-    n = push.shape[0]
-    for i in range(n):
-        poles[i] = complex(-ratio[i] * omega[i], omega[i] * np.sqrt(1.0 - ratio[i] ** 2))
-    coefficients(poles, duration, constant, slope, amplitude, wave, periodic, rows)
-    endless = np.isinf(duration[-1])
-    length = duration
-    if endless:
-        length = duration.copy()
-        length[-1] = 2.0 * np.pi / omega[0]
-    while True:
-        count, total = 0, 0.0
-        for p in range(length.shape[0]):
-            count += steps_of(length[p], max(omega[n - 1], wave[p]))
-            total += length[p]
-        if count > room.time.shape[0]:
-            room = room_for(n, 2 * count)
-        sample(poles, rows, length, wave, omega[n - 1], room.eta, room.rate, room.time)
-        done = True
-        for j in range(n):
-            peak[j] = joint_norms(j, count, room.eta, shapes, push, dims, room.g, room.norm)
-            if endless and done:
-                # Nothing after the samples can be larger than what is left of the modes.
-                left = 0.0
-                for d in range(dims):
-                    most = 0.0
-                    for i in range(n):
-                        z = rows[i, -1, 0] * exponential(poles[i], length[-1])
-                        most += abs(shapes[j, i] * push[i, d]) * abs(z) / poles[i].imag
-                    left += most * most
-                done = left <= peak[j]
-        if done or length[-1] > 1e3 * np.pi / (ratio[0] * omega[0]):
-            break
-        length[-1] *= 2.0
-    for j in range(n):
-        direction[j, 0], direction[j, 1], direction[j, 2] = 0.0, 0.0, 1.0
-        if peak[j] > 0.0:
-            peak[j] = highest(
-                j, count, periodic, total, room.time, room.norm, room.eta, room.rate, start, poles,
-                rows, constant, slope, amplitude, wave, shapes, push, g, terms, direction,
-            )  # fmt: skip
-    return room
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -109,6 +42,7 @@ def _block_peaks(  # type: ignore[no-untyped-def]
     room = room_for(n, 256)
     poles = np.empty(n, dtype=np.complex128)
     rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
+    endless, length = np.isinf(duration[-1]), duration.copy()
     for s in range(first, last):
         frequency[s, :] = np.nan
         peak[s, :] = np.nan
@@ -131,10 +65,42 @@ def _block_peaks(  # type: ignore[no-untyped-def]
                     push[i, d] = moved
                 else:
                     push[i, 0] += moved * along[s, d]
-        room = _pose_peaks(
-            periodic, start, duration, constant, slope, amplitude, wave, omega, ratio,
-            shapes, push, poles, rows, peak[s], found, dims, g, terms, room,
-        )  # fmt: skip
+        for i in range(n):
+            poles[i] = complex(-ratio[i] * omega[i], omega[i] * np.sqrt(1.0 - ratio[i] ** 2))
+        coefficients(poles, duration, constant, slope, amplitude, wave, periodic, rows)
+        if endless:
+            length[-1] = 2.0 * np.pi / omega[0]
+        while True:
+            count, total = 0, 0.0
+            for p in range(length.shape[0]):
+                count += steps_of(length[p], max(omega[n - 1], wave[p]))
+                total += length[p]
+            if count > room.time.shape[0]:
+                room = room_for(n, 2 * count)
+            sample(poles, rows, length, wave, omega[n - 1], room.eta, room.rate, room.time)
+            done = True
+            for j in range(n):
+                peak[s, j] = joint_norms(j, count, room.eta, shapes, push, dims, room.g, room.norm)
+                if endless and done:
+                    # Nothing after the samples can be larger than what is left of the modes.
+                    left = 0.0
+                    for d in range(dims):
+                        most = 0.0
+                        for i in range(n):
+                            z = rows[i, -1, 0] * exponential(poles[i], length[-1])
+                            most += abs(shapes[j, i] * push[i, d]) * abs(z) / poles[i].imag
+                        left += most * most
+                    done = left <= peak[s, j]
+            if done or length[-1] > 1e3 * np.pi / (ratio[0] * omega[0]):
+                break
+            length[-1] *= 2.0
+        for j in range(n):
+            found[j, 0], found[j, 1], found[j, 2] = 0.0, 0.0, 1.0
+            if peak[s, j] > 0.0:
+                peak[s, j] = highest(
+                    j, count, periodic, total, room.time, room.norm, room.eta, room.rate, start,
+                    poles, rows, constant, slope, amplitude, wave, shapes, push, g, terms, found,
+                )  # fmt: skip
         for j in range(n):
             for d in range(3):
                 direction[s, j, d] = found[j, d] if dims == 3 else along[s, d]

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.core.arrays import ComplexArray, FloatArray, IndexArray
+from picchio.vibration.batch.modal_kernel import coefficients
+from picchio.vibration.closed_form.response import RING_DOWN_LEVEL
 
 # Samples a cycle of the fastest mode that lives: a turn's value is then off by 1e-7 of it.
 _PER_CYCLE = 16.0
@@ -76,37 +78,41 @@ def between(h: float, x0: float, v0: float, a0: float, x1: float, v1: float, a1:
 
 
 @njit(cache=True, error_model="numpy")
-def turning_values(
+def turns_from_rest(
     poles: ComplexArray,
-    rows: ComplexArray,
-    wave: FloatArray,
-    length: FloatArray,
+    weights: FloatArray,
+    enough: FloatArray,
+    duration: FloatArray,
     constant: FloatArray,
     slope: FloatArray,
     amplitude: ComplexArray,
-    weights: FloatArray,
-    enough: FloatArray,
-    turns: FloatArray,
-    count: FloatArray,
-) -> None:
-    """Every joint's deflection at rest, at its turns and at the end.
+    wave: FloatArray,
+) -> tuple[FloatArray, IndexArray]:
+    """Every joint's deflection at rest, at its turns and at the end of the ring-down.
 
     Args:
         poles: (m,) of the modes, 1/s.
-        rows: (m, pieces, 7), see `coefficients`.
-        wave: (pieces,) rad/s.
-        length: (pieces,) s; the last ends where the ring-down does.
-        constant: (pieces,) N, and so on: the force, for accelerations.
-        slope: (pieces,) N/s.
-        amplitude: (pieces,) complex N.
         weights: (n, m) deflection of each joint per mode.
         enough: (n,) rad; a joint whose range stays below needs its extremes only, and where all
             do, the ring-down ends when nothing larger can come. Negative: all of it, always.
-        turns: (n, `most_samples`) rad, out.
-        count: (n,) out, integers: how many there are.
+        duration: (pieces,) s, of a burst, the last endless; see `PiecewiseForce` for these.
+        constant: (pieces,) N.
+        slope: (pieces,) N/s.
+        amplitude: (pieces,) complex N.
+        wave: (pieces,) rad/s.
+
+    Returns:
+        (n, k) rad, and how many of the k each joint has, (n,).
     """
     n, m = weights.shape
-    pieces = length.shape[0]
+    pieces = duration.shape[0]
+    rows = np.empty((m, pieces, 7), dtype=np.complex128)
+    coefficients(poles, duration, constant, slope, amplitude, wave, False, rows)
+    length = duration.copy()
+    length[-1] = -np.log(RING_DOWN_LEVEL) / (-poles.real).min()
+    turns = np.empty((n, most_samples(poles, wave, length)))
+    count = np.ones(n, dtype=np.int64)
+    turns[:, 0] = 0.0
     decay, z = np.empty(m, np.complex128), np.empty(m, np.complex128)
     old, now = np.empty((m, 2)), np.empty((m, 2))
     x0, v0 = np.zeros(n), np.zeros(n)
@@ -114,9 +120,6 @@ def turning_values(
     inverse = np.empty(m)
     for i in range(m):
         inverse[i] = 1.0 / poles[i].imag
-    for j in range(n):
-        turns[j, 0] = 0.0
-        count[j] = 1
     for p in range(pieces):
         reached = 0.0
         while reached < length[p]:
@@ -159,7 +162,7 @@ def turning_values(
                             first += weights[j, i] * (before + twice * old[i, 1] - size * old[i, 0])
                             second += weights[j, i] * (after + twice * now[i, 1] - size * now[i, 0])
                         value = between(h, x0[j], v0[j], first, x, v, second)
-                        turns[j, int(count[j])] = value
+                        turns[j, count[j]] = value
                         count[j] += 1
                         top[j] = max(top[j], value)
                         bottom[j] = min(bottom[j], value)
@@ -174,8 +177,9 @@ def turning_values(
                 break
             reached = length[p] if reached + span >= length[p] * (1.0 - 1e-12) else reached + span
     for j in range(n):
-        turns[j, int(count[j])] = x0[j]
+        turns[j, count[j]] = x0[j]
         count[j] += 1
+    return turns, count
 
 
 @njit(cache=True, error_model="numpy")

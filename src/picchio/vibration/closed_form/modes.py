@@ -62,11 +62,9 @@ class Modes:
             angular_frequency: (k,) rad/s.
         """
         s = 1j * np.asarray(angular_frequency, dtype=float)
-        below = 0.5 * self.residues.conj()
-        above = 0.5 * self.residues
-        return np.einsum("mpd,pk->mdk", above, 1.0 / (s - self.poles[:, None])) + np.einsum(
-            "mpd,pk->mdk", below, 1.0 / (s - self.poles.conj()[:, None])
-        )
+        poles = np.append(self.poles, self.poles.conj())
+        residues = 0.5 * np.concatenate([self.residues, self.residues.conj()], axis=1)
+        return np.einsum("mpd,pk->mdk", residues, 1.0 / (s - poles[:, None]))
 
 
 def modal_analysis(system: LinearSystem) -> Modes:

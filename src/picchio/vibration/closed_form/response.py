@@ -23,6 +23,8 @@ from picchio.vibration.closed_form.modes import Modes
 RING_DOWN_LEVEL = 1e-4
 # |1 - exp(pole T)| below this: the blows are in resonance with an undamped mode.
 _RESONANCE = 1e-10
+# Directions times samples that `peak_deflections` evaluates together: 16 MB.
+_CELLS = 2_000_000
 
 
 class Peak(NamedTuple):
@@ -65,15 +67,7 @@ class Response:
         """
         if np.isfinite(self.force.end):
             return float(self.force.end)
-        slowest = -float(self.modes.poles.real.max())
-        if slowest <= 0.0:
-            raise InputError(
-                "a mode has no damping: after the blows it rings for ever",
-                key="damping_ratio",
-                value=0.0,
-                hint="give the joints a damping ratio above 0",
-            )
-        return float(self.force.start[-1] - np.log(RING_DOWN_LEVEL) / slowest)
+        return float(self.force.start[-1]) + ring_down(self.modes)
 
     def _locate(self, time: ArrayLike) -> tuple[IndexArray, FloatArray]:
         t = np.asarray(time, dtype=float)
@@ -157,7 +151,7 @@ class Response:
         modal = self._modal(grid.index, grid.local)
         result = []
         for row in along:
-            on_grid = self._slope_of(row, modal, grid.index, grid.local)
+            on_grid = self._slope(row, grid.index, grid.local, modal)
             index, u = refine_roots(grid, on_grid, partial(self._slope, row))
             time = self.force.start[index] + u
             value = (row @ self._modal(index, u)).real
@@ -165,14 +159,10 @@ class Response:
         return result
 
     def _slope(
-        self, row: ComplexArray, index: IndexArray, u: FloatArray
+        self, row: ComplexArray, index: IndexArray, u: FloatArray, modal: ComplexArray | None = None
     ) -> tuple[FloatArray, FloatArray]:
-        """First and second derivative of one output."""
-        return self._slope_of(row, self._modal(index, u), index, u)
-
-    def _slope_of(
-        self, row: ComplexArray, modal: ComplexArray, index: IndexArray, u: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+        """First and second derivative of one output; `modal` where it is known already."""
+        modal = self._modal(index, u) if modal is None else modal
         # Not by BLAS: its threads cost more than these few rows.
         weighted = row * self.modes.poles
         first, second = np.einsum("dp,pk->dk", [weighted, weighted * self.modes.poles], modal).real
@@ -221,7 +211,7 @@ class Response:
             if np.abs(residue).max() == 0.0:
                 result.append(WorstDirection(0.0, np.array([0.0, 0.0, 1.0]), 0.0))
                 continue
-            on_grid = self._norm_slope_of(residue, modal, grid.index, grid.local)
+            on_grid = self._norm_slope(residue, grid.index, grid.local, modal)
             index, u = refine_roots(grid, on_grid, partial(self._norm_slope, residue))
             # The grid itself as well: a monotonic response has its maximum at an end.
             index, u = np.append(grid.index, index), np.append(grid.local, u)
@@ -259,20 +249,43 @@ class Response:
         return float(final[k]), np.linalg.svd(at)[2][0]
 
     def _norm_slope(
-        self, residue: ComplexArray, index: IndexArray, u: FloatArray
+        self,
+        residue: ComplexArray,
+        index: IndexArray,
+        u: FloatArray,
+        modal: ComplexArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
-        """First and second derivative of |g|^2 / 2."""
-        return self._norm_slope_of(residue, self._modal(index, u), index, u)
-
-    def _norm_slope_of(
-        self, residue: ComplexArray, modal: ComplexArray, index: IndexArray, u: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+        """First and second derivative of |g|^2 / 2; `modal` where it is known already."""
+        modal = self._modal(index, u) if modal is None else modal
         poles = self.modes.poles[:, None]
         g = (residue.T @ modal).real
         v = ((residue * poles).T @ modal).real
         a = ((residue * poles**2).T @ modal).real
         a += (residue * poles).sum(axis=0).real[:, None] * self.force.in_piece(index, u)
         return (g * v).sum(axis=0), (v * v).sum(axis=0) + (g * a).sum(axis=0)
+
+
+def ring_down(modes: Modes) -> float:
+    """How long the slowest mode takes to fall to `RING_DOWN_LEVEL`.
+
+    Args:
+        modes: of the system.
+
+    Returns:
+        s.
+
+    Raises:
+        InputError: an undamped mode rings for ever.
+    """
+    slowest = -float(modes.poles.real.max())
+    if slowest <= 0.0:
+        raise InputError(
+            "a mode has no damping: after the blows it rings for ever",
+            key="damping_ratio",
+            value=0.0,
+            hint="give the joints a damping ratio above 0",
+        )
+    return -float(np.log(RING_DOWN_LEVEL)) / slowest
 
 
 def unit_vector(direction: ArrayLike) -> FloatArray:
@@ -351,6 +364,113 @@ def response_from_rest(
         force = excitation
     rest = np.zeros(modes.poles.size, dtype=complex)
     return Response(modes, force, _propagate(modes.poles, force, rest)[:, :-1], periodic=False)
+
+
+def truncated_fourier_response(
+    modes: Modes,
+    excitation: Excitation | PiecewiseForce,
+    direction: ArrayLike,
+    time: ArrayLike,
+    harmonics: int,
+) -> FloatArray:
+    """The steady state as a Fourier sum of `harmonics` terms: paper eqs. 12 and 13, to compare.
+
+    Eq. 13 is written here in complex form, where amplitude and phase are those of
+    H(i j w) (a_j - i b_j); its arctangent thereby takes the right quadrant, which the plain
+    tan^-1 of the paper does not above resonance.
+
+    Args:
+        modes: the system.
+        excitation: the blows; of a `PiecewiseForce`, one period.
+        direction: (3,) the force's direction, taken as it is.
+        time: (k,) s.
+        harmonics: number of terms after the mean.
+
+    Returns:
+        (m, k) deflection, rad.
+    """
+    force = excitation.one_period() if isinstance(excitation, Excitation) else excitation
+    coefficients = force.fourier_coefficients(harmonics)
+    omega = 2.0 * np.pi / force.end * np.arange(harmonics + 1)
+    transfer = np.einsum(
+        "mdk,d->mk", modes.frequency_response(omega), np.asarray(direction, dtype=float)
+    )
+    spectrum = transfer * coefficients
+    spectrum[:, 1:] *= 2.0  # the negative frequencies
+    t = np.asarray(time, dtype=float)
+    total = np.zeros((spectrum.shape[0], t.size))
+    for first in range(0, harmonics + 1, 2048):  # bounded memory for long sums
+        part = slice(first, first + 2048)
+        total += (spectrum[:, part] @ np.exp(1j * np.outer(omega[part], t))).real
+    return total
+
+
+def peak_deflections(response: Response, directions: ArrayLike) -> FloatArray:
+    """Largest absolute deflection of every output for each force direction, as exact as one by one.
+
+    All directions share one curve g_j(t). It is sampled once; only where a direction's deflection
+    may exceed its own largest sample is its slope solved for zero on the closed form.
+
+    Args:
+        response: steady or from rest.
+        directions: (d, 3) unit vectors.
+
+    Returns:
+        (m, d) rad.
+    """
+    wanted = np.atleast_2d(np.asarray(directions, dtype=float))
+    poles, residues = response.modes.poles, response.modes.residues
+    grid = Grid.of(poles, response.force, response.horizon)
+    modal = response._modal(grid.index, grid.local)
+    value = np.einsum("mpd,pk->mdk", residues, modal).real
+    rate = np.einsum("mpd,p,pk->mdk", residues, poles, modal).real
+    speed = np.linalg.norm(rate, axis=1)
+    step = np.diff(grid.local)
+    # Neighbours in time that belong to different pieces of the force span no interval.
+    step[grid.index[1:] != grid.index[:-1]] = -np.inf
+    rise = step * np.maximum(speed[:, 1:], speed[:, :-1])  # how far a peak may stand out
+    result = np.empty((len(residues), len(wanted)))
+    block = max(1, _CELLS // grid.local.size)
+    for j in range(len(residues)):
+        for first in range(0, len(wanted), block):
+            part = slice(first, first + block)
+            size = np.abs(wanted[part] @ value[j])
+            best = size.max(axis=1)
+            hopeful = np.maximum(size[:, 1:], size[:, :-1]) + rise[j] > best[:, None]
+            row, interval = np.nonzero(hopeful)
+            along = wanted[part] @ residues[j].T
+            np.maximum.at(best, *_peaks_within(response, grid, along, row, interval))
+            result[j, part] = best
+    return result
+
+
+def _peaks_within(
+    response: Response, grid: Grid, along: np.ndarray, row: IndexArray, interval: IndexArray
+) -> tuple[IndexArray, FloatArray]:
+    """Rows and absolute values of the peaks inside some intervals between samples.
+
+    Args:
+        response: whose.
+        grid: the samples.
+        along: (b, p) complex, residues along each direction.
+        row: (c,) which direction.
+        interval: (c,) from which sample to the next.
+    """
+    poles, piece = response.modes.poles, grid.index[interval]
+
+    def slope(which: IndexArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        weighted = (along[row[which]] * poles).T
+        modal = response._modal(piece[which], u)
+        second = (weighted * poles[:, None] * modal).sum(axis=0).real
+        jump = weighted.sum(axis=0).real * response.force.in_piece(piece[which], u)
+        return (weighted * modal).sum(axis=0).real, second + jump
+
+    # Each interval as a piece of its own, with its two ends.
+    ends = Grid(np.repeat(np.arange(len(row)), 2),
+                grid.local[np.stack([interval, interval + 1], axis=1)].ravel())  # fmt: skip
+    which, u = refine_roots(ends, slope(ends.index, ends.local), slope)
+    value = (along[row[which]].T * response._modal(piece[which], u)).sum(axis=0).real
+    return row[which], np.abs(value)
 
 
 def _propagate(poles: ComplexArray, force: PiecewiseForce, state: ComplexArray) -> ComplexArray:

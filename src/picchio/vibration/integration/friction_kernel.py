@@ -6,8 +6,6 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from picchio.vibration.integration.step_kernel import taylor
-
 COULOMB = 3
 _FRICTION_SWEEPS = 4
 _IDEAL = 2e-5  # rad/s, below which friction is taken as ideal
@@ -61,27 +59,15 @@ def _ideal_friction(before, free, gain, limit):
 
 
 @njit(cache=True, nogil=True)
-def stick(
-    old, last, new, n, rows, kinds, parameters, friction, kick, zero, length, regular,
-    from_start, from_end, inverse, ik, ic, fastest,
-):  # fmt: skip
+def stick(old, new, kinds, parameters, rows, kick, friction, last):
     """Dry friction of a step: it holds a joint still where it can, else it has its limit.
 
-    `old` and `new` are the states before and after, (2N,); the mean over the step goes to
+    `old` and `new` are the states before and after, (2N,), and `kick` (elements, 2N) what a unit
+    of each element's friction all through the step adds; the mean over the step goes to
     `friction`, the value at its end to `last`, and `new` is moved by it.
     """
-    for e in range(kinds.size):
-        if kinds[e] != COULOMB:
-            continue
-        if regular:
-            for i in range(2 * n):
-                total = 0.0
-                for j in range(n):
-                    total += (from_start[i, j] + from_end[i, j]) * rows[e, j]
-                kick[e, i] = total
-        else:
-            taylor(zero, rows[e], rows[e], length, inverse, ik, ic, fastest, kick[e])
-        friction[e] = 0.0
+    n = rows.shape[1]
+    friction[:] = 0.0
     for _ in range(_FRICTION_SWEEPS):
         for e in range(kinds.size):
             if kinds[e] != COULOMB:

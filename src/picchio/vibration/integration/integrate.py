@@ -11,7 +11,6 @@ from picchio.core.arrays import BoolArray, FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.excitation.piecewise import PiecewiseForce
 from picchio.model.system import ElementKind, VibratingSystem
-from picchio.vibration.integration.jumps import jump_corrections
 
 # Longest steps, s: the linear part is exact, so these resolve only what comes on top.
 SMOOTH_STEP = 1e-3
@@ -21,6 +20,7 @@ ROUGH_STEP = 2e-4
 _ROUGH = (ElementKind.BOUC_WEN,)
 _STICKING = (ElementKind.COULOMB,)
 _EDGE = 1e-10
+_ON = 1e-6  # of a step: a jump so near a sample is at it
 AtJumps = Literal["after", "mean", "moments"]
 _GAUSS = 0.5 - np.sqrt(3.0) / 6.0
 _SHOOTING = 40
@@ -68,7 +68,6 @@ class Plan:
     force1: FloatArray
     sample: IndexArray
     force_after: FloatArray
-    first: int
 
     def scaled(self, factor: float) -> Plan:
         """The same steps under a force so many times as large.
@@ -102,7 +101,7 @@ def integrate(
         at_jumps: the acceleration at a jump of the force: "after", "mean" of before and after, or,
             for a filter that takes straight lines between the samples and lets no jump through,
             accelerations beside the jump by which its response is right ("moments"; see
-            `picchio.vibration.integration.jumps`).
+            `jump_corrections`).
 
     Returns:
         the motion at the samples.
@@ -177,34 +176,73 @@ def make_plan(
               force.angular_frequency)  # fmt: skip
     points = merged(start, fine, max(count, 0), extra, end, _EDGE)
     lengths = np.diff(points)
-    force0, force1 = np.empty(lengths.size), np.empty(lengths.size)
-    force_lines(points, _GAUSS, *pieces, force0, force1)
-    sample = np.empty(points.size, dtype=np.int64)
-    sample_numbers(points, times, 2 * _EDGE, first, sample)
-    after = np.empty(points.size)
-    force_beside(points, 2 * _EDGE, *pieces, after)
+    force0, force1 = force_lines(points, _GAUSS, *pieces)
+    sample = sample_numbers(points, times, 2 * _EDGE, first)
+    after = force_beside(points, 2 * _EDGE, *pieces)
     if at_jumps != "after":
-        before = np.empty(points.size)
-        force_beside(points, -2 * _EDGE, *pieces, before)
-        after = 0.5 * (before + after)
+        after = 0.5 * (force_beside(points, -2 * _EDGE, *pieces) + after)
     if at_jumps == "moments":
-        jumps = _at(force, edges + 2 * _EDGE) - _at(force, edges - 2 * _EDGE)
+        edges = edges.copy()  # the compiled code is made for arrays that can be written
+        jumps = force_beside(edges, 2 * _EDGE, *pieces) - force_beside(edges, -2 * _EDGE, *pieces)
         added = jump_corrections(samples.start, samples.step, samples.count, first, edges, jumps)
         after = after + np.where(sample >= 0, added[np.maximum(sample, 0)], 0.0)
     regular = np.abs(lengths - fine) < 1e-9 * fine + 2 * _EDGE
     same = np.full(lengths.size, -1)
     same[~regular] = np.unique(np.round(lengths[~regular], 12), return_inverse=True)[1]
-    return Plan(
-        step=fine,
-        lengths=lengths,
-        regular=regular,
-        same=same,
-        force0=force0,
-        force1=force1,
-        sample=sample,
-        force_after=after,
-        first=first,
-    )
+    return Plan(fine, lengths, regular, same, force0, force1, sample, force_after=after)
+
+
+def jump_corrections(
+    start: float, step: float, count: int, first: int, times: FloatArray, heights: FloatArray
+) -> FloatArray:
+    """What to add to samples of a history with jumps, of which one at a sample has its mean there.
+
+    A filter that takes straight lines between samples (first-order hold) sees a jump as a ramp of
+    one step, wherever within the step it is: its response then moves in stairs as the jump moves,
+    by half a step of area. Three sample values around the jump, corrected so that area, first and
+    second moment of the difference vanish, leave an error of third order in the step. The
+    correction is continuous in the jump's time.
+
+    Args:
+        start: s, time of the first sample.
+        step: s between samples.
+        count: of the samples.
+        first: the first sample that can be corrected.
+        times: (m,) s, of the jumps.
+        heights: (m,) of the jumps.
+
+    Returns:
+        (count,) in the unit of the heights.
+    """
+    found = np.zeros(count)
+    place = (np.asarray(times) - start) / step
+    centre = np.rint(place).astype(np.int64)
+    delta = place - centre
+    delta = np.where(np.abs(delta) < _ON, 0.0, delta)
+    # Moments of the true step less those of the ramp, about the nearest sample, in steps.
+    side = np.sign(delta)
+    area = 0.5 * side - delta
+    first_moment = 1.0 / 6.0 - 0.5 * delta**2
+    second_moment = side / 12.0 - delta**3 / 3.0
+    even = second_moment - area / 6.0
+    left, right = 0.5 * (even - first_moment), 0.5 * (even + first_moment)
+    middle = area - even
+    # Where nothing stands on the left, two samples keep area and first moment: the first two.
+    alone = centre - 1 < first
+    beyond = centre < first  # the first is then one step right of where moments are taken
+    two_middle = np.where(beyond, 0.0, area - first_moment)
+    two_right = np.where(beyond, 2.0 * area - first_moment, first_moment)
+    _add(found, centre - 1, heights * np.where(alone, 0.0, left))
+    _add(found, centre, heights * np.where(alone, two_middle, middle))
+    _add(found, centre + 1, heights * np.where(alone, two_right, right))
+    _add(found, centre + 2, heights * np.where(beyond, first_moment - area, 0.0))
+    found[:first] = 0.0
+    return found
+
+
+def _add(found: FloatArray, index: IndexArray, values: FloatArray) -> None:
+    inside = (index >= 0) & (index < found.size)
+    np.add.at(found, index[inside], values[inside])
 
 
 def _edges(force: PiecewiseForce, end: float) -> FloatArray:
@@ -214,13 +252,11 @@ def _edges(force: PiecewiseForce, end: float) -> FloatArray:
     return (force.start + force.end * np.arange(periods)[:, None]).ravel()
 
 
-def _at(force: PiecewiseForce, times: FloatArray) -> FloatArray:
-    return force(np.mod(times, force.end)) if np.isfinite(force.end) else force(times)
-
-
 def _run(
     system: VibratingSystem, plan: Plan, count: int, start: FloatArray
 ) -> tuple[CoordinateMotion, FloatArray]:
+    from picchio.vibration.integration import integrate_kernel as kernel
+
     n = len(system.coordinates)
     x, v, a = (np.zeros((count, n)) for _ in range(3))
     end = np.empty(2 * n + len(system.elements))
@@ -243,13 +279,10 @@ def _run(
         row[: len(element.parameters)] = element.parameters
     elements = (kinds if kinds.size else None, parameters, system.rows, start[2 * n :])
     if any(element.kind in _STICKING for element in system.elements):
-        from picchio.vibration.integration.sticking_kernel import integrate as with_friction
-
-        with_friction(*equations, *elements, *steps, x, v, a, end)
+        run = kernel.integrate_with_friction
     else:
-        from picchio.vibration.integration.integrate_kernel import integrate as without_friction
-
-        without_friction(*equations, *elements, *steps, x, v, a, end)
+        run = kernel.integrate
+    run(*equations, *elements, *steps, x, v, a, end)
     return CoordinateMotion(x, v, a), end
 
 
@@ -266,9 +299,8 @@ def _periodic(
     period, n = force.end, len(system.coordinates)
     parts = int(np.ceil(period / longest))
     once = make_plan(force, Samples(0.0, period / parts, 1), longest, until=period)
-    whole, _, _ = step_matrices(
-        np.linalg.inv(system.mass), system.damping, system.stiffness, period
-    )
+    ik, ic = np.linalg.solve(system.mass, np.stack([system.stiffness, system.damping]))
+    whole = step_matrices(ik, ic, period)[0]
     correction = np.linalg.inv(np.eye(2 * n) - whole)
     state = _rest(system)
     for _ in range(_SHOOTING):

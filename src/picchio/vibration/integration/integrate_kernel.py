@@ -7,6 +7,8 @@ a force edge cuts short are advanced by the Taylor series of the same exponentia
 
 Over a step p is first extrapolated from the last one, evaluated where that leads, and the step
 corrected. At a jump of the force, and where something touches or lets go, it is evaluated twice.
+With dry friction, which may stop a joint anywhere within a step (`friction_kernel`), nothing is
+extrapolated: each step is evaluated twice.
 All is in units of acceleration, M^-1 times the forces.
 """
 
@@ -21,6 +23,7 @@ from picchio.vibration.integration.element_kernel import (
     element_force,
     kink_correction,
 )
+from picchio.vibration.integration.friction_kernel import COULOMB, stick
 from picchio.vibration.integration.step_kernel import fastest_rate, step_matrices, taylor
 
 # From so many time constants of the fastest mode on, matrices are cheaper than a series.
@@ -57,6 +60,27 @@ def packed(inverse, gradient, curvature):
                 for m in range(n):
                     tilts[i, j, k] += inverse[i, m] * gradient[k, m, j]
     return inverse @ forces, tilts
+
+
+@njit(cache=True, nogil=True)
+def _prepared(mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, same):
+    """What `integrate` needs of the equations, M^-1 on all, and room for steps of other lengths."""
+    n = b.size
+    inverse = np.linalg.inv(mass)
+    held = np.empty((n, 2 * n))
+    held[:, :n] = inverse @ stiffness
+    held[:, n:] = inverse @ damping
+    ik, ic = held[:, :n].copy(), held[:, n:].copy()
+    quadratic, tilts = packed(inverse, gradient, curvature)
+    pushed = inverse @ b, inverse @ b_gradient, rows @ inverse
+    kept = 0
+    for k in range(same.size):
+        kept = max(kept, same[k] + 1)
+    made = np.zeros(kept, dtype=np.bool_)
+    short = np.empty((kept, 2 * n, 2 * n))
+    short_start, short_end = np.empty((kept, 2 * n, n)), np.empty((kept, 2 * n, n))
+    room = np.empty(n * (n + 1)), np.empty((n, n)), np.empty(n), np.empty(n)
+    return (ik, ic, held, quadratic, tilts), pushed, (made, short, short_start, short_end), room
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -170,29 +194,20 @@ def integrate(
     (2N + elements,), the last state.
     """
     n = b.size
-    inverse = np.linalg.inv(mass)
-    ik, ic = inverse @ stiffness, inverse @ damping
+    equations, pushed, others, room = _prepared(
+        mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, same
+    )
+    ik, ic, held, quadratic, tilts = equations
+    own, push, pulls = pushed
+    made, short, short_start, short_end = others
+    products, square, rest, a = room
     fastest = fastest_rate(ik, ic)
-    whole, from_start, from_end = step_matrices(inverse, damping, stiffness, step)
-    exponential, by_start, by_end = whole, from_start @ mass, from_end @ mass
-    quadratic, tilts = packed(inverse, gradient, curvature)
-    own, push, pulls = inverse @ b, inverse @ b_gradient, rows @ inverse
+    exponential, by_start, by_end = step_matrices(ik, ic, step)
     states, new_states = start_states.copy(), start_states.copy()
     given = np.zeros(states.size)
-    held = np.empty((n, 2 * n))
-    held[:, :n] = ik
-    held[:, n:] = ic
-    eye = np.eye(n)
-    kept = 0
-    for k in range(lengths.size):
-        kept = max(kept, same[k] + 1)
-    made = np.zeros(kept, dtype=np.bool_)
-    short = np.empty((kept, 2 * n, 2 * n))
-    short_start, short_end = np.empty((kept, 2 * n, n)), np.empty((kept, 2 * n, n))
     y, new, there = start.copy(), np.empty(2 * n), np.empty(2 * n)
     p0, p1, f0, f1, bend = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(2)
     at_first, at_last, first, final = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    products, square, rest, a = np.empty(n * (n + 1)), np.empty((n, n)), np.empty(n), np.empty(n)
     last = 0.0  # length of the step over which nothing jumped; 0 where something did
     for k in range(lengths.size):
         length = lengths[k]
@@ -220,8 +235,7 @@ def integrate(
                 u, by_matrix = same[k], True
                 if not made[u]:
                     made[u] = True
-                    one, two, three = step_matrices(inverse, damping, stiffness, length)
-                    short[u], short_start[u], short_end[u] = one, two @ mass, three @ mass
+                    short[u], short_start[u], short_end[u] = step_matrices(ik, ic, length)
                 matrix, at_start, at_end = short[u], short_start[u], short_end[u]
             if by_matrix:
                 for i in range(2 * n):
@@ -231,7 +245,7 @@ def integrate(
                         total += at_start[i, j] * f0[j] + at_end[i, j] * f1[j]
                     new[i] = total
             else:
-                taylor(y, f0, f1, length, eye, ik, ic, fastest, new)
+                taylor(y, f0, f1, length, ik, ic, fastest, new)
             if kinds is not None:
                 advance(kinds, parameters, rows, y, new, states, new_states)
             lacking(
@@ -260,7 +274,7 @@ def integrate(
                 for i in range(n):
                     f0[i] = own[i] * force0[k] + first[i]
                     f1[i] = own[i] * force1[k] + final[i]
-                taylor(y, f0, f1, length, eye, ik, ic, fastest, there)
+                taylor(y, f0, f1, length, ik, ic, fastest, there)
             if share > 0.0 and not crossed:
                 break
             for i in range(n):
@@ -288,12 +302,98 @@ def integrate(
                     for j in range(n):
                         total -= held[i, j] * y[j] + held[i, n + j] * y[n + j]
                     a[i] = total
+            x_out[s], v_out[s], a_out[s] = y[:n], y[n:], a
+    end[: 2 * n] = y
+    end[2 * n :] = states
+
+
+@njit(cache=True, nogil=True)
+def integrate_with_friction(
+    start, mass, gradient, curvature, damping, stiffness, b, b_gradient,
+    kinds, parameters, rows, start_states,
+    step, lengths, regular, same, force0, force1, sample, force_after,
+    x_out, v_out, a_out, end,
+):  # fmt: skip
+    """As `integrate`, where there is friction among the elements."""
+    n, elements = b.size, kinds.size
+    equations, pushed, others, room = _prepared(
+        mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, same
+    )
+    ik, ic, held, quadratic, tilts = equations
+    own, push, pulls = pushed
+    made, short, short_start, short_end = others
+    products, square, rest, a = room
+    fastest = fastest_rate(ik, ic)
+    exponential, by_start, by_end = step_matrices(ik, ic, step)
+    states, new_states = start_states.copy(), start_states.copy()
+    friction, last, given = np.zeros(elements), np.zeros(elements), np.zeros(elements)
+    y, new, zero = start.copy(), np.empty(2 * n), np.zeros(2 * n)
+    p0, p1, f0, f1, bend = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(2)
+    kick = np.empty((elements, 2 * n))
+    for k in range(lengths.size):
+        # Friction is in the step itself, as `stick` finds it: the pseudo-force must not count it.
+        given[:] = 0.0
+        lacking(
+            y, force0[k], own, push, held, quadratic, tilts, kinds, parameters, rows, pulls,
+            states, given, products, square, rest, p0, a,
+        )  # fmt: skip
+        for i in range(n):
+            f0[i] = own[i] * force0[k] + p0[i]
+            f1[i] = own[i] * force1[k] + p0[i]
+        matrix, at_start, at_end = exponential, by_start, by_end
+        by_matrix = regular[k]
+        if not by_matrix and lengths[k] * fastest > _STIFF:
+            u, by_matrix = same[k], True
+            if not made[u]:
+                made[u] = True
+                short[u], short_start[u], short_end[u] = step_matrices(ik, ic, lengths[k])
+            matrix, at_start, at_end = short[u], short_start[u], short_end[u]
+        for e in range(elements):  # what a unit of friction all through the step does
+            if kinds[e] == COULOMB and by_matrix:
+                for i in range(2 * n):
+                    total = 0.0
+                    for j in range(n):
+                        total += (at_start[i, j] + at_end[i, j]) * pulls[e, j]
+                    kick[e, i] = total
+            elif kinds[e] == COULOMB:
+                taylor(zero, pulls[e], pulls[e], lengths[k], ik, ic, fastest, kick[e])
+        for attempt in range(2):
+            if by_matrix:
+                for i in range(2 * n):
+                    total = 0.0
+                    for j in range(2 * n):
+                        total += matrix[i, j] * y[j]
+                    for j in range(n):
+                        total += at_start[i, j] * f0[j] + at_end[i, j] * f1[j]
+                    new[i] = total
+            else:
+                taylor(y, f0, f1, lengths[k], ik, ic, fastest, new)
+            stick(y, new, kinds, parameters, rows, kick, friction, last)
+            advance(kinds, parameters, rows, y, new, states, new_states)
+            if attempt == 1:
+                break
+            lacking(
+                new, force1[k], own, push, held, quadratic, tilts, kinds, parameters, rows, pulls,
+                new_states, given, products, square, rest, p1, a,
+            )  # fmt: skip
             for i in range(n):
-                x_out[s, i] = y[i]
-                v_out[s, i] = y[n + i]
-                a_out[s, i] = a[i]
-    for i in range(2 * n):
-        end[i] = y[i]
-    if kinds is not None:
-        for e in range(kinds.size):
-            end[2 * n + e] = states[e]
+                f1[i] = own[i] * force1[k] + p1[i]
+            for e in range(elements):
+                if kinds[e] == _BACKLASH or kinds[e] == _CONTACT:
+                    add_kink(
+                        y, new, lengths[k], rows[e], pulls[e], kinds[e], parameters[e], bend, f0,
+                        f1,
+                    )  # fmt: skip
+        y[:] = new
+        states[:] = new_states
+        if sample[k] >= 0:
+            s = sample[k]
+            for e in range(elements):
+                given[e] = -last[e] if kinds[e] == COULOMB else 0.0
+            lacking(
+                y, force_after[k], own, push, held, quadratic, tilts, kinds, parameters, rows,
+                pulls, states, given, products, square, rest, p1, a,
+            )  # fmt: skip
+            x_out[s], v_out[s], a_out[s] = y[:n], y[n:], a
+    end[: 2 * n] = y
+    end[2 * n :] = states

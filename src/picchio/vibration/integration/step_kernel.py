@@ -12,19 +12,18 @@ _MOST_PARTS = 4000
 
 
 @njit(cache=True, nogil=True)
-def step_matrices(inverse, damping, stiffness, step):
-    """exp(A h) (2N, 2N) and what a pseudo-force at start and end of a step adds, (2N, N) each."""
-    n = inverse.shape[0]
+def step_matrices(ik, ic, step):
+    """exp(A h) (2N, 2N) and what accelerations at start and end of a step add, (2N, N) each."""
+    n = ik.shape[0]
     size = 4 * n
     a = np.zeros((size, size))
-    ik, ic = inverse @ stiffness, inverse @ damping
     for i in range(n):
         a[i, n + i] = step
+        a[n + i, 2 * n + i] = step
         a[2 * n + i, 3 * n + i] = 1.0
         for j in range(n):
             a[n + i, j] = -step * ik[i, j]
             a[n + i, n + j] = -step * ic[i, j]
-            a[n + i, 2 * n + j] = step * inverse[i, j]
     # Scaled as states are: the velocity's unit would make the norm large.
     norm = 0.0
     for i in range(n):
@@ -57,8 +56,8 @@ def fastest_rate(ik, ic):
 
 
 @njit(cache=True, nogil=True)
-def taylor(y, f0, f1, length, inverse, ik, ic, fastest, out):
-    """exp(A s) y plus the force that goes from f0 to f1 in a straight line over `length`."""
+def taylor(y, f0, f1, length, ik, ic, fastest, out):
+    """exp(A s) y plus accelerations that go from f0 to f1 in a straight line over `length`."""
     n = f0.size
     parts = min(max(int(np.ceil(length * fastest)), 1), _MOST_PARTS)
     short = length / parts
@@ -76,11 +75,11 @@ def taylor(y, f0, f1, length, inverse, ik, ic, fastest, out):
                 total = 0.0
                 for j in range(n):
                     total -= ik[i, j] * term[j] + ic[i, j] * term[n + j]
-                    # The force is there in the first derivative; its slope comes in the second.
-                    if k == 1:
-                        total += inverse[i, j] * (f0[j] + part * slope[j])
-                    elif k == 2:
-                        total += inverse[i, j] * slope[j]
+                # The force is there in the first derivative; its slope comes in the second.
+                if k == 1:
+                    total += f0[i] + part * slope[i]
+                elif k == 2:
+                    total += slope[i]
                 new[n + i] = total
             for i in range(2 * n):
                 term[i] = new[i] * short / k
@@ -141,8 +140,9 @@ def merged(origin, fine, count, extra, end, tolerance):
 
 
 @njit(cache=True, nogil=True)
-def force_lines(points, gauss, start, end, constant, slope, amplitude, omega, force0, force1):
+def force_lines(points, gauss, start, end, constant, slope, amplitude, omega):
     """The straight line through the force at two Gauss points of every step, (K,) at either end."""
+    force0, force1 = np.empty(points.size - 1), np.empty(points.size - 1)
     for k in range(points.size - 1):
         length = points[k + 1] - points[k]
         a = force_value(points[k] + gauss * length, start, end, constant, slope, amplitude, omega)
@@ -152,24 +152,27 @@ def force_lines(points, gauss, start, end, constant, slope, amplitude, omega, fo
         mean, rise = 0.5 * (a + b), (b - a) / (1.0 - 2.0 * gauss)
         force0[k] = mean - 0.5 * rise
         force1[k] = mean + 0.5 * rise
+    return force0, force1
 
 
 @njit(cache=True, nogil=True)
-def force_beside(points, offset, start, end, constant, slope, amplitude, omega, out):
-    """The force `offset` s after each point, into `out` (K,)."""
+def force_beside(points, offset, start, end, constant, slope, amplitude, omega):
+    """The force `offset` s after each point, (K,)."""
+    out = np.empty(points.size)
     for k in range(points.size):
         out[k] = force_value(points[k] + offset, start, end, constant, slope, amplitude, omega)
+    return out
 
 
 @njit(cache=True, nogil=True)
-def sample_numbers(points, times, tolerance, first, out):
-    """Which sample lies at each point, -1 where none does, into `out` (points,)."""
+def sample_numbers(points, times, tolerance, first):
+    """Which sample lies at each point, -1 where none does, (points,)."""
     place = 0
-    for k in range(out.size):
-        out[k] = -1
+    out = np.full(points.size, -1)
     for i in range(times.size):
         while place < points.size and points[place] < times[i] - tolerance:
             place += 1
         if place == points.size:
             break
         out[place] = first + i
+    return out
