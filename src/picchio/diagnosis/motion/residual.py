@@ -14,7 +14,6 @@ from picchio.diagnosis.motion.data.system import Group, System
 from picchio.diagnosis.motion.fit.baseline import baseline
 from picchio.diagnosis.motion.fit.least_squares import Fit, fit
 from picchio.model.motion import TORQUE, WINDUP
-from picchio.prediction.motion.filters import choose_cutoff
 from picchio.prediction.motion.log import read_logs
 from picchio.robot.flexible_robot import FlexibleRobot
 
@@ -68,9 +67,7 @@ def motion_residual(robot: FlexibleRobot, campaign: Campaign) -> MotionResidual:
     Raises:
         InputError: no record that can be predicted for this robot.
     """
-    logs = read_logs(robot, campaign)
-    moving = [(log.angle[joint], log.rate) for log in logs for joint in log.moving]
-    system = System(robot, logs, choose_cutoff(moving))
+    system = System(robot, read_logs(robot, campaign))
     kept = [g for g in system.groups if g[0] in (TORQUE, WINDUP)]
     if not kept:
         raise InputError("the records hold neither blows nor torque nor a second encoder",

@@ -20,8 +20,8 @@ from picchio.measurement.noise.estimate import NoiseCollector
 from picchio.measurement.noise.level import Noise
 from picchio.measurement.noise.window import read_window
 from picchio.measurement.quality.check import SEVERITIES, Check, Context, Finding
+from picchio.measurement.quality.checks import CHECKS
 from picchio.measurement.quality.checks.repeats import Comparison, RepeatsCheck
-from picchio.measurement.quality.registry import CHECKS
 from picchio.measurement.quality.scan import RecordScan, scan_record
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot

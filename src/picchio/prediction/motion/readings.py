@@ -19,20 +19,12 @@ _KEPT = 400
 Part = tuple[str, str, FloatArray]
 Parts = list[Part]
 
+Readings = dict[str, dict[str, FloatArray]]
+"""What should be read in one record, at all its samples: kind -> joint -> (m,).
 
-@dataclass(frozen=True, eq=False)
-class Readings:
-    """What channels should read in one record, at all its samples.
-
-    Attributes:
-        torque: joint -> N m or N, in the band.
-        ripple: joint -> N m or N, above the band.
-        windup: joint -> rad or m, link side less motor side, without its constant offset.
-    """
-
-    torque: dict[str, FloatArray]
-    ripple: dict[str, FloatArray]
-    windup: dict[str, FloatArray]
+The kinds are TORQUE, in the band, and RIPPLE, above it (N m or N), and WINDUP, link side less motor
+side without its constant offset (rad or m).
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +119,7 @@ class Predictor:
                 torque[name] = around.body[name] + (factor - 1.0) * nominal
         ripple = {name: np.zeros(self.log.samples) for name in torque}
         windup = {name: np.zeros(self.log.samples) for name in self.log.link if name in torque}
-        found = Readings(torque, ripple, windup)
+        found = {TORQUE: torque, RIPPLE: ripple, WINDUP: windup}
         for effect in effects:
             if self.concerns(effect) and (
                 joint is None or effect.target_kind != "joint" or effect.target == joint
@@ -144,7 +136,7 @@ class Predictor:
 
     def by_scale(self, around: Around, joint: str) -> Readings:
         """Derivative of the readings by the factor on a joint's rigid-body torque."""
-        found = Readings({joint: self.nominal.body[joint]}, {}, {})
+        found: Readings = {TORQUE: {joint: self.nominal.body[joint]}, RIPPLE: {}, WINDUP: {}}
         self._report(found, around)
         return found
 
@@ -166,7 +158,7 @@ class Predictor:
         """
         if effect.target_kind != "joint":
             return None
-        found = Readings({}, {}, {})
+        found: Readings = {TORQUE: {}, RIPPLE: {}, WINDUP: {}}
         if not self.concerns(effect):
             return found
         if name in effect.linear:
@@ -191,7 +183,7 @@ class Predictor:
         Torques are predicted from measured angles: where those are late, the measured torque is
         early against its prediction.
         """
-        for series in (found.torque, found.ripple):
+        for series in (found[TORQUE], found[RIPPLE]):
             for joint in series:
                 if (gain := around.gains.get(joint, 1.0)) != 1.0:
                     series[joint] = gain * series[joint]
@@ -272,6 +264,5 @@ class _Watched(dict[str, FloatArray]):
 def _add(found: Readings, part: Part, factor: float) -> None:
     """Add a part; of a derivative's readings, which start empty, the first is the sum."""
     kind, joint, values = part
-    target = {TORQUE: found.torque, RIPPLE: found.ripple, WINDUP: found.windup}[kind]
-    more = values if factor == 1.0 else factor * values
+    target, more = found[kind], values if factor == 1.0 else factor * values
     target[joint] = target[joint] + more if joint in target else more

@@ -5,10 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.diagnosis.motion.criteria.necessity import contribution
+from picchio.diagnosis.motion.criteria.score import contribution
 from picchio.diagnosis.motion.data.system import System
-from picchio.diagnosis.motion.fit.least_squares import Fit, clean, fit, row_weights, stable_solve
-from picchio.diagnosis.motion.fit.state import Coordinate, State
+from picchio.diagnosis.motion.fit.least_squares import (
+    Fit,
+    difference,
+    fit,
+    row_weights,
+    stable_solve,
+)
 from picchio.model.effects.effect import Effect
 
 _LITTLE = 0.05
@@ -85,7 +90,7 @@ def gain_by_record(
         return {}
     rest = [i for i in range(len(current.coordinates)) if i not in own]
     normal, right = equations
-    prior = np.array([_prior(current.coordinates[i]) for i in rest])
+    prior = np.array([current.coordinates[i].precision for i in rest])
     target = right[rest] + normal[np.ix_(rest, own)] @ part
     step = stable_solve(normal[np.ix_(rest, rest)] + np.diag(prior), target)
     change = np.zeros(len(current.coordinates))
@@ -106,18 +111,6 @@ def gain_by_record(
 def held_out_equations(system: System, current: Fit) -> tuple[FloatArray, FloatArray]:
     """Derivatives (rows, k) by the fit's coordinates, and the residual, on records held out."""
     predicted = system.predict(current.state.every, current.state.scales)
-    columns = [_column(system, current.state, c, predicted) for c in current.coordinates]
+    columns = [difference(system, current.state, c, predicted) for c in current.coordinates]
     matrix = np.column_stack(columns) if columns else np.zeros((system.size, 0))
     return matrix, system.measured - predicted
-
-
-def _column(system: System, state: State, c: Coordinate, predicted: FloatArray) -> FloatArray:
-    sign = -1.0 if c.value + c.step > c.upper else 1.0
-    other = state.moved(c, c.value + sign * c.step)
-    only = other.every[c.index] if c.index >= 0 else None
-    changed = system.predict(other.every, other.scales, only, predicted)
-    return clean(system, changed - predicted) / (sign * c.step)
-
-
-def _prior(c: Coordinate) -> float:
-    return 0.0 if c.prior is None else 1.0 / c.prior**2

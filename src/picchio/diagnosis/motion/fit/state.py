@@ -34,6 +34,16 @@ class Coordinate:
     prior: float | None = None
     centre: float = 0.0
 
+    @property
+    def precision(self) -> float:
+        """One over the prior's variance; 0 without a prior."""
+        return 0.0 if self.prior is None else 1.0 / self.prior**2
+
+    @property
+    def pull(self) -> float:
+        """How strongly the prior pulls towards its centre."""
+        return self.precision * (self.centre - self.value)
+
 
 @dataclass(frozen=True)
 class State:

@@ -44,10 +44,10 @@ def time_by_ripple(system: System, current: Fit, delay: type[Effect]) -> Fit:
     steps = int(_LONGEST / (_FINEST * period))
     best: tuple[float, State] | None = None
     pieces = _pieces(system, state, groups)
-    before = _left(pieces, state, 0.0)
+    before = _left(pieces, 0.0)
     for number in range(-steps, steps + 1):
         late = number * _FINEST * period
-        after = _left(pieces, state, late)
+        after = _left(pieces, late)
         cost = _gain(system, current, before, after, groups)
         if number and (best is None or cost > best[0]):
             target = TORQUE if late > 0.0 else next(iter(angles))
@@ -89,7 +89,7 @@ def _pieces(system: System, state: State, groups: list) -> list:
     return found
 
 
-def _left(pieces: list, state: State, late: float) -> dict:
+def _left(pieces: list, late: float) -> dict:
     """Group -> power that its ripples leave, with torques late by `late` s."""
     left = {}
     for group, orders, parts in pieces:

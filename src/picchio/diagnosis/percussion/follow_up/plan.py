@@ -21,7 +21,7 @@ def percussion_records(problem: Problem) -> list[Record]:
 
 def sensor_group(problem: Problem, kind: str) -> str:
     """The channel group that a kind of sensor is asked for as: at the tool, or on every joint."""
-    return kind if kind == "deflection" else f"{kind}.{problem.robot.tool_frame}"
+    return SensorTable(channels=kind).expand(problem.robot)[0][0].group
 
 
 def when(days: float) -> str:

@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from picchio.campaign.channels import parse_channel
+from picchio.campaign.channels import addable_kinds
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.model.geometry import Geometry
 from picchio.prediction.percussion import PercussionSetup
+from picchio.prediction.plan import SensorTable
 
 _POSES = 6
 _DIRECTIONS = 3
@@ -77,12 +78,11 @@ def _setup(
     problem: Problem, like: PercussionSetup, geometry: Geometry, direction: FloatArray
 ) -> PercussionSetup:
     """The record that would be taken, with every sensor that could be had."""
-    frame = problem.robot.tool_frame
-    names = [f"deflection.{n}" for n in problem.robot.flexible_names]
-    names += [f"accelerometer.{frame}.{a}" for a in "xyz"]
+    robot = problem.robot
     channels = {c.name: c for c in like.channels}
-    channels |= {name: parse_channel(name)[0] for name in names}
-    rotation = geometry.motion(frame).rotation
+    for kind in addable_kinds():
+        channels |= {c.name: c for c, _ in SensorTable(channels=kind.name).expand(robot)}
+    rotation = geometry.motion(robot.tool_frame).rotation
     return replace(
         like,
         geometry=geometry,

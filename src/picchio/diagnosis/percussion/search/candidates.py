@@ -22,7 +22,7 @@ def evidence_of(problem: Problem) -> Evidence:
         robot=problem.robot,
         groups=tuple(g for g in problem.groups if not channels[g].of_force),
         vectors=frozenset(g for g, kind in channels.items() if kind.axes),
-        accelerations=frozenset(g for g, kind in channels.items() if kind.accelerates),
+        accelerations=frozenset(g for g, kind in channels.items() if kind.derivative == 2),
         forces=tuple(g for g in problem.groups if channels[g].of_force),
         bursts=any(b.start.size > 1 and b.period is None for b in blows),
         recorded=all(b.recorded for b in blows),

@@ -62,7 +62,7 @@ class LengthCheck(Check):
             std = self.context.std(name) + self.context.hum(name)
             part = values[window.after()]
             size = max(16, values.size // 20)
-            if name == "force" or values.size < 4 * size:
+            if window.channels[name].kind.of_force or values.size < 4 * size:
                 continue
             power = values[: values.size // size * size].reshape(-1, size)
             loudest = float(np.sqrt((power**2).mean(axis=1).max()))
