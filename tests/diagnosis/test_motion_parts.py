@@ -8,9 +8,8 @@ from picchio.campaign.record import Record
 from picchio.diagnosis.motion.data.split import split
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.diagnosis import diagnose_motion
-from picchio.diagnosis.motion.fit.baseline import stated_friction
 from picchio.diagnosis.motion.fit.orders import find_orders, power_at, power_spectrum
-from picchio.diagnosis.motion.fit.state import State
+from picchio.diagnosis.motion.fit.state import State, stated_friction
 from picchio.diagnosis.motion.fit.stretches import confidence
 from picchio.model.effects.registry import effect_class
 from picchio.prediction.motion.log import MotionLog

@@ -61,6 +61,11 @@ class Uncertain:
         return float((ends[moved] / np.abs(step[moved])).min()) if moved.any() else math.inf
 
 
+def has_strength(robot: FlexibleRobot) -> bool:
+    """Whether any joint has what fails."""
+    return any(j.shaft is not None or j.reducer is not None for j in robot.flexible_joints)
+
+
 def life_before_and_after(
     robot: FlexibleRobot,
     task: Task,

@@ -27,7 +27,7 @@ from itertools import chain
 from typing import Any, Literal
 
 from picchio.campaign.campaign import Campaign
-from picchio.diagnosis.motion.conclude.during_blows import effects_during_blows
+from picchio.diagnosis.motion.conclude.during_blows import MotionLife, effects_during_blows
 from picchio.diagnosis.motion.conclude.values import parameters
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.diagnosis import diagnose_motion, refitted
@@ -40,7 +40,7 @@ from picchio.diagnosis.percussion.conclude.causes import fitted_nuisances, fitte
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis, diagnose_percussion
 from picchio.diagnosis.percussion.fit.drawn import refit
-from picchio.diagnosis.percussion.fit.parallel_records import parallel_records
+from picchio.diagnosis.percussion.fit.parallel import parallel_records
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.result import (
     MOSTLY,
@@ -61,6 +61,7 @@ _SURE = 3.0
 _SYSTEMATIC = 0.05
 # Rise of chi-square by which records rule a cause out: three standard deviations.
 _RULED_OUT = _SURE**2
+_TOGETHER = "the life above takes the causes of both kinds of records into account"
 # From the most to the least that may be said.
 _ORDER: tuple[Verdict, ...] = ("nothing-wrong", "named", "ambiguous", "partial", "unexplained")
 
@@ -109,23 +110,6 @@ class Comparison:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class MixedDiagnosis:
-    """A diagnosis of both kinds of records, with each kind's own.
-
-    Attributes:
-        diagnosis: the answer.
-        percussion: with the shared causes at their common values.
-        motion: likewise.
-        comparisons: of the causes that both kinds could show.
-    """
-
-    diagnosis: Diagnosis
-    percussion: PercussionDiagnosis
-    motion: Diagnosis
-    comparisons: tuple[Comparison, ...]
-
-
 def diagnose_mixed(
     robot: FlexibleRobot,
     campaign: Campaign,
@@ -134,7 +118,7 @@ def diagnose_mixed(
     gravity_stiffness: bool = True,
     workers: int | None = None,
     progress: Callable[[str], None] | None = None,
-) -> MixedDiagnosis:
+) -> Diagnosis:
     """What the simulation gets wrong about percussion and motion records of one robot.
 
     Args:
@@ -144,6 +128,10 @@ def diagnose_mixed(
         gravity_stiffness: whether gravity's change with the deflection counts in percussion.
         workers: processes for the percussion records; as many as cores where None.
         progress: told what is being done.
+
+    Returns:
+        the diagnosis; `details` has each kind's own, "percussion" and "motion", with the shared
+        causes at their common values.
 
     Raises:
         InputError: as `diagnose_percussion` and `diagnose_motion`.
@@ -169,8 +157,7 @@ def diagnose_mixed(
         percussion, comparisons = _compared(percussion, motion)
         if not any(c.status == "contradiction" for c in comparisons):
             percussion, motion = _joined(percussion, motion, comparisons)
-    diagnosis = _concluded(percussion, motion, comparisons)
-    return MixedDiagnosis(diagnosis, percussion, motion, tuple(comparisons))
+    return _concluded(percussion, motion, comparisons)
 
 
 def _shared(kind: type[Effect]) -> bool:
@@ -321,8 +308,7 @@ def _comparisons(percussion: PercussionDiagnosis, motion: Diagnosis) -> list[Com
 
 def _percussion_gain(percussion: PercussionDiagnosis, cause: Estimate) -> float:
     """Fall of chi-square in the percussion records by a cause at what motion tells of it."""
-    candidates = {f"{kind.name}:{target}" for kind, target in percussion.search.candidates}
-    if cause.effect.label not in candidates:
+    if cause.effect.label not in percussion.search.considered:
         return 0.0
     problem, whole = percussion.problem, percussion.extended
     informed = whole.hypothesis.informed(cause.effect, cause.std)
@@ -358,11 +344,10 @@ def _joined(
     both = {c.label for c in comparisons if c.status == "both"}
     carried = {c.label for c in comparisons if c.status == "motion"}
     moves, blows = _motion_estimates(motion), _percussion_estimates(percussion)
-    candidates = {f"{kind.name}:{target}" for kind, target in percussion.search.candidates}
     problem, said = percussion.problem, percussion.diagnosis
     start = percussion.extended if said.verdict != "unexplained" else percussion.baseline
     hypothesis = replace(start.hypothesis, priors=())
-    for label in sorted((both | carried) & candidates):
+    for label in sorted((both | carried) & percussion.search.considered):
         hypothesis = hypothesis.informed(moves[label].effect, moves[label].std)
     if hypothesis.priors:
         whole = refit(problem, hypothesis, problem.records)
@@ -451,6 +436,10 @@ def _concluded(
             for kind, found in (("percussion", blows), ("motion", motion))
         },
         shared=tuple(c.to_dict() for c in comparisons),
+        details={
+            "percussion": percussion, "motion": motion, "motion_life": MotionLife(None, _TOGETHER),
+            "during_blows": effects_during_blows(motion),
+        },
     )  # fmt: skip
 
 

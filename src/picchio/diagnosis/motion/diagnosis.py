@@ -15,10 +15,9 @@ from picchio.diagnosis.motion.criteria.score import Scorer, necessity
 from picchio.diagnosis.motion.data.noise import noise_levels
 from picchio.diagnosis.motion.data.split import split
 from picchio.diagnosis.motion.data.system import Group, System
-from picchio.diagnosis.motion.fit.baseline import baseline
 from picchio.diagnosis.motion.fit.instruments import instrument_shifts
 from picchio.diagnosis.motion.fit.least_squares import Fit, fit
-from picchio.diagnosis.motion.fit.state import State
+from picchio.diagnosis.motion.fit.state import State, baseline
 from picchio.diagnosis.motion.follow_up.advice import next_measurement
 from picchio.diagnosis.motion.search.candidates import evidence_of, motion_effects
 from picchio.diagnosis.motion.search.select import Step, alternatives, eliminate, select

@@ -11,8 +11,8 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.motion.data.noise import noise_levels
 from picchio.diagnosis.motion.data.system import Group, System
-from picchio.diagnosis.motion.fit.baseline import baseline
 from picchio.diagnosis.motion.fit.least_squares import Fit, fit
+from picchio.diagnosis.motion.fit.state import baseline
 from picchio.model.motion import TORQUE, WINDUP
 from picchio.prediction.motion.log import read_logs
 from picchio.robot.flexible_robot import FlexibleRobot

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from picchio.diagnosis.life import NO_SHAFT, life_before_and_after
+from picchio.diagnosis.life import NO_SHAFT, has_strength, life_before_and_after
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.state import State
 from picchio.diagnosis.result import Diagnosis
@@ -112,8 +112,7 @@ def motion_life(robot: FlexibleRobot, task: Task | None, diagnosis: Diagnosis) -
         side: {name: joint["peak_deflection"] for name, joint in found[side]["joints"].items()}
         for side in ("baseline", "extended")
     }
-    told = any(j.shaft is not None or j.reducer is not None for j in robot.flexible_joints)
-    if not told:
+    if not has_strength(robot):
         return MotionLife(None, NO_SHAFT, blows)
     return MotionLife(found, said(effects) if effects else NONE_ACTS, blows)
 

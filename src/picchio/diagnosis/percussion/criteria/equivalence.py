@@ -11,7 +11,7 @@ from collections.abc import Sequence, Set
 
 import numpy as np
 
-from picchio.diagnosis.percussion.criteria.bic import SAME, bic
+from picchio.diagnosis.percussion.criteria.comparison import SAME, bic
 from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_range
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
@@ -48,14 +48,12 @@ def _in_series(labels: Set[str], records: Sequence[MeasuredRecord]) -> bool:
     springs = [effect_class(name).yields_along(target) for name, target in pairs]
     if len(springs) != 2 or not all(springs):
         return False
-    return all(_moves_alike(record, *springs) for record in records)
-
-
-def _moves_alike(record: MeasuredRecord, joint: str, axis: str) -> bool:
-    geometry = record.setup.geometry
-    jacobian = geometry.motion(geometry.robot.tool_point).jacobian
-    a, b = (jacobian[:, geometry.chain.index(name)] for name in (joint, axis))
-    return bool(abs(a @ b) >= _PARALLEL * np.linalg.norm(a) * np.linalg.norm(b))
+    for geometry in {record.setup.geometry for record in records}:
+        jacobian = geometry.motion(geometry.robot.tool_point).jacobian
+        a, b = (jacobian[:, geometry.chain.index(name)] for name in springs)
+        if abs(a @ b) < _PARALLEL * np.linalg.norm(a) * np.linalg.norm(b):
+            return False
+    return True
 
 
 def _effective_parameters(problem: Problem, found: Fit) -> float:

@@ -89,7 +89,6 @@ class Problem:
     Args:
         robot: the robot as its files have it.
         campaign: the records.
-        noise: channel -> noise; estimated from the campaign where None.
         gravity_stiffness: whether gravity's change with the deflection counts.
         workers: processes for what is independent; as many as cores where None.
 
@@ -101,7 +100,6 @@ class Problem:
         self,
         robot: FlexibleRobot,
         campaign: Campaign,
-        noise: Mapping[str, Noise] | None = None,
         *,
         gravity_stiffness: bool = True,
         workers: int | None = 1,
@@ -113,8 +111,7 @@ class Problem:
         self.model = Model(robot, gravity_stiffness)
         setups = percussion_setups(robot, campaign)
         values = [campaign[s.name].read([c.name for c in s.channels]) for s in setups]
-        noise = dict(noise) if noise is not None else _noise(campaign, setups, values)
-        self.noise = noise
+        self.noise = noise = _noise(campaign, setups, values)
         poses: dict[bytes, int] = {}
         self.records: list[MeasuredRecord] = []
         for setup, data in zip(setups, values, strict=True):
@@ -336,3 +333,28 @@ def _kept_edges(
         return None if fixed is None else {g: mask[:count] for g, mask in fixed.items()}
     key = (setup.samples, model.key("blows", "sensor"))
     return record._edges.get(key, lambda: near_edges(setup, model))
+
+
+# Which records a model is fitted to, and which it is judged on.
+
+# One pose of so many is held out.
+_EVERY = 3
+
+Split = tuple[list[MeasuredRecord], list[MeasuredRecord]]
+
+
+def held_out(problem: Problem) -> list[Split]:
+    """Ways to choose records to fit and records held out, the usual one first.
+
+    Whole poses are held out, every third; of fewer poses every third record; of fewer records none.
+    """
+    ways: list[Split] = []
+    for offset in reversed(range(_EVERY)):
+        if problem.n_poses >= _EVERY:
+            kept = [r for r in problem.records if r.pose % _EVERY == offset]
+        elif len(problem.records) >= _EVERY:
+            kept = problem.records[offset::_EVERY]
+        else:
+            return [(list(problem.records), [])]
+        ways.append(([r for r in problem.records if r not in kept], kept))
+    return ways

@@ -8,17 +8,16 @@ from dataclasses import replace
 from typing import Any
 
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.criteria.bic import SAME, bic
+from picchio.diagnosis.percussion.criteria.comparison import SAME, bic
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.data.record import MeasuredRecord
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing, is_nonsmooth
+from picchio.diagnosis.percussion.fit.parallel import Workers
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.fit.workers import Workers
 from picchio.diagnosis.percussion.search.screen import Screen, Suspect
 from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.model.effects.effect import Effect
-from picchio.model.effects.registry import effect_class
 
 # One candidate fitted: to the first part of the records, and from there to all of them.
 
@@ -94,7 +93,6 @@ def try_candidates(
     known: Hypothesis,
     *,
     short_list: int = SHORT_LIST,
-    long_fits: int = LONG_FITS,
     whole: bool = False,
     wide: bool = False,
     cause: str = "",
@@ -146,10 +144,10 @@ def try_candidates(
                 return []
         if cause:
             suspects = _rivals(suspects, cause)
-        if wide:
-            short_list, long_fits = 3 * short_list, 2 * long_fits
-        chosen = _short_list(suspects, short_list)
-        little = wide or _promised(suspects) < _HALF * screen.total
+        long_fits = 2 * LONG_FITS if wide else LONG_FITS
+        chosen = _short_list(suspects, 3 * short_list if wide else short_list)
+        promised = max((s.gain for s in suspects), default=0.0)
+        little = wide or promised < _HALF * screen.total
         if early is not None and not cause and little:
             # Growing errors are recognisable only early.
             chosen = _joined(chosen, early.ranked(pool.map("early", candidates)))
@@ -162,11 +160,6 @@ def try_candidates(
         own = fit(problem, best.hypothesis, some, window, iterations=2)
         mark = min(bic(own), short[0][2])
         return _long_trials(pool, short, list(records), long_fits, mark, best.cost)
-
-
-def _promised(suspects: Sequence[Suspect]) -> float:
-    """What the best of them explains."""
-    return max((s.gain for s in suspects), default=0.0)
 
 
 def _joined(chosen: Sequence[Suspect], early: Sequence[Suspect]) -> list[Suspect]:
@@ -256,18 +249,18 @@ def _short_list(suspects: Sequence[Suspect], size: int) -> list[Suspect]:
 
     Whatever explains exactly as much as one of them is there as well: it may be the same thing.
     """
+
+    def twins(one: Suspect, other: Suspect) -> bool:
+        return one.numbers == other.numbers and abs(one.gain - other.gain) < _TWIN * one.gain
+
     chosen: list[Suspect] = []
     for suspect in suspects:
-        if len(chosen) >= size and not any(_twins(suspect, s) for s in chosen):
+        if len(chosen) >= size and not any(twins(suspect, s) for s in chosen):
             continue
         same = sum(1 for s in chosen if s.effect.name == suspect.effect.name)
         if same < 3 and suspect.gain > 0.0:
             chosen.append(suspect)
     return chosen
-
-
-def _twins(one: Suspect, other: Suspect) -> bool:
-    return one.numbers == other.numbers and abs(one.gain - other.gain) < _TWIN * one.gain
 
 
 def records_of_every_pose(records: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
@@ -315,9 +308,7 @@ def over_the_same_samples(search: Search, trials: Sequence[Trial]) -> list[Trial
     close = [
         t
         for t in trials
-        if t.finished(search.records)
-        and t.score - best.score < _ROUGH
-        and effect_class(t.label.split(":")[0]).latent is None
+        if t.finished(search.records) and t.score - best.score < _ROUGH and not t.draws
     ]
     if best not in close or len(close) < 2:
         return list(trials)
