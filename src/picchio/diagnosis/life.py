@@ -105,18 +105,13 @@ def life_before_and_after(
     }
     if any("rivets_interval" in found[side] for side in ("baseline", "extended")):
         found["interval_level"] = LEVEL
-    if others:
-        found["alternatives"] = [_life_or_why(robot, other, task, options) for other in others]
+    for other in others:
+        try:
+            told = _life(with_effects(robot, other), task, options)
+        except InputError as error:  # this set's model is none for this task
+            told = {"why": str(error)}
+        found.setdefault("alternatives", []).append(told)
     return found
-
-
-def _life_or_why(
-    robot: FlexibleRobot, effects: Sequence[Effect], task: Task, options: dict[str, Any]
-) -> dict[str, Any]:
-    try:
-        return _life(with_effects(robot, effects), task, options)
-    except InputError as error:  # this set's model is none for this task
-        return {"why": str(error)}
 
 
 def with_effects(robot: FlexibleRobot, effects: Sequence[Effect]) -> FlexibleRobot:

@@ -21,7 +21,7 @@ side of the gear from percussion records: a motion may show more of these than b
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any, Literal
@@ -175,12 +175,12 @@ def _motion_estimates(motion: Diagnosis) -> dict[str, Estimate]:
     system: System = motion.details["systems"]["train"]
     state: State = motion.details["extended"]
     alone = fit_motion(system, replace(state, priors=()))
-    found = {}
-    for index, effect in enumerate(alone.state.effects):
-        if _shared(type(effect)):
-            values = parameters(system, alone, effect, len(alone.state.nuisances) + index)
-            found[effect.label] = Estimate(effect, _std(effect, values), values)
-    return found
+    first = len(alone.state.nuisances)
+    return _estimates(
+        (effect, parameters(system, alone, effect, first + index))
+        for index, effect in enumerate(alone.state.effects)
+        if _shared(type(effect))
+    )
 
 
 def _percussion_estimates(percussion: PercussionDiagnosis) -> dict[str, Estimate]:
@@ -190,17 +190,20 @@ def _percussion_estimates(percussion: PercussionDiagnosis) -> dict[str, Estimate
     if not any(_shared(type(effect)) for effect in claimed):
         return {}
     alone = refit(problem, replace(hypothesis, priors=()), problem.records)
+    return _estimates(
+        (effect, fitted_values(problem, alone, effect))
+        for effect in alone.hypothesis.causes
+        if _shared(type(effect))
+    )
+
+
+def _estimates(valued: Iterable[tuple[Effect, Values]]) -> dict[str, Estimate]:
+    """Label -> estimate, with the spreads of the parameters that were fitted."""
     found = {}
-    for effect in alone.hypothesis.causes:
-        if _shared(type(effect)):
-            values = fitted_values(problem, alone, effect)
-            found[effect.label] = Estimate(effect, _std(effect, values), values)
+    for effect, values in valued:
+        std = {n: v.std for n, v in values.items() if n in effect.values and v.std > 0.0}
+        found[effect.label] = Estimate(effect, std, values)
     return found
-
-
-def _std(effect: Effect, values: Values) -> dict[str, float]:
-    """Parameter -> spread, of those that were fitted."""
-    return {n: v.std for n, v in values.items() if n in effect.values and v.std > 0.0}
 
 
 # What one kind's records say of a cause that the other shows -------------------------------------
@@ -291,19 +294,21 @@ def _comparisons(percussion: PercussionDiagnosis, motion: Diagnosis) -> list[Com
         elif own is not None:
             status = "percussion"
             if _motion_gain(motion, own) < -_RULED_OUT:
-                status, why = "contradiction", "the percussion records show it, the motion " \
-                    "records rule it out"  # fmt: skip
+                status, why = "contradiction", _ruled_out("percussion", "motion")
         elif other is not None:
             gain = _percussion_gain(percussion, other)
             status = "motion" if label in beyond else "drive"
             if gain < -_RULED_OUT and label in beyond:
-                status, why = "contradiction", "the motion records show it, the percussion " \
-                    "records rule it out"  # fmt: skip
+                status, why = "contradiction", _ruled_out("motion", "percussion")
         name, _, target = label.partition(":")
         found.append(Comparison(
             name, target, status, own.values if own else None, other.values if other else None, why
         ))  # fmt: skip
     return found
+
+
+def _ruled_out(by: str, others: str) -> str:
+    return f"the {by} records show it, the {others} records rule it out"
 
 
 def _percussion_gain(percussion: PercussionDiagnosis, cause: Estimate) -> float:

@@ -211,11 +211,7 @@ def _details(search: _Search, found: Fit, noise: Mapping[Group, float],
     system, judge_on, before = search.system, search.judge_on, search.before
     inner = {**noise, **{g: noise.get(g, 1.0) for g in system.groups}}
     return {
-        "cutoff": system.cutoff,
-        "steps": [
-            {"accepted": s.accepted, "levels": dict(s.levels), "scores": list(s.scores)}
-            for s in search.steps
-        ],
+        "steps": [vars(step) for step in search.steps],
         "train": table(system, before.state, found.state, inner),
         "held_out": table(judge_on, before.state, found.state, noise),
         "dropped": [

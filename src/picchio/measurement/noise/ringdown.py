@@ -31,13 +31,11 @@ class RingDown:
         residual: (c, m) what they leave.
         parameters: numbers fitted per channel, the shared poles' share included.
         poles: (k,) rad/s, one of each pair.
-        amplitude: (c,) root mean square of the fitted waves.
     """
 
     residual: FloatArray
     parameters: float
     poles: ComplexArray
-    amplitude: FloatArray
 
 
 def fit_ring_down(series: FloatArray, rate: float) -> RingDown | None:
@@ -75,8 +73,7 @@ def fit_ring_down(series: FloatArray, rate: float) -> RingDown | None:
         return None
     residual = np.zeros_like(x)
     residual[alive] = best[2] * scale[alive][:, None]
-    amplitude = np.sqrt(np.mean((x - residual - x.mean(axis=1, keepdims=True)) ** 2, axis=1))
-    return RingDown(residual, float(best[3]), best[1], amplitude)
+    return RingDown(residual, float(best[3]), best[1])
 
 
 def _trials(y: FloatArray, rate: float) -> list[ComplexArray]:

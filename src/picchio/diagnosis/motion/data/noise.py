@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from picchio.core.arrays import FloatArray
@@ -50,8 +52,6 @@ def noise_levels(system: System) -> dict[Group, float]:
 
 def _shaken(system: System, log: MotionLog, record: int) -> dict[str, FloatArray]:
     """Joint -> how the rigid-body torque changes when the angles get their noise once more."""
-    from dataclasses import replace
-
     rng = np.random.default_rng(_SEED)
     angle = {
         joint: values + angle_noise(values) * rng.normal(size=values.size)

@@ -108,7 +108,7 @@ class System:
         readings: dict[int, Readings] = {}
         joint = only.target if only is not None and only.target_kind == "joint" else None
         for s in self.segments:
-            if only is not None and base is not None and not self._concerns(only, s):
+            if base is not None and joint not in (None, s.group[1]):
                 continue
             if s.record not in readings:
                 readings[s.record] = self.predictors[s.record].predict(effects, scales, joint)
@@ -144,10 +144,6 @@ class System:
             if s.group[1] == joint and joint in readings[s.record][s.group[0]]:
                 out[s.rows] = _at(s, readings[s.record])
         return out
-
-    @staticmethod
-    def _concerns(effect: Effect, segment: Segment) -> bool:
-        return effect.target_kind != "joint" or effect.target == segment.group[1]
 
 
 def _at(s: Segment, readings: Readings) -> FloatArray:

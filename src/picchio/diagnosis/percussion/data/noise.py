@@ -172,7 +172,7 @@ def _hum(channels: Mapping[str, list[FloatArray]], step: float) -> dict[str, lis
             if ratio > _LINE + 2.0 * len(pieces):
                 gain = float(np.mean([np.hanning(p.size).sum() for p in pieces]))
                 amplitude = 2.0 * float(np.sqrt(np.mean(here))) / gain
-                found.setdefault(name, []).append(Line(frequency, amplitude, 0.0))
+                found.setdefault(name, []).append(Line(frequency, amplitude))
     return found
 
 

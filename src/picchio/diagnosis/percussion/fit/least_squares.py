@@ -65,8 +65,7 @@ class Fit:
         if self.jacobians is None:
             raise InputError("this fit has no Jacobian")
         total = sum(j.T @ j for j in self.jacobians)
-        matrix: FloatArray = np.asarray(total) + np.diag(prior_weights(self.hypothesis) ** 2)
-        return matrix
+        return np.asarray(total + np.diag(prior_weights(self.hypothesis) ** 2))
 
     def covariance(self) -> FloatArray:
         """(unknowns, unknowns) of the transformed unknowns."""
