@@ -15,7 +15,7 @@ import picchio
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import fit
-from picchio.diagnosis.percussion.fit.parallel import Workers, parallel_records
+from picchio.diagnosis.percussion.fit.parallel import parallel_records, worker_pool
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.search.state import Search
@@ -71,10 +71,10 @@ def test_an_error_in_a_worker_is_an_error_here():
         return -item
 
     for workers in (1, 2):
-        with Workers(workers, {"fail": fail}) as pool:
-            assert pool.map("fail", [1, 2, 4]) == [-1, -2, -4]
+        with worker_pool(workers, {"fail": fail}) as mapped:
+            assert mapped("fail", [1, 2, 4]) == [-1, -2, -4]
             with pytest.raises(InputError, match="broken"):
-                pool.map("fail", [1, 3, 2])
+                mapped("fail", [1, 3, 2])
 
 
 def _late(start, rate):

@@ -128,8 +128,8 @@ import picchio
 from picchio.campaign.campaign import Campaign
 from picchio.campaign.record import Record
 from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.follow_up.plan import sensor_group
-from picchio.diagnosis.percussion.follow_up.possible_records import possible_records
+from picchio.diagnosis.percussion.follow_up.records import sensor_group
+from picchio.diagnosis.percussion.follow_up.records import possible_records
 from picchio.prediction.plan import Plan
 robot = picchio.load_robot("fanuc_like_3dof")
 plan = Plan(

@@ -238,7 +238,7 @@ def _damping_of(
 def _sidecar(
     robot: FlexibleRobot, diagnosis: Diagnosis, source: str
 ) -> tuple[dict[str, Any], list[str]]:
-    """The sidecar with the values found, as plain tables; and remarks on what has no place there."""
+    """The sidecar with the values found, and remarks on what has no place in it."""
     if not diagnosis.causes:
         raise InputError(f"the diagnosis is {diagnosis.verdict!r}: there is nothing to write")
     joints = {joint.name: _joint(robot, joint) for joint in robot.flexible_joints}

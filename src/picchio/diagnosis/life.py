@@ -160,8 +160,7 @@ def life_intervals(
     task: Task,
     found: Assessment,
     unsure: Uncertain,
-    options: dict[str, Any] | None = None,
-    level: float = LEVEL,
+    options: dict[str, Any],
 ) -> dict[str, dict[str, tuple[float, float]]]:
     """Intervals of every joint's life and utilisation, from how well a model's values are known.
 
@@ -176,7 +175,6 @@ def life_intervals(
         found: the assessment at the centre.
         unsure: the effects and how well they are known.
         options: of `picchio.studies.assessment.run`.
-        level: two-sided.
 
     Returns:
         joint -> {"rivets_interval": (low, high), "utilisation_interval": (low, high)}, of joints
@@ -186,8 +184,8 @@ def life_intervals(
         InputError: as `assess`.
     """
     worst = _most_strained(task, found)
-    z = NormalDist().inv_cdf(0.5 + 0.5 * level)
-    settings = {**(options or {}), "steady_check": False}
+    z = NormalDist().inv_cdf(0.5 + 0.5 * LEVEL)
+    settings = {**options, "steady_check": False}
 
     def at(vector: FloatArray, task: Task = worst) -> tuple[FloatArray, FloatArray] | None:
         """Utilisation and damage there; None where the model is none."""

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import chain
 from typing import Any, Literal
 
@@ -97,17 +97,9 @@ class Comparison:
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""
-
-        def plain(values: Values | None) -> dict[str, Any] | None:
-            return None if values is None else {n: v.to_dict() for n, v in values.items()}
-
-        return {
-            "effect": self.effect,
-            "target": self.target,
-            "status": self.status,
-            "percussion": plain(self.percussion),
-            "motion": plain(self.motion),
-        }
+        found = asdict(self)
+        del found["why"]
+        return found
 
 
 def diagnose_mixed(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -50,7 +50,7 @@ class Value:
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""
-        return {"value": self.value, "std": self.std, "unit": self.unit}
+        return asdict(self)
 
 
 @dataclass(frozen=True)
@@ -71,12 +71,7 @@ class Cause:
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""
-        return {
-            "effect": self.effect,
-            "target": self.target,
-            "confidence": self.confidence,
-            "parameters": {name: value.to_dict() for name, value in self.parameters.items()},
-        }
+        return asdict(self)
 
 
 @dataclass(frozen=True)

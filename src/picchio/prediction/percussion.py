@@ -163,7 +163,8 @@ class PercussionSetup:
         lead, factor = 0, 1
         if chain.filters:
             factor = max(1, int(np.ceil(samples.step / _FILTER_STEP - 1e-9)))
-            lead = self._lead(samples.step) if self.steady else 0
+            # Samples before a steady record, for filters to settle.
+            lead = int(min(2.0 / samples.step, 20000)) if self.steady else 0
             fine = samples.step / factor
             samples = Samples(
                 samples.start - lead * samples.step, fine, factor * (samples.count + lead - 1) + 1
@@ -234,10 +235,6 @@ class PercussionSetup:
         rate = 1.0 + chain.clock_rate
         mine = self.samples
         return Samples(mine.start * rate - chain.delay, mine.step * rate, mine.count)
-
-    def _lead(self, step: float) -> int:
-        """Samples before a steady record, for filters to settle."""
-        return int(min(2.0 / step, 20000))
 
     def _motion(
         self, model: Model, samples: Samples, at_jumps: AtJumps = "after"

@@ -75,7 +75,16 @@ def motion_residual(robot: FlexibleRobot, campaign: Campaign) -> MotionResidual:
     found = fit(system, baseline(system, campaign.tolerance.force))
     noise = noise_levels(system)
     prismatic = {j.name for j in robot.tree.joints.values() if j.type == "prismatic"}
-    groups = [_group(system, found, g, noise.get(g, 0.0), g[1] in prismatic) for g in kept]
+    groups = []
+    for group in kept:
+        kind, joint = group
+        force, way = ("N", "m") if joint in prismatic else ("N*m", "rad")
+        parts = system.of(group)
+        groups.append(GroupResidual(
+            group, group_words(group), force if kind == TORQUE else way,
+            rms(np.concatenate([s.measured for s in parts])),
+            rms(np.concatenate([found.residual[s.rows] for s in parts])), noise.get(group, 0.0),
+        ))  # fmt: skip
     return MotionResidual(system, found, groups)
 
 
@@ -83,21 +92,6 @@ def group_words(group: Group) -> str:
     """A group for people."""
     kind, joint = group
     return f"torque of {joint}" if kind == TORQUE else f"link angle less motor angle of {joint}"
-
-
-def _group(
-    system: System, found: Fit, group: tuple[str, str], noise: float, prismatic: bool
-) -> GroupResidual:
-    parts = system.of(group)
-    units = ("N", "m") if prismatic else ("N*m", "rad")
-    return GroupResidual(
-        group,
-        group_words(group),
-        units[0] if group[0] == TORQUE else units[1],
-        rms(np.concatenate([s.measured for s in parts])),
-        rms(np.concatenate([found.residual[s.rows] for s in parts])),
-        noise,
-    )
 
 
 def rms(rows: FloatArray) -> float:

@@ -10,8 +10,7 @@ import numpy as np
 from picchio.campaign.campaign import Campaign
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence, whiteness_test
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.prediction.residual import (

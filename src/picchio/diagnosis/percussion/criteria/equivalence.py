@@ -13,8 +13,7 @@ import numpy as np
 
 from picchio.diagnosis.percussion.criteria.comparison import SAME, bic
 from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_range
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.model.effects.registry import effect_class
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from picchio.core.arrays import BoolArray, FloatArray
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.data.problem import Problem, take_out
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, take_out
 from picchio.diagnosis.percussion.fit.least_squares import (
     HOPELESS,
     Fit,

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.active_set import bounded_solution
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis, Unknown
 
 # Windows that grow, s: a long one at once lets the fit skip cycles.

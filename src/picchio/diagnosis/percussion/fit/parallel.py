@@ -1,6 +1,6 @@
 """Work on several cores, by processes that share this one's memory.
 
-`Workers` maps functions over independent items; `parallel_records` has records predicted where a
+`worker_pool` maps functions over independent items; `parallel_records` has records predicted where a
 search's steps depend on each other.
 """
 
@@ -16,12 +16,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from picchio.core.arrays import FloatArray
-from picchio.diagnosis.percussion.data.problem import Pin, Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Pin, Problem
 from picchio.model.effects.effect import Effect
 
 _MOST = 8
@@ -48,8 +46,11 @@ def worker_count(workers: int | None) -> int:
     return min(cores(), _MOST) if workers is None else workers
 
 
-class Workers:
-    """Maps functions over items; a `with` block is as long as the processes live.
+@contextmanager
+def worker_pool(
+    workers: int | None, functions: Mapping[str, Callable[[Any], Any]]
+) -> Iterator[Callable[[str, Iterable[Any]], list[Any]]]:
+    """Within the block, a function that maps others over items: (name, items) -> results in order.
 
     The functions may use whatever exists when the block begins: processes are forked, so nothing
     of that is copied or sent. Items and results are. Where a process can't be forked safely (not
@@ -59,36 +60,26 @@ class Workers:
         workers: processes; as many as cores where None, eight at most.
         functions: name -> function of one item.
     """
+    number, count = next(_numbers), worker_count(workers)
+    pool: ProcessPoolExecutor | None = None
+    if count > 1:
+        _shared[number] = functions
+        pool = ProcessPoolExecutor(count, multiprocessing.get_context("fork"))
 
-    def __init__(self, workers: int | None, functions: Mapping[str, Callable[[Any], Any]]) -> None:
-        self._functions = functions
-        self._number = next(_numbers)
-        self._workers = worker_count(workers)
-        self._pool: ProcessPoolExecutor | None = None
-
-    def __enter__(self) -> Self:
-        if self._workers > 1:
-            _shared[self._number] = self._functions
-            context = multiprocessing.get_context("fork")
-            self._pool = ProcessPoolExecutor(self._workers, context)
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        _shared.pop(self._number, None)
-        if self._pool is not None:
-            self._pool.shutdown(wait=kind is None, cancel_futures=True)
-
-    def map(self, name: str, items: Iterable[Any]) -> list[Any]:
-        """Results of one of the functions, in the items' order."""
+    def mapped(name: str, items: Iterable[Any]) -> list[Any]:
         todo = list(items)
-        if self._pool is None or len(todo) < 2:
-            return [self._functions[name](item) for item in todo]
-        return list(self._pool.map(_run, [(self._number, name, item) for item in todo]))
+        if pool is None or len(todo) < 2:
+            return [functions[name](item) for item in todo]
+        return list(pool.map(_run, [(number, name, item) for item in todo]))
+
+    finished = False
+    try:
+        yield mapped
+        finished = True
+    finally:
+        _shared.pop(number, None)
+        if pool is not None:
+            pool.shutdown(wait=finished, cancel_futures=True)
 
 
 def _run(task: tuple[int, str, Any]) -> Any:

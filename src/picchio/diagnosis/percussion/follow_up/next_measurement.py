@@ -14,13 +14,14 @@ from picchio.diagnosis.percussion.criteria.comparison import SAME
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.follow_up.plan import (
+from picchio.diagnosis.percussion.follow_up.records import (
     asked_plan,
     percussion_records,
+    possible_records,
     sensor_group,
+    varied,
     when,
 )
-from picchio.diagnosis.percussion.follow_up.possible_records import possible_records, varied
 from picchio.diagnosis.percussion.follow_up.separation import Contest, Separation, new_noise
 from picchio.diagnosis.percussion.search.state import Trial
 from picchio.prediction.percussion import PercussionSetup

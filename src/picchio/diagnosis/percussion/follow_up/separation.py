@@ -10,8 +10,7 @@ import numpy as np
 from picchio.campaign.channels import addable_kinds
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.measurement.noise.autoregression import AutoRegression
 from picchio.measurement.noise.level import Noise

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 
 from picchio.diagnosis.percussion.criteria.comparison import bic
 from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
-from picchio.diagnosis.percussion.data.problem import Problem, signal_power
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.model.effects.effect import Effect

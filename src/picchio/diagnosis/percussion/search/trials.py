@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.criteria.comparison import SAME, bic
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing, is_nonsmooth
-from picchio.diagnosis.percussion.fit.parallel import Workers
+from picchio.diagnosis.percussion.fit.parallel import worker_pool
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.screen import Screen, Suspect
 from picchio.diagnosis.percussion.search.state import Search, Trial
@@ -134,8 +133,8 @@ def try_candidates(
     functions = {"screen": screen.suspect, "short": short_fit, "long": long_fit}
     if early is not None:
         functions["early"] = early.suspect
-    with Workers(problem.workers, functions) as pool:
-        suspects = screen.ranked(pool.map("screen", candidates))
+    with worker_pool(problem.workers, functions) as mapped:
+        suspects = screen.ranked(mapped("screen", candidates))
         logarithm = math.log(max(start.samples, 2))
         if whole:
             least = max(-logarithm, enough)
@@ -150,16 +149,16 @@ def try_candidates(
         little = wide or promised < _HALF * screen.total
         if early is not None and not cause and little:
             # Growing errors are recognisable only early.
-            chosen = _joined(chosen, early.ranked(pool.map("early", candidates)))
+            chosen = _joined(chosen, early.ranked(mapped("early", candidates)))
         tried = [(suspect, effect) for suspect in chosen for effect in suspect.starts]
         tried.sort(key=lambda each: each[1].latent is None)
-        fits = pool.map("short", [effect for _, effect in tried])
+        fits = mapped("short", [effect for _, effect in tried])
         short = _best_of_each(tried, fits, some)
         if best is None or not short:
-            return _long_trials(pool, short, list(records), long_fits)
+            return _long_trials(mapped, short, list(records), long_fits)
         own = fit(problem, best.hypothesis, some, window, iterations=2)
         mark = min(bic(own), short[0][2])
-        return _long_trials(pool, short, list(records), long_fits, mark, best.cost)
+        return _long_trials(mapped, short, list(records), long_fits, mark, best.cost)
 
 
 def _joined(chosen: Sequence[Suspect], early: Sequence[Suspect]) -> list[Suspect]:
@@ -208,7 +207,7 @@ def _best_of_each(
 
 
 def _long_trials(
-    pool: Workers,
+    mapped: Callable[[str, Iterable[Any]], list[Any]],
     short: Sequence[tuple[Suspect, Fit, float]],
     records: Sequence[MeasuredRecord],
     long_fits: int,
@@ -237,7 +236,7 @@ def _long_trials(
     others = sorted(wanted[1:], key=lambda each: each[0].effect.latent is None)
     for some in (wanted[:1], others):
         tasks = [(found.hypothesis, suspect.effect, rival) for suspect, found in some]
-        for (suspect, _), light in zip(some, pool.map("long", tasks), strict=True):
+        for (suspect, _), light in zip(some, mapped("long", tasks), strict=True):
             long = replace(light, records=tuple(records))
             rival = min(rival, long.cost)
             trials.append(Trial(suspect.label, long, bic(long), suspect.gain))
