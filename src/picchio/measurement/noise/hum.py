@@ -10,8 +10,8 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.measurement.noise.autoregression import AutoRegression, fit_autoregression
 from picchio.measurement.noise.pieces import Piece
+from picchio.measurement.noise.ringdown import MAINS
 
-MAINS = (50.0, 60.0)
 _FALSE_ALARMS = 1e-4
 _ORDER = 8
 

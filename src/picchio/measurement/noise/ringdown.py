@@ -20,7 +20,7 @@ _LONGEST = 1500
 _MOST_SAMPLES = 6000
 _STEPS = 3
 _COLOUR = 6
-_MAINS = (50.0, 60.0)
+MAINS = (50.0, 60.0)  # Hz
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,7 @@ def _trials(y: FloatArray, rate: float) -> list[ComplexArray]:
 def _basis(poles: ComplexArray, time: FloatArray) -> FloatArray:
     """(m, 2 k + 5) the waves, a constant and the mains."""
     waves = np.exp(np.outer(time, poles))
-    mains = [f(2.0 * np.pi * hz * time) for hz in _MAINS for f in (np.cos, np.sin)]
+    mains = [f(2.0 * np.pi * hz * time) for hz in MAINS for f in (np.cos, np.sin)]
     return np.column_stack([np.ones(time.size), *mains, waves.real, waves.imag])
 
 

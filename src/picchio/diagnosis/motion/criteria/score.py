@@ -224,13 +224,9 @@ def _compare(
         before = sum(x for (g, _), x in base.outside.items() if g == group)
         after = sum(x for (g, _), x in wide.outside.items() if g == group)
         effective += samples
-        gain += 0.5 * samples * np.log(max(before, _TINY) / max(after, _TINY))
-        rank += (
-            0.5
-            * base.rows[group]
-            / common[group]
-            * (np.log(max(before, _TINY) / max(after, _TINY)))
-        )
+        fall = np.log(max(before, _TINY) / max(after, _TINY))
+        gain += 0.5 * samples * fall
+        rank += 0.5 * base.rows[group] / common[group] * fall
         inside = max(base.inside[group], _TINY) / max(wide.inside[group], _TINY)
         bic += 0.5 * samples * np.log(inside)
         removed, total = removed + before - after, total + before
@@ -239,16 +235,11 @@ def _compare(
                 # In logarithms one bad stretch does not outvote the others; without, stretches
                 # in which nothing happens don't. Evidence by either is evidence.
                 other = wide.outside[g, number]
-                change = (
-                    0.5
-                    * base.count[g, number]
-                    / correlation[g]
-                    * (np.log(max(x, _TINY) / max(other, _TINY)))
-                )
+                fall = np.log(max(x, _TINY) / max(other, _TINY))
+                change = 0.5 * base.count[g, number] / correlation[g] * fall
                 differences[number] = differences.get(number, 0.0) + change
-                raw[number] = raw.get(number, 0.0) + (x - other) / correlation[g] / (
-                    max(wide.inside[g], _TINY) / base.rows[g]
-                )
+                power = max(wide.inside[g], _TINY) / base.rows[g]
+                raw[number] = raw.get(number, 0.0) + (x - other) / correlation[g] / power
     penalty = 0.5 * added * np.log(max(effective, 2.0))
     bic -= penalty
     rank -= penalty

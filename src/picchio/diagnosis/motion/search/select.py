@@ -94,7 +94,9 @@ def _forward(system: System, current: Fit, pool: Mapping[str, type[Effect]],
     for _ in range(rounds if pool else 0):
         scored = score_all(system, current, pool)
         chosen = choose(scored)
-        steps.append(_step(current, scored, chosen))
+        levels = {".".join(group): level for group, level in current.level.items()}
+        table = tuple(describe(*pair) for pair in scored[:20])
+        steps.append(Step(tuple(c.label for _, c in chosen), levels, table))
         if not chosen:
             break
         state = current.state
@@ -204,12 +206,6 @@ def eliminate(system: System, current: Fit) -> Fit:
             return current
         current = fit(system, current.state.without(min(tried)[1]))
     return current
-
-
-def _step(current: Fit, scored: list[Scored], chosen: list[Scored]) -> Step:
-    table = tuple(describe(score, candidate) for score, candidate in scored[:20])
-    levels = {".".join(group): level for group, level in current.level.items()}
-    return Step(tuple(c.label for _, c in chosen), levels, table)
 
 
 def describe(score: Score, candidate: Candidate) -> dict[str, Any]:

@@ -58,15 +58,13 @@ def time_by_ripple(system: System, current: Fit, delay: type[Effect]) -> Fit:
 
 
 def _shortest_period(system: System, state: State) -> float:
-    fastest = 0.0
-    for e in state.effects:
-        if e.periodic:
-            for p in system.predictors:
-                if e.target in p.log.moving:
-                    speed = float(np.abs(p.nominal.velocity[e.target]).max())
-                    turns = e.values["order"] * p.nominal.gear_ratio[e.target]
-                    fastest = max(fastest, speed * turns / (2.0 * np.pi))
-    return 1.0 / max(fastest, 1.0)
+    fastest = 1.0
+    for effect in (e for e in state.effects if e.periodic):
+        for nominal in (p.nominal for p in system.predictors if effect.target in p.log.moving):
+            speed = float(np.abs(nominal.velocity[effect.target]).max())
+            turns = effect.values["order"] * nominal.gear_ratio[effect.target]
+            fastest = max(fastest, speed * turns / (2.0 * np.pi))
+    return 1.0 / fastest
 
 
 def _pieces(system: System, state: State, groups: list) -> list:

@@ -28,8 +28,10 @@ def holdout_gain(
     judged = list(kept) or list(train)
     signal, floor = 0.0, 0
     for record in judged:
-        for values in _centred(record):
-            signal += float(np.mean(values**2))
+        for channel in record.channels:
+            values = record.values[channel.name]
+            offset = values.mean() if channel.kind.free_offset else 0.0
+            signal += float(np.mean(((values - offset) / record.noise[channel.name].std) ** 2))
             floor += 1
     signal = max(signal, 1e-300)
     return Gain(
@@ -40,15 +42,6 @@ def holdout_gain(
         float(np.sqrt(floor / signal)),
         floor,
     )
-
-
-def _centred(record: MeasuredRecord) -> list[np.ndarray]:
-    kinds = {c.name: c.kind for c in record.setup.channels}
-    rows = []
-    for name, values in record.values.items():
-        offset = values.mean() if kinds[name].free_offset else 0.0
-        rows.append((values - offset) / record.noise[name].std)
-    return rows
 
 
 def _mean_square(

@@ -17,7 +17,9 @@ from picchio.campaign.channels import Channel
 from picchio.core.arrays import BoolArray, FloatArray
 from picchio.core.errors import InputError
 from picchio.core.recent import Recent
+from picchio.diagnosis.percussion.data.noise import quiet_noise
 from picchio.excitation.piecewise import PiecewiseForce
+from picchio.measurement.noise.estimate import noise_levels
 from picchio.measurement.noise.level import Noise
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
@@ -305,12 +307,8 @@ def _noise(
     values: Sequence[Mapping[str, FloatArray]],
 ) -> dict[str, Noise]:
     """From the quiet time where there is enough of it, else from all that can be used."""
-    from picchio.diagnosis.percussion.data.noise import quiet_noise
-
     found = quiet_noise(setups, values)
     if any(c.name not in found for s in setups for c in s.channels):
-        from picchio.measurement.noise.estimate import noise_levels
-
         found = {**noise_levels(campaign), **found}
     return found
 

@@ -1,7 +1,7 @@
 """Work on several cores, by processes that share this one's memory.
 
-`worker_pool` maps functions over independent items; `parallel_records` has records predicted where a
-search's steps depend on each other.
+`worker_pool` maps functions over independent items; `parallel_records` has records predicted
+where a search's steps depend on each other.
 """
 
 from __future__ import annotations
