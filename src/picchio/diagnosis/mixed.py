@@ -483,7 +483,8 @@ def _beside(pairs: Pairs, labels: Pairs, replaced: Sequence[Cause]) -> Pairs:
 
 def _together(blows: Sequence[Cause], moves: Sequence[Cause]) -> tuple[Cause, ...]:
     """Each cause once: percussion's values, which hold the motion's where both show it."""
-    known = {(c.effect, c.target): c for c in moves if _once(moves, c)}
+    pairs = [(c.effect, c.target) for c in moves]
+    known = {pair: c for pair, c in zip(pairs, moves, strict=True) if pairs.count(pair) == 1}
     found = []
     for cause in blows:
         other = known.get((cause.effect, cause.target))
@@ -496,10 +497,6 @@ def _together(blows: Sequence[Cause], moves: Sequence[Cause]) -> tuple[Cause, ..
         found.append(replace(cause, confidence=sure, parameters={**cause.parameters, **extra}))
     mine = {(c.effect, c.target) for c in blows}
     return (*found, *(c for c in moves if (c.effect, c.target) not in mine))
-
-
-def _once(causes: Sequence[Cause], cause: Cause) -> bool:
-    return sum((c.effect, c.target) == (cause.effect, cause.target) for c in causes) == 1
 
 
 def _ratio(cause: Cause, other: Cause | None) -> float:

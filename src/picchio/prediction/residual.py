@@ -271,6 +271,8 @@ def growth_with_level(parts: Sequence[ChannelResidual]) -> tuple[float, float] |
         the exponent and its standard error; None with fewer than four records that stand out
         of the noise, or levels that hardly differ.
     """
+    from scipy.stats import linregress
+
     groups: dict[str, list[ChannelResidual]] = {}
     for part in parts:
         groups.setdefault(part.record, []).append(part)
@@ -283,8 +285,5 @@ def growth_with_level(parts: Sequence[ChannelResidual]) -> tuple[float, float] |
             y.append(0.5 * math.log(max(whole.nrmse**2 - whole.floor**2, 1e-300)))
     if len(x) < 4 or np.ptp(x) < 0.3:
         return None
-    a = np.stack([np.asarray(x) - np.mean(x), np.ones(len(x))], axis=1)
-    found, *_ = np.linalg.lstsq(a, np.asarray(y), rcond=None)
-    left = np.asarray(y) - a @ found
-    error = math.sqrt(float(left @ left) / (len(x) - 2) / float(a[:, 0] @ a[:, 0]))
-    return 1.0 + float(found[0]), error
+    line = linregress(x, y)
+    return 1.0 + float(line.slope), float(line.stderr)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -67,8 +68,5 @@ def _own_latent(
             e.with_hidden({**e.hidden, **own.hidden}) if e.label == effect.label else e
             for e in hypothesis.effects
         )
-        hypothesis = Hypothesis(
-            effects, hypothesis.tolerance, hypothesis.n_nuisances, hypothesis.freed,
-            hypothesis.scales,
-        )  # fmt: skip
+        hypothesis = replace(hypothesis, effects=effects, drawn=(), priors=())
     return hypothesis
