@@ -251,7 +251,11 @@ class Effect(ABC):
         return type(self)(self.target, **{**kept, **values}).with_hidden(self.hidden)
 
     def bounded(self, **values: float) -> Self:
-        """The same effect with other values, brought within their bounds."""
+        """The same effect with other values, brought within their bounds.
+
+        Args:
+            **values: SI, by parameter.
+        """
         known = {p.name: p for p in self.parameters}
         return self.with_values(
             **{k: min(max(v, known[k].lower), known[k].upper) for k, v in values.items()}
