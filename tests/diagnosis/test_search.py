@@ -9,7 +9,7 @@ import pytest
 import trial
 
 import picchio
-from picchio.diagnosis.percussion.criteria.comparison import SAME, bic
+from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic
 from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem, held_out
 from picchio.diagnosis.percussion.diagnosis import diagnose_percussion

@@ -17,7 +17,7 @@ from picchio.campaign.campaign import Campaign
 from picchio.cli.measured.diagnose import show_diagnosis
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.conclude.holdout import holdout_gain
-from picchio.diagnosis.percussion.criteria.comparison import bic
+from picchio.diagnosis.percussion.criteria.equivalence import bic
 from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem, held_out
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis

@@ -24,9 +24,8 @@ from picchio.diagnosis.percussion.conclude.verdict import (
     why_not_claimed,
 )
 from picchio.diagnosis.percussion.criteria.common_fault import common_faults
-from picchio.diagnosis.percussion.criteria.comparison import SAME, bic
 from picchio.diagnosis.percussion.criteria.dominance import dominant_causes
-from picchio.diagnosis.percussion.criteria.equivalence import bic_difference
+from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic, bic_difference
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence
 from picchio.diagnosis.percussion.data.problem import Problem, Split, held_out

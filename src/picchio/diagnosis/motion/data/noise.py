@@ -10,7 +10,7 @@ from picchio.core.arrays import FloatArray
 from picchio.diagnosis.motion.data.system import Group, System
 from picchio.model.motion import RIPPLE, TORQUE
 from picchio.prediction.motion.log import MotionLog
-from picchio.prediction.motion.rigid import angle_noise, rigid_motion
+from picchio.prediction.motion.readings import angle_noise, rigid_motion
 
 _TINY = 1e-12
 _SEED = 0

@@ -11,7 +11,7 @@ import numpy as np
 from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.life import Uncertain
-from picchio.diagnosis.percussion.criteria.comparison import bic, confidence
+from picchio.diagnosis.percussion.criteria.equivalence import bic, confidence
 from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_range
 from picchio.diagnosis.percussion.criteria.pose_consistency import jackknife_covariance
 from picchio.diagnosis.percussion.data.problem import Problem

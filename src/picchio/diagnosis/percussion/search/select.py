@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
-from picchio.diagnosis.percussion.criteria.comparison import SAME, bic, confidence
-from picchio.diagnosis.percussion.criteria.equivalence import bic_difference
+from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic, bic_difference, confidence
 from picchio.diagnosis.percussion.data.problem import Problem, Split
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis

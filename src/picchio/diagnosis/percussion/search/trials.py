@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.criteria.comparison import SAME, bic
+from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing, is_nonsmooth
