@@ -14,7 +14,7 @@ from picchio.campaign.tables import Tolerance
 from picchio.core.errors import InputError
 from picchio.core.results import TableResult
 from picchio.diagnosis.diagnose import diagnose
-from picchio.diagnosis.result import Cause, Diagnosis, Value
+from picchio.diagnosis.result import Cause, Diagnosis, Value, unit_of
 from picchio.model.effects.registry import effect_class
 from picchio.robot.annotations.sidecar import FORMAT as SIDECAR
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -323,7 +323,8 @@ def _stiffness(robot: FlexibleRobot, cause: Cause) -> Value:
         return cause.parameters["stiffness"]
     scale = cause.parameters["scale"]
     nominal = {j.name: j.stiffness for j in robot.flexible_joints}[cause.target]
-    return Value(scale.value * nominal, scale.std * nominal, "N*m/rad")
+    unit = unit_of(robot, cause.target, "N*m/rad")
+    return Value(scale.value * nominal, scale.std * nominal, unit)
 
 
 def _said(source: str, what: str, value: Value) -> str:

@@ -19,7 +19,7 @@ from picchio.diagnosis.percussion.fit.drawn import width_spread
 from picchio.diagnosis.percussion.fit.least_squares import Fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.state import EXACT, Search, Trial
-from picchio.diagnosis.result import Cause, Value
+from picchio.diagnosis.result import Cause, Value, unit_of
 from picchio.model.effects.effect import CHANNEL_UNIT, Effect
 from picchio.robot.flexible_robot import FlexibleRobot
 
@@ -183,8 +183,7 @@ def fitted_nuisances(found: Fit) -> dict[str, Value]:
         key = effect.tolerance
         scale, std = math.exp(vector[k]), math.exp(vector[k]) * math.sqrt(covariance[k, k])
         if key == "stiffness":
-            prismatic = robot.tree.joints.get(effect.target)
-            unit = "N/m" if prismatic is not None and prismatic.type == "prismatic" else "N*m/rad"
+            unit = unit_of(robot, effect.target, "N*m/rad")
             size, name = float(nominal[effect.target]), f"stiffness.{effect.target}"
         else:
             size, unit = (ratio, "1") if key == "damping_ratio" else (force, "N")
