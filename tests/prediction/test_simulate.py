@@ -5,11 +5,11 @@ import pytest
 
 from picchio.campaign.campaign import load_campaign
 from picchio.core.errors import InputError
-from picchio.core.toml import validate
+from picchio.core.toml import parse_toml, validate
 from picchio.model.effects.registry import effect_class
 from picchio.model.model import Model
 from picchio.prediction.percussion import percussion_setups, predict
-from picchio.prediction.plan import FORMAT, Plan, plan_toml, read_plan
+from picchio.prediction.plan import FORMAT, Plan, plan_toml
 from picchio.prediction.simulation import simulate
 from picchio.robot.loading.load import load_robot
 
@@ -152,7 +152,7 @@ def test_a_plan_survives_its_file(tmp_path):
     asked = plan(levels=[100.0], effect=[{"effect": "backlash", "target": "joint_2",
                                           "parameters": {"gap": 1e-4}}])  # fmt: skip
     (tmp_path / "plan.toml").write_text(plan_toml(asked))
-    assert read_plan(tmp_path / "plan.toml") == asked
+    assert parse_toml(tmp_path / "plan.toml", Plan, format=FORMAT) == asked
 
 
 @pytest.mark.parametrize(

@@ -16,10 +16,11 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
 from picchio.core.results import Result
+from picchio.core.toml import parse_toml
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 from picchio.prediction.percussion import PercussionSetup, percussion_setups
-from picchio.prediction.plan import Plan, PlannedRecord, read_plan
+from picchio.prediction.plan import FORMAT, Plan, PlannedRecord
 from picchio.robot.dynamics.pose import warn_beyond_limits
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
@@ -107,16 +108,16 @@ def simulate(
     """
     loaded = load_robot(robot, flex=flex, tool=tool)
     file = None if isinstance(plan, Plan) else Path(plan)
-    asked = plan if isinstance(plan, Plan) else read_plan(plan)
+    asked = plan if isinstance(plan, Plan) else parse_toml(plan, Plan, format=FORMAT)
     if seed is not None:
         asked = asked.model_copy(update={"seed": seed})
     files = [*([] if file is None else [file]), *loaded.files]
-    digits = max(2, len(str(asked.count)))
     suffix = "parquet" if parquet else "csv"
-    names = [f"r{index + 1:0{digits}d}.{suffix}" for index in range(asked.count)]
     try:
-        warn_beyond_limits(loaded, [loaded.pose(p) for p in asked.poses], "the plan")  # type: ignore[arg-type]
         asked.check()
+        digits = max(2, len(str(asked.count)))
+        names = [f"r{index + 1:0{digits}d}.{suffix}" for index in range(asked.count)]
+        warn_beyond_limits(loaded, [loaded.pose(p) for p in asked.poses], "the plan")  # type: ignore[arg-type]
         every = [*(table.build() for table in asked.effect), *effects]
         model = Model(loaded, gravity_stiffness).with_effects(_drawn(asked, every, names))
         table: dict[str, Any] = {
