@@ -85,10 +85,12 @@ class Check:
     Attributes:
         name: in findings.
         what: what it looks for, in words.
+        of: the kind of records that it sees, "percussion" or "motion"; all where empty.
     """
 
     name: ClassVar[str]
     what: ClassVar[str]
+    of: ClassVar[str] = ""
 
     def __init__(self, context: Context) -> None:
         self.context = context

@@ -304,7 +304,8 @@ def _look_through(
         if scan is None:
             continue
         for checker in checkers:
-            findings.extend(checker.record(scan))
+            if checker.of in ("", record.kind):
+                findings.extend(checker.record(scan))
         summaries.append(summarise(scan))
         say(len(records) + index + 1, total)
     for checker in checkers:

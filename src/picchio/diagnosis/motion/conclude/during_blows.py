@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -114,11 +114,9 @@ def motion_life(robot: FlexibleRobot, task: Task | None, diagnosis: Diagnosis) -
     }
     if not has_strength(robot):
         return MotionLife(None, NO_SHAFT, blows)
-    return MotionLife(found, said(effects) if effects else NONE_ACTS, blows)
-
-
-def said(effects: Sequence[Effect]) -> str:
-    """What a life with these effects takes into account."""
+    if not effects:
+        return MotionLife(found, NONE_ACTS, blows)
     names = ", ".join(f"{e.name.replace('_', ' ')} of {e.target}" for e in effects)
-    return f"the life after takes {names} into account; what is in the drive or in the readings " \
+    why = f"the life after takes {names} into account; what is in the drive or in the readings " \
         "does not act while the tool hits"  # fmt: skip
+    return MotionLife(found, why, blows)

@@ -28,6 +28,7 @@ class MotionAxesCheck(Check):
 
     name = "joints"
     what = "motion: positions, velocities and torques consistent with one another and with gravity"
+    of = "motion"
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -37,8 +38,6 @@ class MotionAxesCheck(Check):
     def record(self, scan: RecordScan) -> Iterator[Finding]:
         """Velocity, motor and reference against position; torques are kept for the end."""
         window = scan.window
-        if window.record.kind != "motion":
-            return
         roles = _roles(window)
         # The link side where it is known, else the motor side.
         joints = {j: window.arrays[n] for j, n in (roles["motor"] | roles["link"]).items()}

@@ -35,6 +35,7 @@ class PercussionAxesCheck(Check):
 
     name = "axes"
     what = "axes and joints swapped or flipped: the first milliseconds of a blow"
+    of = "percussion"
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -46,7 +47,7 @@ class PercussionAxesCheck(Check):
     def record(self, scan: RecordScan) -> Iterable[Finding]:
         """Keeps what was seen and what must be; judged in the end."""
         window, robot, record = scan.window, self.context.robot, scan.record
-        if robot is None or window.blows is None or window.steady or record.kind == "motion":
+        if robot is None or window.blows is None or window.steady:
             return ()
         try:
             assert record.pose is not None and record.direction is not None

@@ -22,12 +22,11 @@ class BlowsCheck(Check):
 
     name = "blows"
     what = "t = 0 at the first blow; measured blows as programmed"
+    of = "percussion"
 
     def record(self, scan: RecordScan) -> Iterator[Finding]:
         """One percussion record."""
         window = scan.window
-        if window.record.kind != "percussion":
-            return
         for name, channel in window.channels.items():
             if channel.kind.of_force and window.blows is not None:
                 yield from self._force(scan, name, window.blows)

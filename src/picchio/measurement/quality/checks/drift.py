@@ -22,12 +22,11 @@ class DriftCheck(Check):
 
     name = "drift"
     what = "zeros that wander, or are none"
+    of = "percussion"
 
     def record(self, scan: RecordScan) -> Iterator[Finding]:
         """Every channel of one percussion record."""
         window = scan.window
-        if window.record.kind != "percussion":
-            return
         for name, values in window.arrays.items():
             channel = window.channels[name]
             if channel.kind.of_force or scan.channels[name].constant:

@@ -17,12 +17,13 @@ class LengthCheck(Check):
 
     name = "length"
     what = "quiet time before, every blow, ring-down or whole periods covered"
+    of = "percussion"
 
     def record(self, scan: RecordScan) -> Iterator[Finding]:
         """One percussion record."""
         window, clock = scan.window, scan.clock
         blows = window.blows
-        if window.record.kind != "percussion" or blows is None:
+        if blows is None:
             return
         if window.steady:
             periods = (clock.end - clock.start + clock.step) / blows.period

@@ -31,6 +31,7 @@ class PhaseCheck(Check):
 
     name = "phase"
     what = "an accelerometer's high-pass, delays between sensors (their phase in the ring-down)"
+    of = "percussion"
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -43,7 +44,7 @@ class PhaseCheck(Check):
     def record(self, scan: RecordScan) -> Iterable[Finding]:
         """Collects phases; judged in the end."""
         window = scan.window
-        if self._looked >= _RECORDS or window.steady or window.record.kind == "motion":
+        if self._looked >= _RECORDS or window.steady:
             return ()
         names = self._comparable(window)
         after = window.after()
