@@ -64,7 +64,7 @@ def fitted_values(problem: Problem, whole: Fit, effect: Effect) -> dict[str, Val
                 std = abs(unknown.slope(vector[k])) * math.sqrt(max(variance[k], 0.0))
                 std = max(std, _unconstrained(problem, whole, k))
         if effect.latent is not None and p.name == effect.latent.spread:
-            drawn = {label: gain for label, *gain in whole.hypothesis.drawn}
+            drawn = {label: (fall, count) for label, fall, count in whole.hypothesis.drawn}
             std = 0.0
             if effect.label in drawn:
                 std = width_spread(effect.values[p.name], *drawn[effect.label])
