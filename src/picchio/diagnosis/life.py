@@ -62,7 +62,11 @@ class Uncertain:
 
 
 def has_strength(robot: FlexibleRobot) -> bool:
-    """Whether any joint has what fails."""
+    """Whether any joint has a shaft or a reducer, which may fail.
+
+    Args:
+        robot: the robot.
+    """
     return any(j.shaft is not None or j.reducer is not None for j in robot.flexible_joints)
 
 
