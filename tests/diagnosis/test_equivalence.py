@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
+from dataclasses import replace
 
 import follow_up
 import numpy as np
@@ -11,13 +11,17 @@ import pytest
 import trial
 
 import picchio
+from picchio.campaign.tables import Tolerance
 from picchio.diagnosis.percussion.criteria.equivalence import _effective_parameters
 from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_range
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 from picchio.diagnosis.percussion.fit.least_squares import fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.measurement.noise.autoregression import AutoRegression
 from picchio.model.effects.registry import effect_class
+from picchio.prediction.plan import Plan
+from picchio.prediction.simulation import simulate
 from worlds import campaign as worlds
 
 ACCELEROMETER = "accelerometer.tool"
@@ -94,38 +98,68 @@ def test_a_base_that_turns_is_found_and_may_be_the_servo_of_the_joint_above(sens
     assert stiffness.std < (0.005 if "deflection" in sensors else 0.3) * true["stiffness"]
 
 
-def fitted(slopes, priors):
-    """A linear problem and a fit with these slopes; None is an unknown that nothing is known of."""
-    unknowns = [SimpleNamespace(prior=p, lower=-9.0, upper=9.0) for p in priors]
-    here = np.zeros(len(priors))
-    records = (object(),)
-    problem = SimpleNamespace(residuals=lambda vector, records, end: [slopes @ vector])
-    return problem, records, SimpleNamespace(
-        hypothesis=SimpleNamespace(
-            unknowns=lambda: unknowns, vector=lambda: here,
-            at=lambda vector: SimpleNamespace(effects=vector),
-        ),
-        jacobians=[slopes], residuals=[slopes @ here], records=records, end=None,
-        normal_matrix=lambda: slopes.T @ slopes
-        + np.diag([0.0 if p is None else p[1] ** -2 for p in priors]),
+@pytest.fixture(scope="module")
+def struck(arm):
+    """One short record of an accelerometer, too noisy to tell more than first-order changes."""
+    blows = {"kind": "pulse_train", "force": 300.0, "period": 0.04, "width": 0.004, "hits": 2}
+    plan = Plan(
+        poses=[[0.3, 0.5, -0.8]], directions=[[0.6, 0.0, 0.8]], sample_rate=1000.0, quiet=0.3,
+        length=0.15, excitation=blows, sensor=[{"channels": ACCELEROMETER, "noise": 1.0}],
     )  # fmt: skip
+    return Problem(arm, simulate(arm, plan).campaign)
+
+
+GAIN = effect_class("sensor_gain")(ACCELEROMETER)
+FORCE = effect_class("force_amplitude")("tool")
+STIFFNESS = effect_class("joint_stiffness")("joint_2")
+
+
+def fitted(problem, causes, force_tolerance, records=None):
+    """The nominal model with causes that do nothing, and its Jacobian."""
+    hypothesis = Hypothesis.baseline(problem.robot, Tolerance(force=force_tolerance))
+    for cause in causes:
+        hypothesis = hypothesis.plus(cause)
+    chosen = records or problem.records
+    return fit(problem, hypothesis, chosen, None, iterations=0, with_jacobian=True)
 
 
 @pytest.mark.parametrize(
-    ("columns", "priors", "numbers"),
+    ("causes", "force_tolerance", "numbers"),
     [
-        ([[9.0, 0.0], [0.0, 9.0]], (None, None), 2.0),
-        ([[9.0, 9.0], [9.0, 9.0]], (None, None), 1.0),  # only their sum
-        ([[9.0, 0.0], [0.0, 0.0]], (None, None), 1.0),  # nothing of the second
-        ([[9.0, 9.0], [9.0, 9.0]], (None, (0.0, 1e-6)), 1.0),  # the other is known
-        ([[9.0, 9.0], [9.0, 9.0]], (None, (0.0, 1e3)), 0.0),  # the other might be all
-        ([[2.1]], (None,), 0.975),  # hardly: a move by a half is just seen
-        ([[1.9]], (None,), 0.0),  # whatever slopes say, nobody would see it move
+        ((GAIN, STIFFNESS), 1e-6, 2.0),
+        ((GAIN, FORCE), 0.05, 1.0),  # only their product
+        ((GAIN,), 1e-6, 1.0),  # the force is known
+        ((GAIN,), 1e3, 0.0),  # the force might be all
     ],
 )
-def test_numbers_count_as_far_as_the_records_tell_them(columns, priors, numbers):
-    problem, _, found = fitted(np.array(columns), priors)
-    assert _effective_parameters(problem, found) == pytest.approx(numbers, abs=5e-3)
+def test_numbers_count_as_far_as_the_records_tell_them(struck, causes, force_tolerance, numbers):
+    found = fitted(struck, causes, force_tolerance)
+    assert _effective_parameters(struck, found) == pytest.approx(numbers, abs=5e-3)
+
+
+@pytest.mark.parametrize(("louder", "seen"), [(0.95, True), (1.05, False)])
+def test_a_number_that_nobody_would_see_move_does_not_count(struck, louder, seen):
+    """Noise so large that a gain, moved by half an e-fold, is just seen, or just not."""
+    found = fitted(struck, (GAIN,), 0.0)
+    vector = found.hypothesis.vector()
+    vector[-1] += 0.5
+    there = struck.residuals(found.hypothesis.at(vector).effects)
+    change = sum(((a - b) ** 2).sum() for a, b in zip(there, found.residuals, strict=True))
+    factor = louder * math.sqrt(change)
+    records = [
+        replace(record, noise={
+            name: replace(
+                noise, std=factor * noise.std,
+                model=AutoRegression(noise.model.reflection, factor**2 * noise.model.variance),
+            )
+            for name, noise in record.noise.items()
+        })
+        for record in struck.records
+    ]  # fmt: skip
+    slope = 1.0 / (louder * (math.exp(0.5) - 1.0))  # of the residuals all in all
+    numbers = 1.0 - 1.0 / (1.0 + 9.0 * slope**2) if seen else 0.0
+    faint = fitted(struck, (GAIN,), 0.0, records)
+    assert _effective_parameters(struck, faint) == pytest.approx(numbers, abs=2e-3)
 
 
 def test_a_rotor_of_next_to_no_inertia_is_no_number(arm, soft_joint):

@@ -5,7 +5,7 @@ import pytest
 import trial
 
 import picchio
-from picchio.diagnosis.percussion.criteria.confidence import confidence
+from picchio.diagnosis.percussion.criteria.equivalence import confidence
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis

@@ -52,11 +52,8 @@ def test_the_lag_of_a_takes_the_error_of_b_and_c(diagnosis):
 
 
 def test_stiffness_only_where_b_and_c_gain(robot, kuka, diagnosis):
-    from picchio.diagnosis.motion.search.candidates import motion_effects
-
     joints = {c.target for c in diagnosis.causes if c.effect == "joint_stiffness"}
-    rest = set(motion_effects()) - {"joint_stiffness"}
-    without = diagnose_motion(robot, kuka, catalogue=rest)
+    without = diagnose_motion(robot, kuka, without=["joint_stiffness"])
     for record in ("trajectory_b.csv", "trajectory_c.csv"):
         before, after = mdeg(without, record, "extended"), mdeg(diagnosis, record, "extended")
         for axis, b, a in zip(AXES, before, after, strict=True):
@@ -85,10 +82,7 @@ def test_rotor_inertias_are_those_documented(diagnosis):
 
 
 def test_without_delay_in_the_catalogue_no_wrong_name(robot, kuka):
-    from picchio.diagnosis.motion.search.candidates import motion_effects
-
-    rest = set(motion_effects()) - {"encoder_delay"}
-    diagnosis = diagnose_motion(robot, kuka, catalogue=rest)
+    diagnosis = diagnose_motion(robot, kuka, without=["encoder_delay"])
     assert diagnosis.verdict in ("partial", "unexplained")
     assert all(c.effect not in ("joint_stiffness", "backlash") or c.target == "joint_a3"
                for c in diagnosis.causes)  # fmt: skip

@@ -8,10 +8,10 @@ from picchio.campaign.record import Record
 from picchio.diagnosis.motion.data.split import split
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.diagnosis import diagnose_motion
-from picchio.diagnosis.motion.fit.baseline import stated_friction
 from picchio.diagnosis.motion.fit.orders import find_orders, power_at, power_spectrum
-from picchio.diagnosis.motion.fit.state import State
+from picchio.diagnosis.motion.fit.state import State, stated_friction
 from picchio.diagnosis.motion.fit.stretches import confidence
+from picchio.diagnosis.result import unit_of
 from picchio.model.effects.registry import effect_class
 from picchio.prediction.motion.log import MotionLog
 from picchio.robot.loading.load import load_robot
@@ -139,6 +139,12 @@ def test_friction_that_the_urdf_states_is_in_the_baseline():
     found = stated_friction(load_robot("emps"), ["slide"])
     assert [(e.name, e.target) for e in found] == [("viscous_friction", "slide")]
     assert stated_friction(load_robot("fanuc_like_3dof"), ["joint_1"]) == ()
+
+
+def test_what_a_slide_is_told_in():
+    slide, arm = load_robot("emps"), load_robot("fanuc_like_3dof")
+    assert unit_of(slide, "slide", "N*m/rad") == "N/m"
+    assert unit_of(arm, "joint_1", "N*m/rad") == unit_of(arm, "tool", "N*m/rad") == "N*m/rad"
 
 
 @pytest.mark.parametrize("late", [0.0, 0.003])

@@ -77,9 +77,7 @@ def test_two_at_once():
     ],
 )
 def test_without_the_cause_in_the_catalogue_no_wrong_name(effect, gone):
-    from picchio.diagnosis.motion.search.candidates import motion_effects
-
-    diagnosis = found(effect, 5, catalogue=set(motion_effects()) - gone)
+    diagnosis = found(effect, 5, without=gone)
     assert diagnosis.verdict in ("partial", "unexplained")
 
 
@@ -110,7 +108,7 @@ def test_what_is_wrong_with_the_input_is_told():
     robot = load_robot(ARM)
     good = campaign(robot, {}, 0)
     with pytest.raises(InputError, match="no such effect"):
-        diagnose_motion(robot, good, catalogue=["rust"])
+        diagnose_motion(robot, good, without=["rust"])
     with pytest.raises(InputError, match="no such motion record"):
         diagnose_motion(robot, good, train=["m9.csv"])
     with pytest.raises(InputError, match="not both"):

@@ -8,8 +8,7 @@ import trial
 
 import picchio
 from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
-from picchio.prediction.plan import read_plan
-from picchio.prediction.simulation import simulated_campaign
+from picchio.prediction.simulation import simulate
 
 FEW = {"robot": "fanuc_like_3dof", "kind": "few", "snr": 40, "draw": 0}
 CLEAR = 30.0  # chi-square
@@ -42,7 +41,7 @@ def test_what_is_asked_for_tells_force_from_gain(effect, arm, tmp_path):
     assert not after.alternatives
     file = tmp_path / "next.toml"
     file.write_text(ask["plan"])
-    (record,) = simulated_campaign(arm, read_plan(file)).records
+    (record,) = simulate(arm, file).campaign.records
     assert {c.partition(".")[0] for c in record.channels} == {"accelerometer", "deflection"}
     assert record.hits == campaign.records[0].hits
     assert record.clock.step == pytest.approx(campaign.records[0].clock.step)

@@ -9,10 +9,9 @@ import pytest
 import trial
 
 import picchio
-from picchio.diagnosis.percussion.criteria.bic import SAME, bic
+from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic
 from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.split import held_out
+from picchio.diagnosis.percussion.data.problem import Problem, held_out
 from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing

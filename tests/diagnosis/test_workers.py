@@ -15,9 +15,8 @@ import picchio
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import fit
-from picchio.diagnosis.percussion.fit.parallel_records import parallel_records
+from picchio.diagnosis.percussion.fit.parallel import parallel_records, worker_pool
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.fit.workers import Workers
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.search.state import Search
 from picchio.diagnosis.percussion.search.trials import try_candidates
@@ -58,13 +57,11 @@ def test_workers_change_nothing(campaign):
             )
             some = [c for c in all_candidates(problem) if c[0].name in names]
             search = Search(problem, some, scales, problem.records, (), base, base)
-            promises = []
-            search.log = promises.append
             trials = try_candidates(search, base.hypothesis)
         assert all(t.fit.records for t in trials)
-        found.append((promises, [(t.label, t.score, t.fit.hypothesis) for t in trials]))
+        found.append([(t.label, t.promise, t.score, t.fit.hypothesis) for t in trials])
     assert found[0] == found[1]
-    assert found[0][1][0][0] == "payload:tool"
+    assert found[0][0][0] == "payload:tool"
 
 
 def test_an_error_in_a_worker_is_an_error_here():
@@ -74,10 +71,10 @@ def test_an_error_in_a_worker_is_an_error_here():
         return -item
 
     for workers in (1, 2):
-        with Workers(workers, {"fail": fail}) as pool:
-            assert pool.map("fail", [1, 2, 4]) == [-1, -2, -4]
+        with worker_pool(workers, {"fail": fail}) as mapped:
+            assert mapped("fail", [1, 2, 4]) == [-1, -2, -4]
             with pytest.raises(InputError, match="broken"):
-                pool.map("fail", [1, 3, 2])
+                mapped("fail", [1, 3, 2])
 
 
 def _late(start, rate):
@@ -143,7 +140,7 @@ import picchio, trial
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.search.warm_up import warm_up
+from picchio.diagnosis.percussion.search.candidates import warm_up
 
 def loaded():
     found = [o for o in gc.get_objects() if isinstance(o, numba.core.registry.CPUDispatcher)]

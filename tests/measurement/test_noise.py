@@ -88,7 +88,7 @@ def test_spectrum_and_whitening(kind):
         area = level.psd.mean() * level.rate / 2.0
         assert area == pytest.approx(level.std**2, rel=0.03)
         alarms = [
-            whiteness(level.whiten(noise(kind, 1500, std, np.random.default_rng(seed))),
+            whiteness(level.model.whiten(noise(kind, 1500, std, np.random.default_rng(seed))),
                       std=1.0, level=0.01).alarm
             for seed in range(100, 120)
         ]  # fmt: skip
@@ -107,14 +107,6 @@ def test_whitening_is_exact_from_the_first_sample_on():
     whitener = model.whiten(np.eye(lags)).T  # columns: the filter's answer to each unit vector
     np.testing.assert_allclose(whitener @ toeplitz(covariance) @ whitener.T, np.eye(lags),
                                atol=1e-10)  # fmt: skip
-
-
-def test_samples_like_it():
-    model = AutoRegression(np.array([0.8, -0.4]), 2.5)
-    drawn = np.array([model.sample(64, np.random.default_rng(s)) for s in range(4000)])
-    np.testing.assert_allclose(drawn.var(axis=0), 2.5, rtol=0.12)  # from the first on
-    again = fit_autoregression(list(drawn))
-    np.testing.assert_allclose(again.reflection[:2], model.reflection, atol=0.02)
 
 
 def test_noise_without_variance_cannot_whiten():

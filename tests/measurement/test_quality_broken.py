@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from picchio.measurement.quality.registry import CHECKS
+from picchio.measurement.quality.checks import CHECKS
 from picchio.measurement.quality.report import check
 from picchio.robot.loading.load import load_robot
 

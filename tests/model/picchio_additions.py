@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from picchio.campaign.channels import ChannelKind
-from picchio.campaign.readers import Reading
+from picchio.campaign.readers import Reading, velocity
 from picchio.core.arrays import FloatArray
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
@@ -54,6 +54,9 @@ def _turning(reading: Reading) -> FloatArray:
 
 GYROSCOPE = ChannelKind("gyroscope", "frame", ("rad/s",), True, "rate of turn of the frame",
                         free_offset=True, reader=_turning)  # fmt: skip
+VIBROMETER = ChannelKind("vibrometer", "frame", ("m/s",), True, "of the frame, world axes",
+                         reader=velocity, derivative=1,
+                         plausible=((-5.0, 5.0, "mm/s?"),))  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ ENTRY_POINTS = """
 supply_scatter = picchio_additions:SupplyScatter
 [picchio.channels]
 gyroscope = picchio_additions:GYROSCOPE
+vibrometer = picchio_additions:VIBROMETER
 [picchio.excitations]
 triangle_train = picchio_additions:TriangleTrain
 """
@@ -113,6 +114,69 @@ print(json.dumps({{key: found[key] for key in ("verdict", "causes", "gain")}}))
     std = cause["parameters"]["std"]
     assert std["value"] == pytest.approx(0.2, abs=3.0 * std["std"])
     assert found["gain"]["explained"] > 0.99
+
+
+def test_channels_from_outside_are_checked_and_planned_for(installed):
+    """One declares what the checks need: swapped axes and a wrong unit are found, as of any other.
+
+    What the other does not declare is told. Both are sensors that a diagnosis may ask for.
+    """
+    code = """
+import json, warnings
+warnings.simplefilter("ignore")
+import picchio
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.follow_up.records import sensor_group
+from picchio.diagnosis.percussion.follow_up.records import possible_records
+from picchio.prediction.plan import Plan
+robot = picchio.load_robot("fanuc_like_3dof")
+plan = Plan(
+    poses=[[0.2, 0.5, -0.8], [-0.6, 0.2, 0.4]], directions=[[1, 0, 0], [0, 0.6, 0.8]],
+    levels=[300.0], sample_rate=2000.0, quiet=0.2, length=0.2,
+    excitation=dict(kind="pulse_train", force=300.0, period=0.04, width=0.004, hits=2),
+    sensor=[dict(channels="vibrometer", noise=1e-5), dict(channels="gyroscope", noise=1e-5)],
+)
+made = picchio.simulate(robot, plan).campaign
+def spoilt(change):
+    records = []
+    for record in made:
+        read = record.read()
+        time = read.pop("time")
+        table = record.table.model_dump(exclude_none=True, exclude={"file"})
+        records.append(Record.from_arrays(record.file, time, change(read), **table))
+    table = dict(robot=robot.name, excitation=made.table.excitation.model_dump(exclude_none=True))
+    return [
+        (f.check, f.channel, f.message)
+        for f in picchio.check(Campaign.from_records(records, **table), robot).findings
+    ]
+x, y = "vibrometer.tool.x", "vibrometer.tool.y"
+problem = Problem(robot, made)
+setup = next(iter(possible_records(problem, problem.records[0])))
+print(json.dumps(dict(
+    sound=spoilt(lambda read: read),
+    swapped=spoilt(lambda read: {**read, x: read[y], y: read[x]}),
+    wrong=spoilt(lambda read: {n: 1e3 * v if n[0] == "v" else v for n, v in read.items()}),
+    asked=[sensor_group(problem, name) for name in ("gyroscope", "vibrometer", "deflection")],
+    groups=sorted(setup.groups),
+)))
+"""
+    found = run(installed, code)
+    about = lambda told, group: {(c, m) for c, g, m in told if g and g.startswith(group)}  # noqa: E731
+    sound = about(found["sound"], "vibrometer")
+    assert not {check for check, _ in sound} & {"axes", "units", "phase"}
+    (told,) = [m for check, m in about(found["swapped"], "vibrometer") if check == "axes"]
+    assert "x shows y, y shows x" in told
+    assert {"units", "axes"} <= {check for check, _ in about(found["wrong"], "vibrometer")}
+    unsaid = [m for check, m in about(found["sound"], "gyroscope") if check == "channels"]
+    assert unsaid == [
+        "its axes, its phase or its size are not checked: its kind does not declare derivative "
+        "and plausible"
+    ]
+    assert found["asked"] == ["gyroscope.tool", "vibrometer.tool", "deflection"]
+    assert found["groups"] == ["accelerometer.tool", "deflection", "gyroscope.tool",
+                               "vibrometer.tool"]  # fmt: skip
 
 
 CLASH = """

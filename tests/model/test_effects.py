@@ -19,7 +19,7 @@ from picchio.model.effects.registry import catalogue, effect_class, from_dict
 from picchio.model.geometry import Geometry
 from picchio.model.model import Model
 from picchio.prediction.plan import Plan
-from picchio.prediction.simulation import simulated_campaign
+from picchio.prediction.simulation import simulate
 from picchio.vibration.integration.integrate import Samples, integrate
 
 BLOWS = picchio.PulseTrain(force=300.0, period=0.040, width=0.004)
@@ -384,7 +384,7 @@ def problem(arm):
         sensor=[{"channels": "accelerometer", "noise": 0.01}, {"channels": "deflection",
                 "noise": 1e-7}, {"channels": "force", "noise": 0.1}],
     )  # fmt: skip
-    return Problem(arm, simulated_campaign(arm, plan))
+    return Problem(arm, simulate(arm, plan).campaign)
 
 
 @pytest.fixture(scope="module")

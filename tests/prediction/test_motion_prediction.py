@@ -10,6 +10,7 @@ from picchio.campaign.campaign import Campaign
 from picchio.campaign.record import Record
 from picchio.core.errors import InputError
 from picchio.model.effects.registry import effect_class
+from picchio.model.motion import TORQUE, WINDUP
 from picchio.prediction.motion.closed_loop import CascadeLaw, friction_curve, simulate_closed_loop
 from picchio.prediction.motion.filters import Band, choose_cutoff, shift
 from picchio.prediction.motion.log import read_logs
@@ -60,7 +61,7 @@ def test_inverse_dynamics_is_pinocchios(name):
     """kinova has continuous joints, which have two coordinates in Pinocchio."""
     robot = load_robot(name)
     q = sines(robot)
-    found = predictor(robot, q).predict(()).torque
+    found = predictor(robot, q).predict(())[TORQUE]
     band = Band(20.0, RATE)
     smooth = band.low_pass(q)
     v, a = (np.gradient(x, 1 / RATE, axis=1) for x in (smooth, smooth))
@@ -91,7 +92,7 @@ def test_payload_is_a_body_appended_in_pinocchio():
     point = pin.Inertia(7.0, np.zeros(3), np.zeros((3, 3)))
     model.appendBodyToJoint(frame.parentJoint, point, frame.placement)
     data = model.createData()
-    found = one.predict((effect,)).torque
+    found = one.predict((effect,))[TORQUE]
     nominal = one.nominal
     for i in range(0, 4000, 101):
         state = [np.array([x[joint][i] for joint in robot.joint_names])
@@ -107,11 +108,11 @@ def test_windup_is_torque_over_stiffness_and_a_late_encoder_lags():
     more = {"position.joint_2": q[1]}
     one = predictor(robot, q, **more)
     spring = effect_class("joint_stiffness")("joint_2", scale=0.5)
-    found = one.predict((spring,)).windup["joint_2"]
+    found = one.predict((spring,))[WINDUP]["joint_2"]
     expected = -one.nominal.body["joint_2"] / (0.5 * robot.stiffness[1])
     np.testing.assert_allclose(found, expected, rtol=1e-12)
     late = effect_class("encoder_delay")("position", delay=0.0031)
-    found = one.predict((late,)).windup["joint_2"][100:-100]
+    found = one.predict((late,))[WINDUP]["joint_2"][100:-100]
     phase = 2.0 * np.pi * 0.4 * 0.0031
     amplitude = 2.0 * 0.4 * np.sin(0.5 * phase)
     assert np.abs(found).max() == pytest.approx(amplitude, rel=1e-3)
@@ -121,9 +122,9 @@ def test_late_angles_and_late_torques_are_opposite():
     robot = load_robot("fanuc_like_3dof")
     one = predictor(robot, sines(robot))
     delay = effect_class("encoder_delay")
-    bare = one.predict(()).torque["joint_2"]
+    bare = one.predict(())[TORQUE]["joint_2"]
     for target, sign in (("motor_position", -1.0), ("torque", 1.0)):
-        moved = one.predict((delay(target, delay=0.01),)).torque["joint_2"]
+        moved = one.predict((delay(target, delay=0.01),))[TORQUE]["joint_2"]
         expected = np.interp(T - sign * 0.01, T, bare)
         inner = slice(100, -100)
         np.testing.assert_allclose(moved[inner], expected[inner], atol=2e-3 * np.ptp(bare))
@@ -142,14 +143,14 @@ def test_every_friction_opposes_the_motion():
     robot = load_robot("fanuc_like_3dof")
     one = predictor(robot, sines(robot))
     v = one.nominal.velocity["joint_1"]
-    bare = one.predict(()).torque["joint_1"]
+    bare = one.predict(())[TORQUE]["joint_1"]
     for name, values in (
         ("viscous_friction", {"coefficient": 5.0}),
         ("coulomb_friction", {"torque": 5.0}),
         ("stribeck_friction", {"torque": 5.0, "velocity": 0.1}),
     ):
         effect = effect_class(name)("joint_1", **values)
-        added = one.predict((effect,)).torque["joint_1"] - bare
+        added = one.predict((effect,))[TORQUE]["joint_1"] - bare
         assert np.trapezoid(added * v, T) > 0.0
 
 
@@ -221,7 +222,7 @@ def test_a_balancer_is_part_of_the_torque():
     q = np.array([[0.0], [0.3], [0.6]]) + 1e-3 * np.sin(0.2 * T)
     one = predictor(robot, q)
     pose = [one.nominal.angle[joint][2000] for joint in robot.joint_names]
-    got = [one.predict(()).torque[joint][2000] for joint in robot.joint_names]
+    got = [one.predict(())[TORQUE][joint][2000] for joint in robot.joint_names]
     np.testing.assert_allclose(got, robot.gravity_torque(pose), atol=0.05)
     bare = load_robot("fanuc_like_3dof")
     assert abs(got[1] - bare.gravity_torque(pose)[1]) > 1.0

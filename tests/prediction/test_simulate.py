@@ -5,12 +5,12 @@ import pytest
 
 from picchio.campaign.campaign import load_campaign
 from picchio.core.errors import InputError
-from picchio.core.toml import validate
+from picchio.core.toml import parse_toml, validate
 from picchio.model.effects.registry import effect_class
 from picchio.model.model import Model
 from picchio.prediction.percussion import percussion_setups, predict
-from picchio.prediction.plan import FORMAT, Plan, plan_toml, read_plan
-from picchio.prediction.simulation import simulated_campaign
+from picchio.prediction.plan import FORMAT, Plan, plan_toml
+from picchio.prediction.simulation import simulate
 from picchio.robot.loading.load import load_robot
 
 from ..whiteness import whiteness
@@ -41,6 +41,10 @@ def plan(**changes):
     return validate({k: v for k, v in content.items() if v is not None}, Plan, format=FORMAT)
 
 
+def simulated(robot, plan, **options):
+    return simulate(robot, plan, **options).campaign
+
+
 @pytest.fixture(scope="module")
 def robot():
     return load_robot("fanuc_like_3dof")
@@ -54,7 +58,7 @@ def alarms(robot, seeds, level=0.01, **changes):
     """How many whiteness tests were made, and which raised the alarm."""
     made, raised = 0, []
     for seed in seeds:
-        campaign = simulated_campaign(robot, plan(seed=seed, **changes))
+        campaign = simulated(robot, plan(seed=seed, **changes))
         for record in campaign:
             predicted = predict(robot, campaign)[record.file]
             for name in record.channels:
@@ -97,7 +101,7 @@ def test_false_alarms_come_at_the_rate_stated(robot, hits):
 
 def test_a_wrong_model_is_seen_in_every_channel(robot):
     """The tests above can fail: a payload that the model does not have is not white."""
-    campaign = simulated_campaign(robot, plan(), [effect_class("payload")("tool", mass=5.0)])
+    campaign = simulated(robot, plan(), effects=[effect_class("payload")("tool", mass=5.0)])
     predicted = predict(robot, campaign)["r01.csv"]
     record = campaign["r01.csv"]
     for name in record.channels:
@@ -108,7 +112,7 @@ def test_a_wrong_model_is_seen_in_every_channel(robot):
 
 
 def test_written_and_read_back_it_is_the_same(robot, tmp_path):
-    made = simulated_campaign(robot, plan(levels=[150.0, 300.0]), robot_name="fanuc_like_3dof")
+    made = simulated(robot, plan(levels=[150.0, 300.0]), robot_name="fanuc_like_3dof")
     made.save(tmp_path / "campaign")
     read = load_campaign(tmp_path / "campaign")
     assert read.table.provenance["seed"] == 0
@@ -121,15 +125,13 @@ def test_written_and_read_back_it_is_the_same(robot, tmp_path):
 
 
 def test_a_seed_makes_the_same_noise_again_and_another_another(robot):
-    one, again, other = (
-        simulated_campaign(robot, plan(seed=s))["r01.csv"]["force"] for s in (3, 3, 4)
-    )
+    one, again, other = (simulated(robot, plan(seed=s))["r01.csv"]["force"] for s in (3, 3, 4))
     np.testing.assert_array_equal(one, again)
     assert np.abs(one - other).max() > 1.0
 
 
 def test_records_of_one_campaign_have_their_own_noise(robot):
-    campaign = simulated_campaign(robot, plan(repeats=2))
+    campaign = simulated(robot, plan(repeats=2))
     a, b = (r["accelerometer.tool.x"] for r in campaign)
     assert (a - b).std() == pytest.approx(np.sqrt(2) * NOISE["accelerometer.tool"], rel=0.1)
 
@@ -137,7 +139,7 @@ def test_records_of_one_campaign_have_their_own_noise(robot):
 def test_the_plan_says_which_records(robot):
     two = {"poses": [[0.3, 0.5, -0.8], {"joint_2": 0.4}], "levels": [100.0, 200.0, 300.0],
            "directions": [[1, 0, 0], [0, 0, 2.0]], "length": 0.1, "quiet": 0.0}  # fmt: skip
-    every = simulated_campaign(robot, plan(**two))
+    every = simulated(robot, plan(**two))
     assert len(every.records) == 12
     assert {r.excitation.force for r in every} == {100.0, 200.0, 300.0}
     turned = plan(**two, combine="in-turn")
@@ -150,7 +152,7 @@ def test_a_plan_survives_its_file(tmp_path):
     asked = plan(levels=[100.0], effect=[{"effect": "backlash", "target": "joint_2",
                                           "parameters": {"gap": 1e-4}}])  # fmt: skip
     (tmp_path / "plan.toml").write_text(plan_toml(asked))
-    assert read_plan(tmp_path / "plan.toml") == asked
+    assert parse_toml(tmp_path / "plan.toml", Plan, format=FORMAT) == asked
 
 
 @pytest.mark.parametrize(
@@ -163,7 +165,7 @@ def test_a_plan_survives_its_file(tmp_path):
 )
 def test_what_is_drawn_anew_in_every_record_is_drawn(robot, effect, target, values):
     given = {"effect": effect, "target": target, "parameters": values}
-    campaign = simulated_campaign(robot, plan(repeats=2, effect=[given]))
+    campaign = simulated(robot, plan(repeats=2, effect=[given]))
     clean = predict(robot, campaign)
     a, b = (r["accelerometer.tool.x"] - clean[r.file]["accelerometer.tool.x"] for r in campaign)
     noise = NOISE["accelerometer.tool"]
@@ -190,21 +192,19 @@ def test_what_is_drawn_anew_in_every_record_is_drawn(robot, effect, target, valu
 )
 def test_a_wrong_plan_is_told_in_one_line(robot, changes, word):
     with pytest.raises(InputError, match=word) as caught:
-        simulated_campaign(robot, plan(**changes))
+        simulated(robot, plan(**changes))
     assert "\n" not in str(caught.value)
 
 
 def test_gravity_counts_unless_switched_off(robot):
     quiet = plan(sensor=[{"channels": "deflection"}])
-    with_gravity = simulated_campaign(robot, quiet)["r01.csv"]["deflection.joint_2"]
-    without = simulated_campaign(robot, quiet, gravity_stiffness=False)["r01.csv"][
-        "deflection.joint_2"
-    ]
+    with_gravity = simulated(robot, quiet)["r01.csv"]["deflection.joint_2"]
+    without = simulated(robot, quiet, gravity_stiffness=False)["r01.csv"]["deflection.joint_2"]
     assert np.abs(with_gravity - without).max() > 1e-4 * np.abs(without).max()
 
 
 def test_noise_free_it_is_the_model_bit_for_bit(robot):
-    quiet = simulated_campaign(robot, plan(sensor=[{"channels": c} for c in NOISE]))
+    quiet = simulated(robot, plan(sensor=[{"channels": c} for c in NOISE]))
     (setup,) = percussion_setups(robot, quiet)
     for name, values in setup.predict(Model(robot, True)).items():
         np.testing.assert_array_equal(quiet["r01.csv"][name], values)

@@ -17,10 +17,9 @@ from picchio.campaign.campaign import Campaign
 from picchio.cli.measured.diagnose import show_diagnosis
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.conclude.holdout import holdout_gain
-from picchio.diagnosis.percussion.criteria.bic import bic
+from picchio.diagnosis.percussion.criteria.equivalence import bic
 from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.split import held_out
+from picchio.diagnosis.percussion.data.problem import Problem, held_out
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis

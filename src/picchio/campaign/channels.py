@@ -38,12 +38,22 @@ class ChannelKind:
         of_force: whether it reads the force, rather than the robot's answer.
         jumps: whether its reading jumps where the force does: samples beside a jump then say
             nothing for sure.
-        accelerates: whether its sensor reads acceleration, and so may swing on its mount.
         ac_corner: Hz, below which sensors of this kind answer less and less (first order), as
             one that is AC-coupled does; 0 where they answer to a constant.
         motion: what it is in a motion record: "link", "motor", "reference" or "torque" of a
             joint; empty where it is nothing that is compared.
         unused: why it is compared with no prediction, where that needs no warning.
+        condition: whether it is a condition that the robot is under, such as its temperature: it
+            may stand still for long.
+        derivative: which derivative of a displacement by time it reads: 0, 1 or 2; None of what is
+            none of them: its axes and its phase are then not checked. A sensor of accelerations
+            may swing on its mount.
+        own_axes: whether it reads along the axes of the frame that it is fixed to, gravity included
+            where it reads accelerations, rather than along the world's.
+        plausible: (least, most, what other numbers may be in) for each of `units`: no vibration of
+            a robot, and no such condition, lies beyond.
+        addable: whether a diagnosis may ask for such a sensor, at the tool or on every flexible
+            joint, where a campaign has none.
     """
 
     name: str
@@ -55,10 +65,24 @@ class ChannelKind:
     reader: Reader | None = None
     of_force: bool = False
     jumps: bool = False
-    accelerates: bool = False
     ac_corner: float = 0.0
     motion: Literal["", "link", "motor", "reference", "torque"] = ""
     unused: str = ""
+    condition: bool = False
+    derivative: Literal[0, 1, 2] | None = None
+    own_axes: bool = False
+    plausible: tuple[tuple[float, float, str], ...] = ()
+    addable: bool = True
+
+    @property
+    def answers(self) -> bool:
+        """Whether it shows how the robot answers to the tool."""
+        return self.reader is not None and not self.of_force
+
+    @property
+    def smooth(self) -> bool:
+        """Whether it reads a position or a velocity, which no blow makes jump."""
+        return self.derivative in (0, 1) and not self.jumps
 
     @property
     def pattern(self) -> str:
@@ -68,29 +92,37 @@ class ChannelKind:
 
 KINDS: list[ChannelKind] = [
     ChannelKind("force", None, ("N",), meaning="the tool's force along the direction",
-                reader=readers.force, of_force=True, jumps=True),
+                reader=readers.force, of_force=True, jumps=True,
+                plausible=((-2e5, 2e5, "mN, or counts?"),)),
     ChannelKind("deflection", "joint", ("rad", "m"), meaning="link side minus motor side",
-                free_offset=True, reader=readers.deflection),
+                free_offset=True, reader=readers.deflection, derivative=0,
+                plausible=((-0.05, 0.05, "deg, or arcmin?"), (-0.05, 0.05, "mm?"))),
     ChannelKind("acceleration", "frame", ("m/s^2",), True, "of the frame's origin, world axes",
-                reader=readers.acceleration, jumps=True, accelerates=True),
+                reader=readers.acceleration, jumps=True, derivative=2,
+                plausible=((-5e3, 5e3, "mm/s^2?"),), addable=False),
     ChannelKind("accelerometer", "frame", ("m/s^2",), True, "as read, the frame's axes",
-                reader=readers.accelerometer, jumps=True, accelerates=True),
+                reader=readers.accelerometer, jumps=True, derivative=2,
+                own_axes=True, plausible=((-5e3, 5e3, "mm/s^2, or counts?"),)),
     ChannelKind("velocity", "frame", ("m/s",), True, "of the frame's origin, world axes",
-                reader=readers.velocity),
+                reader=readers.velocity, derivative=1, plausible=((-10.0, 10.0, "mm/s?"),),
+                addable=False),
     ChannelKind("displacement", "frame", ("m",), True, "of the frame's origin, world axes",
-                free_offset=True, reader=readers.displacement),
+                free_offset=True, reader=readers.displacement, derivative=0,
+                plausible=((-0.1, 0.1, "mm?"),), addable=False),
     ChannelKind("position", "joint", ("rad", "m"), meaning="link side", free_offset=True,
-                motion="link"),
+                motion="link", derivative=0),
     ChannelKind("motor_position", "joint", ("rad", "m"), meaning="motor side, after the gear",
-                free_offset=True, motion="motor"),
+                free_offset=True, motion="motor", derivative=0),
     ChannelKind("reference_position", "joint", ("rad", "m"), meaning="as commanded",
-                free_offset=True, motion="reference"),
+                free_offset=True, motion="reference", derivative=0),
     ChannelKind("velocity", "joint", ("rad/s", "m/s"), meaning="link side",
-                unused="positions are differentiated instead"),
+                unused="positions are differentiated instead", derivative=1,
+                plausible=((-50.0, 50.0, "deg/s, or rpm?"), (-10.0, 10.0, "mm/s?"))),
     ChannelKind("torque", "joint", ("N*m", "N"), meaning="of the drive, after the gear",
                 motion="torque"),
     ChannelKind("temperature", "joint", ("degC",), meaning="of the joint",
-                unused="it is a condition, not an answer of the robot"),
+                unused="it is a condition, not an answer of the robot", condition=True,
+                plausible=((-60.0, 250.0, "K, or raw counts?"),)),
 ]  # fmt: skip
 GROUP = "picchio.channels"
 _TIME_KIND = ChannelKind(TIME, None, ("s",), meaning="0 is the first edge of the first blow")
@@ -137,6 +169,11 @@ def _plugged() -> tuple[ChannelKind, ...]:
         lambda x: x.pattern,
     )  # fmt: skip
     return tuple(kind for kind in found.values() if kind not in [*KINDS, _TIME_KIND])
+
+
+def addable_kinds() -> list[ChannelKind]:
+    """The kinds of sensor that a diagnosis may ask for."""
+    return [kind for kind in kinds() if kind.answers and kind.addable]
 
 
 def patterns() -> list[str]:

@@ -11,8 +11,8 @@ from typing import Any
 from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.core.errors import InputError, PicchioWarning
 from picchio.core.provenance import provenance
-from picchio.diagnosis.life import NO_SHAFT
-from picchio.diagnosis.mixed import MixedDiagnosis, diagnose_mixed
+from picchio.diagnosis.life import NO_SHAFT, has_strength
+from picchio.diagnosis.mixed import diagnose_mixed
 from picchio.diagnosis.motion.conclude.during_blows import (
     BlowEffects,
     MotionLife,
@@ -97,21 +97,23 @@ def diagnose(
             details={"motion": found, "during_blows": acting, "motion_life": told},
         )  # fmt: skip
     else:
-        options: dict[str, Any] = {"gravity_stiffness": gravity_stiffness, "workers": workers}
+        options: dict[str, Any] = {
+            "without": without, "gravity_stiffness": gravity_stiffness, "workers": workers,
+            "progress": progress,
+        }  # fmt: skip
         hit: PercussionDiagnosis
         if "motion" in kinds:
-            mixed = diagnose_mixed(loaded, records, without=without, progress=progress, **options)
-            hit, details = mixed.percussion, _mixed_details(mixed)
-            notes += _left_out(details["during_blows"])
-            answer = mixed.diagnosis
+            answer = diagnose_mixed(loaded, records, **options)
+            hit = answer.details["percussion"]
+            notes += _left_out(answer.details["during_blows"])
         else:
-            hit = diagnose_percussion(
-                loaded, records, without=without, progress=progress, **options
-            )
-            answer, details = hit.diagnosis, {"percussion": hit}
-        answer = replace(answer, not_looked_for=not_looked_for(hit.problem))
+            hit = diagnose_percussion(loaded, records, **options)
+            answer = replace(hit.diagnosis, details={"percussion": hit})
         effects = hit.extended.hypothesis.effects
-        answer = replace(answer, life=_percussion_life(hit, answer, work), details=details)
+        answer = replace(
+            answer, not_looked_for=not_looked_for(hit.problem),
+            life=_percussion_life(hit, answer, work),
+        )  # fmt: skip
     files = [*loaded.files, *records.files]
     folder = None if records.folder is None else records.folder.name
     stamp = provenance(files)
@@ -128,15 +130,6 @@ def diagnose(
     )
 
 
-def _mixed_details(mixed: MixedDiagnosis) -> dict[str, Any]:
-    acting = effects_during_blows(mixed.motion)
-    why = "the life above takes the causes of both kinds of records into account"
-    return {
-        "percussion": mixed.percussion, "motion": mixed.motion, "during_blows": acting,
-        "motion_life": MotionLife(None, why),
-    }  # fmt: skip
-
-
 def _left_out(acting: BlowEffects) -> str:
     """What a model's file says of causes that it does not hold."""
     why: dict[str, list[str]] = {}
@@ -149,11 +142,16 @@ def _left_out(acting: BlowEffects) -> str:
     return f"; found as well, and not in this model: {'; '.join(said)}" if said else ""
 
 
+def _task_of(robot: FlexibleRobot, task: Task | None) -> Task | None:
+    """The task that was asked for, else the robot's own."""
+    if task is not None or robot.task_path is None:
+        return task
+    return load_task(robot.task_path, robot)
+
+
 def _motion_life(robot: FlexibleRobot, found: Diagnosis, task: Task | None) -> MotionLife:
     try:
-        if task is None and robot.task_path is not None:
-            return motion_life(robot, load_task(robot.task_path, robot), found)
-        return motion_life(robot, task, found)
+        return motion_life(robot, _task_of(robot, task), found)
     except InputError as error:
         if task is not None:
             raise
@@ -165,16 +163,15 @@ def _percussion_life(
 ) -> dict[str, Any] | None:
     """Life before and after; None where there is no task or nothing was found."""
     robot = hit.problem.robot
-    if not any(j.shaft is not None or j.reducer is not None for j in robot.flexible_joints):
+    if not has_strength(robot):
         if task is not None:
             warnings.warn(NO_SHAFT, PicchioWarning, stacklevel=3)
         return None
     if answer.verdict in ("nothing-wrong", "unexplained"):
         return None
     try:
-        if task is None and robot.task_path is not None:
-            task = load_task(robot.task_path, robot)
-        return None if task is None else hit.life(task)
+        work = _task_of(robot, task)
+        return None if work is None else hit.life(work)
     except InputError as error:  # what took minutes to find is told all the same
         warnings.warn(f"the life could not be computed: {error}", PicchioWarning, stacklevel=3)
         return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -14,7 +14,7 @@ from picchio.campaign.tables import Tolerance
 from picchio.core.errors import InputError
 from picchio.core.results import TableResult
 from picchio.diagnosis.diagnose import diagnose
-from picchio.diagnosis.result import Cause, Diagnosis, Value
+from picchio.diagnosis.result import Cause, Diagnosis, Value, unit_of
 from picchio.model.effects.registry import effect_class
 from picchio.robot.annotations.sidecar import FORMAT as SIDECAR
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -98,7 +98,7 @@ class Identification(TableResult):
         """
         import tomlkit
 
-        table, remarks = identified_sidecar(self.robot, self.diagnosis, self.source)
+        table, remarks = _sidecar(self.robot, self.diagnosis, self.source)
         made = self.diagnosis.extra["provenance"]
         document = tomlkit.document()
         said = f"Written by picchio {made['picchio']}; verdict: {self.diagnosis.verdict}."
@@ -235,23 +235,10 @@ def _damping_of(
     return Identified.of(value, share * value, told, why)
 
 
-def identified_sidecar(
+def _sidecar(
     robot: FlexibleRobot, diagnosis: Diagnosis, source: str
 ) -> tuple[dict[str, Any], list[str]]:
-    """The robot's sidecar with the values that were found in it.
-
-    Stiffnesses, rotor inertias (of joints whose gear ratio is known) and the tool's mass are put
-    in with their uncertainty; everything else of the joints stays as it was. What a sidecar has
-    no place for (friction, ripple, delays) is returned as lines for people.
-
-    Args:
-        robot: as it was diagnosed.
-        diagnosis: its causes.
-        source: where the data are from, such as the campaign's name.
-
-    Returns:
-        the sidecar as plain tables, and remarks.
-    """
+    """The sidecar with the values found, and remarks on what has no place in it."""
     if not diagnosis.causes:
         raise InputError(f"the diagnosis is {diagnosis.verdict!r}: there is nothing to write")
     joints = {joint.name: _joint(robot, joint) for joint in robot.flexible_joints}
@@ -284,10 +271,7 @@ def identified_sidecar(
                 entry |= {"stiffness": value.value, "source": _said(source, "stiffness", value)}
         else:
             remarks.append(f"{name} = {_number(value)}")
-    table["joint"] = joints
-    table["tool"] = tool
-    table |= _standing(robot)
-    return table, remarks
+    return {**table, "joint": joints, "tool": tool, **_standing(robot)}, remarks
 
 
 def _joint(robot: FlexibleRobot, joint: Joint) -> dict[str, Any]:
@@ -339,7 +323,8 @@ def _stiffness(robot: FlexibleRobot, cause: Cause) -> Value:
         return cause.parameters["stiffness"]
     scale = cause.parameters["scale"]
     nominal = {j.name: j.stiffness for j in robot.flexible_joints}[cause.target]
-    return Value(scale.value * nominal, scale.std * nominal, "N*m/rad")
+    unit = unit_of(robot, cause.target, "N*m/rad")
+    return Value(scale.value * nominal, scale.std * nominal, unit)
 
 
 def _said(source: str, what: str, value: Value) -> str:
@@ -351,6 +336,5 @@ def _number(value: Value) -> str:
 
 
 def _remark(cause: Cause) -> str:
-    numbers: Mapping[str, Value] = cause.parameters
-    text = ", ".join(f"{name} {_number(value)}" for name, value in numbers.items())
+    text = ", ".join(f"{name} {_number(value)}" for name, value in cause.parameters.items())
     return f"{cause.effect} of {cause.target}: {text}"

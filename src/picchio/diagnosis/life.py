@@ -61,6 +61,15 @@ class Uncertain:
         return float((ends[moved] / np.abs(step[moved])).min()) if moved.any() else math.inf
 
 
+def has_strength(robot: FlexibleRobot) -> bool:
+    """Whether any joint has a shaft or a reducer, which may fail.
+
+    Args:
+        robot: the robot.
+    """
+    return any(j.shaft is not None or j.reducer is not None for j in robot.flexible_joints)
+
+
 def life_before_and_after(
     robot: FlexibleRobot,
     task: Task,
@@ -100,18 +109,13 @@ def life_before_and_after(
     }
     if any("rivets_interval" in found[side] for side in ("baseline", "extended")):
         found["interval_level"] = LEVEL
-    if others:
-        found["alternatives"] = [_life_or_why(robot, other, task, options) for other in others]
+    for other in others:
+        try:
+            told = _life(with_effects(robot, other), task, options)
+        except InputError as error:  # this set's model is none for this task
+            told = {"why": str(error)}
+        found.setdefault("alternatives", []).append(told)
     return found
-
-
-def _life_or_why(
-    robot: FlexibleRobot, effects: Sequence[Effect], task: Task, options: dict[str, Any]
-) -> dict[str, Any]:
-    try:
-        return _life(with_effects(robot, effects), task, options)
-    except InputError as error:  # this set's model is none for this task
-        return {"why": str(error)}
 
 
 def with_effects(robot: FlexibleRobot, effects: Sequence[Effect]) -> FlexibleRobot:
@@ -160,8 +164,7 @@ def life_intervals(
     task: Task,
     found: Assessment,
     unsure: Uncertain,
-    options: dict[str, Any] | None = None,
-    level: float = LEVEL,
+    options: dict[str, Any],
 ) -> dict[str, dict[str, tuple[float, float]]]:
     """Intervals of every joint's life and utilisation, from how well a model's values are known.
 
@@ -176,7 +179,6 @@ def life_intervals(
         found: the assessment at the centre.
         unsure: the effects and how well they are known.
         options: of `picchio.studies.assessment.run`.
-        level: two-sided.
 
     Returns:
         joint -> {"rivets_interval": (low, high), "utilisation_interval": (low, high)}, of joints
@@ -186,8 +188,8 @@ def life_intervals(
         InputError: as `assess`.
     """
     worst = _most_strained(task, found)
-    z = NormalDist().inv_cdf(0.5 + 0.5 * level)
-    settings = {**(options or {}), "steady_check": False}
+    z = NormalDist().inv_cdf(0.5 + 0.5 * LEVEL)
+    settings = {**options, "steady_check": False}
 
     def at(vector: FloatArray, task: Task = worst) -> tuple[FloatArray, FloatArray] | None:
         """Utilisation and damage there; None where the model is none."""

@@ -21,13 +21,13 @@ side of the gear from percussion records: a motion may show more of these than b
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from itertools import chain
 from typing import Any, Literal
 
 from picchio.campaign.campaign import Campaign
-from picchio.diagnosis.motion.conclude.during_blows import effects_during_blows
+from picchio.diagnosis.motion.conclude.during_blows import MotionLife, effects_during_blows
 from picchio.diagnosis.motion.conclude.values import parameters
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.diagnosis import diagnose_motion, refitted
@@ -40,7 +40,7 @@ from picchio.diagnosis.percussion.conclude.causes import fitted_nuisances, fitte
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis, diagnose_percussion
 from picchio.diagnosis.percussion.fit.drawn import refit
-from picchio.diagnosis.percussion.fit.parallel_records import parallel_records
+from picchio.diagnosis.percussion.fit.parallel import parallel_records
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.result import (
     MOSTLY,
@@ -61,6 +61,7 @@ _SURE = 3.0
 _SYSTEMATIC = 0.05
 # Rise of chi-square by which records rule a cause out: three standard deviations.
 _RULED_OUT = _SURE**2
+_TOGETHER = "the life above takes the causes of both kinds of records into account"
 # From the most to the least that may be said.
 _ORDER: tuple[Verdict, ...] = ("nothing-wrong", "named", "ambiguous", "partial", "unexplained")
 
@@ -96,34 +97,9 @@ class Comparison:
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""
-
-        def plain(values: Values | None) -> dict[str, Any] | None:
-            return None if values is None else {n: v.to_dict() for n, v in values.items()}
-
-        return {
-            "effect": self.effect,
-            "target": self.target,
-            "status": self.status,
-            "percussion": plain(self.percussion),
-            "motion": plain(self.motion),
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class MixedDiagnosis:
-    """A diagnosis of both kinds of records, with each kind's own.
-
-    Attributes:
-        diagnosis: the answer.
-        percussion: with the shared causes at their common values.
-        motion: likewise.
-        comparisons: of the causes that both kinds could show.
-    """
-
-    diagnosis: Diagnosis
-    percussion: PercussionDiagnosis
-    motion: Diagnosis
-    comparisons: tuple[Comparison, ...]
+        found = asdict(self)
+        del found["why"]
+        return found
 
 
 def diagnose_mixed(
@@ -134,7 +110,7 @@ def diagnose_mixed(
     gravity_stiffness: bool = True,
     workers: int | None = None,
     progress: Callable[[str], None] | None = None,
-) -> MixedDiagnosis:
+) -> Diagnosis:
     """What the simulation gets wrong about percussion and motion records of one robot.
 
     Args:
@@ -144,6 +120,10 @@ def diagnose_mixed(
         gravity_stiffness: whether gravity's change with the deflection counts in percussion.
         workers: processes for the percussion records; as many as cores where None.
         progress: told what is being done.
+
+    Returns:
+        the diagnosis; `details` has each kind's own, "percussion" and "motion", with the shared
+        causes at their common values.
 
     Raises:
         InputError: as `diagnose_percussion` and `diagnose_motion`.
@@ -169,8 +149,7 @@ def diagnose_mixed(
         percussion, comparisons = _compared(percussion, motion)
         if not any(c.status == "contradiction" for c in comparisons):
             percussion, motion = _joined(percussion, motion, comparisons)
-    diagnosis = _concluded(percussion, motion, comparisons)
-    return MixedDiagnosis(diagnosis, percussion, motion, tuple(comparisons))
+    return _concluded(percussion, motion, comparisons)
 
 
 def _shared(kind: type[Effect]) -> bool:
@@ -188,12 +167,12 @@ def _motion_estimates(motion: Diagnosis) -> dict[str, Estimate]:
     system: System = motion.details["systems"]["train"]
     state: State = motion.details["extended"]
     alone = fit_motion(system, replace(state, priors=()))
-    found = {}
-    for index, effect in enumerate(alone.state.effects):
-        if _shared(type(effect)):
-            values = parameters(system, alone, effect, len(alone.state.nuisances) + index)
-            found[effect.label] = Estimate(effect, _std(effect, values), values)
-    return found
+    first = len(alone.state.nuisances)
+    return _estimates(
+        (effect, parameters(system, alone, effect, first + index))
+        for index, effect in enumerate(alone.state.effects)
+        if _shared(type(effect))
+    )
 
 
 def _percussion_estimates(percussion: PercussionDiagnosis) -> dict[str, Estimate]:
@@ -203,17 +182,20 @@ def _percussion_estimates(percussion: PercussionDiagnosis) -> dict[str, Estimate
     if not any(_shared(type(effect)) for effect in claimed):
         return {}
     alone = refit(problem, replace(hypothesis, priors=()), problem.records)
+    return _estimates(
+        (effect, fitted_values(problem, alone, effect))
+        for effect in alone.hypothesis.causes
+        if _shared(type(effect))
+    )
+
+
+def _estimates(valued: Iterable[tuple[Effect, Values]]) -> dict[str, Estimate]:
+    """Label -> estimate, with the spreads of the parameters that were fitted."""
     found = {}
-    for effect in alone.hypothesis.causes:
-        if _shared(type(effect)):
-            values = fitted_values(problem, alone, effect)
-            found[effect.label] = Estimate(effect, _std(effect, values), values)
+    for effect, values in valued:
+        std = {n: v.std for n, v in values.items() if n in effect.values and v.std > 0.0}
+        found[effect.label] = Estimate(effect, std, values)
     return found
-
-
-def _std(effect: Effect, values: Values) -> dict[str, float]:
-    """Parameter -> spread, of those that were fitted."""
-    return {n: v.std for n, v in values.items() if n in effect.values and v.std > 0.0}
 
 
 # What one kind's records say of a cause that the other shows -------------------------------------
@@ -304,14 +286,12 @@ def _comparisons(percussion: PercussionDiagnosis, motion: Diagnosis) -> list[Com
         elif own is not None:
             status = "percussion"
             if _motion_gain(motion, own) < -_RULED_OUT:
-                status, why = "contradiction", "the percussion records show it, the motion " \
-                    "records rule it out"  # fmt: skip
+                status, why = "contradiction", _ruled_out("percussion", "motion")
         elif other is not None:
             gain = _percussion_gain(percussion, other)
             status = "motion" if label in beyond else "drive"
             if gain < -_RULED_OUT and label in beyond:
-                status, why = "contradiction", "the motion records show it, the percussion " \
-                    "records rule it out"  # fmt: skip
+                status, why = "contradiction", _ruled_out("motion", "percussion")
         name, _, target = label.partition(":")
         found.append(Comparison(
             name, target, status, own.values if own else None, other.values if other else None, why
@@ -319,10 +299,13 @@ def _comparisons(percussion: PercussionDiagnosis, motion: Diagnosis) -> list[Com
     return found
 
 
+def _ruled_out(by: str, others: str) -> str:
+    return f"the {by} records show it, the {others} records rule it out"
+
+
 def _percussion_gain(percussion: PercussionDiagnosis, cause: Estimate) -> float:
     """Fall of chi-square in the percussion records by a cause at what motion tells of it."""
-    candidates = {f"{kind.name}:{target}" for kind, target in percussion.search.candidates}
-    if cause.effect.label not in candidates:
+    if cause.effect.label not in percussion.search.considered:
         return 0.0
     problem, whole = percussion.problem, percussion.extended
     informed = whole.hypothesis.informed(cause.effect, cause.std)
@@ -358,11 +341,10 @@ def _joined(
     both = {c.label for c in comparisons if c.status == "both"}
     carried = {c.label for c in comparisons if c.status == "motion"}
     moves, blows = _motion_estimates(motion), _percussion_estimates(percussion)
-    candidates = {f"{kind.name}:{target}" for kind, target in percussion.search.candidates}
     problem, said = percussion.problem, percussion.diagnosis
     start = percussion.extended if said.verdict != "unexplained" else percussion.baseline
     hypothesis = replace(start.hypothesis, priors=())
-    for label in sorted((both | carried) & candidates):
+    for label in sorted((both | carried) & percussion.search.considered):
         hypothesis = hypothesis.informed(moves[label].effect, moves[label].std)
     if hypothesis.priors:
         whole = refit(problem, hypothesis, problem.records)
@@ -451,6 +433,10 @@ def _concluded(
             for kind, found in (("percussion", blows), ("motion", motion))
         },
         shared=tuple(c.to_dict() for c in comparisons),
+        details={
+            "percussion": percussion, "motion": motion, "motion_life": MotionLife(None, _TOGETHER),
+            "during_blows": effects_during_blows(motion),
+        },
     )  # fmt: skip
 
 
@@ -497,7 +483,8 @@ def _beside(pairs: Pairs, labels: Pairs, replaced: Sequence[Cause]) -> Pairs:
 
 def _together(blows: Sequence[Cause], moves: Sequence[Cause]) -> tuple[Cause, ...]:
     """Each cause once: percussion's values, which hold the motion's where both show it."""
-    known = {(c.effect, c.target): c for c in moves if _once(moves, c)}
+    pairs = [(c.effect, c.target) for c in moves]
+    known = {pair: c for pair, c in zip(pairs, moves, strict=True) if pairs.count(pair) == 1}
     found = []
     for cause in blows:
         other = known.get((cause.effect, cause.target))
@@ -510,10 +497,6 @@ def _together(blows: Sequence[Cause], moves: Sequence[Cause]) -> tuple[Cause, ..
         found.append(replace(cause, confidence=sure, parameters={**cause.parameters, **extra}))
     mine = {(c.effect, c.target) for c in blows}
     return (*found, *(c for c in moves if (c.effect, c.target) not in mine))
-
-
-def _once(causes: Sequence[Cause], cause: Cause) -> bool:
-    return sum((c.effect, c.target) == (cause.effect, cause.target) for c in causes) == 1
 
 
 def _ratio(cause: Cause, other: Cause | None) -> float:

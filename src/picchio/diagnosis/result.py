@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,6 +12,7 @@ from picchio.core.errors import InputError
 from picchio.core.results import Result
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
+from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.saved_model import saved_model_text
 
 # What percussion and motion records are judged by alike.
@@ -50,7 +51,26 @@ class Value:
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""
-        return {"value": self.value, "std": self.std, "unit": self.unit}
+        return asdict(self)
+
+
+# Of a prismatic joint, in place of a revolute one's.
+_PRISMATIC = {
+    "N*m": "N", "N*m*s/rad": "N*s/m", "N*m/rad": "N/m", "kg*m^2": "kg", "rad/s": "m/s", "rad": "m",
+}  # fmt: skip
+
+
+def unit_of(robot: FlexibleRobot, target: str, unit: str) -> str:
+    """A parameter's unit, SI; newtons and metres where the target is a prismatic joint.
+
+    Args:
+        robot: the robot.
+        target: a joint, or anything else.
+        unit: at a revolute joint.
+    """
+    joint = robot.tree.joints.get(target)
+    prismatic = joint is not None and joint.type == "prismatic"
+    return _PRISMATIC.get(unit, unit) if prismatic else unit
 
 
 @dataclass(frozen=True)
@@ -71,12 +91,7 @@ class Cause:
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""
-        return {
-            "effect": self.effect,
-            "target": self.target,
-            "confidence": self.confidence,
-            "parameters": {name: value.to_dict() for name, value in self.parameters.items()},
-        }
+        return asdict(self)
 
 
 @dataclass(frozen=True)

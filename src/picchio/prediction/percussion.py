@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -26,7 +26,6 @@ from picchio.model.geometry import Geometry
 from picchio.model.model import Model
 from picchio.model.sensing import SensorChain
 from picchio.model.system import VibratingSystem
-from picchio.prediction.filters import apply_filters
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.vibration.integration.integrate import (
     AtJumps,
@@ -38,8 +37,6 @@ from picchio.vibration.integration.integrate import (
     integrate,
     make_plan,
 )
-
-# One percussion record before and after it is predicted, by a model with any effects.
 
 # Filters need the motion this finely, s.
 _FILTER_STEP = 1e-4
@@ -166,7 +163,8 @@ class PercussionSetup:
         lead, factor = 0, 1
         if chain.filters:
             factor = max(1, int(np.ceil(samples.step / _FILTER_STEP - 1e-9)))
-            lead = self._lead(samples.step) if self.steady else 0
+            # Samples before a steady record, for filters to settle.
+            lead = int(min(2.0 / samples.step, 20000)) if self.steady else 0
             fine = samples.step / factor
             samples = Samples(
                 samples.start - lead * samples.step, fine, factor * (samples.count + lead - 1) + 1
@@ -238,10 +236,6 @@ class PercussionSetup:
         mine = self.samples
         return Samples(mine.start * rate - chain.delay, mine.step * rate, mine.count)
 
-    def _lead(self, step: float) -> int:
-        """Samples before a steady record, for filters to settle."""
-        return int(min(2.0 / step, 20000))
-
     def _motion(
         self, model: Model, samples: Samples, at_jumps: AtJumps = "after"
     ) -> tuple[VibratingSystem, CoordinateMotion]:
@@ -267,9 +261,7 @@ class PercussionSetup:
 _SECONDS_A_DAY = 86400.0
 
 
-def percussion_setups(
-    robot: FlexibleRobot, campaign: Campaign, *, records: Sequence[Record] | None = None
-) -> list[PercussionSetup]:
+def percussion_setups(robot: FlexibleRobot, campaign: Campaign) -> list[PercussionSetup]:
     """What is needed to predict a campaign's percussion records.
 
     Poses that are the same share their geometry, blows that are the same their force.
@@ -277,14 +269,13 @@ def percussion_setups(
     Args:
         robot: the robot.
         campaign: the records.
-        records: only these.
 
     Raises:
         InputError: a pose that does not fit the robot, a channel of a joint or frame it does
             not have, a record without stated blows or measured force.
     """
     chain, geometries = WideChain(robot), {}  # type: WideChain, dict[bytes, Geometry]
-    chosen = [r for r in (records or campaign.records) if r.kind == "percussion"]
+    chosen = [r for r in campaign.records if r.kind == "percussion"]
     taken = [r.taken for r in chosen if r.taken is not None]
     warm = [r.temperature for r in chosen if r.temperature is not None]
     setups, in_common = [], InCommon()
@@ -399,3 +390,43 @@ def predict(
     """
     model = Model(robot, gravity_stiffness).with_effects(effects)
     return {s.name: s.predict(model) for s in percussion_setups(robot, campaign)}
+
+
+# First- and second-order sensor filters, exact for straight lines between samples.
+
+
+def apply_filters(chain: SensorChain, values: FloatArray, step: float) -> FloatArray:
+    """What is left of (c, k) values `step` s apart behind the chain's mount and filters.
+
+    Before the first sample there is rest.
+    """
+    from scipy.signal import lfilter
+
+    for b, a in _transfer_functions(chain):
+        numerator, denominator = _first_order_hold(tuple(b), tuple(a), step)
+        values = lfilter(numerator, denominator, values, axis=-1)
+    return values
+
+
+def _transfer_functions(chain: SensorChain) -> list[tuple[list[float], list[float]]]:
+    """Numerators and denominators in s, highest power first."""
+    found = []
+    if chain.mount is not None and np.isfinite(chain.mount[0]):
+        w, zeta = 2.0 * np.pi * chain.mount[0], chain.mount[1]
+        found.append(([w * w], [1.0, 2.0 * zeta * w, w * w]))
+    if chain.highpass is not None and chain.highpass > 0.0:
+        found.append(([1.0, 0.0], [1.0, 2.0 * np.pi * chain.highpass]))
+    if chain.lowpass is not None and np.isfinite(chain.lowpass):
+        w = 2.0 * np.pi * chain.lowpass
+        found.append(([w], [1.0, w]))
+    return found
+
+
+@cache
+def _first_order_hold(
+    b: tuple[float, ...], a: tuple[float, ...], step: float
+) -> tuple[FloatArray, FloatArray]:
+    from scipy.signal import cont2discrete
+
+    numerator, denominator, _ = cont2discrete((list(b), list(a)), step, method="foh")
+    return np.atleast_1d(np.squeeze(numerator)), denominator

@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
-from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -14,7 +13,7 @@ from pydantic import Field
 from picchio.campaign.channels import AXES, Channel, ChannelKind, kinds, parse_channel
 from picchio.campaign.tables import CampaignExcitation, Direction, Hits, Pose, Tolerance
 from picchio.core.errors import InputError
-from picchio.core.toml import Finite, NotNegative, Positive, StrictModel, parse_toml
+from picchio.core.toml import Finite, NotNegative, Positive, StrictModel
 from picchio.excitation.table import catalogue, excitation_class
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import from_dict
@@ -243,20 +242,6 @@ class Plan(StrictModel):
                              key="sample_rate", value=self.sample_rate)  # fmt: skip
         first = next(self.records())
         self.excitation.overridden_by(CampaignExcitation(force=first.level)).blows.build()
-
-
-def read_plan(path: str | Path) -> Plan:
-    """A plan from its file.
-
-    Raises:
-        InputError: syntax, misspelt keys, wrong values; with file and key.
-    """
-    plan = parse_toml(path, Plan, format=FORMAT)
-    try:
-        plan.check()
-    except InputError as error:
-        raise error.placed(file=path) from None
-    return plan
 
 
 def plan_toml(plan: Plan) -> str:

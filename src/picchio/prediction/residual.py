@@ -227,15 +227,9 @@ def spectrum(white: Sequence[FloatArray], step: float, edges: FloatArray) -> Flo
     Returns:
         (k,) mean power; NaN where no frequency of the records falls in.
     """
-    total, count = np.zeros(edges.size - 1), np.zeros(edges.size - 1)
-    for row in white:
-        power = np.abs(np.fft.rfft(row)) ** 2 / row.size
-        frequency = np.fft.rfftfreq(row.size, step)
-        place = np.searchsorted(edges, frequency[1:], side="right") - 1
-        inside = (place >= 0) & (place < total.size)
-        np.add.at(total, place[inside], power[1:][inside])
-        np.add.at(count, place[inside], 1.0)
-    return np.where(count > 0.0, total / np.maximum(count, 1.0), np.nan)
+    frequencies = [np.fft.rfftfreq(row.size, step)[1:] for row in white]
+    powers = [np.abs(np.fft.rfft(row)[1:]) ** 2 / row.size for row in white]
+    return _binned(frequencies, powers, edges)
 
 
 def by_window(
@@ -251,13 +245,20 @@ def by_window(
     Returns:
         (k,); NaN where a window has no sample.
     """
+    return np.sqrt(_binned([time + 1e-9 for time in times], [row**2 for row in rows], edges))
+
+
+def _binned(
+    places: Sequence[FloatArray], values: Sequence[FloatArray], edges: FloatArray
+) -> FloatArray:
+    """(k,) mean of the values whose places lie between two edges; NaN where there is none."""
     total, count = np.zeros(edges.size - 1), np.zeros(edges.size - 1)
-    for time, row in zip(times, rows, strict=True):
-        place = np.searchsorted(edges, time + 1e-9, side="right") - 1
-        inside = (place >= 0) & (place < total.size)
-        np.add.at(total, place[inside], row[inside] ** 2)
-        np.add.at(count, place[inside], 1.0)
-    return np.where(count > 0.0, np.sqrt(total / np.maximum(count, 1.0)), np.nan)
+    for place, value in zip(places, values, strict=True):
+        number = np.searchsorted(edges, place, side="right") - 1
+        inside = (number >= 0) & (number < total.size)
+        np.add.at(total, number[inside], value[inside])
+        np.add.at(count, number[inside], 1.0)
+    return np.where(count > 0.0, total / np.maximum(count, 1.0), np.nan)
 
 
 def growth_with_level(parts: Sequence[ChannelResidual]) -> tuple[float, float] | None:
@@ -270,6 +271,8 @@ def growth_with_level(parts: Sequence[ChannelResidual]) -> tuple[float, float] |
         the exponent and its standard error; None with fewer than four records that stand out
         of the noise, or levels that hardly differ.
     """
+    from scipy.stats import linregress
+
     groups: dict[str, list[ChannelResidual]] = {}
     for part in parts:
         groups.setdefault(part.record, []).append(part)
@@ -282,8 +285,5 @@ def growth_with_level(parts: Sequence[ChannelResidual]) -> tuple[float, float] |
             y.append(0.5 * math.log(max(whole.nrmse**2 - whole.floor**2, 1e-300)))
     if len(x) < 4 or np.ptp(x) < 0.3:
         return None
-    a = np.stack([np.asarray(x) - np.mean(x), np.ones(len(x))], axis=1)
-    found, *_ = np.linalg.lstsq(a, np.asarray(y), rcond=None)
-    left = np.asarray(y) - a @ found
-    error = math.sqrt(float(left @ left) / (len(x) - 2) / float(a[:, 0] @ a[:, 0]))
-    return 1.0 + float(found[0]), error
+    line = linregress(x, y)
+    return 1.0 + float(line.slope), float(line.stderr)

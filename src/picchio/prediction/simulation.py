@@ -16,10 +16,11 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
 from picchio.core.results import Result
+from picchio.core.toml import parse_toml
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 from picchio.prediction.percussion import PercussionSetup, percussion_setups
-from picchio.prediction.plan import Plan, PlannedRecord, read_plan
+from picchio.prediction.plan import FORMAT, Plan, PlannedRecord
 from picchio.robot.dynamics.pose import warn_beyond_limits
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
@@ -107,22 +108,27 @@ def simulate(
     """
     loaded = load_robot(robot, flex=flex, tool=tool)
     file = None if isinstance(plan, Plan) else Path(plan)
-    asked = plan if isinstance(plan, Plan) else read_plan(plan)
+    asked = plan if isinstance(plan, Plan) else parse_toml(plan, Plan, format=FORMAT)
     if seed is not None:
         asked = asked.model_copy(update={"seed": seed})
     files = [*([] if file is None else [file]), *loaded.files]
+    suffix = "parquet" if parquet else "csv"
     try:
+        asked.check()
+        digits = max(2, len(str(asked.count)))
+        names = [f"r{index + 1:0{digits}d}.{suffix}" for index in range(asked.count)]
         warn_beyond_limits(loaded, [loaded.pose(p) for p in asked.poses], "the plan")  # type: ignore[arg-type]
-        made = simulated_campaign(
-            loaded,
-            asked,
-            effects,
-            robot_name=robot_name or (None if robot is loaded else str(robot)),
-            gravity_stiffness=gravity_stiffness,
-            suffix=".parquet" if parquet else ".csv",
-            inputs=files,
-            progress=progress,
-        )
+        every = [*(table.build() for table in asked.effect), *effects]
+        model = Model(loaded, gravity_stiffness).with_effects(_drawn(asked, every, names))
+        table: dict[str, Any] = {
+            "robot": robot_name or (loaded.name if robot is loaded else str(robot)),
+            "tool": loaded.tool_frame,
+            "excitation": _excitation(asked),
+            "tolerance": asked.tolerance.model_dump(),
+            "notes": asked.notes,
+            "provenance": _origin(asked, every, files),
+        }
+        made = _campaign(model, asked, names, table, progress)
     except InputError as error:
         if error.file is not None or file is None:
             raise
@@ -132,68 +138,36 @@ def simulate(
     return Simulation(made, asked, loaded.name, provenance(files, seed=asked.seed))
 
 
-def simulated_campaign(
-    robot: FlexibleRobot,
-    plan: Plan,
-    effects: Sequence[Effect] = (),
-    *,
-    robot_name: str | None = None,
-    gravity_stiffness: bool = True,
-    suffix: str = ".csv",
-    inputs: Sequence[str | Path] = (),
-    progress: Callable[[int, int], None] | None = None,
-) -> Campaign:
-    """Simulate a plan: the model's exact prediction of every channel, plus white noise.
-
-    What an effect draws anew in every record (jitter, missed hits, the phase of a hum) is drawn
-    from the plan's seed.
-
-    Args:
-        robot: the robot, with the effects it was saved with.
-        plan: what is to be measured.
-        effects: besides those of the plan and of a saved robot.
-        robot_name: what the campaign calls the robot; its own name where None.
-        gravity_stiffness: whether gravity's change with the deflection counts.
-        suffix: ".csv" or ".parquet", of the records' files.
-        inputs: files to name, with their hashes, in the provenance.
-        progress: called with (done, total) records.
-
-    Returns:
-        a campaign in memory.
-
-    Raises:
-        InputError: a pose, joint, frame or effect that does not fit the robot.
-    """
-    plan.check()
-    channels = _channels(robot, plan)
-    digits = max(2, len(str(plan.count)))
-    names = [f"r{index + 1:0{digits}d}{suffix}" for index in range(plan.count)]
+def _drawn(plan: Plan, effects: Sequence[Effect], names: Sequence[str]) -> list[Effect]:
+    """The effects with what they draw anew in every record (jitter, missed hits, a hum's phase)."""
     rng = np.random.default_rng([plan.seed, 1])
-    every = [*(table.build() for table in plan.effect), *effects]
-    hidden = [
+    return [
         effect if effect.latent is None or effect.hidden else
         effect.with_hidden({name: tuple(effect.draw(rng, plan.burst or 1)) for name in names})
-        for effect in every
+        for effect in effects
     ]  # fmt: skip
-    model = Model(robot, gravity_stiffness).with_effects(hidden)
+
+
+def _campaign(
+    model: Model,
+    plan: Plan,
+    names: Sequence[str],
+    table: dict[str, Any],
+    progress: Callable[[int, int], None] | None,
+) -> Campaign:
+    """The model's exact prediction of every channel, plus white noise, in memory."""
+    channels = _channels(model.robot, plan)
     records = [
         _blank(name, planned, plan, [c for c, _ in channels])
         for name, planned in zip(names, plan.records(), strict=True)
     ]
-    table: dict[str, Any] = {
-        "robot": robot_name or robot.name,
-        "tool": robot.tool_frame,
-        "excitation": _excitation(plan),
-        "tolerance": plan.tolerance.model_dump(),
-        "notes": plan.notes,
-    }
-    setups = percussion_setups(robot, Campaign.from_records(records, **table))
+    setups = percussion_setups(model.robot, Campaign.from_records(records, **table))
     filled = []
     for index, (record, setup) in enumerate(zip(records, setups, strict=True)):
         filled.append(_filled(record, setup, model, channels, [plan.seed, 2, index], plan))
         if progress is not None:
             progress(index + 1, len(records))
-    return Campaign.from_records(filled, **table, provenance=_origin(plan, every, inputs))
+    return Campaign.from_records(filled, **table)
 
 
 def _channels(robot: FlexibleRobot, plan: Plan) -> list[tuple[Channel, float]]:

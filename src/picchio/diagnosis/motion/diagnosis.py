@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from picchio.campaign.campaign import Campaign
@@ -10,24 +11,20 @@ from picchio.core.errors import InputError
 from picchio.diagnosis.motion.conclude.holdout import judge, judged_groups, table
 from picchio.diagnosis.motion.conclude.values import cause, nuisances
 from picchio.diagnosis.motion.criteria.holdout import validate
-from picchio.diagnosis.motion.criteria.necessity import necessity
-from picchio.diagnosis.motion.criteria.score import Scorer
+from picchio.diagnosis.motion.criteria.score import Scorer, necessity
 from picchio.diagnosis.motion.data.noise import noise_levels
 from picchio.diagnosis.motion.data.split import split
 from picchio.diagnosis.motion.data.system import Group, System
-from picchio.diagnosis.motion.fit.baseline import baseline
 from picchio.diagnosis.motion.fit.instruments import instrument_shifts
 from picchio.diagnosis.motion.fit.least_squares import Fit, fit
-from picchio.diagnosis.motion.fit.state import State
+from picchio.diagnosis.motion.fit.state import State, baseline
 from picchio.diagnosis.motion.follow_up.advice import next_measurement
-from picchio.diagnosis.motion.search.alternatives import alternatives
 from picchio.diagnosis.motion.search.candidates import evidence_of, motion_effects
-from picchio.diagnosis.motion.search.select import Step, eliminate, select
+from picchio.diagnosis.motion.search.select import Step, alternatives, eliminate, select
 from picchio.diagnosis.result import MOSTLY, Cause, Diagnosis, Estimate, Gain, Verdict
 from picchio.model.effects.effect import Effect
-from picchio.model.effects.registry import catalogue as all_effects
-from picchio.prediction.motion.filters import choose_cutoff
-from picchio.prediction.motion.log import MotionLog, read_logs
+from picchio.model.effects.registry import effect_class
+from picchio.prediction.motion.log import read_logs
 from picchio.robot.flexible_robot import FlexibleRobot
 
 _NOISE = 1.15  # residual over noise that counts as noise: noise is known to about a tenth
@@ -35,16 +32,35 @@ _SURE = 0.9999
 Pair = tuple[str, str]
 
 
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """What a search has come from and through, whatever its last fit is.
+
+    Attributes:
+        system: the equations that are fitted to.
+        judge_on: those of the records held out; the same where none is.
+        before: the nominal model's fit.
+        kinds: the catalogue.
+        steps: its rounds.
+        dropped: effects that lost on records held out, and by how much on each.
+    """
+
+    system: System
+    judge_on: System
+    before: Fit
+    kinds: Mapping[str, type[Effect]]
+    steps: list[Step]
+    dropped: list[tuple[Effect, dict[str, float]]]
+
+
 def diagnose_motion(
     robot: FlexibleRobot,
     campaign: Campaign,
     *,
-    catalogue: Collection[str] | None = None,
     without: Collection[str] = (),
     train: Sequence[str] | None = None,
     held_out: Sequence[str] | None = None,
     known: Sequence[Estimate] = (),
-    cutoff: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Diagnosis:
     """What the simulation gets wrong about a moving robot, why, and the gain of knowing it.
@@ -57,14 +73,11 @@ def diagnose_motion(
     Args:
         robot: the nominal robot.
         campaign: its motion records; others are passed over.
-        catalogue: names of the effects that may be claimed; all where None.
         without: names of effects that must not be considered.
         train: files of the records to fit to; see `picchio.diagnosis.motion.data.split`.
         held_out: files of the records to judge on.
         known: causes that other records tell; the search starts from them, and takes out those
             that are not needed here.
-        cutoff: Hz, of the band in which torques are compared; chosen from the encoders' noise
-            where None.
         progress: told (step, steps).
 
     Returns:
@@ -75,19 +88,15 @@ def diagnose_motion(
     Raises:
         InputError: no motion record, a joint that the robot lacks, an unknown effect or file.
     """
-    for name in (*(catalogue or ()), *without):
-        if name not in all_effects():
-            raise InputError("no such effect", value=name, choices=all_effects())
-    logs = read_logs(robot, campaign)
-    inside, outside = split(logs, train, held_out)
-    if cutoff is None:
-        cutoff = choose_cutoff(_moving(inside))
-    system = System(robot, inside, cutoff)
+    for name in without:
+        effect_class(name)
+    inside, outside = split(read_logs(robot, campaign), train, held_out)
+    system = System(robot, inside)
     if not system.groups:
         raise InputError("the records hold no torque and no second encoder of a joint that moves",
                          file=campaign.folder)  # fmt: skip
-    judge_on = System(robot, outside, cutoff) if outside else system
-    kinds = {n: k for n, k in motion_effects(catalogue).items() if n not in without}
+    judge_on = System(robot, outside, system.cutoff) if outside else system
+    kinds = motion_effects(without)
     start = baseline(system, campaign.tolerance.force)
     before = fit(system, start)
     informed = _informed(system, start, known)
@@ -97,15 +106,15 @@ def diagnose_motion(
         found, dropped = validate(system, judge_on, found)
         # What stood only beside a cause that is gone goes, too.
         found = eliminate(system, found) if dropped else found
-    found = fit(system, found.state)
-    return _conclude(system, judge_on, before, found, kinds, steps, dropped)
+    search = _Search(system, judge_on, before, kinds, steps, dropped)
+    return _conclude(search, fit(system, found.state))
 
 
 def refitted(diagnosis: Diagnosis, known: Sequence[Estimate]) -> Diagnosis:
     """A diagnosis whose causes are fitted again, with what other records tell of their values."""
-    system, judge_on, before, kinds, steps, dropped = diagnosis.details["search"]
-    state = _informed(system, diagnosis.details["extended"], known)
-    return _conclude(system, judge_on, before, fit(system, state), kinds, steps, dropped)
+    search: _Search = diagnosis.details["search"]
+    state = _informed(search.system, diagnosis.details["extended"], known)
+    return _conclude(search, fit(search.system, state))
 
 
 def _informed(system: System, state: State, known: Sequence[Estimate]) -> State:
@@ -117,13 +126,8 @@ def _informed(system: System, state: State, known: Sequence[Estimate]) -> State:
     return state
 
 
-def _moving(logs: Sequence[MotionLog]) -> list[Any]:
-    return [(log.angle[joint], log.rate) for log in logs for joint in log.moving]
-
-
-def _conclude(system: System, judge_on: System, before: Fit, found: Fit,
-              kinds: Mapping[str, type[Effect]], steps: list[Step],
-              dropped: list[tuple[Effect, dict[str, float]]]) -> Diagnosis:  # fmt: skip
+def _conclude(search: _Search, found: Fit) -> Diagnosis:
+    system, judge_on, before = search.system, search.judge_on, search.before
     noise = noise_levels(system)
     outer = {**noise, **noise_levels(judge_on)} if judge_on is not system else noise
     groups = judged_groups(judge_on, found)
@@ -134,7 +138,7 @@ def _conclude(system: System, judge_on: System, before: Fit, found: Fit,
     for index in range(len(found.state.effects)):
         score = necessity(scorer, index)
         sure.append(min(_SURE, score.confidence) if score is not None else 0.5)
-    rivals = alternatives(system, found, kinds)
+    rivals = alternatives(system, found, search.kinds)
     order = sorted(
         range(len(found.state.effects)),
         key=lambda i: (found.state.effects[i].periodic, i),
@@ -142,7 +146,7 @@ def _conclude(system: System, judge_on: System, before: Fit, found: Fit,
     causes = tuple(cause(system, found, i, sure[i]) for i in order)
     verdict = _verdict(system, before, found, noise, gain)
     # The search stopped where nothing more could be claimed: what helped a little then.
-    leads = _leads(steps, found.state, dropped)
+    leads = _leads(search, found.state)
     if verdict == "unexplained":
         leads = tuple(dict.fromkeys([*_labels(found.state), *leads]))
         causes = ()
@@ -158,8 +162,8 @@ def _conclude(system: System, judge_on: System, before: Fit, found: Fit,
         gain=gain,
         next_measurement=next_measurement(system, found, noise, rivals)
         if verdict not in ("nothing-wrong", "named") else None,
-        scores=tuple(row for step in steps for row in step.scores),
-        details=_details(system, judge_on, before, found, outer, steps, causes, dropped, kinds),
+        scores=tuple(row for step in search.steps for row in step.scores),
+        details=_details(search, found, outer, causes),
     )  # fmt: skip
 
 
@@ -184,13 +188,12 @@ def _labels(state: State) -> list[Pair]:
     return [(e.name, e.target) for e in state.effects]
 
 
-def _leads(steps: list[Step], state: State,
-           dropped: list[tuple[Effect, dict[str, float]]]) -> tuple[Pair, ...]:  # fmt: skip
+def _leads(search: _Search, state: State) -> tuple[Pair, ...]:
     claimed = set(_labels(state))
-    last = next((s for s in reversed(steps) if s.scores), None)
+    last = next((s for s in reversed(search.steps) if s.scores), None)
     rows = last.scores if last is not None else ()
     helped = [(r["effect"], r["target"]) for r in rows if r["gain"] > 1.0 and r["admissible"]]
-    every = [*((e.name, e.target) for e, _ in dropped), *helped]
+    every = [*((e.name, e.target) for e, _ in search.dropped), *helped]
     return tuple(dict.fromkeys(p for p in every if p not in claimed))[:8]
 
 
@@ -203,27 +206,22 @@ def _alternatives(state: State, alike: Mapping[int, Sequence[Pair]]) -> tuple[
     )  # fmt: skip
 
 
-def _details(system: System, judge_on: System, before: Fit, found: Fit,
-             noise: Mapping[Group, float], steps: list[Step], causes: tuple[Cause, ...],
-             dropped: list[tuple[Effect, dict[str, float]]],
-             kinds: Mapping[str, type[Effect]]) -> dict[str, Any]:  # fmt: skip
+def _details(search: _Search, found: Fit, noise: Mapping[Group, float],
+             causes: tuple[Cause, ...]) -> dict[str, Any]:  # fmt: skip
+    system, judge_on, before = search.system, search.judge_on, search.before
     inner = {**noise, **{g: noise.get(g, 1.0) for g in system.groups}}
     return {
-        "cutoff": system.cutoff,
-        "steps": [
-            {"accepted": s.accepted, "levels": dict(s.levels), "scores": list(s.scores)}
-            for s in steps
-        ],
+        "steps": [vars(step) for step in search.steps],
         "train": table(system, before.state, found.state, inner),
         "held_out": table(judge_on, before.state, found.state, noise),
         "dropped": [
             {"effect": e.name, "target": e.target, "order": e.values.get("order"), "gain": dict(g)}
-            for e, g in dropped
+            for e, g in search.dropped
         ],
         "stiffness": _stiffness(system, found, causes),
         "instruments": instrument_shifts(system, found),
         "systems": {"train": system, "held_out": judge_on},
-        "search": (system, judge_on, before, kinds, steps, dropped),
+        "search": search,
         "baseline": before.state,
         "extended": found.state,
     }

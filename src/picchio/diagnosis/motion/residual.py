@@ -11,10 +11,9 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.motion.data.noise import noise_levels
 from picchio.diagnosis.motion.data.system import Group, System
-from picchio.diagnosis.motion.fit.baseline import baseline
 from picchio.diagnosis.motion.fit.least_squares import Fit, fit
+from picchio.diagnosis.motion.fit.state import baseline
 from picchio.model.motion import TORQUE, WINDUP
-from picchio.prediction.motion.filters import choose_cutoff
 from picchio.prediction.motion.log import read_logs
 from picchio.robot.flexible_robot import FlexibleRobot
 
@@ -68,9 +67,7 @@ def motion_residual(robot: FlexibleRobot, campaign: Campaign) -> MotionResidual:
     Raises:
         InputError: no record that can be predicted for this robot.
     """
-    logs = read_logs(robot, campaign)
-    moving = [(log.angle[joint], log.rate) for log in logs for joint in log.moving]
-    system = System(robot, logs, choose_cutoff(moving))
+    system = System(robot, read_logs(robot, campaign))
     kept = [g for g in system.groups if g[0] in (TORQUE, WINDUP)]
     if not kept:
         raise InputError("the records hold neither blows nor torque nor a second encoder",
@@ -78,7 +75,16 @@ def motion_residual(robot: FlexibleRobot, campaign: Campaign) -> MotionResidual:
     found = fit(system, baseline(system, campaign.tolerance.force))
     noise = noise_levels(system)
     prismatic = {j.name for j in robot.tree.joints.values() if j.type == "prismatic"}
-    groups = [_group(system, found, g, noise.get(g, 0.0), g[1] in prismatic) for g in kept]
+    groups = []
+    for group in kept:
+        kind, joint = group
+        force, way = ("N", "m") if joint in prismatic else ("N*m", "rad")
+        parts = system.of(group)
+        groups.append(GroupResidual(
+            group, group_words(group), force if kind == TORQUE else way,
+            rms(np.concatenate([s.measured for s in parts])),
+            rms(np.concatenate([found.residual[s.rows] for s in parts])), noise.get(group, 0.0),
+        ))  # fmt: skip
     return MotionResidual(system, found, groups)
 
 
@@ -86,21 +92,6 @@ def group_words(group: Group) -> str:
     """A group for people."""
     kind, joint = group
     return f"torque of {joint}" if kind == TORQUE else f"link angle less motor angle of {joint}"
-
-
-def _group(
-    system: System, found: Fit, group: tuple[str, str], noise: float, prismatic: bool
-) -> GroupResidual:
-    parts = system.of(group)
-    units = ("N", "m") if prismatic else ("N*m", "rad")
-    return GroupResidual(
-        group,
-        group_words(group),
-        units[0] if group[0] == TORQUE else units[1],
-        rms(np.concatenate([s.measured for s in parts])),
-        rms(np.concatenate([found.residual[s.rows] for s in parts])),
-        noise,
-    )
 
 
 def rms(rows: FloatArray) -> float:

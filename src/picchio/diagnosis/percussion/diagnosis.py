@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,20 +23,18 @@ from picchio.diagnosis.percussion.conclude.verdict import (
     verdict_of,
     why_not_claimed,
 )
-from picchio.diagnosis.percussion.criteria.bic import SAME, bic
 from picchio.diagnosis.percussion.criteria.common_fault import common_faults
 from picchio.diagnosis.percussion.criteria.dominance import dominant_causes
-from picchio.diagnosis.percussion.criteria.equivalence import bic_difference
+from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic, bic_difference
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.split import Split, held_out
+from picchio.diagnosis.percussion.data.problem import Problem, Split, held_out
 from picchio.diagnosis.percussion.fit.drawn import refit, with_solved_numbers
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
-from picchio.diagnosis.percussion.fit.parallel_records import parallel_records
+from picchio.diagnosis.percussion.fit.parallel import parallel_records
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.follow_up.next_measurement import next_measurement
-from picchio.diagnosis.percussion.search.candidates import all_candidates
+from picchio.diagnosis.percussion.search.candidates import all_candidates, warm_up
 from picchio.diagnosis.percussion.search.select import (
     alternatives,
     begin_search,
@@ -44,9 +42,7 @@ from picchio.diagnosis.percussion.search.select import (
     start_from,
 )
 from picchio.diagnosis.percussion.search.state import LEAST_GAIN, Search, Trial
-from picchio.diagnosis.percussion.search.warm_up import warm_up
 from picchio.diagnosis.result import Diagnosis, Estimate
-from picchio.measurement.noise.level import Noise
 from picchio.model.effects.effect import Effect
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.tasks import Task
@@ -101,7 +97,6 @@ def diagnose_percussion(
     *,
     without: Iterable[str] = (),
     known: Sequence[Estimate] = (),
-    noise: Mapping[str, Noise] | None = None,
     gravity_stiffness: bool = True,
     workers: int | None = None,
     progress: Callable[[str], None] | None = None,
@@ -113,7 +108,6 @@ def diagnose_percussion(
         campaign: the records; motion records are left out.
         without: names of effects that must not be considered.
         known: causes that other records tell; the search starts from those that help here, too.
-        noise: channel -> noise; estimated where None.
         gravity_stiffness: whether gravity's change with the deflection counts.
         workers: processes (Linux only); as many as cores where None. The result is the same.
         progress: told what is being done.
@@ -123,7 +117,7 @@ def diagnose_percussion(
     """
     say = progress or (lambda text: None)
     say("reading the records and their noise")
-    problem = Problem(robot, campaign, noise, gravity_stiffness=gravity_stiffness, workers=workers)
+    problem = Problem(robot, campaign, gravity_stiffness=gravity_stiffness, workers=workers)
     candidates = all_candidates(problem, without)
     warm_up(problem, candidates)
     with parallel_records(problem):

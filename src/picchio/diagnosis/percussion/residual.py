@@ -10,8 +10,7 @@ import numpy as np
 from picchio.campaign.campaign import Campaign
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence, whiteness_test
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.prediction.residual import (
@@ -30,6 +29,8 @@ _HIGHEST = 6.0
 _MOST_WINDOWS = 60
 # A joint moves if its deflection is so many times its noise.
 _CLEAR = 15.0
+# Channels whose transfer function is shown.
+_TRANSFERS = 4
 
 
 def channel_residuals(
@@ -38,17 +39,17 @@ def channel_residuals(
     """Every channel of every record."""
     found = []
     for record, white, predicted in zip(fit.records, fit.residuals, predictions, strict=True):
-        kinds = {c.name: c for c in record.setup.channels}
         source = problem.campaign[record.name]
-        for row, (name, values) in enumerate(record.values.items()):
+        for channel, row in zip(record.channels, white, strict=True):
+            name, values = channel.name, record.values[channel.name]
             left, signal = values - predicted[name], values
-            if record.setup.steady or kinds[name].kind.free_offset:
+            if record.setup.steady or channel.kind.free_offset:
                 left, signal = left - left.mean(), values - values.mean()
             found.append(
                 ChannelResidual(
                     record.name,
                     name,
-                    kinds[name].group,
+                    channel.group,
                     record.pose,
                     tuple(float(c) for c in record.setup.blows.direction),
                     float(np.abs(record.setup.blows.height).max()),
@@ -57,7 +58,7 @@ def channel_residuals(
                     float(np.sqrt(np.mean(left**2))),
                     float(np.sqrt(np.mean(signal**2))),
                     record.noise[name].std,
-                    float(np.sqrt(np.mean(white[row] ** 2))),
+                    float(np.sqrt(np.mean(row**2))),
                 )
             )
     return found
@@ -106,8 +107,8 @@ def spectra(problem: Problem, fit: Fit) -> Spectra:
     for record, white in zip(fit.records, fit.residuals, strict=True):
         if abs(record.setup.samples.step / step - 1.0) > 1e-6:
             continue
-        for name, row in zip(record.values, white, strict=True):
-            rows.setdefault(_group(record, name), []).append(row)
+        for channel, row in zip(record.channels, white, strict=True):
+            rows.setdefault(channel.group, []).append(row)
     power = {group: spectrum(every, step, edges) for group, every in rows.items()}
     return Spectra(edges, power, modes, 1.0 / fit.records[0].setup.blows.interval)
 
@@ -187,18 +188,16 @@ def over_time(fit: Fit) -> OverTime:
         window *= 2.0
     before = np.ceil(max(-start, 0.0) / window)
     edges = window * np.arange(-before, np.floor(end / window) + 1)
-    residual: dict[str, FloatArray] = {}
-    signal: dict[str, FloatArray] = {}
-    for group in dict.fromkeys(_group(r, n) for r, _ in like for n in r.values):
-        rows, levels, times = [], [], []
-        for record, white in like:
-            for row, (name, values) in zip(white, record.values.items(), strict=True):
-                if _group(record, name) == group:
-                    rows.append(row)
-                    levels.append(values / record.noise[name].std)
-                    times.append(record.setup.samples.times)
-        residual[group] = by_window(times, rows, edges)
-        signal[group] = by_window(times, levels, edges)
+    # Group -> times, residuals and readings, both in units of the noise.
+    parts: dict[str, tuple[list[FloatArray], list[FloatArray], list[FloatArray]]] = {}
+    for record, white in like:
+        for channel, row in zip(record.channels, white, strict=True):
+            times, rows, levels = parts.setdefault(channel.group, ([], [], []))
+            times.append(record.setup.samples.times)
+            rows.append(row)
+            levels.append(record.values[channel.name] / record.noise[channel.name].std)
+    residual = {g: by_window(times, rows, edges) for g, (times, rows, _) in parts.items()}
+    signal = {g: by_window(times, levels, edges) for g, (times, _, levels) in parts.items()}
     last = None if first.steady else float(first.blows.start.max())
     return OverTime(edges, residual, signal, last)
 
@@ -257,7 +256,7 @@ def _missing(
 
 
 def transfers(
-    problem: Problem, fit: Fit, predictions: Sequence[dict[str, FloatArray]], most: int = 4
+    fit: Fit, predictions: Sequence[dict[str, FloatArray]]
 ) -> tuple[list[MeasuredRecord], dict[str, Transfer]]:
     """Response over force of the channels that are wrong most, where a force was measured."""
     chosen = [r for r in fit.records if "force" in r.values]
@@ -272,16 +271,12 @@ def transfers(
     ]  # fmt: skip
     white = fit.residuals[fit.records.index(worst)]
     order = np.argsort(-(white**2).mean(axis=1))
-    names = [list(worst.values)[i] for i in order]
+    names = [worst.channels[i].name for i in order if not worst.channels[i].kind.of_force]
     found = {}
-    for name in [n for n in names if n != "force"][:most]:
+    for name in names[:_TRANSFERS]:
         if not all(name in r.values for r in like):
             continue
         simulated = [predictions[fit.records.index(r)][name] for r in like]
         found[name] = transfer([r.values["force"] for r in like], [r.values[name] for r in like],
                                simulated, worst.setup.samples.step)  # fmt: skip
     return like, found
-
-
-def _group(record: MeasuredRecord, name: str) -> str:
-    return next(c.group for c in record.setup.channels if c.name == name)

@@ -1,4 +1,4 @@
-"""Coloured noise as an autoregression: a spectrum, a whitening filter, samples like it."""
+"""Coloured noise as an autoregression: a spectrum, a whitening filter."""
 
 from __future__ import annotations
 
@@ -83,30 +83,6 @@ class AutoRegression:
         for row, predictor in zip(table, self.predictors, strict=True):
             row[: predictor.size] = predictor
         return table, np.sqrt(self.variances)
-
-    def sample(self, samples: int, rng: np.random.Generator) -> FloatArray:
-        """(samples,) noise like it, stationary from the first sample on.
-
-        Args:
-            samples: how many.
-            rng: source of random numbers.
-        """
-        from scipy.signal import lfilter, lfiltic
-
-        white = rng.normal(size=samples)
-        p = self.order
-        x = np.empty(samples)
-        for i in range(min(p, samples)):
-            a = self.predictors[i]
-            x[i] = (x[:i][::-1] @ a if i else 0.0) + white[i] * np.sqrt(self.variances[i])
-        if samples > p:
-            denominator = np.append(1.0, -self.predictors[p])
-            gain = np.sqrt(self.variances[p])
-            if p == 0:
-                return gain * white
-            state = lfiltic([gain], denominator, x[:p][::-1])
-            x[p:], _ = lfilter([gain], denominator, white[p:], zi=state)
-        return x
 
     def psd(self, frequency: ArrayLike, rate: float) -> FloatArray:
         """One-sided power spectral density, unit^2/Hz, at frequencies in Hz.

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from picchio.campaign.campaign import Campaign
-from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
 from picchio.measurement.noise.autoregression import (
     AutoRegression,
@@ -27,26 +27,15 @@ from picchio.measurement.noise.pieces import (
     steady_period,
     steady_pieces,
 )
+from picchio.measurement.noise.repeats import Repeats
 from picchio.measurement.noise.window import Window, read_window
 
 # Enough for 0.6 %: more is not kept.
 _ENOUGH = 1 << 14
 # With fewer samples than this from surer sources, the ring-down is used too.
 _TOO_FEW = 1500
-_REPEAT_SAMPLES = 16384
-_REPEATS_KEPT = 24 << 20
 # A source may exceed a surer one by this factor and still be used.
 _SLACK = 1.08
-
-
-def repeat_key(record: Record) -> tuple[object, ...] | None:
-    """What repeats of a record have in common; None for records that cannot be compared."""
-    if record.kind == "motion" or record.pose is None or record.direction is None:
-        return None
-    pose = record.pose
-    where = tuple(sorted(pose.items())) if isinstance(pose, dict) else tuple(pose)
-    blows = record.excitation.model_dump(exclude_none=True)
-    return (where, tuple(np.round(record.direction, 9)), tuple(sorted(blows.items())))
 
 
 class NoiseCollector:
@@ -65,34 +54,26 @@ class NoiseCollector:
         self._rates: dict[int, float] = {}
         self._resolution: dict[str, float] = {}
         self._range: dict[str, float] = {}
-        self._left: dict[tuple[object, ...], int] = defaultdict(int)
-        self._before: dict[tuple[object, ...], Window] = {}
-        self._kept = 0
-        for record in campaign:
-            key = repeat_key(record)
-            if key is not None:
-                self._left[key] += 1
+        self._repeats = Repeats(campaign)
 
     def add(self, window: Window) -> None:
         """Take the next record's window."""
         rate = self._rate(window.rate)
         for name, values in window.arrays.items():
-            self.units[name] = window.record.channel(name).unit
+            self.units[name] = window.channels[name].unit
             self._note_resolution(name, values)
-        for name, piece in quiet_pieces(window):
-            self._put(name, rate, piece)
+        self._put(rate, quiet_pieces(window))
         found = steady_period(window)
         if found is not None:
             self.periods[window.record.file] = found
-            for name, piece in steady_pieces(window, found[1]):
-                self._put(name, rate, piece)
-        self._repeat(window, rate)
+            self._put(rate, steady_pieces(window, found[1]))
+        before = self._repeats.before(window)
+        if before is not None:
+            self._put(rate, repeat_pieces(before, window))
         if window.record.kind == "motion":
-            for name, piece in fast_pieces(window):
-                self._put(name, rate, piece)
+            self._put(rate, fast_pieces(window))
         elif not window.steady and self._poor(window, rate):
-            for name, piece in ring_down_pieces(window):
-                self._put(name, rate, piece)
+            self._put(rate, ring_down_pieces(window))
 
     def _rate(self, rate: float) -> int:
         for key, known in self._rates.items():
@@ -114,14 +95,15 @@ class NoiseCollector:
             least = 0.0
         self._resolution[name] = min(self._resolution.get(name, np.inf), least)
 
-    def _put(self, name: str, rate: int, piece: Piece) -> None:
-        kept = self._pieces[name, rate][piece.method]
-        if sum(p.samples for p in kept) < _ENOUGH:
-            m = min(piece.values.size, _ENOUGH)
-            share = m / piece.values.size
-            short = piece.time[:m].copy(), piece.values[:m].copy()
-            kept.append(replace(piece, time=short[0], values=short[1],
-                                samples=piece.samples * share))  # fmt: skip
+    def _put(self, rate: int, pieces: Iterable[tuple[str, Piece]]) -> None:
+        for name, piece in pieces:
+            kept = self._pieces[name, rate][piece.method]
+            if sum(p.samples for p in kept) < _ENOUGH:
+                m = min(piece.values.size, _ENOUGH)
+                share = m / piece.values.size
+                short = piece.time[:m].copy(), piece.values[:m].copy()
+                kept.append(replace(piece, time=short[0], values=short[1],
+                                    samples=piece.samples * share))  # fmt: skip
 
     def _poor(self, window: Window, rate: int) -> bool:
         """Whether some channel of this record still has too little noise for an estimate."""
@@ -130,24 +112,6 @@ class NoiseCollector:
             < _TOO_FEW
             for name in window.arrays
         )
-
-    def _repeat(self, window: Window, rate: int) -> None:
-        key = repeat_key(window.record)
-        if key is None:
-            return
-        self._left[key] -= 1
-        before = self._before.pop(key, None)
-        if before is not None:
-            self._kept -= before.time.size * (len(before.arrays) + 1)
-            if abs(before.rate / window.rate - 1.0) < 1e-6:
-                for name, piece in repeat_pieces(before, window):
-                    self._put(name, rate, piece)
-        if self._left[key] > 0 and self._kept < _REPEATS_KEPT // 8:
-            m = _REPEAT_SAMPLES
-            arrays = {name: values[:m].copy() for name, values in window.arrays.items()}
-            kept = Window(window.record, window.time[:m].copy(), arrays, False, window.rate)
-            self._before[key] = kept
-            self._kept += kept.time.size * (len(arrays) + 1)
 
     def finish(self) -> dict[str, Noise]:
         """The estimates."""
@@ -211,15 +175,11 @@ class NoiseCollector:
                 used = known.std == 0.0 and std == 0.0
             elif less:
                 # The surer one is not as quiet as it should be: something moved there.
-                sources[:] = [_dropped(s) for s in sources]
+                sources[:] = [replace(s, used=False) for s in sources]
                 chosen.clear()
         sources.append(NoiseSource(method, std, error, len({p.record for p in pieces}), used))
         if used:
             chosen.extend(pieces)
-
-
-def _dropped(source: NoiseSource) -> NoiseSource:
-    return replace(source, used=False)
 
 
 def _model(pieces: list[Piece]) -> AutoRegression:

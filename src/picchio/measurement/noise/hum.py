@@ -10,8 +10,8 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.measurement.noise.autoregression import AutoRegression, fit_autoregression
 from picchio.measurement.noise.pieces import Piece
+from picchio.measurement.noise.ringdown import MAINS
 
-MAINS = (50.0, 60.0)
 _FALSE_ALARMS = 1e-4
 _ORDER = 8
 
@@ -23,12 +23,10 @@ class Line:
     Attributes:
         frequency: Hz.
         amplitude: in the channel's unit; the phase differs from record to record.
-        probability: of finding as much in noise without it.
     """
 
     frequency: float
     amplitude: float
-    probability: float
 
 
 def take_out_hum(pieces: Sequence[Piece], rate: float) -> tuple[list[Piece], tuple[Line, ...]]:
@@ -84,7 +82,7 @@ def _search(pieces: Sequence[Piece], nominal: float, rate: float, *,
     # What noise alone would give is subtracted from the squares.
     extra = [4.0 * noise.psd(frequency, rate) * rate / 2.0 / p.values.size for p in used]
     amplitude = np.sqrt(max(float(np.average(np.subtract(squares, extra), weights=weights)), 0.0))
-    return Line(frequency, float(amplitude), min(1.0, probability))
+    return Line(frequency, float(amplitude))
 
 
 def _basis(piece: Piece, frequency: float) -> FloatArray:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.measurement.noise.autoregression import AutoRegression
@@ -90,26 +89,6 @@ class Noise:
         white = AutoRegression(np.zeros(0), self.std**2)
         return Noise(self.channel, self.unit, rate, self.std, self.error, white, self.hum,
                      self.resolution, self.sources, self.rough)  # fmt: skip
-
-    def whiten(self, residual: ArrayLike) -> FloatArray:
-        """A residual divided by the noise: white and of unit variance if it is this noise.
-
-        Args:
-            residual: (..., m) at `rate`, in the channel's unit, hum removed.
-
-        Raises:
-            InputError: the channel has no noise.
-        """
-        return self.model.whiten(residual)
-
-    def sample(self, samples: int, rng: np.random.Generator) -> FloatArray:
-        """(samples,) noise like it at `rate`, without hum.
-
-        Args:
-            samples: how many.
-            rng: source of random numbers.
-        """
-        return self.model.sample(samples, rng)
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""

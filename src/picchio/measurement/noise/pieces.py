@@ -9,6 +9,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.measurement.noise.periodic import find_period, not_periodic
+from picchio.measurement.noise.repeats import overlap
 from picchio.measurement.noise.ringdown import fit_ring_down
 from picchio.measurement.noise.window import Window
 
@@ -156,7 +157,7 @@ def steady_pieces(window: Window, period: float) -> Iterator[tuple[str, Piece]]:
 def ring_down_pieces(window: Window) -> Iterator[tuple[str, Piece]]:
     """What fitted damped sines leave after a burst."""
     after = window.after()
-    names = [name for name in window.arrays if not name.startswith("force")]
+    names = [name for name, channel in window.channels.items() if not channel.kind.of_force]
     if after.stop - after.start < 200 or not names:
         return
     found = fit_ring_down(np.stack([window.arrays[name][after] for name in names]), window.rate)
@@ -173,16 +174,15 @@ def ring_down_pieces(window: Window) -> Iterator[tuple[str, Piece]]:
 
 def repeat_pieces(one: Window, other: Window) -> Iterator[tuple[str, Piece]]:
     """Half the difference between two records of the same thing, over sqrt(2)."""
-    shift = round((other.time[0] - one.time[0]) * one.rate)
-    a, b = (shift, 0) if shift >= 0 else (0, -shift)
-    m = min(one.time.size - a, other.time.size - b)
-    if m < _FEWEST:
+    a, b = overlap(one, other)
+    time = one.time[a]
+    if time.size < _FEWEST:
         return
     for name in one.arrays.keys() & other.arrays.keys():
-        difference = (other.arrays[name][b : b + m] - one.arrays[name][a : a + m]) / np.sqrt(2.0)
-        time = one.time[a : a + m]
+        difference = (other.arrays[name][b] - one.arrays[name][a]) / np.sqrt(2.0)
         yield name, Piece("repeats", f"{one.record.file}, {other.record.file}", time,
-                          difference - difference.mean(), m - 1, mean_removed=True)  # fmt: skip
+                          difference - difference.mean(), time.size - 1,
+                          mean_removed=True)  # fmt: skip
 
 
 def fast_pieces(window: Window) -> Iterator[tuple[str, Piece]]:

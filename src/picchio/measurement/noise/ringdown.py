@@ -20,7 +20,7 @@ _LONGEST = 1500
 _MOST_SAMPLES = 6000
 _STEPS = 3
 _COLOUR = 6
-_MAINS = (50.0, 60.0)
+MAINS = (50.0, 60.0)  # Hz
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,13 +31,11 @@ class RingDown:
         residual: (c, m) what they leave.
         parameters: numbers fitted per channel, the shared poles' share included.
         poles: (k,) rad/s, one of each pair.
-        amplitude: (c,) root mean square of the fitted waves.
     """
 
     residual: FloatArray
     parameters: float
     poles: ComplexArray
-    amplitude: FloatArray
 
 
 def fit_ring_down(series: FloatArray, rate: float) -> RingDown | None:
@@ -75,8 +73,7 @@ def fit_ring_down(series: FloatArray, rate: float) -> RingDown | None:
         return None
     residual = np.zeros_like(x)
     residual[alive] = best[2] * scale[alive][:, None]
-    amplitude = np.sqrt(np.mean((x - residual - x.mean(axis=1, keepdims=True)) ** 2, axis=1))
-    return RingDown(residual, float(best[3]), best[1], amplitude)
+    return RingDown(residual, float(best[3]), best[1])
 
 
 def _trials(y: FloatArray, rate: float) -> list[ComplexArray]:
@@ -111,7 +108,7 @@ def _trials(y: FloatArray, rate: float) -> list[ComplexArray]:
 def _basis(poles: ComplexArray, time: FloatArray) -> FloatArray:
     """(m, 2 k + 5) the waves, a constant and the mains."""
     waves = np.exp(np.outer(time, poles))
-    mains = [f(2.0 * np.pi * hz * time) for hz in _MAINS for f in (np.cos, np.sin)]
+    mains = [f(2.0 * np.pi * hz * time) for hz in MAINS for f in (np.cos, np.sin)]
     return np.column_stack([np.ones(time.size), *mains, waves.real, waves.imag])
 
 

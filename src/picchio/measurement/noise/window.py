@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from picchio.campaign.channels import TIME
+from picchio.campaign.channels import TIME, Channel
 from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
@@ -34,6 +34,19 @@ class Window:
     arrays: dict[str, FloatArray] = field(repr=False)
     complete: bool
     rate: float
+
+    @cached_property
+    def channels(self) -> dict[str, Channel]:
+        """The channels of `arrays`, by name."""
+        return {name: self.record.channel(name) for name in self.arrays}
+
+    @cached_property
+    def groups(self) -> dict[str, list[Channel]]:
+        """The same by channel group."""
+        found: dict[str, list[Channel]] = {}
+        for channel in self.channels.values():
+            found.setdefault(channel.group, []).append(channel)
+        return found
 
     @property
     def step(self) -> float:
@@ -72,21 +85,14 @@ class Window:
         return slice(int(np.searchsorted(self.time, self.burst_end)), self.time.size)
 
 
-def read_window(
-    record: Record, limit: int = LIMIT, channels: Iterable[str] | None = None
-) -> Window:
+def read_window(record: Record) -> Window:
     """Read the first samples of a record.
-
-    Args:
-        record: the record.
-        limit: numbers to keep, all channels together.
-        channels: all where None.
 
     Raises:
         InputError: as `Record.chunks`.
     """
-    names = list(record.channels if channels is None else channels)
-    collector = WindowCollector(record, names, limit)
+    names = list(record.channels)
+    collector = WindowCollector(record, names)
     for block in record.chunks(names):
         if not collector.feed(block):
             break
@@ -96,9 +102,9 @@ def read_window(
 class WindowCollector:
     """Keeps the first blocks of a record, up to a limit."""
 
-    def __init__(self, record: Record, names: list[str], limit: int = LIMIT) -> None:
+    def __init__(self, record: Record, names: list[str]) -> None:
         self.record, self.names = record, names
-        self.most = max(4096, limit // (len(names) + 1))
+        self.most = max(4096, LIMIT // (len(names) + 1))
         self._blocks: list[dict[str, FloatArray]] = []
         self._samples = 0
         self._complete = True

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
@@ -80,27 +79,29 @@ class Context:
         return sum(line.amplitude for line in noise.hum) if noise is not None else 0.0
 
 
-class Check(ABC):
-    """Sees the records one by one, and may report at the end.
+class Check:
+    """Sees the records one by one, and may report at each of them and at the end.
 
     Attributes:
         name: in findings.
         what: what it looks for, in words.
+        of: the kind of records that it sees, "percussion" or "motion"; all where empty.
     """
 
     name: ClassVar[str]
     what: ClassVar[str]
+    of: ClassVar[str] = ""
 
     def __init__(self, context: Context) -> None:
         self.context = context
 
-    @abstractmethod
-    def record(self, scan: RecordScan) -> Iterator[Finding]:
+    def record(self, scan: RecordScan) -> Iterable[Finding]:
         """Findings in one record."""
+        return ()
 
-    def finish(self) -> Iterator[Finding]:
+    def finish(self) -> Iterable[Finding]:
         """Findings in all records together."""
-        yield from ()
+        return ()
 
     def found(self, severity: Severity, message: str, advice: str = "", *,
               record: str | None = None, channel: str | None = None,

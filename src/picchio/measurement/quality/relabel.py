@@ -1,4 +1,4 @@
-"""Which way round a sensor's axes are: all 48 ways of mounting it by right angles or mirrored."""
+"""Which labels fit what is seen: of a sensor's axes, in any order and sign; of joints."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from itertools import permutations, product
 import numpy as np
 
 from picchio.campaign.channels import AXES
-from picchio.core.arrays import ComplexArray
+from picchio.core.arrays import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True)
@@ -57,3 +57,14 @@ def relabel(seen: Sequence[ComplexArray], must: Sequence[ComplexArray]) -> Relab
     )
     rivals = sum(score > best - 0.02 for score in scores.values()) - 1
     return Relabelling(labelled, best, rivals, words)
+
+
+def cosines(seen: FloatArray, must: FloatArray) -> FloatArray:
+    """(n,) between what one joint shows and what each must; 0 where there is nothing to show.
+
+    Args:
+        seen: (m,).
+        must: (n, m), a joint each.
+    """
+    size = np.linalg.norm(must, axis=1) * np.linalg.norm(seen)
+    return np.where(size > 0.0, must @ seen / np.where(size > 0.0, size, 1.0), 0.0)

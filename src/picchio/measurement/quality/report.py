@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,8 +20,8 @@ from picchio.measurement.noise.estimate import NoiseCollector
 from picchio.measurement.noise.level import Noise
 from picchio.measurement.noise.window import read_window
 from picchio.measurement.quality.check import SEVERITIES, Check, Context, Finding
+from picchio.measurement.quality.checks import CHECKS
 from picchio.measurement.quality.checks.repeats import Comparison, RepeatsCheck
-from picchio.measurement.quality.registry import CHECKS
 from picchio.measurement.quality.scan import RecordScan, scan_record
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
@@ -103,6 +103,7 @@ def summarise(scan: RecordScan) -> RecordSummary:
 
 FORMAT = "picchio-check/1"
 _NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -274,35 +275,39 @@ def _look_through(
     records = [replace(record, clock_tolerance=math.inf) for record in campaign.records]
     campaign = replace(campaign, records=tuple(records))
     findings: list[Finding] = []
-    collector = NoiseCollector(campaign)
-    readable: list[Record] = []
-    total = 2 * len(records)
-    for index, record in enumerate(records):
+
+    def tried(read: Callable[[Record], T], record: Record) -> T | None:
         try:
-            collector.add(read_window(record))
-            readable.append(record)
+            return read(record)
         except InputError as error:
             if not keep_going:
                 raise
-            findings.append(_unreadable(record, error))
-        if progress is not None:
-            progress(index + 1, total)
+            advice = "mend the file, or leave the record out"
+            findings.append(Finding("readable", "error", str(error), advice, record=record.file))
+            return None
+
+    collector = NoiseCollector(campaign)
+    readable: list[Record] = []
+    say = progress or (lambda done, total: None)
+    total = 2 * len(records)
+    for index, record in enumerate(records):
+        window = tried(read_window, record)
+        if window is not None:
+            collector.add(window)
+            readable.append(record)
+        say(index + 1, total)
     context = Context(campaign, robot, collector.finish(), collector.periods)
     checkers: list[Check] = [kind(context) for kind in CHECKS]
     summaries = []
     for index, record in enumerate(readable):
-        try:
-            scan = scan_record(record)
-        except InputError as error:
-            if not keep_going:
-                raise
-            findings.append(_unreadable(record, error))
+        scan = tried(scan_record, record)
+        if scan is None:
             continue
         for checker in checkers:
-            findings.extend(checker.record(scan))
+            if checker.of in ("", record.kind):
+                findings.extend(checker.record(scan))
         summaries.append(summarise(scan))
-        if progress is not None:
-            progress(len(records) + index + 1, total)
+        say(len(records) + index + 1, total)
     for checker in checkers:
         findings.extend(checker.finish())
     repeats = next((c.comparisons for c in checkers if isinstance(c, RepeatsCheck)), [])
@@ -318,8 +323,3 @@ def _look_through(
         tuple(repeats),
         {kind.name: kind.what for kind in CHECKS},
     )
-
-
-def _unreadable(record: Record, error: InputError) -> Finding:
-    return Finding("readable", "error", str(error), "mend the file, or leave the record out",
-                   record=record.file)  # fmt: skip

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from picchio.campaign.channels import TIME
 from picchio.campaign.clock import Clock
 from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
@@ -75,7 +74,7 @@ class ChannelScan:
         """Every sample is the same."""
         return self.least == self.most
 
-    def feed(self, values: FloatArray, first: int) -> None:
+    def feed(self, values: FloatArray) -> None:
         """Take the next block."""
         self.least = min(self.least, float(values.min()))
         self.most = max(self.most, float(values.max()))
@@ -83,7 +82,7 @@ class ChannelScan:
         self.squares += float(values @ values)
         joined = values if self.samples == 0 else np.concatenate([[self._last], values])
         steps = np.diff(joined)
-        at = first + (1 if self.samples == 0 else 0)
+        at = max(self.samples, 1)
         changes = np.flatnonzero(steps)
         self.equal += steps.size - changes.size
         self.moved += float(np.abs(steps).sum())
@@ -150,12 +149,10 @@ def scan_record(record: Record) -> RecordScan:
     names = list(record.channels)
     channels = {name: ChannelScan() for name in names}
     collector = WindowCollector(record, names)
-    first = 0
     for block in record.chunks(names):
         collector.feed(block)
         for name in names:
-            channels[name].feed(block[name], first)
-        first += block[TIME].size
+            channels[name].feed(block[name])
     for channel in channels.values():
         channel.close()
     return RecordScan(record, collector.finish(), channels, record.clock)

@@ -46,6 +46,9 @@ class Parameter:
         upper: largest.
         logarithmic: whether steps are ratios rather than differences.
         meaning: one line.
+        size: of a linear one, in what steps it is fitted from 0; see `size_beside` where 0.
+        share: of the other parameters' size, where they start away from 0 and it does not.
+        by_inverse: of one that is neutral at infinity: whether half of it does twice as much.
     """
 
     name: str
@@ -56,6 +59,17 @@ class Parameter:
     upper: float = math.inf
     logarithmic: bool = False
     meaning: str = ""
+    size: float = 0.0
+    share: float = 1.0
+    by_inverse: bool = False
+
+    def size_beside(self, typical: float) -> float:
+        """The size of a linear parameter that starts at 0.
+
+        Args:
+            typical: size of the effect's largest linear parameter.
+        """
+        return self.size or self.share * typical
 
 
 @dataclass(frozen=True)
@@ -235,6 +249,17 @@ class Effect(ABC):
         neutral = {p.name: p.neutral for p in self.parameters}
         kept = {k: v for k, v in self.values.items() if v != neutral[k]}
         return type(self)(self.target, **{**kept, **values}).with_hidden(self.hidden)
+
+    def bounded(self, **values: float) -> Self:
+        """The same effect with other values, brought within their bounds.
+
+        Args:
+            **values: SI, by parameter.
+        """
+        known = {p.name: p for p in self.parameters}
+        return self.with_values(
+            **{k: min(max(v, known[k].lower), known[k].upper) for k, v in values.items()}
+        )
 
     def with_hidden(self, hidden: Mapping[str, tuple[float, ...]]) -> Self:
         """The same effect with other numbers drawn anew in every record.

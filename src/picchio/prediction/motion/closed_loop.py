@@ -59,20 +59,6 @@ class CascadeLaw:
         except (TypeError, ValueError):
             raise InputError("must be a number", key="controller") from None
 
-    def force(self, reference: FloatArray, position: FloatArray, velocity: FloatArray,
-              extra: FloatArray | float = 0.0) -> FloatArray:  # fmt: skip
-        """What the law commands, N (N m); `extra` volts are added before the limit.
-
-        Args:
-            reference: (m,) m or rad.
-            position: (m,) m or rad.
-            velocity: (m,) m/s or rad/s.
-            extra: (m,) V.
-        """
-        volts = self.kp * self.kv * (reference - position) - self.kv * velocity + extra
-        found: FloatArray = self.gtau * np.clip(volts, -self.limit, self.limit)
-        return found
-
 
 @dataclass(frozen=True, eq=False)
 class ClosedLoop:
@@ -96,7 +82,6 @@ def simulate_closed_loop(
     inertia: float,
     friction: Callable[[float], float],
     *,
-    extra: FloatArray | None = None,
     start: tuple[float, float] = (0.0, 0.0),
 ) -> ClosedLoop:
     """Run the loop: the law is sampled and its torque held, the joint moves in between.
@@ -109,7 +94,6 @@ def simulate_closed_loop(
         rate: samples a second, Hz.
         inertia: kg or kg m^2; constant.
         friction: velocity -> N or N m against positive motion; its jump at zero is dry friction.
-        extra: (m,) V, added to the command.
         start: position and velocity.
 
     Returns:
@@ -118,11 +102,10 @@ def simulate_closed_loop(
     samples = reference.size
     step = 1.0 / (rate * _SUBSTEPS)
     position, velocity, torque = np.empty(samples), np.empty(samples), np.empty(samples)
-    added = np.zeros(samples) if extra is None else extra
     forwards, backwards = friction(1e-9), friction(-1e-9)
     x, v = start
     for i in range(samples):
-        volts = law.kp * law.kv * (reference[i] - x) - law.kv * v + added[i]
+        volts = law.kp * law.kv * (reference[i] - x) - law.kv * v
         force = law.gtau * min(max(volts, -law.limit), law.limit)
         position[i], velocity[i], torque[i] = x, v, force
         for _ in range(_SUBSTEPS):

@@ -39,8 +39,7 @@ def shift(series: FloatArray, late: float) -> FloatArray:
     # out[i] = sum_k kernel[k] series[i - whole - taps[k]]
     full = np.convolve(padded, kernel)
     first = pad + _TAPS - 1 - whole
-    found: FloatArray = full[first : first + series.size]
-    return found
+    return np.asarray(full[first : first + series.size])
 
 
 def shift_smooth(series: FloatArray, late: float) -> FloatArray:
@@ -48,8 +47,7 @@ def shift_smooth(series: FloatArray, late: float) -> FloatArray:
     from scipy.interpolate import CubicSpline
 
     t = np.arange(series.size, dtype=np.float64)
-    found: FloatArray = CubicSpline(t, series)(np.clip(t - late, 0.0, t[-1]))
-    return found
+    return np.asarray(CubicSpline(t, series)(np.clip(t - late, 0.0, t[-1])))
 
 
 _ORDER = 4
@@ -75,15 +73,13 @@ class Band:
     def _sections(self) -> FloatArray:
         from scipy.signal import butter
 
-        found: FloatArray = butter(_ORDER, self.cutoff, fs=self.rate, output="sos")
-        return found
+        return np.asarray(butter(_ORDER, self.cutoff, fs=self.rate, output="sos"))
 
     @cached_property
     def _steady(self) -> FloatArray:
         from scipy.signal import sosfilt_zi
 
-        found: FloatArray = sosfilt_zi(self._sections)
-        return found
+        return np.asarray(sosfilt_zi(self._sections))
 
     @property
     def step(self) -> int:
@@ -115,13 +111,11 @@ class Band:
         for _ in range(2):
             steady = self._steady.reshape(-1, *[1] * (x.ndim - 1), 2) * x[..., :1]
             x = sosfilt(self._sections, x, axis=-1, zi=steady)[0][..., ::-1]
-        found: FloatArray = x[..., pad : pad + series.shape[-1]]
-        return found
+        return np.asarray(x[..., pad : pad + series.shape[-1]])
 
     def differentiate(self, series: FloatArray) -> FloatArray:
         """(..., m) central differences."""
-        found: FloatArray = np.gradient(series, 1.0 / self.rate, axis=-1)
-        return found
+        return np.asarray(np.gradient(series, 1.0 / self.rate, axis=-1))
 
 
 def choose_cutoff(angles: Sequence[tuple[FloatArray, float]]) -> float:

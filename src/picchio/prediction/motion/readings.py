@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -12,27 +13,20 @@ from picchio.model.effects.effect import Effect
 from picchio.model.motion import RIPPLE, ROTOR, TORQUE, WINDUP, Motion
 from picchio.prediction.motion.filters import Band, shift, shift_smooth
 from picchio.prediction.motion.log import MotionLog
-from picchio.prediction.motion.rigid import rigid_motion
+from picchio.robot.dynamics.statics import balancing
 from picchio.robot.flexible_robot import FlexibleRobot
 
 _KEPT = 400
+_STILL = 0.01  # of the fastest
 Part = tuple[str, str, FloatArray]
 Parts = list[Part]
 
+Readings = dict[str, dict[str, FloatArray]]
+"""What should be read in one record, at all its samples: kind -> joint -> (m,).
 
-@dataclass(frozen=True, eq=False)
-class Readings:
-    """What channels should read in one record, at all its samples.
-
-    Attributes:
-        torque: joint -> N m or N, in the band.
-        ripple: joint -> N m or N, above the band.
-        windup: joint -> rad or m, link side less motor side, without its constant offset.
-    """
-
-    torque: dict[str, FloatArray]
-    ripple: dict[str, FloatArray]
-    windup: dict[str, FloatArray]
+The kinds are TORQUE, in the band, and RIPPLE, above it (N m or N), and WINDUP, link side less motor
+side without its constant offset (rad or m).
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +121,7 @@ class Predictor:
                 torque[name] = around.body[name] + (factor - 1.0) * nominal
         ripple = {name: np.zeros(self.log.samples) for name in torque}
         windup = {name: np.zeros(self.log.samples) for name in self.log.link if name in torque}
-        found = Readings(torque, ripple, windup)
+        found = {TORQUE: torque, RIPPLE: ripple, WINDUP: windup}
         for effect in effects:
             if self.concerns(effect) and (
                 joint is None or effect.target_kind != "joint" or effect.target == joint
@@ -144,7 +138,7 @@ class Predictor:
 
     def by_scale(self, around: Around, joint: str) -> Readings:
         """Derivative of the readings by the factor on a joint's rigid-body torque."""
-        found = Readings({joint: self.nominal.body[joint]}, {}, {})
+        found: Readings = {TORQUE: {joint: self.nominal.body[joint]}, RIPPLE: {}, WINDUP: {}}
         self._report(found, around)
         return found
 
@@ -166,7 +160,7 @@ class Predictor:
         """
         if effect.target_kind != "joint":
             return None
-        found = Readings({}, {}, {})
+        found: Readings = {TORQUE: {}, RIPPLE: {}, WINDUP: {}}
         if not self.concerns(effect):
             return found
         if name in effect.linear:
@@ -191,7 +185,7 @@ class Predictor:
         Torques are predicted from measured angles: where those are late, the measured torque is
         early against its prediction.
         """
-        for series in (found.torque, found.ripple):
+        for series in (found[TORQUE], found[RIPPLE]):
             for joint in series:
                 if (gain := around.gains.get(joint, 1.0)) != 1.0:
                     series[joint] = gain * series[joint]
@@ -272,6 +266,77 @@ class _Watched(dict[str, FloatArray]):
 def _add(found: Readings, part: Part, factor: float) -> None:
     """Add a part; of a derivative's readings, which start empty, the first is the sum."""
     kind, joint, values = part
-    target = {TORQUE: found.torque, RIPPLE: found.ripple, WINDUP: found.windup}[kind]
-    more = values if factor == 1.0 else factor * values
+    target, more = found[kind], values if factor == 1.0 else factor * values
     target[joint] = target[joint] + more if joint in target else more
+
+
+# From a log to the motion that the model sees: filtered, differentiated, with its torques.
+
+
+def rigid_motion(robot: FlexibleRobot, log: MotionLog, band: Band) -> Motion:
+    """The record's motion and the torques that its rigid bodies take, by Pinocchio.
+
+    Angles and what follows from them are low-passed in `band`. Joints that were not recorded
+    stand at zero.
+
+    Args:
+        robot: masses and geometry.
+        log: the record.
+        band: where to filter.
+    """
+    q = {joint: band.low_pass(angle) for joint, angle in log.angle.items()}
+    v = {joint: band.differentiate(x) for joint, x in q.items()}
+    a = {joint: band.differentiate(x) for joint, x in v.items()}
+    poses, velocities, accelerations = (_stack(robot, x, log.samples) for x in (q, v, a))
+    torque = robot.rigid.inverse_dynamics(poses, velocities, accelerations)
+    _balance(robot, poses, torque)
+    index = {joint: i for i, joint in enumerate(robot.joint_names)}
+
+    @cache
+    def tool_load() -> dict[str, FloatArray]:
+        frame = robot.rigid.frame(robot.tool_frame)
+        load = robot.rigid.point_load(poses, velocities, accelerations, frame)
+        return {joint: load[:, index[joint]] for joint in q}
+
+    stiffness = dict(zip(robot.flexible_names, robot.stiffness, strict=True))
+    ratio = {joint.name: joint.gear_ratio for joint in robot.flexible_joints}
+    return Motion(
+        rate=log.rate,
+        angle=q,
+        velocity=v,
+        acceleration=a,
+        still={joint: _still(log, band, joint, x) for joint, x in v.items()},
+        body={joint: torque[:, index[joint]] for joint in q},
+        stiffness={joint: float(k) for joint, k in stiffness.items()},
+        gear_ratio={joint: abs(ratio.get(joint) or 1.0) for joint in q},
+        tool_load=tool_load,
+    )
+
+
+def _stack(robot: FlexibleRobot, series: dict[str, FloatArray], samples: int) -> FloatArray:
+    zero = np.zeros(samples)
+    return np.column_stack([series.get(joint, zero) for joint in robot.joint_names])
+
+
+def _balance(robot: FlexibleRobot, poses: FloatArray, torque: FloatArray) -> None:
+    """Add what gravity balancers that the sidecar states leave to the drives."""
+    if any(joint.balancer is not None for joint in robot.flexible_joints):
+        flexible = robot.flexible_index
+        for pose, row in zip(poses, torque, strict=True):
+            row[flexible] += balancing(robot.flexible_joints, robot.tree, pose[flexible])[0]
+
+
+def _still(log: MotionLog, band: Band, joint: str, velocity: FloatArray) -> float:
+    """A hundredth of the fastest, or what the encoder's noise alone makes of a standing joint."""
+    noise = angle_noise(log.angle[joint]) * np.sqrt(2.0 * band.cutoff / log.rate)
+    return max(_STILL * float(np.abs(velocity).max()),
+               3.0 * noise * 2.0 * np.pi * band.cutoff / np.sqrt(3.0))  # fmt: skip
+
+
+def angle_noise(series: FloatArray) -> float:
+    """Standard deviation of an encoder's noise, from fourth differences, which motion lacks."""
+    if series.size < 16:
+        return 0.0
+    fourth = np.diff(series, 4)
+    # Var of the fourth difference of white noise: 1 + 16 + 36 + 16 + 1 = 70.
+    return float(1.4826 * np.median(np.abs(fourth)) / np.sqrt(70.0))

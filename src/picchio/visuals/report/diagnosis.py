@@ -14,7 +14,7 @@ from picchio.core.provenance import provenance
 from picchio.diagnosis.motion.conclude.during_blows import BlowEffects, MotionLife
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
-from picchio.diagnosis.percussion.follow_up.plan import when
+from picchio.diagnosis.percussion.follow_up.records import when
 from picchio.diagnosis.result import Cause, Diagnosis, Value, differences, in_words
 from picchio.model.effects.registry import catalogue
 from picchio.robot.flexible_robot import FlexibleRobot

@@ -10,8 +10,8 @@ import numpy as np
 
 from picchio.campaign.channels import Channel
 from picchio.core.arrays import FloatArray
-from picchio.diagnosis.percussion.criteria.bic import bic
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.criteria.equivalence import bic
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 from picchio.diagnosis.percussion.fit.least_squares import Fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
@@ -347,7 +347,7 @@ class PercussionResidualFigures(_Percussion):
 
     def transfers(self) -> tuple[str, list[Picture]]:
         """Frequency responses, and the names of the records that they are from."""
-        records, found = transfers(self.left.problem, self.baseline, self.left.predictions)
+        records, found = transfers(self.baseline, self.left.predictions)
         made = []
         highest = 2.0 * max(high for _, high in self.left.spectra.modes)
         for name, one in found.items():

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from picchio.diagnosis.life import NO_SHAFT, life_before_and_after
+from picchio.diagnosis.life import NO_SHAFT, has_strength, life_before_and_after
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.state import State
 from picchio.diagnosis.result import Diagnosis
@@ -112,14 +112,11 @@ def motion_life(robot: FlexibleRobot, task: Task | None, diagnosis: Diagnosis) -
         side: {name: joint["peak_deflection"] for name, joint in found[side]["joints"].items()}
         for side in ("baseline", "extended")
     }
-    told = any(j.shaft is not None or j.reducer is not None for j in robot.flexible_joints)
-    if not told:
+    if not has_strength(robot):
         return MotionLife(None, NO_SHAFT, blows)
-    return MotionLife(found, said(effects) if effects else NONE_ACTS, blows)
-
-
-def said(effects: Sequence[Effect]) -> str:
-    """What a life with these effects takes into account."""
+    if not effects:
+        return MotionLife(found, NONE_ACTS, blows)
     names = ", ".join(f"{e.name.replace('_', ' ')} of {e.target}" for e in effects)
-    return f"the life after takes {names} into account; what is in the drive or in the readings " \
+    why = f"the life after takes {names} into account; what is in the drive or in the readings " \
         "does not act while the tool hits"  # fmt: skip
+    return MotionLife(found, why, blows)

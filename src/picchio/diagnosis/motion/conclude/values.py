@@ -8,19 +8,10 @@ import numpy as np
 
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit
-from picchio.diagnosis.result import Cause, Value
+from picchio.diagnosis.result import Cause, Value, unit_of
 from picchio.model.effects.effect import Effect
-from picchio.robot.flexible_robot import FlexibleRobot
 
-_PRISMATIC = {"N*m": "N", "N*m*s/rad": "N*s/m", "kg*m^2": "kg", "rad/s": "m/s", "rad": "m"}
 _POSES = 50
-
-
-def unit_of(robot: FlexibleRobot, target: str, unit: str) -> str:
-    """A parameter's unit; newtons and metres where the joint is prismatic."""
-    joint = robot.tree.joints.get(target)
-    prismatic = joint is not None and joint.type == "prismatic"
-    return _PRISMATIC.get(unit, unit) if prismatic else unit
 
 
 def cause(system: System, current: Fit, index: int, confidence: float) -> Cause:
@@ -50,7 +41,7 @@ def parameters(system: System, current: Fit, effect: Effect, number: int) -> dic
     if "scale" in effect.inverse and "scale" in found:
         stated = dict(zip(robot.flexible_names, robot.stiffness, strict=True))
         documented = float(stated[effect.target])
-        unit = "N/m" if unit_of(robot, effect.target, "rad") == "m" else "N*m/rad"
+        unit = unit_of(robot, effect.target, "N*m/rad")
         scale = found["scale"]
         found["stiffness"] = Value(scale.value * documented, scale.std * documented, unit)
     if effect.periodic and {"cosine", "sine"} <= found.keys():

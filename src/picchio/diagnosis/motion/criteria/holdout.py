@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from picchio.core.arrays import FloatArray
-from picchio.diagnosis.motion.criteria.necessity import contribution
+from picchio.diagnosis.motion.criteria.score import contribution
 from picchio.diagnosis.motion.data.system import System
-from picchio.diagnosis.motion.fit.least_squares import Fit, clean, fit, row_weights, stable_solve
-from picchio.diagnosis.motion.fit.state import Coordinate, State
+from picchio.diagnosis.motion.fit.least_squares import (
+    Fit,
+    difference,
+    fit,
+    row_weights,
+    stable_solve,
+)
 from picchio.model.effects.effect import Effect
 
 _LITTLE = 0.05
@@ -30,9 +34,7 @@ def validate(
     if len(held_out.logs) < 2:
         return current, dropped
     while current.state.effects:
-        seen, equations = held_out_equations(held_out, current), normal_equations(train, current)
-        gains = [gain_by_record(held_out, current, i, seen, equations)
-                 for i in range(len(current.state.effects))]  # fmt: skip
+        gains = _gains(train, held_out, current)
         failing = [
             i for i, found in enumerate(gains)
             if found and _fails(found, current.state.effects[i].periodic)
@@ -58,66 +60,41 @@ def _fails(gains: dict[str, float], ripple: bool) -> bool:
     return mean <= 0.0 or worst <= (-_LITTLE if ripple else 0.0)
 
 
-def normal_equations(train: System, current: Fit) -> tuple[FloatArray, FloatArray]:
-    """(k, k) and (k,): of all training rows, weighted, for the fit's coordinates."""
-    weight = row_weights(train, current.level)
-    left = current.columns * weight[:, None]
-    return left.T @ left, left.T @ (current.residual * weight)
-
-
-def gain_by_record(
-    held_out: System, current: Fit, index: int, seen: tuple[FloatArray, FloatArray],
-    equations: tuple[FloatArray, FloatArray],
-) -> dict[str, float]:  # fmt: skip
-    """File -> part of the power in its equations that an effect takes away, linearised.
+def _gains(train: System, held_out: System, current: Fit) -> list[dict[str, float]]:
+    """Of every effect: file -> part of the power in its equations that it takes away, linearised.
 
     Without the effect everything else is fitted anew to the training records.
 
     Args:
-        held_out: the equations of the records held out.
+        train: the equations fitted to.
+        held_out: those of the records held out.
         current: the fit to the training records.
-        index: which effect.
-        seen: of `held_out_equations`.
-        equations: of `normal_equations`.
     """
-    own, part = contribution(current, index)
-    if not own:
-        return {}
-    rest = [i for i in range(len(current.coordinates)) if i not in own]
-    normal, right = equations
-    prior = np.array([_prior(current.coordinates[i]) for i in rest])
-    target = right[rest] + normal[np.ix_(rest, own)] @ part
-    step = stable_solve(normal[np.ix_(rest, rest)] + np.diag(prior), target)
-    change = np.zeros(len(current.coordinates))
-    change[own], change[rest] = part, -step
-    columns, residual = seen
-    found: dict[str, list[float]] = {}
+    weight = row_weights(train, current.level)
+    left = current.columns * weight[:, None]
+    normal, right = left.T @ left, left.T @ (current.residual * weight)
+    state = current.state
+    predicted = held_out.predict(state.every, state.scales)
+    slopes = [difference(held_out, state, c, predicted) for c in current.coordinates]
+    columns = np.column_stack(slopes) if slopes else np.zeros((held_out.size, 0))
+    residual = held_out.measured - predicted
     scale = row_weights(held_out, {g: current.level.get(g, 1.0) for g in held_out.groups})
-    for s in held_out.segments:
-        if not np.any(columns[s.rows][:, own]):
-            continue
-        without = residual[s.rows] + columns[s.rows] @ change
-        sums = found.setdefault(held_out.logs[s.record].file, [0.0, 0.0])
-        sums[0] += float(np.sum((without * scale[s.rows]) ** 2))
-        sums[1] += float(np.sum((residual[s.rows] * scale[s.rows]) ** 2))
-    return {file: (a - b) / max(a, 1e-300) for file, (a, b) in found.items()}
-
-
-def held_out_equations(system: System, current: Fit) -> tuple[FloatArray, FloatArray]:
-    """Derivatives (rows, k) by the fit's coordinates, and the residual, on records held out."""
-    predicted = system.predict(current.state.every, current.state.scales)
-    columns = [_column(system, current.state, c, predicted) for c in current.coordinates]
-    matrix = np.column_stack(columns) if columns else np.zeros((system.size, 0))
-    return matrix, system.measured - predicted
-
-
-def _column(system: System, state: State, c: Coordinate, predicted: FloatArray) -> FloatArray:
-    sign = -1.0 if c.value + c.step > c.upper else 1.0
-    other = state.moved(c, c.value + sign * c.step)
-    only = other.every[c.index] if c.index >= 0 else None
-    changed = system.predict(other.every, other.scales, only, predicted)
-    return clean(system, changed - predicted) / (sign * c.step)
-
-
-def _prior(c: Coordinate) -> float:
-    return 0.0 if c.prior is None else 1.0 / c.prior**2
+    prior = np.array([c.precision for c in current.coordinates])
+    gains = []
+    for index in range(len(state.effects)):
+        own, part = contribution(current, index)
+        rest = [i for i in range(len(current.coordinates)) if i not in own]
+        target = right[rest] + normal[np.ix_(rest, own)] @ part
+        step = stable_solve(normal[np.ix_(rest, rest)] + np.diag(prior[rest]), target)
+        change = np.zeros(len(current.coordinates))
+        change[own], change[rest] = part, -step
+        found: dict[str, list[float]] = {}
+        for s in held_out.segments:
+            if not np.any(columns[s.rows][:, own]):
+                continue
+            without = residual[s.rows] + columns[s.rows] @ change
+            sums = found.setdefault(held_out.logs[s.record].file, [0.0, 0.0])
+            sums[0] += float(np.sum((without * scale[s.rows]) ** 2))
+            sums[1] += float(np.sum((residual[s.rows] * scale[s.rows]) ** 2))
+        gains.append({file: (a - b) / max(a, 1e-300) for file, (a, b) in found.items()})
+    return gains

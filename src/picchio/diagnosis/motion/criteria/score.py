@@ -1,4 +1,7 @@
-"""How much a candidate would help, judged on stretches of the records that it was not fitted to."""
+"""How much an effect helps, judged on stretches of the records that it was not fitted to.
+
+And by that: whether a candidate may be claimed, and whether one that was added is still needed.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +27,11 @@ from picchio.model.effects.effect import Effect
 
 _TINY = 1e-300
 _SAME = 0.02  # of a column's power: less of its own and others do the same already
+_LEAST_BIC = 3.0
+_LEAST_CONFIDENCE = 0.90
+_LEAST_SHARE = 0.005
+_TIE = 2.0
+_SURE = 0.95
 
 
 @dataclass(frozen=True)
@@ -69,10 +77,8 @@ class Scorer:
             self.weight[s.rows] = 1.0 / max(base.level[s.group], _TINY)
         self.left = base.columns * self.weight[:, None]
         self.right = base.residual * self.weight
-        prior = [0.0 if c.prior is None else 1.0 / c.prior**2 for c in base.coordinates]
-        self.prior = np.array(prior)
-        pull = [p * (c.centre - c.value) for p, c in zip(prior, base.coordinates, strict=True)]
-        self.pull = np.array(pull)
+        self.prior = np.array([c.precision for c in base.coordinates])
+        self.pull = np.array([c.pull for c in base.coordinates])
         self._stretches: dict[int, list[Stretch]] = {}
         self._sums: dict[int, tuple[np.ndarray, FloatArray, FloatArray]] = {}
         self._spectra: dict[str, Spectrum | None] = {}
@@ -218,13 +224,9 @@ def _compare(
         before = sum(x for (g, _), x in base.outside.items() if g == group)
         after = sum(x for (g, _), x in wide.outside.items() if g == group)
         effective += samples
-        gain += 0.5 * samples * np.log(max(before, _TINY) / max(after, _TINY))
-        rank += (
-            0.5
-            * base.rows[group]
-            / common[group]
-            * (np.log(max(before, _TINY) / max(after, _TINY)))
-        )
+        fall = np.log(max(before, _TINY) / max(after, _TINY))
+        gain += 0.5 * samples * fall
+        rank += 0.5 * base.rows[group] / common[group] * fall
         inside = max(base.inside[group], _TINY) / max(wide.inside[group], _TINY)
         bic += 0.5 * samples * np.log(inside)
         removed, total = removed + before - after, total + before
@@ -233,16 +235,11 @@ def _compare(
                 # In logarithms one bad stretch does not outvote the others; without, stretches
                 # in which nothing happens don't. Evidence by either is evidence.
                 other = wide.outside[g, number]
-                change = (
-                    0.5
-                    * base.count[g, number]
-                    / correlation[g]
-                    * (np.log(max(x, _TINY) / max(other, _TINY)))
-                )
+                fall = np.log(max(x, _TINY) / max(other, _TINY))
+                change = 0.5 * base.count[g, number] / correlation[g] * fall
                 differences[number] = differences.get(number, 0.0) + change
-                raw[number] = raw.get(number, 0.0) + (x - other) / correlation[g] / (
-                    max(wide.inside[g], _TINY) / base.rows[g]
-                )
+                power = max(wide.inside[g], _TINY) / base.rows[g]
+                raw[number] = raw.get(number, 0.0) + (x - other) / correlation[g] / power
     penalty = 0.5 * added * np.log(max(effective, 2.0))
     bic -= penalty
     rank -= penalty
@@ -252,3 +249,58 @@ def _compare(
         confidence=sure, values=values, admissible=admissible, groups=groups,
         differences=differences,
     )  # fmt: skip
+
+
+def passes(score: Score, ripple: bool = False) -> bool:
+    """Whether a candidate may be claimed: penalised, held out, and on every stretch."""
+    enough = ripple or score.share >= _LEAST_SHARE
+    return (
+        score.admissible and score.bic > _LEAST_BIC and score.gain > 0.0
+        and score.confidence >= _LEAST_CONFIDENCE and enough
+    )  # fmt: skip
+
+
+def necessity(scorer: Scorer, index: int) -> Score | None:
+    """What an effect of the scorer's fit gains over the fit without it."""
+    current = scorer.base
+    own, part = contribution(current, index)
+    if not own:
+        return None
+    coordinates = [current.coordinates[i] for i in own]
+    columns = current.columns[:, own]
+    values = np.array([c.value for c in coordinates])
+    noise = scorer.noise_of(current.state.effects[index])
+    return scorer.score(columns, coordinates, values - part, without=own, back=columns @ part,
+                        noise=noise)  # fmt: skip
+
+
+def contribution(current: Fit, index: int) -> tuple[list[int], FloatArray]:
+    """An effect's coordinates, and how far each is from where it does nothing.
+
+    At the optimum the residual is what the full model leaves: with the effect's own part (its
+    columns times these) added back, a fit without it has to leave it.
+    """
+    number = len(current.state.nuisances) + index
+    own = [i for i, c in enumerate(current.coordinates) if c.index == number]
+    return own, np.array([_from_neutral(current, i) for i in own])
+
+
+def _from_neutral(current: Fit, i: int) -> float:
+    """How far a linear parameter is from where it does nothing; others count as they are."""
+    c = current.coordinates[i]
+    effect = current.state.every[c.index]
+    parameter = next(p for p in effect.parameters if p.name == c.name)
+    if parameter.name == "order" or parameter.logarithmic:
+        return c.value if c.name in effect.inverse else 0.0
+    return c.value - parameter.neutral
+
+
+def indistinguishable(score: Score, other: Score) -> bool:
+    """Whether a rival is nearly as likely, or loses in no clear majority of the stretches."""
+    if other.rank >= score.rank - _TIE:
+        return True
+    shared = sorted(set(score.differences) | set(other.differences))
+    lead = np.array([
+        score.differences.get(b, 0.0) - other.differences.get(b, 0.0) for b in shared
+    ])  # fmt: skip
+    return confidence(lead) < _SURE and float(lead.sum()) < 3.0 * _TIE

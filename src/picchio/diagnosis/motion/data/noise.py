@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.motion.data.system import Group, System
 from picchio.model.motion import RIPPLE, TORQUE
 from picchio.prediction.motion.log import MotionLog
-from picchio.prediction.motion.rigid import angle_noise, rigid_motion
+from picchio.prediction.motion.readings import angle_noise, rigid_motion
 
 _TINY = 1e-12
 _SEED = 0
@@ -50,8 +52,6 @@ def noise_levels(system: System) -> dict[Group, float]:
 
 def _shaken(system: System, log: MotionLog, record: int) -> dict[str, FloatArray]:
     """Joint -> how the rigid-body torque changes when the angles get their noise once more."""
-    from dataclasses import replace
-
     rng = np.random.default_rng(_SEED)
     angle = {
         joint: values + angle_noise(values) * rng.normal(size=values.size)

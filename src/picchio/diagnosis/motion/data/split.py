@@ -64,7 +64,13 @@ def _by_itself(logs: Sequence[MotionLog]) -> tuple[list[MotionLog], list[MotionL
     speed = [_speeds(log) for log in logs]
     while len(logs) - len(inside) > 2:
         rest = [i for i in order if i not in inside]
-        uncovered = [i for i in rest if _beyond(speed, inside, i)]
+        covered: dict[str, float] = {}
+        for k in inside:
+            covered |= {j: max(v, covered.get(j, 0.0)) for j, v in speed[k].items()}
+        uncovered = [
+            i for i in rest
+            if any(_COVERED * v > covered.get(joint, 0.0) for joint, v in speed[i].items())
+        ]  # fmt: skip
         if not uncovered:
             break
         inside.append(max(uncovered, key=lambda i: max(speed[i].values())))
@@ -81,10 +87,3 @@ def _speeds(log: MotionLog) -> dict[str, float]:
         * log.rate / width
         for joint in log.moving
     }  # fmt: skip
-
-
-def _beyond(speed: list[dict[str, float]], inside: list[int], i: int) -> bool:
-    return any(
-        _COVERED * v > max((speed[k].get(joint, 0.0) for k in inside), default=0.0)
-        for joint, v in speed[i].items()
-    )

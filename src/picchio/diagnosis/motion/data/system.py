@@ -10,7 +10,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.model.effects.effect import Effect
 from picchio.model.motion import RIPPLE, TORQUE, WINDUP
-from picchio.prediction.motion.filters import Band
+from picchio.prediction.motion.filters import Band, choose_cutoff
 from picchio.prediction.motion.log import MotionLog
 from picchio.prediction.motion.readings import Around, Predictor, Readings
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -49,10 +49,14 @@ class System:
     Args:
         robot: the nominal robot.
         logs: the records.
-        cutoff: Hz.
+        cutoff: Hz, of the band in which torques are compared; from the encoders' noise if None.
     """
 
-    def __init__(self, robot: FlexibleRobot, logs: Sequence[MotionLog], cutoff: float) -> None:
+    def __init__(
+        self, robot: FlexibleRobot, logs: Sequence[MotionLog], cutoff: float | None = None
+    ) -> None:
+        if cutoff is None:
+            cutoff = choose_cutoff([(log.angle[j], log.rate) for log in logs for j in log.moving])
         self.robot, self.logs, self.cutoff = robot, list(logs), cutoff
         self.predictors = [Predictor(robot, log, Band(cutoff, log.rate)) for log in logs]
         self.segments: list[Segment] = []
@@ -104,14 +108,11 @@ class System:
         readings: dict[int, Readings] = {}
         joint = only.target if only is not None and only.target_kind == "joint" else None
         for s in self.segments:
-            if only is not None and base is not None and not self._concerns(only, s):
+            if base is not None and joint not in (None, s.group[1]):
                 continue
             if s.record not in readings:
                 readings[s.record] = self.predictors[s.record].predict(effects, scales, joint)
-            found = {TORQUE: readings[s.record].torque, RIPPLE: readings[s.record].ripple,
-                     WINDUP: readings[s.record].windup}[s.group[0]]  # fmt: skip
-            values = found[s.group[1]][s.samples]
-            out[s.rows] = values - values.mean() if s.group[0] == WINDUP else values
+            out[s.rows] = _at(s, readings[s.record])
         return out
 
     def around(self, effects: Sequence[Effect]) -> list[Around]:
@@ -140,18 +141,16 @@ class System:
         """(rows,) what one joint's readings are there, record by record."""
         out = np.zeros(self.size)
         for s in self.segments:
-            if s.group[1] != joint:
-                continue
-            found = readings[s.record]
-            series = {TORQUE: found.torque, RIPPLE: found.ripple, WINDUP: found.windup}[s.group[0]]
-            if joint in series:
-                values = series[joint][s.samples]
-                out[s.rows] = values - values.mean() if s.group[0] == WINDUP else values
+            if s.group[1] == joint and joint in readings[s.record][s.group[0]]:
+                out[s.rows] = _at(s, readings[s.record])
         return out
 
-    @staticmethod
-    def _concerns(effect: Effect, segment: Segment) -> bool:
-        return effect.target_kind != "joint" or effect.target == segment.group[1]
+
+def _at(s: Segment, readings: Readings) -> FloatArray:
+    """A segment's part of its record's readings; of a windup, less its mean."""
+    kind, joint = s.group
+    values = readings[kind][joint][s.samples]
+    return values - values.mean() if kind == WINDUP else values
 
 
 def _choose(log: MotionLog, predictor: Predictor) -> list[tuple[Group, np.ndarray]]:

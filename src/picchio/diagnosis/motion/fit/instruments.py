@@ -18,7 +18,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.motion.data.system import System
-from picchio.diagnosis.motion.fit.least_squares import Fit, clean, row_weights
+from picchio.diagnosis.motion.fit.least_squares import Fit, difference, row_weights
 from picchio.diagnosis.motion.fit.state import Coordinate, State
 from picchio.model.motion import TORQUE
 from picchio.prediction.motion.readings import Predictor
@@ -88,11 +88,8 @@ def instrument_shifts(system: System, found: Fit) -> list[Shift]:
     for i, c in enumerate(found.coordinates):
         if not np.any(found.columns[rows, i]) or _nonlinear(state, c):
             continue
-        sign = -1.0 if c.value + c.step > c.upper else 1.0
-        moved = state.moved(c, c.value + sign * c.step)
-        change = clean(system, other.predict(moved.every, moved.scales) - predicted)
         kept.append(i)
-        columns.append(change[rows] / (sign * c.step))
+        columns.append(difference(other, state, c, predicted)[rows])
     if not kept:
         return []
     weight = row_weights(system, found.level)[rows]

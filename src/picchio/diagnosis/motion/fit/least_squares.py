@@ -87,7 +87,7 @@ def finish(system: System, state: State) -> Fit:
     for s in system.segments:
         weight[s.rows] = 1.0 / (max(level[s.group], _TINY) * np.sqrt(correlation[s.group]))
     weighted = columns * weight[:, None]
-    normal = weighted.T @ weighted + np.diag([_prior(c) for c in coordinates])
+    normal = weighted.T @ weighted + np.diag([c.precision for c in coordinates])
     scale = np.sqrt(np.maximum(np.diag(normal), _TINY))
     covariance = np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True)
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale
@@ -121,18 +121,37 @@ def jacobian(
                 kept.append(c)
                 columns.append(column)
             continue
-        sign = -1.0 if c.value + c.step > c.upper else 1.0
-        other = state.moved(c, c.value + sign * c.step)
-        effect = other.every[c.index]
-        column = system.by_parameter(around, state.every[c.index], effect, c.name, sign * c.step)
+        step = _inward(c)
+        effect = state.moved(c, c.value + step).every[c.index]
+        column = system.by_parameter(around, state.every[c.index], effect, c.name, step)
         if column is None:
-            changed = system.predict(other.every, other.scales, effect, predicted)
-            column = clean(system, changed - predicted) / (sign * c.step)
+            column = difference(system, state, c, predicted)
         if np.any(column):
             kept.append(c)
             columns.append(column)
     matrix = np.column_stack(columns) if columns else np.zeros((system.size, 0))
     return kept, matrix
+
+
+def _inward(c: Coordinate) -> float:
+    """The step for a difference, towards where there is room."""
+    return -c.step if c.value + c.step > c.upper else c.step
+
+
+def difference(system: System, state: State, c: Coordinate, predicted: FloatArray) -> FloatArray:
+    """(rows,) derivative of the prediction by one coordinate, by a difference.
+
+    Args:
+        system: the equations.
+        state: where.
+        c: the coordinate.
+        predicted: (rows,) there.
+    """
+    step = _inward(c)
+    other = state.moved(c, c.value + step)
+    only = other.every[c.index] if c.index >= 0 else None
+    changed = system.predict(other.every, other.scales, only, predicted)
+    return clean(system, changed - predicted) / step
 
 
 def clean(system: System, change: FloatArray) -> FloatArray:
@@ -147,10 +166,8 @@ def clean(system: System, change: FloatArray) -> FloatArray:
 
 def solve(columns: FloatArray, residual: FloatArray, coordinates: list[Coordinate]) -> FloatArray:
     """(k,) the step that leaves least within the bounds (active set)."""
-    prior = np.array([_prior(c) for c in coordinates])
-    pull = np.array([p * (c.centre - c.value) for p, c in zip(prior, coordinates, strict=True)])
-    normal = columns.T @ columns + np.diag(prior)
-    right = columns.T @ residual + pull
+    normal = columns.T @ columns + np.diag([c.precision for c in coordinates])
+    right = columns.T @ residual + np.array([c.pull for c in coordinates])
     low = np.array([c.lower - c.value for c in coordinates])
     high = np.array([c.upper - c.value for c in coordinates])
     return bounded_solution(
@@ -234,7 +251,3 @@ def correlation_length(system: System, residual: FloatArray, group: Group) -> fl
     end = int(below[0]) if below.size else rho.size
     longest = len_of(system, group) / (4.0 * stretches)
     return float(max(1.0, min(1.0 + 2.0 * rho[1:end].sum(), longest)))
-
-
-def _prior(c: Coordinate) -> float:
-    return 0.0 if c.prior is None else 1.0 / c.prior**2

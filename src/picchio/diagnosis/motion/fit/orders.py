@@ -76,8 +76,7 @@ class Spectrum:
     @property
     def strength(self) -> FloatArray:
         """(k,) power over its neighbourhood's, in the record in which it is most."""
-        found: FloatArray = np.max([lines.ratio for lines in self.records], axis=0)
-        return found
+        return np.asarray(np.max([lines.ratio for lines in self.records], axis=0))
 
     def noise(self, order: float) -> float:
         """Power of a sample's noise as a line at this order sees it, N^2 m^2 or N^2.
@@ -153,8 +152,7 @@ def _without(angle: FloatArray, values: FloatArray, order: float, step: float) -
     near = order + step * np.linspace(-1.0, 1.0, 21)
     best = near[int(np.argmax(power_at([(angle, values)], near)))]
     waves = np.column_stack([np.cos(best * angle), np.sin(best * angle)])
-    found: FloatArray = values - waves @ np.linalg.solve(waves.T @ waves, waves.T @ values)
-    return found
+    return np.asarray(values - waves @ np.linalg.solve(waves.T @ waves, waves.T @ values))
 
 
 def _pieces(system: System, residual: FloatArray, joint: str, state: State) -> list[Piece]:
@@ -310,8 +308,7 @@ def _together(evidence: list[FloatArray]) -> FloatArray:
         return every[0]
     tried = np.sum(every > 0.0, axis=0)
     summed = -gamma.logsf(every.sum(axis=0), np.maximum(tried, 1))
-    found: FloatArray = np.maximum(every.max(axis=0), summed) - np.log(tried + 1.0)
-    return found
+    return np.asarray(np.maximum(every.max(axis=0), summed) - np.log(tried + 1.0))
 
 
 def _peaks(spectrum: Spectrum, known: Sequence[float]) -> list[int]:

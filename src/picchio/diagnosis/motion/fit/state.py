@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from lxml import etree
+
+from picchio.diagnosis.motion.data.system import System
 from picchio.model.effects.effect import Effect, Parameter
+from picchio.model.effects.registry import catalogue
+from picchio.model.motion import TORQUE
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.urdf.xml import parse_urdf, read_urdf_bytes
 
 _SMALL = 1e-3
 
@@ -33,6 +40,16 @@ class Coordinate:
     step: float
     prior: float | None = None
     centre: float = 0.0
+
+    @property
+    def precision(self) -> float:
+        """One over the prior's variance; 0 without a prior."""
+        return 0.0 if self.prior is None else 1.0 / self.prior**2
+
+    @property
+    def pull(self) -> float:
+        """How strongly the prior pulls towards its centre."""
+        return self.precision * (self.centre - self.value)
 
 
 @dataclass(frozen=True)
@@ -157,8 +174,7 @@ def with_coordinate(effect: Effect, name: str, value: float) -> Effect:
     """The effect with one parameter set as a fit sees it."""
     if name in effect.inverse:
         value = 1.0 / max(value, _SMALL)
-    bounds = next(p for p in effect.parameters if p.name == name)
-    return effect.with_values(**{name: min(max(value, bounds.lower), bounds.upper)})
+    return effect.bounded(**{name: value})
 
 
 def _step(p: Parameter, value: float, rate: float) -> float:
@@ -169,3 +185,46 @@ def _step(p: Parameter, value: float, rate: float) -> float:
     if p.logarithmic:
         return 1e-3 * value
     return min(1.0, _SMALL * (p.upper - p.lower))
+
+
+def baseline(system: System, tolerance: float) -> State:
+    """The nominal model's state.
+
+    The rigid bodies' torque of each joint may be off by the tolerance of forces: masses are
+    rounded, currents calibrated. Friction that the URDF states is there, but friction is never
+    known beforehand: it is fitted without prior.
+
+    Args:
+        system: the training equations.
+        tolerance: relative standard deviation.
+    """
+    driven = [joint for kind, joint in system.groups if kind == TORQUE]
+    return State(
+        nuisances=stated_friction(system.robot, driven),
+        scales=dict.fromkeys(driven, 1.0),
+        tolerance=tolerance,
+    )
+
+
+def stated_friction(robot: FlexibleRobot, joints: list[str]) -> tuple[Effect, ...]:
+    """The friction that the URDF states for these joints."""
+    root = parse_urdf(read_urdf_bytes(robot.source), robot.source)
+    found: list[Effect] = []
+    for element in root.iter("joint"):
+        name, dynamics = element.get("name"), element.find("dynamics")
+        if name in joints and dynamics is not None:
+            found += _stated(str(name), dynamics)
+    return tuple(found)
+
+
+def _stated(joint: str, dynamics: etree._Element) -> list[Effect]:
+    found = []
+    stated = [(*each, kind) for kind in catalogue().values() for each in kind.urdf.items()]
+    for attribute, parameter, kind in sorted(stated, key=lambda each: each[:2]):
+        try:
+            value = float(dynamics.get(attribute) or 0.0)
+        except ValueError:
+            continue
+        if value > 0.0:
+            found.append(kind(joint, **{parameter: value}))
+    return found

@@ -173,8 +173,7 @@ def _left(power: FloatArray, normal: FloatArray, right: FloatArray,
           solution: FloatArray) -> FloatArray:  # fmt: skip
     """(n,) power that solutions leave, each in its stretch."""
     half = (normal @ solution[:, :, None])[:, :, 0] - 2.0 * right
-    found: FloatArray = np.maximum(0.0, power + np.sum(solution * half, axis=1))
-    return found
+    return np.asarray(np.maximum(0.0, power + np.sum(solution * half, axis=1)))
 
 
 def confidence(differences: FloatArray) -> float:

@@ -11,7 +11,7 @@ from picchio.core.arrays import FloatArray
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit, clean, jacobian
 from picchio.diagnosis.motion.fit.orders import find_orders
-from picchio.diagnosis.motion.fit.state import Coordinate, effect_coordinates
+from picchio.diagnosis.motion.fit.state import Coordinate, effect_coordinates, with_coordinate
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.registry import catalogue, effect_class
@@ -46,19 +46,17 @@ class Candidate:
 
     def started(self, values: tuple[float, ...]) -> Effect:
         """The effect at values of its coordinates."""
-        from picchio.diagnosis.motion.fit.state import with_coordinate
-
         effect = self.effect
         for c, value in zip(self.coordinates, values, strict=True):
             effect = with_coordinate(effect, c.name, float(np.clip(value, c.lower, c.upper)))
         return effect
 
 
-def motion_effects(names: Collection[str] | None = None) -> dict[str, type[Effect]]:
-    """Those of the catalogue that change a motion record."""
+def motion_effects(without: Collection[str] = ()) -> dict[str, type[Effect]]:
+    """Those of the catalogue that change a motion record, less some by name."""
     return {
         name: kind for name, kind in catalogue().items()
-        if kind.shows(motion=True) and (names is None or name in names)
+        if kind.shows(motion=True) and name not in without
     }  # fmt: skip
 
 
@@ -127,22 +125,16 @@ def _trials(system: System, kind: type[Effect], target: str) -> list[dict[str, f
 def _make(system: System, base: Fit, predicted: FloatArray, effect: Effect,
           searched: set[str], around: list[Around]) -> list[Candidate]:  # fmt: skip
     """Derivatives at nothing, by what is not searched for."""
-    inverse = effect.inverse
-    rate = system.logs[0].rate
-    if inverse:
+    state = base.state.with_effect(effect)
+    coordinates = effect_coordinates(effect, len(state.every) - 1, system.logs[0].rate)
+    if effect.inverse:
         # Nothing is an infinite stiffness; the column is what the nominal one does.
-        state = base.state.with_effect(effect)
         changed = system.predict(state.every, state.scales, effect, predicted)
         columns = clean(system, changed - predicted)[:, None]
-        coordinates = effect_coordinates(effect, len(state.every) - 1, rate)
-        kept = [c for c in coordinates if c.name in inverse]
+        kept = [c for c in coordinates if c.name in effect.inverse]
         return [Candidate(effect, columns, kept, np.zeros(1))] if np.any(columns) else []
-    state = base.state.with_effect(effect)
-    index = len(state.every) - 1
-    coordinates = [
-        c for c in effect_coordinates(effect, index, rate) if c.name not in searched
-    ]  # fmt: skip
-    kept, columns = jacobian(system, state, predicted, coordinates, around)
+    varied = [c for c in coordinates if c.name not in searched]
+    kept, columns = jacobian(system, state, predicted, varied, around)
     if not kept:
         return []
     return [Candidate(effect, columns, kept, np.array([c.value for c in kept]), len(searched))]

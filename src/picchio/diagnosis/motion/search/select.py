@@ -1,4 +1,7 @@
-"""Effects are added one after the other, then those that are not needed are taken out again."""
+"""Effects are added one after the other, then those that are not needed are taken out again.
+
+Last, which other effects would do as well as one that was found.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from picchio.diagnosis.motion.criteria.necessity import necessity, passes
-from picchio.diagnosis.motion.criteria.score import Score, Scorer
+from picchio.diagnosis.motion.criteria.score import (
+    Score,
+    Scorer,
+    contribution,
+    indistinguishable,
+    necessity,
+    passes,
+)
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit, fit, row_weights
 from picchio.diagnosis.motion.fit.state import State
@@ -85,7 +94,9 @@ def _forward(system: System, current: Fit, pool: Mapping[str, type[Effect]],
     for _ in range(rounds if pool else 0):
         scored = score_all(system, current, pool)
         chosen = choose(scored)
-        steps.append(_step(current, scored, chosen))
+        levels = {".".join(group): level for group, level in current.level.items()}
+        table = tuple(describe(*pair) for pair in scored[:20])
+        steps.append(Step(tuple(c.label for _, c in chosen), levels, table))
         if not chosen:
             break
         state = current.state
@@ -197,12 +208,6 @@ def eliminate(system: System, current: Fit) -> Fit:
     return current
 
 
-def _step(current: Fit, scored: list[Scored], chosen: list[Scored]) -> Step:
-    table = tuple(describe(score, candidate) for score, candidate in scored[:20])
-    levels = {".".join(group): level for group, level in current.level.items()}
-    return Step(tuple(c.label for _, c in chosen), levels, table)
-
-
 def describe(score: Score, candidate: Candidate) -> dict[str, Any]:
     """A score as a row of the report."""
     effect = candidate.started(score.values)
@@ -217,3 +222,40 @@ def describe(score: Score, candidate: Candidate) -> dict[str, Any]:
         "confidence": score.confidence,
         "admissible": score.admissible,
     }
+
+
+def alternatives(
+    system: System, current: Fit, kinds: Mapping[str, type[Effect]]
+) -> dict[int, list[tuple[str, str]]]:
+    """Number of an effect of the fit -> those that the training records can't tell from it.
+
+    A rival takes the effect's place beside all others. It can't be told apart where it is
+    nearly as likely, or where its losses are not of one sign over the stretches held out.
+    """
+    slow = {name: kind for name, kind in kinds.items() if not kind.periodic}
+    scorer = Scorer(system, current)
+    found: dict[int, list[tuple[str, str]]] = {}
+    for index, effect in enumerate(current.state.effects):
+        if effect.periodic:
+            continue
+        score = necessity(scorer, index)
+        own, part = contribution(current, index)
+        if score is None:
+            continue
+        back = current.columns[:, own] @ part
+        # Derivatives are those without the effect: a gain would else scale its rival with it.
+        state = current.state.without(index)
+        residual = system.measured - system.predict(state.every, state.scales)
+        without = replace(current, state=state, residual=residual)
+        near = effect.target if effect.target_kind == "joint" else None
+        for candidate in candidates(system, without, slow, near):
+            other = scorer.score(candidate.columns, candidate.coordinates, candidate.neutral,
+                                 searched=candidate.searched, without=own, back=back)  # fmt: skip
+            if other is None or not passes(other) or not set(other.groups) & set(score.groups):
+                continue
+            same = candidate.label == (effect.name, effect.target)
+            if not same and indistinguishable(score, other):
+                known = found.setdefault(index, [])
+                if candidate.label not in known:
+                    known.append(candidate.label)
+    return found

@@ -44,10 +44,10 @@ def time_by_ripple(system: System, current: Fit, delay: type[Effect]) -> Fit:
     steps = int(_LONGEST / (_FINEST * period))
     best: tuple[float, State] | None = None
     pieces = _pieces(system, state, groups)
-    before = _left(pieces, state, 0.0)
+    before = _left(pieces, 0.0)
     for number in range(-steps, steps + 1):
         late = number * _FINEST * period
-        after = _left(pieces, state, late)
+        after = _left(pieces, late)
         cost = _gain(system, current, before, after, groups)
         if number and (best is None or cost > best[0]):
             target = TORQUE if late > 0.0 else next(iter(angles))
@@ -58,15 +58,13 @@ def time_by_ripple(system: System, current: Fit, delay: type[Effect]) -> Fit:
 
 
 def _shortest_period(system: System, state: State) -> float:
-    fastest = 0.0
-    for e in state.effects:
-        if e.periodic:
-            for p in system.predictors:
-                if e.target in p.log.moving:
-                    speed = float(np.abs(p.nominal.velocity[e.target]).max())
-                    turns = e.values["order"] * p.nominal.gear_ratio[e.target]
-                    fastest = max(fastest, speed * turns / (2.0 * np.pi))
-    return 1.0 / max(fastest, 1.0)
+    fastest = 1.0
+    for effect in (e for e in state.effects if e.periodic):
+        for nominal in (p.nominal for p in system.predictors if effect.target in p.log.moving):
+            speed = float(np.abs(nominal.velocity[effect.target]).max())
+            turns = effect.values["order"] * nominal.gear_ratio[effect.target]
+            fastest = max(fastest, speed * turns / (2.0 * np.pi))
+    return 1.0 / fastest
 
 
 def _pieces(system: System, state: State, groups: list) -> list:
@@ -89,7 +87,7 @@ def _pieces(system: System, state: State, groups: list) -> list:
     return found
 
 
-def _left(pieces: list, state: State, late: float) -> dict:
+def _left(pieces: list, late: float) -> dict:
     """Group -> power that its ripples leave, with torques late by `late` s."""
     left = {}
     for group, orders, parts in pieces:

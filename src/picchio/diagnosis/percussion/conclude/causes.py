@@ -11,8 +11,7 @@ import numpy as np
 from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.life import Uncertain
-from picchio.diagnosis.percussion.criteria.bic import bic
-from picchio.diagnosis.percussion.criteria.confidence import confidence
+from picchio.diagnosis.percussion.criteria.equivalence import bic, confidence
 from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_range
 from picchio.diagnosis.percussion.criteria.pose_consistency import jackknife_covariance
 from picchio.diagnosis.percussion.data.problem import Problem
@@ -20,7 +19,7 @@ from picchio.diagnosis.percussion.fit.drawn import width_spread
 from picchio.diagnosis.percussion.fit.least_squares import Fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.state import EXACT, Search, Trial
-from picchio.diagnosis.result import Cause, Value
+from picchio.diagnosis.result import Cause, Value, unit_of
 from picchio.model.effects.effect import CHANNEL_UNIT, Effect
 from picchio.robot.flexible_robot import FlexibleRobot
 
@@ -65,7 +64,10 @@ def fitted_values(problem: Problem, whole: Fit, effect: Effect) -> dict[str, Val
                 std = abs(unknown.slope(vector[k])) * math.sqrt(max(variance[k], 0.0))
                 std = max(std, _unconstrained(problem, whole, k))
         if effect.latent is not None and p.name == effect.latent.spread:
-            std = _width_spread(whole, effect)
+            drawn = {label: (fall, count) for label, fall, count in whole.hypothesis.drawn}
+            std = 0.0
+            if effect.label in drawn:
+                std = width_spread(effect.values[p.name], *drawn[effect.label])
         values[p.name] = Value(effect.values[p.name], std, _unit(whole, effect, p.name))
     return values
 
@@ -91,14 +93,6 @@ def _unit(whole: Fit, effect: Effect, parameter: str) -> str:
     return "1"
 
 
-def _width_spread(whole: Fit, effect: Effect) -> float:
-    for label, fall, count in whole.hypothesis.drawn:
-        if label == effect.label:
-            width = effect.values[effect.latent.spread] if effect.latent is not None else 0.0
-            return width_spread(width, fall, count)
-    return 0.0
-
-
 def reported_covariance(whole: Fit) -> FloatArray:
     """(unknowns, unknowns) of the transformed unknowns, as it is told.
 
@@ -113,15 +107,18 @@ def reported_covariance(whole: Fit) -> FloatArray:
         if effect.label in hypothesis.labels and covariance[k, k] > 0.0:
             neutral = next(p.neutral for p in effect.parameters if p.name == unknown.name)
             slope = abs(unknown.slope(vector[k]))
-            left = _inexact(effect.values[unknown.name], neutral)
+            # What the forward model's own inexactness leaves open: a share of the effect's size.
+            from_neutral = effect.values[unknown.name] - (
+                neutral if math.isfinite(neutral) else 0.0
+            )
+            left = EXACT * abs(from_neutral)
             covariance[k, k] += (left / slope) ** 2 if slope > 0.0 else 0.0
     return covariance
 
 
 def fitted_spread(whole: Fit) -> Uncertain:
     """How well all values of a fit are known, for the life."""
-    hypothesis = whole.hypothesis
-    return _uncertain(hypothesis, reported_covariance(whole))
+    return _uncertain(whole.hypothesis, reported_covariance(whole))
 
 
 def nominal_spread(robot: FlexibleRobot, tolerance: Tolerance) -> Uncertain:
@@ -140,11 +137,6 @@ def _uncertain(hypothesis: Hypothesis, covariance: FloatArray) -> Uncertain:
         np.array([u.lower for u in unknowns]),
         np.array([u.upper for u in unknowns]),
     )
-
-
-def _inexact(value: float, neutral: float) -> float:
-    """What the forward model's own inexactness leaves open: its share of the effect's size."""
-    return EXACT * abs(value - (neutral if math.isfinite(neutral) else 0.0))
 
 
 def _confidence(
@@ -191,8 +183,7 @@ def fitted_nuisances(found: Fit) -> dict[str, Value]:
         key = effect.tolerance
         scale, std = math.exp(vector[k]), math.exp(vector[k]) * math.sqrt(covariance[k, k])
         if key == "stiffness":
-            prismatic = robot.tree.joints.get(effect.target)
-            unit = "N/m" if prismatic is not None and prismatic.type == "prismatic" else "N*m/rad"
+            unit = unit_of(robot, effect.target, "N*m/rad")
             size, name = float(nominal[effect.target]), f"stiffness.{effect.target}"
         else:
             size, unit = (ratio, "1") if key == "damping_ratio" else (force, "N")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
@@ -29,8 +29,10 @@ def holdout_gain(
     judged = list(kept) or list(train)
     signal, floor = 0.0, 0
     for record in judged:
-        for values in _centred(record):
-            signal += float(np.mean(values**2))
+        for channel in record.channels:
+            values = record.values[channel.name]
+            offset = values.mean() if channel.kind.free_offset else 0.0
+            signal += float(np.mean(((values - offset) / record.noise[channel.name].std) ** 2))
             floor += 1
     signal = max(signal, 1e-300)
     return Gain(
@@ -41,15 +43,6 @@ def holdout_gain(
         float(np.sqrt(floor / signal)),
         floor,
     )
-
-
-def _centred(record: MeasuredRecord) -> list[np.ndarray]:
-    kinds = {c.name: c.kind for c in record.setup.channels}
-    rows = []
-    for name, values in record.values.items():
-        offset = values.mean() if kinds[name].free_offset else 0.0
-        rows.append((values - offset) / record.noise[name].std)
-    return rows
 
 
 def _mean_square(
@@ -75,8 +68,5 @@ def _own_latent(
             e.with_hidden({**e.hidden, **own.hidden}) if e.label == effect.label else e
             for e in hypothesis.effects
         )
-        hypothesis = Hypothesis(
-            effects, hypothesis.tolerance, hypothesis.n_nuisances, hypothesis.freed,
-            hypothesis.scales,
-        )  # fmt: skip
+        hypothesis = replace(hypothesis, effects=effects, drawn=(), priors=())
     return hypothesis

@@ -59,7 +59,12 @@ def _doubted(causes: Sequence[Cause]) -> list[Cause]:
 def why_not_claimed(causes: Sequence[Cause], common: Sequence[str]) -> str:
     """Why no cause is claimed though they leave noise."""
     if common:
-        return _why_common(common)
+        said = " and ".join(name.replace("_", " ") for name in common)
+        return (
+            f"{said} would explain it, but by the same amount in all sensors: then it is not they "
+            "that are wrong but something before them, in the blows or in the clock that starts "
+            "the records, which no known cause describes; a force sensor at the tool would tell"
+        )
     doubted = _doubted(causes)
     if not doubted:
         return ""
@@ -71,15 +76,6 @@ def why_not_claimed(causes: Sequence[Cause], common: Sequence[str]) -> str:
         f"{len(causes)} causes together leave nothing but noise, but {said} is not beyond doubt, "
         "and several causes are named only where each of them is: they may imitate another one "
         "that is not known"
-    )
-
-
-def _why_common(names: Sequence[str]) -> str:
-    said = " and ".join(name.replace("_", " ") for name in names)
-    return (
-        f"{said} would explain it, but by the same amount in all sensors: then it is not they that "
-        "are wrong but something before them, in the blows or in the clock that starts the "
-        "records, which no known cause describes; a force sensor at the tool would tell"
     )
 
 

@@ -1,7 +1,8 @@
-"""Equivalence: by how much one explanation is worse than another, where few records leave several.
+"""Equivalence: how fits are compared, and when one explanation is as good as another.
 
-BIC takes every number to be known the better, the more samples there are. Numbers that these
-records say nothing of cost nothing: what they leave open is no reason to drop a cause.
+By BIC, and by how sure it is, pose by pose, that one is better. BIC takes every number to be known
+the better, the more samples there are; but numbers that few records say nothing of cost nothing:
+what they leave open is no reason to drop a cause.
 """
 
 from __future__ import annotations
@@ -11,16 +12,61 @@ from collections.abc import Sequence, Set
 
 import numpy as np
 
-from picchio.diagnosis.percussion.criteria.bic import SAME, bic
 from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_range
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.fit.drawn import hidden_cost
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
+from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import effect_class
 
+# Sets whose BIC is within this cannot be told apart.
+SAME = 10.0
+_DECISIVE = 60.0
+_CHANCE = 2.0
 _PARALLEL = 1.0 - 1e-9
 # What is known of a cause's number beforehand, in typical sizes or e-folds: hardly anything.
 _VAGUE = 3.0
+
+
+def bic(found: Fit) -> float:
+    """BIC: chi-square and priors, plus ln(samples) for every number the causes hold.
+
+    What numbers drawn anew in every record cost is in `drawn_cost`.
+    """
+    causes = found.hypothesis.causes
+    numbers = sum(_numbers(effect) for effect in causes)
+    hidden = hidden_cost(found.hypothesis, len(found.records), found.samples)
+    return found.cost + numbers * math.log(max(found.samples, 2)) + hidden
+
+
+def _numbers(effect: Effect) -> int:
+    return 1 if effect.latent is not None or effect.discrete else len(effect.parameters)
+
+
+def confidence(better: Fit, other: Fit) -> float:
+    """That a fit is better than another one of the same records.
+
+    From the differences of the poses' scores and their spread (Student's t). A single pose has no
+    spread: what it says counts only where it decides beyond doubt on its own.
+
+    Args:
+        better: the one with less left.
+        other: the rival.
+    """
+    from scipy.stats import t as student
+
+    poses = sorted({r.pose for r in better.records})
+    difference = np.zeros(len(poses))
+    for record, a, b in zip(better.records, better.residuals, other.residuals, strict=True):
+        difference[poses.index(record.pose)] += float((b * b).sum() - (a * a).sum())
+    if len(poses) < 2:
+        return 1.0 if difference.sum() > _DECISIVE else 0.5
+    # A pose that decides beyond doubt on its own counts as one: how far beyond says nothing.
+    difference = np.clip(difference, -_DECISIVE, _DECISIVE)
+    total, spread = difference.mean(), difference.std(ddof=1) / math.sqrt(len(poses))
+    # What chance alone moves a pose's score by: that of log-likelihoods a few units apart.
+    spread = math.hypot(spread, _CHANCE / math.sqrt(len(poses)))
+    return float(student.cdf(total / spread, len(poses) - 1))
 
 
 def bic_difference(problem: Problem, best: Fit, other: Fit) -> float:
@@ -48,14 +94,12 @@ def _in_series(labels: Set[str], records: Sequence[MeasuredRecord]) -> bool:
     springs = [effect_class(name).yields_along(target) for name, target in pairs]
     if len(springs) != 2 or not all(springs):
         return False
-    return all(_moves_alike(record, *springs) for record in records)
-
-
-def _moves_alike(record: MeasuredRecord, joint: str, axis: str) -> bool:
-    geometry = record.setup.geometry
-    jacobian = geometry.motion(geometry.robot.tool_point).jacobian
-    a, b = (jacobian[:, geometry.chain.index(name)] for name in (joint, axis))
-    return bool(abs(a @ b) >= _PARALLEL * np.linalg.norm(a) * np.linalg.norm(b))
+    for geometry in {record.setup.geometry for record in records}:
+        jacobian = geometry.motion(geometry.robot.tool_point).jacobian
+        a, b = (jacobian[:, geometry.chain.index(name)] for name in springs)
+        if abs(a @ b) < _PARALLEL * np.linalg.norm(a) * np.linalg.norm(b):
+            return False
+    return True
 
 
 def _effective_parameters(problem: Problem, found: Fit) -> float:

@@ -109,7 +109,8 @@ def whiteness_test(problem: Problem, found: Fit) -> Evidence:
             errors.setdefault(group, []).append(record.noise[name].error)
             total += float((row[first:] ** 2).sum())
             count += row.size - first
-    bands, poses = [], []
+    bands: list[Level] = []
+    poses: list[Level] = []
     for group, entries in powers.items():
         error = 2.0 * float(np.mean(errors[group])) / np.sqrt(_channels_of(problem, group))
         lowest = min(float(f[0]) for _, f, _ in entries)
@@ -120,14 +121,11 @@ def whiteness_test(problem: Problem, found: Fit) -> Evidence:
         for low, up in zip(edges[:-1], edges[1:], strict=True):
             picked = [s[(f > low) & (f <= up)] for _, f, s in entries]
             unsure = float(np.hypot(error, colour(0.5 * (low + up))))
-            level = _level(group, f"{low:.3g}-{up:.3g} Hz", picked, unsure)
-            if level is not None:
-                bands.append(level)
+            bands += _level(group, f"{low:.3g}-{up:.3g} Hz", picked, unsure)
         for pose in sorted({p for p, _, _ in entries}):
             picked = [s[f <= high] for p, f, s in entries if p == pose]
-            level = _level(group, f"pose {pose + 1}", picked, np.hypot(error, colour(0.5 * high)))
-            if level is not None:
-                poses.append(level)
+            unsure = float(np.hypot(error, colour(0.5 * high)))
+            poses += _level(group, f"pose {pose + 1}", picked, unsure)
     return Evidence(tuple(bands), tuple(poses), total / max(count, 1))
 
 
@@ -153,13 +151,14 @@ def _colour(problem: Problem, group: str) -> Callable[[float], float]:
     return unsure
 
 
-def _level(group: str, part: str, picked: Sequence[FloatArray], error: float) -> Level | None:
+def _level(group: str, part: str, picked: Sequence[FloatArray], error: float) -> list[Level]:
+    """The level of one part; none where there is too little."""
     values = np.concatenate(picked) if picked else np.zeros(0)
     if values.size < 8:
-        return None
+        return []
     power = float(values.mean())
     scatter = float(np.sqrt(1.0 / values.size + error**2 + _MODEL_FLOOR**2))
-    return Level(group, part, power, standard_deviations(power, scatter))
+    return [Level(group, part, power, standard_deviations(power, scatter))]
 
 
 def standard_deviations(power: float, scatter: float) -> float:

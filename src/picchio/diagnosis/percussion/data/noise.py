@@ -16,6 +16,7 @@ from picchio.core.arrays import FloatArray
 from picchio.measurement.noise.autoregression import AutoRegression
 from picchio.measurement.noise.hum import Line
 from picchio.measurement.noise.level import Noise
+from picchio.measurement.noise.ringdown import MAINS
 from picchio.prediction.percussion import PercussionSetup
 
 # Fewer quiet samples a channel than this say too little.
@@ -23,7 +24,6 @@ LEAST_SAMPLES = 120
 _ORDER = 24
 _LONGEST = 400
 _SMALL = 2e-3
-_MAINS = (50.0, 60.0)
 # A line in the quiet time is one where chance would make it once in a million channels.
 _LINE = 30.0
 
@@ -150,7 +150,7 @@ def _hum(channels: Mapping[str, list[FloatArray]], step: float) -> dict[str, lis
     """Lines of the mains, by the power at their frequency against that beside it."""
     found: dict[str, list[Line]] = {}
     for name, pieces in channels.items():
-        for frequency in _MAINS:
+        for frequency in MAINS:
             if frequency > 0.4 / step:
                 continue
             here, beside = [], []
@@ -172,7 +172,7 @@ def _hum(channels: Mapping[str, list[FloatArray]], step: float) -> dict[str, lis
             if ratio > _LINE + 2.0 * len(pieces):
                 gain = float(np.mean([np.hanning(p.size).sum() for p in pieces]))
                 amplitude = 2.0 * float(np.sqrt(np.mean(here))) / gain
-                found.setdefault(name, []).append(Line(frequency, amplitude, 0.0))
+                found.setdefault(name, []).append(Line(frequency, amplitude))
     return found
 
 

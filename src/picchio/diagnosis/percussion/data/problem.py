@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import itertools
+import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
 
 from picchio.campaign.campaign import Campaign
+from picchio.campaign.channels import Channel
 from picchio.core.arrays import BoolArray, FloatArray
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.core.recent import Recent
+from picchio.diagnosis.percussion.data.noise import quiet_noise
 from picchio.excitation.piecewise import PiecewiseForce
+from picchio.measurement.noise.estimate import noise_levels
 from picchio.measurement.noise.level import Noise
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
@@ -31,6 +36,63 @@ _MARGIN = 2e-5
 _SMEARED = 0.5
 _ON_EDGE = 1e-7
 _SMALL_JUMP = 0.05
+_KEPT_EDGES = 8
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredRecord:
+    """One record to be explained.
+
+    Attributes:
+        setup: what is needed to predict it.
+        values: channel -> (m,) SI.
+        noise: channel -> its noise at the record's rate.
+        pose: number of its pose among the campaign's.
+    """
+
+    setup: PercussionSetup
+    values: Mapping[str, FloatArray]
+    noise: Mapping[str, Noise]
+    pose: int
+    _cuts: dict[float, PercussionSetup] = field(default_factory=dict)
+    _edges: Recent[dict[str, BoolArray] | None] = field(default_factory=lambda: Recent(_KEPT_EDGES))
+    _fillers: dict[str, FloatArray] = field(default_factory=dict)
+    _pinned: list[dict[str, BoolArray] | None] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        """Its file."""
+        return self.setup.name
+
+    @cached_property
+    def channels(self) -> list[Channel]:
+        """The channels of `values`, in their order."""
+        known = {channel.name: channel for channel in self.setup.channels}
+        return [known[name] for name in self.values]
+
+    def filler(self, channel: str) -> FloatArray:
+        """(m,) of +-1 without a pattern, always the same: in place of what is not known.
+
+        Args:
+            channel: its name.
+        """
+        if channel not in self._fillers:
+            seed = zlib.crc32(f"{self.name}/{channel}".encode())
+            signs = np.random.default_rng(seed).integers(0, 2, self.setup.samples.count)
+            self._fillers[channel] = 2.0 * signs - 1.0
+        return self._fillers[channel]
+
+    def until(self, end: float | None) -> PercussionSetup:
+        """The setup up to a time, s.
+
+        Args:
+            end: s; None for all of the record.
+        """
+        if end is None or end >= self.setup.samples.last:
+            return self.setup
+        if end not in self._cuts:
+            self._cuts[end] = self.setup.cut(end)
+        return self._cuts[end]
 
 
 def near_edges(setup: PercussionSetup, model: Model) -> dict[str, BoolArray] | None:
@@ -89,7 +151,6 @@ class Problem:
     Args:
         robot: the robot as its files have it.
         campaign: the records.
-        noise: channel -> noise; estimated from the campaign where None.
         gravity_stiffness: whether gravity's change with the deflection counts.
         workers: processes for what is independent; as many as cores where None.
 
@@ -101,7 +162,6 @@ class Problem:
         self,
         robot: FlexibleRobot,
         campaign: Campaign,
-        noise: Mapping[str, Noise] | None = None,
         *,
         gravity_stiffness: bool = True,
         workers: int | None = 1,
@@ -113,8 +173,7 @@ class Problem:
         self.model = Model(robot, gravity_stiffness)
         setups = percussion_setups(robot, campaign)
         values = [campaign[s.name].read([c.name for c in s.channels]) for s in setups]
-        noise = dict(noise) if noise is not None else _noise(campaign, setups, values)
-        self.noise = noise
+        self.noise = noise = _noise(campaign, setups, values)
         poses: dict[bytes, int] = {}
         self.records: list[MeasuredRecord] = []
         for setup, data in zip(setups, values, strict=True):
@@ -248,12 +307,8 @@ def _noise(
     values: Sequence[Mapping[str, FloatArray]],
 ) -> dict[str, Noise]:
     """From the quiet time where there is enough of it, else from all that can be used."""
-    from picchio.diagnosis.percussion.data.noise import quiet_noise
-
     found = quiet_noise(setups, values)
     if any(c.name not in found for s in setups for c in s.channels):
-        from picchio.measurement.noise.estimate import noise_levels
-
         found = {**noise_levels(campaign), **found}
     return found
 
@@ -336,3 +391,28 @@ def _kept_edges(
         return None if fixed is None else {g: mask[:count] for g, mask in fixed.items()}
     key = (setup.samples, model.key("blows", "sensor"))
     return record._edges.get(key, lambda: near_edges(setup, model))
+
+
+# Which records a model is fitted to, and which it is judged on.
+
+# One pose of so many is held out.
+_EVERY = 3
+
+Split = tuple[list[MeasuredRecord], list[MeasuredRecord]]
+
+
+def held_out(problem: Problem) -> list[Split]:
+    """Ways to choose records to fit and records held out, the usual one first.
+
+    Whole poses are held out, every third; of fewer poses every third record; of fewer records none.
+    """
+    ways: list[Split] = []
+    for offset in reversed(range(_EVERY)):
+        if problem.n_poses >= _EVERY:
+            kept = [r for r in problem.records if r.pose % _EVERY == offset]
+        elif len(problem.records) >= _EVERY:
+            kept = problem.records[offset::_EVERY]
+        else:
+            return [(list(problem.records), [])]
+        ways.append(([r for r in problem.records if r not in kept], kept))
+    return ways

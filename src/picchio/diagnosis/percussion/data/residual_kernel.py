@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from numba import njit
 
+from picchio.measurement.noise.whiten_kernel import whiten
+
 
 @njit(cache=True, nogil=True)
 def whitened(measured, predicted, offset, unknown, filler, predictors, deviation, room, out):
@@ -12,20 +14,14 @@ def whitened(measured, predicted, offset, unknown, filler, predictors, deviation
 
     measured and predicted are (m,) or longer; `offset` is subtracted, too. Where unknown (m,) or
     (0,) holds, the difference counts as none before the filter, and `filler` stands after it.
-    predictors (p + 1, p) and deviation (p + 1,) are as in
-    `picchio.measurement.noise.whiten_kernel`; room is (m,). Into `out` (m,).
+    predictors (p + 1, p) and deviation (p + 1,) are as in `whiten`; room is (m,). Into `out` (m,).
     """
-    order = predictors.shape[1]
     masked = unknown.size > 0
     for i in range(out.size):
         room[i] = measured[i] - predicted[i] - offset
         if masked and unknown[i]:
             room[i] = 0.0
-        known = min(i, order)
-        left = room[i]
-        for k in range(known):
-            left -= predictors[known, k] * room[i - 1 - k]
-        out[i] = left / deviation[known]
+    whiten(room, predictors, deviation, out)
     if masked:
         for i in range(out.size):
             if unknown[i]:

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from picchio.core.arrays import BoolArray, FloatArray
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.data.problem import Problem, take_out
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, take_out
 from picchio.diagnosis.percussion.fit.least_squares import (
     HOPELESS,
     Fit,
     bounded_step,
     fit,
+    from_prior,
+    jacobian,
     prior_cost,
     prior_weights,
 )
-from picchio.diagnosis.percussion.fit.slopes import jacobian
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.model.effects.effect import Effect, Latent
 
@@ -49,12 +49,6 @@ def drawn_cost(fall: float, count: int, samples: int) -> float:
     return count * min(1.0 + math.log(fall / count), math.log(max(samples, 2)))
 
 
-def with_drawn(hypothesis: Hypothesis, label: str, fall: float, count: int) -> Hypothesis:
-    """The hypothesis with what an effect's drawn numbers gain written down."""
-    others = tuple(item for item in hypothesis.drawn if item[0] != label)
-    return replace(hypothesis, drawn=(*others, (label, fall, count)))
-
-
 def width_spread(width: float, fall: float, count: int) -> float:
     """Standard deviation of the width of a distribution, from numbers drawn from it.
 
@@ -70,30 +64,27 @@ def width_spread(width: float, fall: float, count: int) -> float:
 
 # The numbers of every record.
 
-Hidden = Mapping[str, tuple[float, ...]]
+
+def _drawn_by(effect: Effect) -> Latent:
+    assert effect.latent is not None
+    return effect.latent
 
 
 def hidden_columns(problem: Problem, known: Fit, effect: Effect) -> list[FloatArray]:
     """The residual's change with every free number that an effect draws, per record."""
-    latent = effect.latent
-    assert latent is not None
-    current = hidden_numbers(known, effect)
-    step = latent.step
+    latent, current = _drawn_by(effect), hidden_numbers(known, effect)
     found: list[list[FloatArray]] = [[] for _ in known.records]
     for k in range(latent.first, max(numbers.size for numbers in current.values())):
         hidden = {}
         for name, numbers in current.items():
             moved = numbers.copy()
-            moved[k : k + 1] += step
-            hidden[name] = tuple(moved)
-        there = problem.residuals(
-            with_hidden(known.hypothesis, effect, hidden).effects, known.records, known.end
-        )
-        for i, (record, new, old) in enumerate(
-            zip(known.records, there, known.residuals, strict=True)
-        ):
+            moved[k : k + 1] += latent.step
+            hidden[name] = moved
+        effects = with_hidden(known.hypothesis, effect, hidden).effects
+        there = problem.residuals(effects, known.records, known.end)
+        for own, record, new, old in zip(found, known.records, there, known.residuals, strict=True):
             if k < current[record.name].size:
-                found[i].append(((new - old) / step).ravel())
+                own.append(((new - old) / latent.step).ravel())
     return [
         np.stack(columns, axis=1) if columns else np.zeros((r.size, 0))
         for columns, r in zip(found, known.residuals, strict=True)
@@ -110,8 +101,7 @@ def current_hidden(hypothesis: Hypothesis, label: str) -> dict[str, tuple[float,
 
 def hidden_numbers(here: Fit, effect: Effect) -> dict[str, FloatArray]:
     """Every record's hidden numbers, 0 where none are known."""
-    current, latent = current_hidden(here.hypothesis, effect.label), effect.latent
-    assert latent is not None
+    current, latent = current_hidden(here.hypothesis, effect.label), _drawn_by(effect)
     return {
         r.name: np.array(
             current.get(r.name, np.zeros(latent.size(int(r.setup.blows.hit.max()) + 1))),
@@ -122,13 +112,13 @@ def hidden_numbers(here: Fit, effect: Effect) -> dict[str, FloatArray]:
 
 
 def with_hidden(
-    hypothesis: Hypothesis, effect: Effect, hidden: Mapping[str, tuple[float, ...]]
+    hypothesis: Hypothesis, effect: Effect, hidden: Mapping[str, Iterable[float]]
 ) -> Hypothesis:
     """With an effect's hidden numbers (record -> numbers), and the effect if it was not there."""
-    label = effect.label
-    effects = tuple(e.with_hidden(hidden) if e.label == label else e for e in hypothesis.effects)
+    label, frozen = effect.label, {name: tuple(numbers) for name, numbers in hidden.items()}
+    effects = tuple(e.with_hidden(frozen) if e.label == label else e for e in hypothesis.effects)
     if label not in {e.label for e in hypothesis.effects}:
-        effects = (*effects, effect.with_hidden(hidden))
+        effects = (*effects, effect.with_hidden(frozen))
     return replace(hypothesis, effects=effects)
 
 
@@ -183,21 +173,17 @@ _MOVES = 3
 _REFIT = (1, 2, 4, 8)
 
 
-def blow_by_blow(
-    problem: Problem,
-    start: Fit,
-    hypothesis_with: Callable[[Hypothesis, Hidden], Hypothesis],
-) -> Hypothesis:
+def blow_by_blow(problem: Problem, start: Fit, effect: Effect) -> Hypothesis:
     """The blows' times of every record, and the rest fitted to them.
 
     Args:
         problem: data and noise.
         start: what is known so far; its records and its end are used.
-        hypothesis_with: (hypothesis, record -> (hits,) s) -> the hypothesis with these times.
+        effect: whose hidden numbers the times are.
     """
     records = start.records
     late = {r.name: np.zeros(int(r.setup.blows.hit.max()) + 1) for r in records}
-    here = hypothesis_with(start.hypothesis, _frozen(late))
+    here = with_hidden(start.hypothesis, effect, late)
     for hit in range(1, max(numbers.size for numbers in late.values())):
         struck = [r for r in records if hit < late[r.name].size]
         first = min((hit - _SPAN) * r.setup.blows.interval for r in struck)
@@ -205,17 +191,17 @@ def blow_by_blow(
             break
         if hit in _REFIT:
             here = fit(problem, here, records, first, iterations=3).hypothesis
-        found = _best_times(problem, here, hypothesis_with, struck, late, hit)
+        found = _best_times(problem, here, effect, struck, late, hit)
         for record, time in zip(struck, found, strict=True):
             late[record.name][hit] = time
-        here = hypothesis_with(here, _frozen(late))
+        here = with_hidden(here, effect, late)
     return here
 
 
 def _best_times(
     problem: Problem,
     here: Hypothesis,
-    hypothesis_with: Callable[[Hypothesis, Hidden], Hypothesis],
+    effect: Effect,
     struck: Sequence[MeasuredRecord],
     late: Mapping[str, FloatArray],
     hit: int,
@@ -233,7 +219,7 @@ def _best_times(
         for record, time in zip(struck, times, strict=True):
             trial[record.name] = late[record.name].copy()
             trial[record.name][hit] = time
-        return hypothesis_with(here, _frozen(trial))
+        return with_hidden(here, effect, trial)
 
     def cost(times: FloatArray) -> FloatArray:
         there = problem.residuals(at(times).effects, struck, end)
@@ -310,10 +296,6 @@ def _refined(
     return middle
 
 
-def _frozen(late: Mapping[str, FloatArray]) -> dict[str, tuple[float, ...]]:
-    return {name: tuple(float(x) for x in numbers) for name, numbers in late.items()}
-
-
 _ROUNDS = 6
 _SHARES = (1.0, 0.5, 0.25, 0.1)
 _CONVERGED = 1e-4
@@ -333,14 +315,13 @@ def fit_latent(problem: Problem, start: Fit, effect: Effect, rival: float = np.i
         effect: one that draws numbers; it is found in the hypothesis by its label, or added.
         rival: cost of what does as well.
     """
-    latent = effect.latent
-    assert latent is not None
+    latent = _drawn_by(effect)
     if latent.linear:
         return _priced_solved(problem, start, effect)
     here = start
     known_in = set(current_hidden(start.hypothesis, effect.label))
     if latent.times and not {r.name for r in start.records} <= known_in:
-        begun = blow_by_blow(problem, start, lambda old, late: with_hidden(old, effect, late))
+        begun = blow_by_blow(problem, start, effect)
         here = fit(problem, begun, start.records, start.end, iterations=2)
     for turn in range(_ROUNDS):
         before = here.cost
@@ -356,8 +337,7 @@ def fit_latent(problem: Problem, start: Fit, effect: Effect, rival: float = np.i
 
 def _with_width(here: Fit, effect: Effect, columns: Sequence[FloatArray]) -> Fit:
     """With the width of the numbers' spread, without what noise adds to it, and what they cost."""
-    known, latent = hidden_numbers(here, effect), effect.latent
-    assert latent is not None
+    known, latent = hidden_numbers(here, effect), _drawn_by(effect)
     moved, fall, count = 0.0, 0.0, 0
     for record, own in zip(here.records, columns, strict=True):
         numbers = known[record.name][latent.first :]
@@ -370,16 +350,14 @@ def _with_width(here: Fit, effect: Effect, columns: Sequence[FloatArray]) -> Fit
 
 def _with_fraction(here: Fit, effect: Effect) -> Fit:
     """With the share of the numbers that are 1."""
-    hidden = current_hidden(here.hypothesis, effect.label)
-    assert effect.latent is not None
-    numbers = np.concatenate([np.array(v)[effect.latent.first :] for v in hidden.values()])
+    hidden, first = current_hidden(here.hypothesis, effect.label), _drawn_by(effect).first
+    numbers = np.concatenate([np.array(v)[first:] for v in hidden.values()])
     return _with_own(here, effect, float(numbers.mean()))
 
 
 def _with_own(here: Fit, effect: Effect, spread: float) -> Fit:
     """With the effect's own parameter as its hidden numbers have it."""
-    assert effect.latent is not None
-    values = {effect.latent.spread: spread}
+    values = {_drawn_by(effect).spread: spread}
     effects = tuple(
         e.with_values(**values) if e.label == effect.label else e for e in here.hypothesis.effects
     )
@@ -388,15 +366,17 @@ def _with_own(here: Fit, effect: Effect, spread: float) -> Fit:
 
 def _priced_solved(problem: Problem, here: Fit, effect: Effect) -> Fit:
     """With what numbers cost that are solved for, by how much chi-square falls by them."""
-    assert effect.latent is not None
     effects = tuple(e for e in here.hypothesis.effects if e.label != effect.label)
     without = problem.residuals(effects, here.records, here.end)
     fall = sum(float((r * r).sum()) for r in without) - here.chi_square
-    return _priced(here, effect.label, fall, effect.latent.size(0) * len(here.records))
+    return _priced(here, effect.label, fall, _drawn_by(effect).size(0) * len(here.records))
 
 
 def _priced(here: Fit, label: str, fall: float, count: int) -> Fit:
-    return replace(here, hypothesis=with_drawn(here.hypothesis, label, fall, count))
+    """With what an effect's drawn numbers gain written down."""
+    others = tuple(item for item in here.hypothesis.drawn if item[0] != label)
+    drawn = (*others, (label, fall, count))
+    return replace(here, hypothesis=replace(here.hypothesis, drawn=drawn))
 
 
 def _bounds(here: Fit, latent: Latent) -> tuple[float, float]:
@@ -407,15 +387,13 @@ def _bounds(here: Fit, latent: Latent) -> tuple[float, float]:
 
 def _in_turns(problem: Problem, here: Fit, effect: Effect, columns: Sequence[FloatArray]) -> Fit:
     """Hidden numbers first, record by record; then what is common to all."""
-    known, latent = hidden_numbers(here, effect), effect.latent
-    assert latent is not None
+    known, latent = hidden_numbers(here, effect), _drawn_by(effect)
     wanted = {}
     for record, residual, slopes in zip(here.records, here.residuals, columns, strict=True):
         numbers = known[record.name].copy()
         if slopes.shape[1]:
-            numbers[latent.first :] += np.linalg.lstsq(slopes, -residual.ravel(), rcond=_SMALLEST)[
-                0
-            ]
+            moved = np.linalg.lstsq(slopes, -residual.ravel(), rcond=_SMALLEST)[0]
+            numbers[latent.first :] += moved
         numbers = np.clip(numbers, *_bounds(here, latent))
         wanted[record.name] = np.round(numbers) if latent.whole else numbers
     hidden = {name: tuple(numbers) for name, numbers in wanted.items()}
@@ -438,9 +416,8 @@ def _together(
         return None
     slopes = jacobian(problem, here.hypothesis, here.records, here.end, here.residuals)
     vector, weights = here.hypothesis.vector(), prior_weights(here.hypothesis)
-    means = np.array([u.prior[0] if u.prior else 0.0 for u in unknowns])
     normal = np.diag(weights**2)
-    gradient = weights**2 * (vector - means)
+    gradient = weights**2 * from_prior(here.hypothesis)
     for residual, common, own in zip(here.residuals, slopes, columns, strict=True):
         alive = np.linalg.norm(own, axis=0) > 0.0
         basis = np.linalg.qr(own[:, alive])[0] if alive.any() else own[:, :0]
@@ -449,11 +426,8 @@ def _together(
         gradient = gradient + free.T @ residual.ravel()
     if not np.isfinite(normal).all():
         return None
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-12 * np.diag(normal).max() + 1e-300))
-    lower, upper = np.array([u.lower for u in unknowns]), np.array([u.upper for u in unknowns])
-    step = bounded_step(normal, gradient, scale, 1e-6, vector, lower, upper)
-    known, latent = hidden_numbers(here, effect), effect.latent
-    assert latent is not None
+    step = bounded_step(unknowns, vector, normal, gradient, 1e-6)
+    known, latent = hidden_numbers(here, effect), _drawn_by(effect)
     for share in _SHARES:
         hidden = {}
         for record, residual, common, own in zip(

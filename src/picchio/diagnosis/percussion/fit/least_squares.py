@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.active_set import bounded_solution
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
-from picchio.diagnosis.percussion.fit.slopes import borrowed, fine_steps, jacobian, updated
-from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis, Unknown
 
 # Windows that grow, s: a long one at once lets the fit skip cycles.
 WINDOWS = (0.06, 0.16, 0.4, None)
@@ -24,6 +22,7 @@ _INSIDE = 1e-9
 HOPELESS = 1.5
 # A step that gains less than this share of what was expected asks for a new Jacobian.
 _TRUSTED = 0.25
+_LEAST_STEP = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +64,7 @@ class Fit:
         if self.jacobians is None:
             raise InputError("this fit has no Jacobian")
         total = sum(j.T @ j for j in self.jacobians)
-        matrix: FloatArray = np.asarray(total) + np.diag(prior_weights(self.hypothesis) ** 2)
-        return matrix
+        return np.asarray(total + np.diag(prior_weights(self.hypothesis) ** 2))
 
     def covariance(self) -> FloatArray:
         """(unknowns, unknowns) of the transformed unknowns."""
@@ -80,11 +78,15 @@ def prior_weights(hypothesis: Hypothesis) -> FloatArray:
     return np.array([1.0 / u.prior[1] if u.prior else 0.0 for u in hypothesis.unknowns()])
 
 
+def from_prior(hypothesis: Hypothesis) -> FloatArray:
+    """(unknowns,) how far the unknowns are from what is known beforehand."""
+    means = np.array([u.prior[0] if u.prior else 0.0 for u in hypothesis.unknowns()])
+    return hypothesis.vector() - means
+
+
 def prior_cost(hypothesis: Hypothesis) -> float:
     """Sum of squares of the priors."""
-    u, w = hypothesis.vector(), prior_weights(hypothesis)
-    means = np.array([k.prior[0] if k.prior else 0.0 for k in hypothesis.unknowns()])
-    return float(((w * (u - means)) ** 2).sum())
+    return float(((prior_weights(hypothesis) * from_prior(hypothesis)) ** 2).sum())
 
 
 # A trial far off may diverge: what is no number then ends it.
@@ -135,18 +137,14 @@ def fit(
             slopes = jacobian(problem, here, chosen, end, residuals, steps, first)
             steps, fresh = fine_steps(slopes, unknowns), first is None
         weights, vector = prior_weights(here), here.vector()
-        means = np.array([u.prior[0] if u.prior else 0.0 for u in unknowns])
         normal = sum(j.T @ j for j in slopes) + np.diag(weights**2)
         gradient = sum(j.T @ r.ravel() for j, r in zip(slopes, residuals, strict=True))
-        gradient = gradient + weights**2 * (vector - means)
+        gradient = gradient + weights**2 * from_prior(here)
         if not np.isfinite(normal).all():
             break
-        scale = np.sqrt(np.maximum(np.diag(normal), 1e-12 * np.diag(normal).max() + 1e-300))
-        lower = np.array([u.lower for u in unknowns])
-        upper = np.array([u.upper for u in unknowns])
         improved = False
         for _ in range(7 if fresh else 2):
-            step = bounded_step(normal, gradient, scale, damping, vector, lower, upper)
+            step = bounded_step(unknowns, vector, normal, gradient, damping)
             trial = here.at(vector + step)
             try:
                 there = problem.residuals(trial.effects, chosen, end)
@@ -171,7 +169,7 @@ def fit(
         gained = cost - value
         moved = trial.vector() - vector
         expected = -float(2.0 * gradient @ moved + moved @ normal @ moved)
-        slopes = updated(slopes, residuals, there, moved, scale)
+        slopes = updated(slopes, residuals, there, moved, _scale(normal))
         here, residuals, cost = trial, there, value
         damping = max(damping / 8.0, 1e-9)
         small = gained < _CONVERGED * cost + 1e-3
@@ -197,23 +195,28 @@ def _square(residuals: Sequence[FloatArray]) -> float:
     return total if np.isfinite(total) else np.inf
 
 
+def _scale(normal: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.maximum(np.diag(normal), 1e-12 * np.diag(normal).max() + 1e-300)))
+
+
 def bounded_step(
+    unknowns: Sequence[Unknown],
+    vector: FloatArray,
     normal: FloatArray,
     gradient: FloatArray,
-    scale: FloatArray,
     damping: float,
-    vector: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
 ) -> FloatArray:
-    """The damped step that stays within the bounds."""
+    """The damped step from `vector` that stays within the bounds of the unknowns."""
+    scale = _scale(normal)
+    low = np.array([u.lower for u in unknowns]) - vector
+    high = np.array([u.upper for u in unknowns]) - vector
 
     def solve(block: FloatArray, right: FloatArray, index: NDArray[np.intp]) -> FloatArray:
         size = scale[index]
         damped = block / np.outer(size, size) + damping * np.eye(index.size)
         return np.asarray(np.linalg.lstsq(damped, right / size, rcond=None)[0] / size)
 
-    return bounded_solution(normal, -gradient, lower - vector, upper - vector, solve, _INSIDE)
+    return bounded_solution(normal, -gradient, low, high, solve, _INSIDE)
 
 
 def fit_growing(
@@ -223,7 +226,6 @@ def fit_growing(
     *,
     windows: Sequence[float | None] = WINDOWS,
     iterations: int = 6,
-    with_jacobian: bool = False,
     near: Fit | None = None,
 ) -> Fit:
     """Fit up to one time after the other.
@@ -234,24 +236,115 @@ def fit_growing(
         records: to fit; all where None.
         windows: s, ends of the growing stretch that is fitted; None for the whole record.
         iterations: of the last window; the others take 3.
-        with_jacobian: compute the Jacobian at the end.
         near: a fit nearby, whose slopes may be used again.
 
     Returns:
         the fit to the last window.
     """
-    found: Fit | None = None
-    for i, end in enumerate(windows):
-        last = i == len(windows) - 1
-        start = found.hypothesis if found else hypothesis
-        found = fit(
-            problem,
-            start,
-            records,
-            end,
-            iterations=iterations if last else 3,
-            with_jacobian=with_jacobian and last,
-            near=near,
-        )
-    assert found is not None
+    *first, last = windows
+    for end in first:
+        hypothesis = fit(problem, hypothesis, records, end, iterations=3, near=near).hypothesis
+    return fit(problem, hypothesis, records, last, iterations=iterations, near=near)
+
+
+# Jacobians of residuals: by differences, from a fit nearby, or updated from step to step.
+
+
+def jacobian(
+    problem: Problem,
+    hypothesis: Hypothesis,
+    records: Sequence[MeasuredRecord],
+    end: float | None,
+    at: list[FloatArray],
+    steps: FloatArray | None = None,
+    first: Sequence[FloatArray] | None = None,
+) -> list[FloatArray]:
+    """D residual / d unknowns of every record by differences, (channels x m, unknowns).
+
+    Args:
+        problem: data and noise.
+        hypothesis: where.
+        records: which.
+        end: s.
+        at: the residuals there.
+        steps: (unknowns,) of the differences; the unknowns' own where None.
+        first: the first columns, where they are known.
+    """
+    vector, unknowns = hypothesis.vector(), hypothesis.unknowns()
+    columns: list[list[FloatArray]] = [[] for _ in records]
+    known = first[0].shape[1] if first else 0
+    for k, unknown in enumerate(unknowns[known:], start=known):
+        step = unknown.step if steps is None else float(steps[k])
+        if vector[k] + step > unknown.upper:
+            step = -step
+        moved = vector.copy()
+        moved[k] += step
+        try:
+            there = problem.residuals(hypothesis.at(moved).effects, records, end)
+        except InputError:  # no model there, such as springs that gravity overturns
+            step = -step
+            moved[k] = vector[k] + step
+            there = problem.residuals(hypothesis.at(moved).effects, records, end)
+        for i, (a, b) in enumerate(zip(there, at, strict=True)):
+            columns[i].append(((a - b) / step).ravel())
+    found = [
+        np.stack(c, axis=1) if c else np.zeros((a.size, 0))
+        for c, a in zip(columns, at, strict=True)
+    ]
+    if first:
+        found = [np.concatenate(pair, axis=1) for pair in zip(first, found, strict=True)]
     return found
+
+
+def fine_steps(parts: Sequence[FloatArray], unknowns: Sequence[Unknown]) -> FloatArray:
+    """Steps that change the residuals by about two standard deviations all in all.
+
+    The time of a blow's edge is known to a microsecond: a step of a thousandth would carry late
+    edges past samples, and its difference quotient would say nothing of the slope.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # of a motion that diverges
+        norms = np.sqrt(sum((part**2).sum(axis=0) for part in parts))
+    norms = np.where(np.isfinite(norms), norms, np.inf)
+    own = np.array([u.step for u in unknowns])
+    return np.asarray(np.clip(2.0 / np.maximum(norms, 1e-12), _LEAST_STEP, own))
+
+
+def borrowed(
+    hypothesis: Hypothesis,
+    residuals: Sequence[FloatArray],
+    near: Hypothesis,
+    near_slopes: Sequence[FloatArray],
+    near_residuals: Sequence[FloatArray],
+) -> list[FloatArray] | None:
+    """The first columns of the Jacobian, from a fit nearby, cut to these residuals' length.
+
+    None where the nearby fit's unknowns are not the first of these.
+    """
+    own = [(u.effect, u.name) for u in hypothesis.unknowns()]
+    known = [(u.effect, u.name) for u in near.unknowns()]
+    if own[: len(known)] != known:
+        return None
+    found = []
+    for slopes, whole, part in zip(near_slopes, near_residuals, residuals, strict=True):
+        channels, count = whole.shape
+        shaped = slopes.reshape(channels, count, -1)[:, : part.shape[1]]
+        found.append(shaped.reshape(part.size, -1))
+    return found
+
+
+def updated(
+    slopes: Sequence[FloatArray],
+    before: Sequence[FloatArray],
+    after: Sequence[FloatArray],
+    moved: FloatArray,
+    scale: FloatArray,
+) -> list[FloatArray]:
+    """Broyden's update: the least change that agrees with what the step did."""
+    weighted = scale**2 * moved
+    along = float(moved @ weighted)
+    if not along > 0.0:
+        return list(slopes)
+    return [
+        j + np.outer((new - old).ravel() - j @ moved, weighted / along)
+        for j, old, new in zip(slopes, before, after, strict=True)
+    ]

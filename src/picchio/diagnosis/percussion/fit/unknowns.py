@@ -140,14 +140,12 @@ class Hypothesis:
                 at = min(max(known.values["scale"] * effect.values["scale"], 0.05), 20.0)
                 effects[i] = known.with_values(scale=at)
                 return replace(self, effects=tuple(effects), freed=self.freed | {effect.label})
-        scales = {
-            p.name: abs(effect.values[p.name]) for p in effect.parameters if not p.logarithmic
-        }
-        sizes = [v for v in scales.values() if v > 0.0 and math.isfinite(v)]
-        typical = max(sizes) if sizes else 1.0
+        linear = [p for p in effect.parameters if not p.logarithmic]
+        sizes = [abs(effect.values[p.name]) for p in linear]
+        typical = max((v for v in sizes if v > 0.0 and math.isfinite(v)), default=1.0)
         own = tuple(
-            (f"{effect.label}.{name}", value if value > 0.0 else _companion(name, typical))
-            for name, value in scales.items()
+            (f"{effect.label}.{p.name}", size if size > 0.0 else p.size_beside(typical))
+            for p, size in zip(linear, sizes, strict=True)
         )
         return replace(self, effects=(*self.effects, effect), scales=self.scales + own)
 
@@ -213,8 +211,8 @@ class Hypothesis:
         for i, effect in enumerate(self.effects):
             nuisance = i < self.n_nuisances
             for p in effect.parameters:
-                if effect.discrete or _fixed(effect, p.name):
-                    continue
+                if effect.discrete or effect.latent is not None:
+                    continue  # found in another way than by the fit
                 prior = None
                 lower, upper = p.lower, p.upper
                 if nuisance:
@@ -254,30 +252,9 @@ class Hypothesis:
         for unknown, u in zip(self.unknowns(), vector, strict=True):
             clipped = min(max(float(u), unknown.lower), unknown.upper)
             changes.setdefault(unknown.effect, {})[unknown.name] = unknown.value(clipped)
+        # log and exp leave a bound by a rounding.
         effects = tuple(
-            effect.with_values(**_inside(effect, changes[i])) if i in changes else effect
+            effect.bounded(**changes[i]) if i in changes else effect
             for i, effect in enumerate(self.effects)
         )
         return replace(self, effects=effects)
-
-
-def _inside(effect: Effect, values: dict[str, float]) -> dict[str, float]:
-    # log and exp leave a bound by a rounding.
-    bounds = {p.name: (p.lower, p.upper) for p in effect.parameters}
-    return {name: min(max(v, bounds[name][0]), bounds[name][1]) for name, v in values.items()}
-
-
-def _fixed(effect: Effect, name: str) -> bool:
-    """Parameters that are found in another way than by the fit."""
-    return effect.latent is not None
-
-
-def _companion(name: str, typical: float) -> float:
-    """Size of a linear parameter that starts at zero beside others that do not."""
-    if name in ("modal_share",):
-        return 1.0
-    if name == "smoothing":
-        return 1e-3
-    if name == "damping":
-        return 0.02 * typical
-    return typical

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,19 +10,19 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.criteria.bic import SAME
+from picchio.diagnosis.percussion.criteria.equivalence import SAME
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.follow_up.plan import (
+from picchio.diagnosis.percussion.follow_up.records import (
     asked_plan,
     percussion_records,
+    possible_records,
     sensor_group,
+    varied,
     when,
 )
-from picchio.diagnosis.percussion.follow_up.possible_records import possible_records, varied
-from picchio.diagnosis.percussion.follow_up.refit import expected_rise
-from picchio.diagnosis.percussion.follow_up.separation import Separation, new_noise, separation
+from picchio.diagnosis.percussion.follow_up.separation import Contest, Separation, new_noise
 from picchio.diagnosis.percussion.search.state import Trial
 from picchio.prediction.percussion import PercussionSetup
 
@@ -98,14 +98,14 @@ def next_measurement(
     some = max(problem.records, key=lambda r: float(np.abs(r.setup.blows.height).max()))
     fits = [_fitted(problem, other) for other in chosen]
     setups = list(possible_records(problem, some))
-    fresh = new_noise(problem, setups, best)
-    shots = _shots(problem, setups, best, fits, fresh)
+    contest = Contest(problem, best, fits, new_noise(problem, setups, best))
+    shots = _shots(contest, setups)
     if not shots:
         return None
-    shot = _best(problem, shots, best, fits, fresh)
+    shot = _best(contest, shots)
     names = [_name(other.hypothesis) for other in chosen]
-    how = _conditions(problem, shot)
-    where = "here" if not how.words else f"here, {' and '.join(how.words)}"
+    said, conditions = _conditions(problem, shot)
+    where = f"here, {said}" if said else "here"
     why = _why(shot, _name(best.hypothesis), names, where)
     pose = zip(problem.robot.joint_names, shot.setup.geometry.pose, strict=True)
     ask: dict[str, Any] = {
@@ -114,7 +114,7 @@ def next_measurement(
         "direction": [round(float(c), 6) for c in shot.setup.blows.direction],
         "force": round(float(np.abs(shot.setup.blows.height).max()), 6),
         "sensor": shot.sensor,
-        **how.values,
+        **conditions,
         "separation": float(shot.surely.max()),
         "rivals": [
             {
@@ -167,13 +167,7 @@ def _fitted(problem: Problem, found: Fit) -> Fit:
     return fit(problem, found.hypothesis, None, None, iterations=4, with_jacobian=True)
 
 
-def _best(
-    problem: Problem,
-    shots: Sequence[_Proposal],
-    best: Fit,
-    rivals: Sequence[Fit],
-    fresh: Mapping[str, float],
-) -> _Proposal:
+def _best(contest: Contest, shots: Sequence[_Proposal]) -> _Proposal:
     """The best record: of each sensor that which slopes say is best, held against refits."""
     firsts: dict[str, _Proposal] = {}
     for shot in sorted(shots, key=lambda s: s.worth, reverse=True):
@@ -181,11 +175,11 @@ def _best(
     checked: list[_Proposal] = []
     for shot in firsts.values():
         ways = np.array([shot.told.if_best, shot.told.if_rival])
-        for k, rival in enumerate(rivals):
+        for k, rival in enumerate(contest.rivals):
             if shot.perhaps[k] >= _ENOUGH:
                 ways[:, k] = [
-                    expected_rise(problem, shot.setup, shot.sensor, fresh, true, other)
-                    for true, other in ((best, rival), (rival, best))
+                    contest.expected_rise(shot.setup, shot.sensor, true, other)
+                    for true, other in ((contest.best, rival), (rival, contest.best))
                 ]
         checked.append(replace(shot, told=Separation(ways[0], ways[1])))
         if (checked[-1].surely >= _ENOUGH).all():
@@ -198,57 +192,38 @@ def _name(hypothesis: Hypothesis) -> str:
     return " + ".join(labels) or "the nominal model"
 
 
-def _shots(
-    problem: Problem,
-    setups: Sequence[PercussionSetup],
-    best: Fit,
-    rivals: Sequence[Fit],
-    fresh: Mapping[str, float],
-) -> list[_Proposal]:
-    shots = [shot for setup in setups for shot in _taken(problem, setup, best, rivals, fresh)]
+def _shots(contest: Contest, setups: Sequence[PercussionSetup]) -> list[_Proposal]:
+    shots = [shot for setup in setups for shot in _taken(contest, setup)]
     again = dict.fromkeys(s.setup for s in sorted(shots, key=lambda s: s.worth, reverse=True))
     for setup in list(again)[:_TRIED_AGAIN]:
-        for what, other in varied(problem, setup).items():
-            shots += _taken(problem, other, best, rivals, fresh, what)
+        for what, other in varied(contest.problem, setup).items():
+            shots += _taken(contest, other, what)
     return shots
 
 
-def _taken(
-    problem: Problem,
-    setup: PercussionSetup,
-    best: Fit,
-    rivals: Sequence[Fit],
-    fresh: Mapping[str, float],
-    what: str = "",
-) -> list[_Proposal]:
+def _taken(contest: Contest, setup: PercussionSetup, what: str = "") -> list[_Proposal]:
     """The record with every sensor; none where one of the models is none there."""
     try:
-        told = separation(problem, setup, best, rivals, fresh)
+        told = contest.separations(setup)
     except InputError:
         return []
+    problem = contest.problem
     return [
         _Proposal(setup, what, name, sensor_group(problem, name) in problem.groups, value)
         for name, value in told.items()
     ]
 
 
-@dataclass(frozen=True)
-class _How:
-    """What is unlike the campaign's own conditions."""
-
-    words: tuple[str, ...]
-    values: dict[str, float]
-
-
-def _conditions(problem: Problem, shot: _Proposal) -> _How:
+def _conditions(problem: Problem, shot: _Proposal) -> tuple[str, dict[str, float]]:
+    """What is unlike the campaign's own conditions, in words; and what the JSON has of it."""
     here = shot.setup.conditions
     if shot.varied == "force":
         force = float(np.abs(shot.setup.blows.height).max())
-        return _How((f"with soft blows ({force:.3g} N)",), {})
+        return f"with soft blows ({force:.3g} N)", {}
     if shot.varied == "temperature" and here.temperature is not None:
         warm = [r.temperature for r in percussion_records(problem) if r.temperature is not None]
         degrees = round(float(np.mean(warm)) + here.temperature, 3)
-        return _How((f"at {degrees:.3g} deg C",), {"temperature": degrees})
+        return f"at {degrees:.3g} deg C", {"temperature": degrees}
     if shot.varied == "days" and here.days is not None:
-        return _How((when(here.days),), {"days": round(here.days, 3)})
-    return _How((), {})
+        return when(here.days), {"days": round(here.days, 3)}
+    return "", {}

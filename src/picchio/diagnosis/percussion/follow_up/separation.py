@@ -1,21 +1,24 @@
-"""By how much a record would tell rivals apart, whatever else is refitted."""
+"""By how much a record would tell a model from its rivals, whatever else is refitted."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from picchio.campaign.channels import addable_kinds
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.fit.least_squares import Fit
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
+from picchio.measurement.noise.autoregression import AutoRegression
+from picchio.measurement.noise.level import Noise
 from picchio.prediction.percussion import PercussionSetup
 
-_SENSORS = ("deflection", "accelerometer")
 # Relative noise of a sensor that the campaign does not have.
 _NEW_SENSOR = 0.01
+_TURNS = 8
 
 
 def new_noise(problem: Problem, setups: Sequence[PercussionSetup], best: Fit) -> dict[str, float]:
@@ -57,37 +60,86 @@ class Separation:
     if_rival: FloatArray
 
 
-def separation(
-    problem: Problem,
-    setup: PercussionSetup,
-    best: Fit,
-    rivals: Sequence[Fit],
-    fresh: Mapping[str, float],
-) -> dict[str, Separation]:
-    """Sensor -> by how much a record would tell each rival, whichever is refitted.
+@dataclass(frozen=True, eq=False)
+class Contest:
+    """The best model and its rivals, which a further record is to tell apart.
 
-    Args:
+    Attributes:
         problem: what was measured.
-        setup: the record that might be taken.
-        best: the best fit, with its Jacobian.
-        rivals: what else it might be, with theirs.
+        best: the best fit to all records, with its Jacobian.
+        rivals: what else it might be, likewise.
         fresh: `new_noise`.
     """
-    fits = (best, *rivals)
-    read = [setup.predict(problem.model.with_effects(f.hypothesis.effects)) for f in fits]
-    moves = [_moves(problem, setup, f, at) for f, at in zip(fits, read, strict=True)]
-    own = [c.name for c in setup.channels if c.group in problem.groups]
-    noise = {c.name: _known(problem, c.name) or fresh[c.group] for c in setup.channels}
-    found = {}
-    for sensor in _SENSORS:
-        rows = own + [n for n in read[0] if n.startswith(f"{sensor}.") and n not in own]
-        slopes = [np.concatenate([m[n] / noise[n] for n in rows]) if m else None for m, _ in moves]
-        told = np.zeros((2, len(rivals)))
-        for k in range(1, len(fits)):
-            left = np.concatenate([(read[k][n] - read[0][n]) / noise[n] for n in rows])
-            told[:, k - 1] = [_left(left, slopes[m], moves[m][1]) for m in (k, 0)]
-        found[sensor] = Separation(told[0], told[1])
-    return found
+
+    problem: Problem
+    best: Fit
+    rivals: Sequence[Fit]
+    fresh: Mapping[str, float]
+
+    def separations(self, setup: PercussionSetup) -> dict[str, Separation]:
+        """Sensor -> by how much a record would tell each rival, whichever is refitted.
+
+        By slopes: the unknowns of the one that is wrong move as far as what is known of them lets
+        them.
+
+        Args:
+            setup: the record that might be taken.
+        """
+        problem, rivals = self.problem, self.rivals
+        fits = (self.best, *rivals)
+        read = [setup.predict(problem.model.with_effects(f.hypothesis.effects)) for f in fits]
+        moves = [_moves(problem, setup, f, at) for f, at in zip(fits, read, strict=True)]
+        own = [c.name for c in setup.channels if c.group in problem.groups]
+        noise = {c.name: _known(problem, c.name) or self.fresh[c.group] for c in setup.channels}
+        found = {}
+        for kind in addable_kinds():
+            rows = own + [n for n in read[0] if n.startswith(f"{kind.name}.") and n not in own]
+            slopes = [
+                np.concatenate([m[n] / noise[n] for n in rows]) if m else None for m, _ in moves
+            ]
+            told = np.zeros((2, len(rivals)))
+            for k in range(1, len(fits)):
+                left = np.concatenate([(read[k][n] - read[0][n]) / noise[n] for n in rows])
+                told[:, k - 1] = [_left(left, slopes[m], moves[m][1]) for m in (k, 0)]
+            found[kind.name] = Separation(told[0], told[1])
+        return found
+
+    def expected_rise(self, setup: PercussionSetup, sensor: str, true: Fit, other: Fit) -> float:
+        """How far chi-square would rise by a record in which one model is true, the other refitted.
+
+        Slopes say so as long as nothing moves far; what the records so far leave open may move far.
+
+        Args:
+            setup: the record that might be taken.
+            sensor: kind of sensor that is there beside those of the campaign.
+            true: simulated in the record, without noise.
+            other: fitted to all records.
+        """
+        problem = self.problem
+        record = self._simulated(setup, sensor, true)
+        records = [*problem.records, record]
+        after = fit(problem, other.hypothesis, records, None, iterations=_TURNS)
+        # Samples near edges count as noise, whatever is true.
+        (own,) = problem.residuals(true.hypothesis.effects, [record])
+        return max(after.cost - other.cost - float((own**2).sum()), 0.0)
+
+    def _simulated(self, setup: PercussionSetup, sensor: str, true: Fit) -> MeasuredRecord:
+        problem = self.problem
+        # Under a name of its own: what is known by the others' names is not asked for.
+        setup = replace(setup, name="next")
+        read = setup.predict(problem.model.with_effects(true.hypothesis.effects))
+        rate = 1.0 / setup.samples.step
+        noise: dict[str, Noise] = {}
+        for channel in setup.channels:
+            known = problem.noise.get(channel.name)
+            if known is not None and known.std > 0.0:
+                noise[channel.name] = known.at(rate)
+            elif channel.kind.name == sensor:
+                std = self.fresh[channel.group]
+                white = AutoRegression(np.zeros(0), std**2)
+                noise[channel.name] = Noise(channel.name, channel.unit, rate, std, 1.0, white)
+        values = {name: read[name] for name in noise}
+        return MeasuredRecord(setup, values, noise, problem.n_poses)
 
 
 def _moves(

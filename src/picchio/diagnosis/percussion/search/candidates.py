@@ -7,11 +7,16 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.fit.parallel import worker_count
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.registry import catalogue
 from picchio.model.effects.scales import Scales
+
+_MOMENT = 0.06  # s
 
 
 def evidence_of(problem: Problem) -> Evidence:
@@ -22,7 +27,7 @@ def evidence_of(problem: Problem) -> Evidence:
         robot=problem.robot,
         groups=tuple(g for g in problem.groups if not channels[g].of_force),
         vectors=frozenset(g for g, kind in channels.items() if kind.axes),
-        accelerations=frozenset(g for g, kind in channels.items() if kind.accelerates),
+        accelerations=frozenset(g for g, kind in channels.items() if kind.derivative == 2),
         forces=tuple(g for g in problem.groups if channels[g].of_force),
         bursts=any(b.start.size > 1 and b.period is None for b in blows),
         recorded=all(b.recorded for b in blows),
@@ -136,3 +141,27 @@ def measure_scales(
             if np.mean(values) > 0.0
         },
     )
+
+
+def warm_up(problem: Problem, candidates: Sequence[tuple[type[Effect], str]]) -> None:
+    """Predict a moment of one record with every effect once, where there will be processes.
+
+    Compiled kernels and libraries come with it. Processes are forked anew for every round of a
+    search: what this one has not loaded each of them would load again.
+
+    Args:
+        problem: data and noise.
+        candidates: effects and targets.
+    """
+    if worker_count(problem.workers) < 2:
+        return
+    nominal = Hypothesis.baseline(problem.robot, problem.campaign.tolerance)
+    scales = measure_scales(problem, nominal.effects, problem.predictions(nominal.effects))
+    first = dict(reversed(candidates))
+    for kind, target in first.items():
+        values = next(iter(kind(target).trials(scales)), {})
+        try:
+            effects = nominal.plus(kind(target, **values)).effects
+            problem.own_residuals(effects, problem.records[:1], _MOMENT)
+        except InputError:  # no model at this size
+            continue

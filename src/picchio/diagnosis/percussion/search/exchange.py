@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Set
 from dataclasses import replace
 
-from picchio.diagnosis.percussion.criteria.bic import bic
+from picchio.diagnosis.percussion.criteria.equivalence import bic
 from picchio.diagnosis.percussion.fit.drawn import fit_latent, with_hidden
 from picchio.diagnosis.percussion.fit.least_squares import HOPELESS, Fit, fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
@@ -16,7 +16,6 @@ from picchio.diagnosis.percussion.search.trials import (
     records_of_every_pose,
     try_candidates,
 )
-from picchio.model.effects.registry import effect_class
 
 
 def prune(search: Search, found: Fit, *, alone: bool = True) -> Fit:
@@ -61,7 +60,7 @@ def exchange(search: Search) -> Fit:
             chosen = step[0].label
             if chosen not in best.hypothesis.labels or not rival.finished(search.records):
                 continue
-            if rival.label in best.hypothesis.labels or _draws(rival.label):
+            if rival.label in best.hypothesis.labels or rival.draws:
                 continue
             joined = rival.fit.hypothesis
             for cause in best.hypothesis.causes:
@@ -74,11 +73,6 @@ def exchange(search: Search) -> Fit:
             if bic(other) < bic(best) - search.least:
                 best = other
     return best
-
-
-def _draws(label: str) -> bool:
-    """Whether an effect draws numbers anew in every record."""
-    return effect_class(label.partition(":")[0]).latent is not None
 
 
 def _come_near(search: Search, hypothesis: Hypothesis, best: Fit) -> Hypothesis | None:

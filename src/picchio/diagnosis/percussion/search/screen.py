@@ -16,12 +16,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.fit.drawn import (
-    blow_by_blow,
-    drawn_cost,
-    hidden_columns,
-    with_hidden,
-)
+from picchio.diagnosis.percussion.fit.drawn import blow_by_blow, drawn_cost, hidden_columns
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, prior_weights
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
@@ -57,11 +52,11 @@ def smallest(trials: Sequence[Effect]) -> Effect:
 def scaled(trial: Effect, weight: float, signed: bool) -> Effect:
     """The trial made larger or smaller as the residual asks."""
     size = float(np.clip(abs(weight), 0.05, 8.0))
-    return bounded(trial, resized(trial, math.copysign(size, weight) if signed else size))
+    return resized(trial, math.copysign(size, weight) if signed else size)
 
 
-def resized(trial: Effect, size: float) -> dict[str, float]:
-    """A trial's values with its distance from doing nothing so many times as large."""
+def resized(trial: Effect, size: float) -> Effect:
+    """A trial with its distance from doing nothing so many times as large."""
     values = dict(trial.values)
     for p in trial.parameters:
         value = values[p.name]
@@ -71,91 +66,16 @@ def resized(trial: Effect, size: float) -> dict[str, float]:
             new = value * size
         elif p.neutral == 1.0 and p.logarithmic:
             new = math.exp(math.log(value) * float(np.clip(size, -3.0, 3.0)))
-        elif math.isinf(p.neutral) and p.name in ("stiffness", "limit"):
-            new = value / size if p.name == "stiffness" else value
+        elif p.by_inverse:
+            new = value / size
         else:
             continue
         values[p.name] = min(max(new, p.lower), p.upper)
-    return {p.name: values[p.name] for p in trial.parameters if values[p.name] != p.neutral}
-
-
-def bounded(trial: Effect, values: dict[str, float]) -> Effect:
-    """The effect with values brought within their bounds."""
-    bounds = {p.name: (p.lower, p.upper) for p in trial.parameters}
-    inside = {k: min(max(v, bounds[k][0]), bounds[k][1]) for k, v in values.items()}
-    return type(trial)(trial.target, **inside)
+    return type(trial)(trial.target, **values)
 
 
 # Late blows that the screening tries.
 _LOOKED_AT = 1.8
-
-
-def latent_gain(
-    problem: Problem,
-    known: Fit,
-    starts: Sequence[Effect],
-    project: Projector,
-    left: FloatArray,
-) -> Suspect:
-    """How much of the residual an effect's hidden numbers could explain.
-
-    Args:
-        problem: data and noise.
-        known: what is known so far.
-        starts: the effect, as its trials have it.
-        project: takes out what is known.
-        left: what is left of the residual.
-    """
-    start, latent = starts[0], starts[0].latent
-    assert latent is not None
-    if latent.linear:
-        gain = 0.0
-        for each in starts:
-            there = problem.residuals(known.hypothesis.plus(each).effects, known.records, known.end)
-            fall = known.chi_square - sum(float((r * r).sum()) for r in there)
-            if fall > gain:
-                start, gain = each, fall
-        count = latent.size(0) * len(known.records)
-        return _promise(start, gain, count, known.samples)
-    fall, numbers = 0.0, 0
-    for residual, columns in zip(
-        known.residuals, hidden_columns(problem, known, start), strict=True
-    ):
-        if columns.shape[1] == 0:
-            continue
-        weights = np.linalg.lstsq(columns, -residual.ravel(), rcond=1e-6)[0]
-        fall += float((residual**2).sum() - ((residual.ravel() + columns @ weights) ** 2).sum())
-        numbers += columns.shape[1]
-    if latent.times and known.end is not None:
-        fall = max(fall, _late_share(problem, known, start) * float(left @ left))
-    if start.discrete:
-        return Suspect(start, fall, numbers, (start,))
-    return _promise(start, fall, numbers, known.samples)
-
-
-def _promise(start: Effect, fall: float, count: int, samples: int) -> Suspect:
-    """A suspect with numbers that are drawn: they cost less than as many free ones."""
-    cost = drawn_cost(fall, count, samples)
-    return Suspect(start, fall, 1 + cost / math.log(max(samples, 2)), (start,))
-
-
-def _late_share(problem: Problem, known: Fit, start: Effect) -> float:
-    """What share of the residual the times of the first late blows explain.
-
-    A blow that comes late by more than its own edges' width is not seen in any slope.
-    """
-    interval = min(r.setup.blows.interval for r in known.records)
-    end = min((1 + _LOOKED_AT) * interval, known.end or math.inf)
-    try:
-        first = fit(problem, known.hypothesis, known.records, end, iterations=3)
-        early = replace(first, end=end)
-        begun = blow_by_blow(problem, early, lambda old, late: with_hidden(old, start, late))
-        late = fit(problem, begun, known.records, end, iterations=2)
-    except InputError:  # led to where there is no model
-        return 0.0
-    return max(1.0 - late.chi_square / max(first.chi_square, 1e-300), 0.0)
-
-
 _FAINT = 20.0
 _SOME = 3
 # A first look is at every so-manyth record; what promises there less than so much of its share of
@@ -272,7 +192,7 @@ class Screen:
             return None
         if kind.latent is not None:
             starts = [kind(target, **values) for values in kind(target).trials(self.scales)]
-            return latent_gain(self.problem, self.fit, starts, self.project, self.left)
+            return self._latent(starts)
         if kind.discrete and self.faint:
             return None  # what has no small size would have been seen before
         if self.first is not None:
@@ -287,6 +207,50 @@ class Screen:
                 trials = [smallest(trials)]  # the others would become the same
             trials = [self._faint(trial) for trial in trials]
         return _judged(*self._changes(trials), self.left, self.faint)
+
+    def _latent(self, starts: Sequence[Effect]) -> Suspect:
+        """What an effect's hidden numbers could explain; `starts` is it as its trials have it."""
+        known, start, latent = self.fit, starts[0], starts[0].latent
+        assert latent is not None
+        if latent.linear:
+            gain = 0.0
+            for each in starts:
+                effects = known.hypothesis.plus(each).effects
+                there = self.problem.residuals(effects, known.records, known.end)
+                fall = known.chi_square - sum(float((r * r).sum()) for r in there)
+                if fall > gain:
+                    start, gain = each, fall
+            count = latent.size(0) * len(known.records)
+            return _promise(start, gain, count, known.samples)
+        fall, numbers = 0.0, 0
+        slopes = hidden_columns(self.problem, known, start)
+        for residual, columns in zip(known.residuals, slopes, strict=True):
+            if columns.shape[1] == 0:
+                continue
+            weights = np.linalg.lstsq(columns, -residual.ravel(), rcond=1e-6)[0]
+            fall += float((residual**2).sum() - ((residual.ravel() + columns @ weights) ** 2).sum())
+            numbers += columns.shape[1]
+        if latent.times and known.end is not None:
+            fall = max(fall, self._late_share(start) * self.total)
+        if start.discrete:
+            return Suspect(start, fall, numbers, (start,))
+        return _promise(start, fall, numbers, known.samples)
+
+    def _late_share(self, start: Effect) -> float:
+        """What share of the residual the times of the first late blows explain.
+
+        A blow that comes late by more than its own edges' width is not seen in any slope.
+        """
+        problem, known = self.problem, self.fit
+        interval = min(r.setup.blows.interval for r in known.records)
+        end = min((1 + _LOOKED_AT) * interval, known.end or math.inf)
+        try:
+            first = fit(problem, known.hypothesis, known.records, end, iterations=3)
+            begun = blow_by_blow(problem, replace(first, end=end), start)
+            late = fit(problem, begun, known.records, end, iterations=2)
+        except InputError:  # led to where there is no model
+            return 0.0
+        return max(1.0 - late.chi_square / max(first.chi_square, 1e-300), 0.0)
 
     def _changes(self, trials: Sequence[Effect]) -> tuple[list[Effect], list[FloatArray]]:
         """The trials, smaller ones where they are far too large, and what they change."""
@@ -309,7 +273,7 @@ class Screen:
             tried = [(trial, moved)]
             large = float(np.linalg.norm(moved)) / self.beyond
             if large > _LARGE and not self.faint and not trial.discrete:
-                smaller = type(trial)(trial.target, **resized(trial, 1.0 / large))
+                smaller = resized(trial, 1.0 / large)
                 moved = change(smaller) if smaller.values != trial.values else None
                 if moved is not None:  # of a vector's components one size each
                     tried = [(smaller, moved)] if components else [*tried, (smaller, moved)]
@@ -332,13 +296,18 @@ class Screen:
         change *= math.sqrt(len(fit.records) / len(some))
         if not change > _FAINT:
             return trial
-        values = resized(trial, _FAINT / change)
-        return type(trial)(trial.target, **values)
+        return resized(trial, _FAINT / change)
 
     def ranked(self, suspects: Iterable[Suspect | None]) -> list[Suspect]:
         """The most promising first."""
         found = [s for s in suspects if s is not None]
         return sorted(found, key=lambda s: -(s.gain - s.numbers * math.log(self.left.size)))
+
+
+def _promise(start: Effect, fall: float, count: int, samples: int) -> Suspect:
+    """A suspect with numbers that are drawn: they cost less than as many free ones."""
+    cost = drawn_cost(fall, count, samples)
+    return Suspect(start, fall, 1 + cost / math.log(max(samples, 2)), (start,))
 
 
 def _part(fit: Fit) -> Fit:
@@ -387,7 +356,7 @@ def _judged(
             for p in trial.parameters:
                 if trial.values[p.name] != p.neutral:
                     values[p.name] = float(np.clip(weight, -6.0, 6.0)) * trial.values[p.name]
-        start = bounded(kept[0], values)
+        start = kept[0].bounded(**values)
         return Suspect(start, total, numbers, (start,))
     order = np.argsort(-gains)
     starts = tuple(scaled(kept[i], float(alone[i]), linear) for i in order[:2])

@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
-from picchio.diagnosis.percussion.criteria.bic import SAME, bic
-from picchio.diagnosis.percussion.criteria.confidence import confidence
-from picchio.diagnosis.percussion.criteria.equivalence import bic_difference
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.split import Split
+from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic, bic_difference, confidence
+from picchio.diagnosis.percussion.data.problem import Problem, Split
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import measure_scales
@@ -64,9 +61,8 @@ def begin_search(
 
 def start_from(search: Search, known: Sequence[Estimate]) -> None:
     """Take over causes that other records tell, as far as they help in these, too."""
-    candidates = {f"{kind.name}:{target}" for kind, target in search.candidates}
     for cause in known:
-        if cause.effect.label in candidates:
+        if cause.effect.label in search.considered:
             informed = search.best.hypothesis.informed(cause.effect, cause.std)
             there = search.fit(informed, iterations=6)
             if there.cost < search.best.cost - search.least:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from picchio.diagnosis.percussion.criteria.bic import bic
+from picchio.diagnosis.percussion.criteria.equivalence import bic
 from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
-from picchio.diagnosis.percussion.data.problem import Problem, signal_power
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.model.effects.effect import Effect
+from picchio.model.effects.registry import effect_class
 from picchio.model.effects.scales import Scales
 
 # Fall of BIC below which nothing is claimed: with a hundred candidates tried, chance alone
@@ -30,6 +30,11 @@ class Trial:
     fit: Fit
     score: float
     promise: float
+
+    @property
+    def draws(self) -> bool:
+        """Whether its effect draws numbers anew in every record."""
+        return effect_class(self.label.partition(":")[0]).latent is not None
 
     def finished(self, records: Sequence[MeasuredRecord]) -> bool:
         """Whether it was fitted to all of these records, to their ends.
@@ -78,6 +83,11 @@ class Search:
     def labels(self) -> frozenset[str]:
         """Of the causes that stand."""
         return self.best.hypothesis.labels
+
+    @property
+    def considered(self) -> frozenset[str]:
+        """Of all that may be causes."""
+        return frozenset(f"{kind.name}:{target}" for kind, target in self.candidates)
 
     @property
     def gained(self) -> float:

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.criteria.bic import SAME, bic
-from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
+from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing, is_nonsmooth
+from picchio.diagnosis.percussion.fit.parallel import worker_pool
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.fit.workers import Workers
 from picchio.diagnosis.percussion.search.screen import Screen, Suspect
 from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.model.effects.effect import Effect
-from picchio.model.effects.registry import effect_class
 
 # One candidate fitted: to the first part of the records, and from there to all of them.
 
@@ -94,7 +92,6 @@ def try_candidates(
     known: Hypothesis,
     *,
     short_list: int = SHORT_LIST,
-    long_fits: int = LONG_FITS,
     whole: bool = False,
     wide: bool = False,
     cause: str = "",
@@ -136,8 +133,8 @@ def try_candidates(
     functions = {"screen": screen.suspect, "short": short_fit, "long": long_fit}
     if early is not None:
         functions["early"] = early.suspect
-    with Workers(problem.workers, functions) as pool:
-        suspects = screen.ranked(pool.map("screen", candidates))
+    with worker_pool(problem.workers, functions) as mapped:
+        suspects = screen.ranked(mapped("screen", candidates))
         logarithm = math.log(max(start.samples, 2))
         if whole:
             least = max(-logarithm, enough)
@@ -146,27 +143,22 @@ def try_candidates(
                 return []
         if cause:
             suspects = _rivals(suspects, cause)
-        if wide:
-            short_list, long_fits = 3 * short_list, 2 * long_fits
-        chosen = _short_list(suspects, short_list)
-        little = wide or _promised(suspects) < _HALF * screen.total
+        long_fits = 2 * LONG_FITS if wide else LONG_FITS
+        chosen = _short_list(suspects, 3 * short_list if wide else short_list)
+        promised = max((s.gain for s in suspects), default=0.0)
+        little = wide or promised < _HALF * screen.total
         if early is not None and not cause and little:
             # Growing errors are recognisable only early.
-            chosen = _joined(chosen, early.ranked(pool.map("early", candidates)))
+            chosen = _joined(chosen, early.ranked(mapped("early", candidates)))
         tried = [(suspect, effect) for suspect in chosen for effect in suspect.starts]
         tried.sort(key=lambda each: each[1].latent is None)
-        fits = pool.map("short", [effect for _, effect in tried])
+        fits = mapped("short", [effect for _, effect in tried])
         short = _best_of_each(tried, fits, some)
         if best is None or not short:
-            return _long_trials(pool, short, list(records), long_fits)
+            return _long_trials(mapped, short, list(records), long_fits)
         own = fit(problem, best.hypothesis, some, window, iterations=2)
         mark = min(bic(own), short[0][2])
-        return _long_trials(pool, short, list(records), long_fits, mark, best.cost)
-
-
-def _promised(suspects: Sequence[Suspect]) -> float:
-    """What the best of them explains."""
-    return max((s.gain for s in suspects), default=0.0)
+        return _long_trials(mapped, short, list(records), long_fits, mark, best.cost)
 
 
 def _joined(chosen: Sequence[Suspect], early: Sequence[Suspect]) -> list[Suspect]:
@@ -215,7 +207,7 @@ def _best_of_each(
 
 
 def _long_trials(
-    pool: Workers,
+    mapped: Callable[[str, Iterable[Any]], list[Any]],
     short: Sequence[tuple[Suspect, Fit, float]],
     records: Sequence[MeasuredRecord],
     long_fits: int,
@@ -244,7 +236,7 @@ def _long_trials(
     others = sorted(wanted[1:], key=lambda each: each[0].effect.latent is None)
     for some in (wanted[:1], others):
         tasks = [(found.hypothesis, suspect.effect, rival) for suspect, found in some]
-        for (suspect, _), light in zip(some, pool.map("long", tasks), strict=True):
+        for (suspect, _), light in zip(some, mapped("long", tasks), strict=True):
             long = replace(light, records=tuple(records))
             rival = min(rival, long.cost)
             trials.append(Trial(suspect.label, long, bic(long), suspect.gain))
@@ -256,18 +248,18 @@ def _short_list(suspects: Sequence[Suspect], size: int) -> list[Suspect]:
 
     Whatever explains exactly as much as one of them is there as well: it may be the same thing.
     """
+
+    def twins(one: Suspect, other: Suspect) -> bool:
+        return one.numbers == other.numbers and abs(one.gain - other.gain) < _TWIN * one.gain
+
     chosen: list[Suspect] = []
     for suspect in suspects:
-        if len(chosen) >= size and not any(_twins(suspect, s) for s in chosen):
+        if len(chosen) >= size and not any(twins(suspect, s) for s in chosen):
             continue
         same = sum(1 for s in chosen if s.effect.name == suspect.effect.name)
         if same < 3 and suspect.gain > 0.0:
             chosen.append(suspect)
     return chosen
-
-
-def _twins(one: Suspect, other: Suspect) -> bool:
-    return one.numbers == other.numbers and abs(one.gain - other.gain) < _TWIN * one.gain
 
 
 def records_of_every_pose(records: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
@@ -315,9 +307,7 @@ def over_the_same_samples(search: Search, trials: Sequence[Trial]) -> list[Trial
     close = [
         t
         for t in trials
-        if t.finished(search.records)
-        and t.score - best.score < _ROUGH
-        and effect_class(t.label.split(":")[0]).latent is None
+        if t.finished(search.records) and t.score - best.score < _ROUGH and not t.draws
     ]
     if best not in close or len(close) < 2:
         return list(trials)

@@ -14,11 +14,13 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.measurement.noise.window import Window
 from picchio.measurement.quality.check import Check, Context, Finding
+from picchio.measurement.quality.relabel import cosines
 from picchio.measurement.quality.scan import RecordScan
 
 _SAMPLES = 400
 _SMOOTH = 0.05
 _FEWEST = 50
+Pair = tuple[FloatArray, FloatArray]
 
 
 class MotionAxesCheck(Check):
@@ -26,45 +28,45 @@ class MotionAxesCheck(Check):
 
     name = "joints"
     what = "motion: positions, velocities and torques consistent with one another and with gravity"
+    of = "motion"
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._torques: dict[str, list[tuple[FloatArray, FloatArray]]] = defaultdict(list)
+        # (joint's number, torque's channel): what was seen and what all joints must show.
+        self._torques: dict[tuple[int, str], list[Pair]] = defaultdict(list)
 
     def record(self, scan: RecordScan) -> Iterator[Finding]:
         """Velocity, motor and reference against position; torques are kept for the end."""
         window = scan.window
-        if window.record.kind != "motion":
-            return
-        joints = _joints(window)
+        roles = _roles(window)
+        # The link side where it is known, else the motor side.
+        joints = {j: window.arrays[n] for j, n in (roles["motor"] | roles["link"]).items()}
         for joint, position in joints.items():
-            for kind in ("motor_position", "reference_position"):
-                other = window.arrays.get(f"{kind}.{joint}")
-                if other is None or other is position:
-                    continue
-                yield from self._follows(scan, f"{kind}.{joint}", other, position,
-                                         f"position of {joint}")  # fmt: skip
-            velocity = window.arrays.get(f"velocity.{joint}")
-            if velocity is not None:
-                yield from self._follows(scan, f"velocity.{joint}", velocity,
-                                         np.gradient(_smooth(position, window), window.step),
-                                         f"derivative of {joint}'s position",
-                                         zero=True)  # fmt: skip
-        self._keep_torques(window, joints)
+            for role in ("motor", "reference"):
+                name = roles[role].get(joint)
+                if name is not None and window.arrays[name] is not position:
+                    what = f"position of {joint}"
+                    yield from self._follows(scan, name, position, what)
+            name = roles["velocity"].get(joint)
+            if name is not None:
+                rate = np.gradient(_smooth(position, window), window.step)
+                what = f"derivative of {joint}'s position"
+                yield from self._follows(scan, name, rate, what, zero=True)
+        self._keep_torques(window, joints, roles["torque"])
 
-    def _follows(self, scan: RecordScan, name: str, values: FloatArray, leader: FloatArray,
-                 what: str, zero: bool = False) -> Iterator[Finding]:  # fmt: skip
+    def _follows(self, scan: RecordScan, name: str, leader: FloatArray, what: str,
+                 zero: bool = False) -> Iterator[Finding]:  # fmt: skip
+        values = scan.window.arrays[name]
         a, b = leader - (0.0 if zero else leader.mean()), values - (0.0 if zero else values.mean())
         power, other = float(a @ a), float(b @ b)
         if a.size < _FEWEST or power <= 0.0 or other <= 0.0:
             return
         if min(np.ptp(a), np.ptp(b)) < 100.0 * np.median(np.abs(np.diff(values))) * 0.05:
             return
+        if float(np.ptp(leader)) <= 0.02:
+            return
         likeness = float(a @ b) / np.sqrt(power * other)
         slope = float(a @ b) / power
-        moved = float(np.ptp(leader)) > 0.02
-        if not moved:
-            return
         if likeness < -0.7:
             yield self.found("warning", f"runs against the {what}: its sign is flipped",
                              "correct the sign", record=scan.file, channel=name,
@@ -79,9 +81,11 @@ class MotionAxesCheck(Check):
                              "check its unit, and the gear ratio", record=scan.file,
                              channel=name, value=slope)  # fmt: skip
 
-    def _keep_torques(self, window: Window, joints: dict[str, FloatArray]) -> None:
+    def _keep_torques(
+        self, window: Window, joints: dict[str, FloatArray], torques: dict[str, str]
+    ) -> None:
         robot = self.context.robot
-        measured = [j for j in joints if f"torque.{j}" in window.arrays]
+        measured = [joint for joint in joints if joint in torques]
         if robot is None or not measured or any(j not in robot.joint_names for j in joints):
             return
         smooth = {joint: _smooth(values, window) for joint, values in joints.items()}
@@ -103,50 +107,53 @@ class MotionAxesCheck(Check):
         ])  # fmt: skip
         for joint in measured:
             velocity = np.gradient(smooth[joint], window.step)[index]
-            seen = _smooth(window.arrays[f"torque.{joint}"], window)[index]
+            seen = _smooth(window.arrays[torques[joint]], window)[index]
             basis = np.column_stack([np.ones(index.size), np.tanh(velocity / 0.01), velocity])
             q, _ = np.linalg.qr(basis)
             left = [v - q @ (q.T @ v) for v in (seen, must)]
-            self._torques[joint].append((left[0], left[1]))
+            number = robot.joint_names.index(joint)
+            self._torques[number, torques[joint]].append((left[0], left[1].T))
 
     def finish(self) -> Iterator[Finding]:
         """Torques against gravity and masses, all records together."""
         robot = self.context.robot
         if robot is None:
             return
-        for joint, rows in self._torques.items():
-            own = robot.joint_names.index(joint)
+        for (own, channel), rows in self._torques.items():
             seen = np.concatenate([row[0] for row in rows])
-            must = np.concatenate([row[1] for row in rows])
-            size = np.linalg.norm(must, axis=0) * np.linalg.norm(seen)
-            likeness = np.where(size > 0.0, (seen @ must) / np.where(size > 0.0, size, 1.0), 0.0)
-            strong = np.linalg.norm(must[:, own]) > 0.05 * np.linalg.norm(must, axis=0).max()
+            must = np.concatenate([row[1] for row in rows], axis=1)
+            likeness = cosines(seen, must)
+            size = np.linalg.norm(must, axis=1)
+            if not size[own] > 0.05 * size.max():
+                continue
             best = int(np.abs(likeness).argmax())
-            if likeness[own] < -0.6 and strong:
+            if likeness[own] < -0.6:
                 yield self.found("warning", "runs against gravity and the masses: its sign is "
                                  f"flipped (correlation {likeness[own]:.2f})",
                                  "correct the sign of the torque, or of the position",
-                                 channel=f"torque.{joint}", value=float(likeness[own]))  # fmt: skip
-            elif best != own and abs(likeness[best]) > 0.93 and likeness[own] < 0.4 and strong:
+                                 channel=channel, value=float(likeness[own]))  # fmt: skip
+            elif best != own and abs(likeness[best]) > 0.93 and likeness[own] < 0.4:
                 yield self.found("warning", f"follows what {robot.joint_names[best]} must carry, "
-                                 f"not {joint}: joints are swapped", "relabel the columns",
-                                 channel=f"torque.{joint}", value=float(likeness[own]))  # fmt: skip
-            elif likeness[own] > 0.8 and strong:
-                slope = float(seen @ must[:, own] / (must[:, own] @ must[:, own]))
+                                 f"not {robot.joint_names[own]}: joints are swapped",
+                                 "relabel the columns", channel=channel,
+                                 value=float(likeness[own]))  # fmt: skip
+            elif likeness[own] > 0.8:
+                slope = float(seen @ must[own] / (must[own] @ must[own]))
                 if not 0.125 < slope < 8.0:
                     yield self.found("warning", f"is {slope:.3g} times what gravity and the masses "
                                      "ask for", "check its unit, the gear ratio, and the payload",
-                                     channel=f"torque.{joint}", value=slope)  # fmt: skip
+                                     channel=channel, value=slope)  # fmt: skip
 
 
-def _joints(window: Window) -> dict[str, FloatArray]:
-    """{joint: (m,) position}: the link side where it is known, else the motor side."""
-    found: dict[str, FloatArray] = {}
-    for kind in ("motor_position", "position"):
-        for name, values in window.arrays.items():
-            channel = window.record.channel(name)
-            if channel.kind.name == kind and channel.subject:
-                found[channel.subject] = values
+def _roles(window: Window) -> dict[str, dict[str, str]]:
+    """What a channel is in a motion -> joint -> the channel; a "velocity" has a role, too."""
+    found: dict[str, dict[str, str]] = defaultdict(dict)
+    for name, channel in window.channels.items():
+        role = channel.kind.motion
+        if channel.kind.of == "joint" and channel.kind.derivative == 1 and not role:
+            found["velocity"][channel.subject or ""] = name
+        elif role:
+            found[role][channel.subject or ""] = name
     return found
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.excitation.excitation import Excitation
 from picchio.measurement.noise.window import Window
 from picchio.measurement.quality.check import Check, Finding
 from picchio.measurement.quality.scan import RecordScan
@@ -21,14 +22,14 @@ class BlowsCheck(Check):
 
     name = "blows"
     what = "t = 0 at the first blow; measured blows as programmed"
+    of = "percussion"
 
     def record(self, scan: RecordScan) -> Iterator[Finding]:
         """One percussion record."""
         window = scan.window
-        if window.record.kind != "percussion":
-            return
-        if "force" in window.arrays and window.blows is not None:
-            yield from self._force(scan)
+        for name, channel in window.channels.items():
+            if channel.kind.of_force and window.blows is not None:
+                yield from self._force(scan, name, window.blows)
         yield from self._onset(scan)
         if scan.file in self.context.periods:
             programmed, found = self.context.periods[scan.file]
@@ -41,14 +42,13 @@ class BlowsCheck(Check):
                     value=found, unit="s",
                 )  # fmt: skip
 
-    def _force(self, scan: RecordScan) -> Iterator[Finding]:
-        window, blows = scan.window, scan.window.blows
-        assert blows is not None
-        force = window.arrays["force"] - blows.preload
+    def _force(self, scan: RecordScan, channel: str, blows: Excitation) -> Iterator[Finding]:
+        window = scan.window
+        force = window.arrays[channel] - blows.preload
         programmed = blows.peak_force
         if not force.any() or programmed <= 0.0:
             return
-        name = {"record": scan.file, "channel": "force"}
+        name = {"record": scan.file, "channel": channel}
         if -force.min() > 2.0 * force.max():
             yield self.found("warning", "the blows are negative: the force is flipped",
                              "it must be the tool's force on the robot along `direction`",
@@ -68,12 +68,11 @@ class BlowsCheck(Check):
                              f"{programmed:.4g} N: {100 * (ratio - 1):+.0f} %",
                              "state the measured force, or check the cell's calibration",
                              value=ratio, **name)  # fmt: skip
-        yield from self._timing(scan, window, force, peak, name)
+        yield from self._timing(window, blows, force, peak, name)
 
-    def _timing(self, scan: RecordScan, window: Window, force: FloatArray, peak: float,
+    def _timing(self, window: Window, blows: Excitation, force: FloatArray, peak: float,
                 name: dict[str, str]) -> Iterator[Finding]:  # fmt: skip
-        blows, hits = window.blows, window.record.hits
-        assert blows is not None
+        hits = window.record.hits
         above = force > 0.5 * peak
         rising = np.flatnonzero(above[1:] & ~above[:-1]) + 1
         # Noise at the threshold is not another blow.
@@ -108,7 +107,7 @@ class BlowsCheck(Check):
         onsets = {}
         for name, values in window.arrays.items():
             std = self.context.std(name)
-            if name == "force" or std == 0.0:
+            if window.channels[name].kind.of_force or std == 0.0:
                 continue
             x = values - np.median(values[: max(10, quiet.stop // 2)])
             moved = np.abs(x) > _SIGMAS * std + 1.5 * self.context.hum(name)

@@ -12,8 +12,8 @@ from picchio.excitation.table import excitation_class
 from picchio.measurement.quality.check import Check, Context, Finding
 from picchio.measurement.quality.scan import ChannelScan, RecordScan
 
-_MOTION = ("torque", "accelerometer", "acceleration")
 _KEPT = 4000
+_ADVICE = "set a larger range and repeat; until then leave these samples out"
 
 
 class ClippingCheck(Check):
@@ -30,31 +30,29 @@ class ClippingCheck(Check):
     def record(self, scan: RecordScan) -> Iterator[Finding]:
         """Flat tops that are exact; what may be one under noise is kept until the end."""
         for name, seen in scan.channels.items():
-            channel = scan.record.channel(name)
-            if seen.constant or channel.kind.name == "temperature":
+            channel = scan.window.channels[name]
+            if seen.constant or channel.kind.condition:
                 continue
             motion = scan.record.kind == "motion"
-            if motion and channel.kind.name not in _MOTION:
+            if motion and channel.kind.smooth:
                 continue  # a machine may stand still where its range ends
-            if name == "force" and excitation_class(scan.record.excitation.kind).flat:
+            if channel.kind.of_force and excitation_class(scan.record.excitation.kind).flat:
                 continue
             values = scan.window.arrays[name]
-            flat = _exact(values, seen, self.context)
+            flat = _exact(values, seen)
             if flat:
+                limit, samples = flat
                 self._told.add(channel.group)
-                yield self._told_of(scan.file, name, *flat, channel.unit)
+                yield self.found(
+                    "warning",
+                    f"reaches its limit of {limit:.4g} {channel.unit}: {samples} samples lie "
+                    "exactly there",
+                    _ADVICE, record=scan.file, channel=name, value=limit, unit=channel.unit,
+                )  # fmt: skip
             elif not motion:
                 keep = np.argsort(np.abs(values))[-_KEPT:]
                 keep.sort()
                 self._tops[channel.group].append((scan.file, name, keep, values[keep]))
-
-    def _told_of(self, file: str, name: str, limit: float, samples: int, unit: str) -> Finding:
-        return self.found(
-            "warning",
-            f"reaches its limit of {limit:.4g} {unit}: {samples} samples lie exactly there",
-            "set a larger range and repeat; until then leave these samples out",
-            record=file, channel=name, value=limit, unit=unit,
-        )  # fmt: skip
 
     def finish(self) -> Iterator[Finding]:
         """Groups whose largest values pile up within the noise of one level."""
@@ -102,12 +100,12 @@ class ClippingCheck(Check):
                 "warning",
                 f"seems to reach a limit of about {limit:.4g}: {at} samples of "
                 f"{len(set(files))} records pile up there, {below} as far below it",
-                "set a larger range and repeat; until then leave these samples out",
+                _ADVICE,
                 record=files[0] if len(set(files)) == 1 else None, channel=group, value=limit,
             )  # fmt: skip
 
 
-def _exact(values: FloatArray, seen: ChannelScan, context: Context) -> tuple[float, int] | None:
+def _exact(values: FloatArray, seen: ChannelScan) -> tuple[float, int] | None:
     """(limit, samples) where samples in a row lie exactly at an extreme, and pile up there."""
     for limit in (seen.most, seen.least):
         at = values == limit

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from picchio.campaign.channels import Channel
 from picchio.core.arrays import FloatArray
 from picchio.measurement.quality.check import Check, Finding
 from picchio.measurement.quality.scan import RecordScan
@@ -21,16 +22,16 @@ class DriftCheck(Check):
 
     name = "drift"
     what = "zeros that wander, or are none"
+    of = "percussion"
 
     def record(self, scan: RecordScan) -> Iterator[Finding]:
         """Every channel of one percussion record."""
         window = scan.window
-        if window.record.kind != "percussion":
-            return
         for name, values in window.arrays.items():
-            if name == "force" or scan.channels[name].constant:
+            channel = window.channels[name]
+            if channel.kind.of_force or scan.channels[name].constant:
                 continue
-            unit = window.record.channel(name).unit
+            unit = channel.unit
             size = float(np.sqrt(np.mean((values - values.mean()) ** 2)))
             quiet = window.quiet()
             if window.steady:
@@ -52,7 +53,7 @@ class DriftCheck(Check):
                 error = self._error(name, window.rate, quiet.stop, flat=True)
                 error += self.context.hum(name) / np.sqrt(quiet.stop)
                 if abs(zero) > _SIGMAS * error and abs(zero) > 0.02 * size:
-                    yield self._offset(scan, name, zero, size, unit)
+                    yield self._offset(scan, channel, zero, size)
 
     def _wander(self, scan: RecordScan, name: str, values: FloatArray, size: float) -> float | None:
         """Unit/s at which the zero moves, if it does so after the blows as before and during."""
@@ -76,14 +77,15 @@ class DriftCheck(Check):
             return float(sum(steps) / sum(spans))
         return None
 
-    def _offset(self, scan: RecordScan, name: str, zero: float, size: float, unit: str) -> Finding:
-        gravity = name.startswith(("acceler",)) and 0.2 * _G < abs(zero) < 1.05 * _G
+    def _offset(self, scan: RecordScan, channel: Channel, zero: float, size: float) -> Finding:
+        gravity = channel.kind.derivative == 2 and 0.2 * _G < abs(zero) < 1.05 * _G
         return self.found(
             "warning",
-            f"is {zero:+.3g} {unit} before the first blow, {zero / size:+.2g} times the signal",
+            f"is {zero:+.3g} {channel.unit} before the first blow, {zero / size:+.2g} times the "
+            "signal",
             "it must be less its value at rest: gravity is still in it" if gravity
             else "it must be less its value at rest: take the mean of the quiet time off",
-            record=scan.file, channel=name, value=zero, unit=unit,
+            record=scan.file, channel=channel.name, value=zero, unit=channel.unit,
         )  # fmt: skip
 
     def _steady(self, scan: RecordScan, name: str, values: FloatArray, size: float,

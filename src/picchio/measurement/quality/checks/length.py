@@ -17,12 +17,13 @@ class LengthCheck(Check):
 
     name = "length"
     what = "quiet time before, every blow, ring-down or whole periods covered"
+    of = "percussion"
 
     def record(self, scan: RecordScan) -> Iterator[Finding]:
         """One percussion record."""
         window, clock = scan.window, scan.clock
         blows = window.blows
-        if window.record.kind != "percussion" or blows is None:
+        if blows is None:
             return
         if window.steady:
             periods = (clock.end - clock.start + clock.step) / blows.period
@@ -62,7 +63,7 @@ class LengthCheck(Check):
             std = self.context.std(name) + self.context.hum(name)
             part = values[window.after()]
             size = max(16, values.size // 20)
-            if name == "force" or values.size < 4 * size:
+            if window.channels[name].kind.of_force or values.size < 4 * size:
                 continue
             power = values[: values.size // size * size].reshape(-1, size)
             loudest = float(np.sqrt((power**2).mean(axis=1).max()))

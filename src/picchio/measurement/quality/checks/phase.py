@@ -9,11 +9,11 @@ the phase: a phase that grows with the frequency is a delay, one that falls with
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from picchio.campaign.channels import AXES
+from picchio.campaign.channels import AXES, ChannelKind
 from picchio.core.arrays import ComplexArray, FloatArray
 from picchio.core.errors import InputError
 from picchio.measurement.noise.ringdown import fit_ring_down
@@ -23,7 +23,6 @@ from picchio.measurement.quality.relabel import relabel
 from picchio.measurement.quality.scan import RecordScan
 
 _RECORDS = 8
-_POWERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _Waves = dict[str, ComplexArray]
 
 
@@ -32,56 +31,56 @@ class PhaseCheck(Check):
 
     name = "phase"
     what = "an accelerometer's high-pass, delays between sensors (their phase in the ring-down)"
+    of = "percussion"
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self._looked = 0
-        # group: (frequency, phase, weight) of every wave
-        self._points: dict[str, list[tuple[float, float, float]]] = defaultdict(list)
+        # (group, against the deflections): (frequency, phase, weight) of every wave
+        self._points: dict[tuple[str, bool], list[tuple[float, float, float]]] = defaultdict(list)
         # group: (3,) seen and (3,) expected, one row a wave
         self._vectors: dict[str, list[tuple[ComplexArray, ComplexArray]]] = defaultdict(list)
 
-    def record(self, scan: RecordScan) -> Iterator[Finding]:
+    def record(self, scan: RecordScan) -> Iterable[Finding]:
         """Collects phases; judged in the end."""
-        yield from ()
         window = scan.window
-        if self._looked >= _RECORDS or window.steady or window.record.kind == "motion":
-            return
-        pairs = self._pairs(window)
+        if self._looked >= _RECORDS or window.steady:
+            return ()
+        names = self._comparable(window)
         after = window.after()
-        if not pairs or after.stop - after.start < 200:
-            return
-        names = sorted({name for waves in pairs for name in waves})
+        if not names or after.stop - after.start < 200:
+            return ()
         found = fit_ring_down(np.stack([window.arrays[n][after] for n in names]), window.rate)
         if found is None or not found.poles.size:
-            return
+            return ()
         self._looked += 1
         m = found.residual.shape[1]
         waves, error = _amplitudes(window, after, names, found.poles, m)
         self._compare(window, waves, error, found.poles)
+        return ()
 
-    def _pairs(self, window: Window) -> list[list[str]]:
-        groups = {window.record.channel(n).group for n in window.arrays}
-        deflections = [n for n in window.arrays if n.startswith("deflection.")]
+    def _comparable(self, window: Window) -> list[str]:
+        """Channels whose waves follow from one another; none where there are none."""
+        channels = window.channels.values()
+        deflections = _deflections(window)
+        every = [channel for channel in channels if _is_of_frame(channel.kind)]
         robot = self.context.robot
-        every = [n for g in sorted(groups) if g.partition(".")[0] in (*_POWERS, "accelerometer")
-                 for n in window.arrays if window.record.channel(n).group == g]  # fmt: skip
-        by_robot = robot is not None and {f"deflection.{j}" for j in robot.flexible_names} <= set(
-            deflections
-        )
-        frames = [g.partition(".")[2] for g in groups if g.partition(".")[0] in _POWERS]
-        same = len(frames) > len(set(frames))
-        return [every + deflections] if every and (by_robot or same) else []
+        by_robot = robot is not None and set(robot.flexible_names) <= set(deflections)
+        frames = [own[0].subject for own in window.groups.values()
+                  if _is_of_frame(own[0].kind) and not own[0].kind.own_axes]  # fmt: skip
+        if not every or not (by_robot or len(frames) > len(set(frames))):
+            return []
+        return sorted({*(channel.name for channel in every), *deflections.values()})
 
     def _compare(self, window: Window, waves: _Waves, error: dict[str, FloatArray],
                  poles: ComplexArray) -> None:  # fmt: skip
         must = self._from_deflections(window, waves, poles)
-        source = "deflections"
+        by_robot = must is not None
         if must is None:
-            must, source = _from_same_frame(window, waves, poles), ""
+            must = _from_same_frame(window, waves, poles)
         self._keep_vectors(waves, error, must)
         for name, expected in must.items():
-            group = window.record.channel(name).group
+            group = window.channels[name].group
             for k, s in enumerate(poles):
                 seen, strength = waves[name][k], abs(waves[name][k])
                 if strength < 8.0 * error[name][k] or abs(expected[k]) < 0.1 * strength:
@@ -92,12 +91,12 @@ class PhaseCheck(Check):
                     continue
                 phase = float(np.angle(seen / expected[k]))
                 weight = strength / error[name][k]
-                self._points[f"{group}|{source}"].append(
+                self._points[group, by_robot].append(
                     (float(s.imag), phase, float(min(weight, 200.0)))
                 )
 
     def _keep_vectors(self, waves: _Waves, error: dict[str, FloatArray], must: _Waves) -> None:
-        groups = {name.rpartition(".")[0] for name in must}
+        groups = dict.fromkeys(name.rpartition(".")[0] for name in must)
         for group in groups:
             names = [f"{group}.{axis}" for axis in AXES]
             if not all(name in must for name in names):
@@ -114,15 +113,15 @@ class PhaseCheck(Check):
         robot, pose = self.context.robot, window.record.pose
         if robot is None or pose is None:
             return None
-        names = [f"deflection.{joint}" for joint in robot.flexible_names]
-        if not all(name in waves for name in names):
+        deflections = _deflections(window)
+        if not set(robot.flexible_names) <= set(deflections):
             return None
-        x = np.stack([waves[name] for name in names])
+        x = np.stack([waves[deflections[joint]] for joint in robot.flexible_names])
         gravity = np.asarray(robot.mounting.gravity, dtype=float)
         found: _Waves = {}
-        for group in {window.record.channel(n).group for n in waves}:
-            kind, _, frame = group.partition(".")
-            if kind not in _POWERS and kind != "accelerometer":
+        for channels in window.groups.values():
+            kind, frame = channels[0].kind, channels[0].subject or ""
+            if not _is_of_frame(kind):
                 continue
             try:
                 jacobian = robot.frame_jacobian(robot.pose(pose), frame)
@@ -130,13 +129,12 @@ class PhaseCheck(Check):
             except InputError:
                 continue
             move, turn = jacobian[:3] @ x, jacobian[3:] @ x
-            if kind == "accelerometer":
-                move = rotation.T @ (move * poles**2 + np.cross(turn.T, gravity).T)
-            else:
-                move = move * poles ** _POWERS[kind]
-            for axis, row in zip(AXES, move, strict=True):
-                if f"{group}.{axis}" in waves:
-                    found[f"{group}.{axis}"] = row
+            move = move * poles ** (kind.derivative or 0)
+            if kind.own_axes:
+                if kind.derivative == 2:
+                    move = move + np.cross(turn.T, gravity).T
+                move = rotation.T @ move
+            found |= {channel.name: move[AXES.index(channel.axis or "x")] for channel in channels}
         return found
 
     def finish(self) -> Iterator[Finding]:
@@ -155,11 +153,10 @@ class PhaseCheck(Check):
                     "check how the sensor is mounted, then relabel the columns",
                     channel=group, value=ways.as_labelled,
                 )  # fmt: skip
-        for key, points in self._points.items():
-            group, _, source = key.partition("|")
+        for (group, by_robot), points in self._points.items():
             if group in self.context.told:
                 continue  # phases of the wrong axes mean nothing
-            against = "the deflections" if source else "the other channels of its frame"
+            against = "the deflections" if by_robot else "the other channels of its frame"
             fit = _fit(np.array(points)) if len(points) >= 4 else None
             if fit is None:
                 continue
@@ -204,20 +201,36 @@ def _amplitudes(window: Window, after: slice, names: list[str], poles: ComplexAr
     return waves, error
 
 
+def _is_of_frame(kind: ChannelKind) -> bool:
+    """Whether its waves follow from the motion of a frame."""
+    return kind.of == "frame" and kind.axes and kind.answers and kind.derivative is not None
+
+
+def _deflections(window: Window) -> dict[str, str]:
+    """Joint -> the channel of its deflection."""
+    return {
+        channel.subject or "": name for name, channel in window.channels.items()
+        if channel.kind.of == "joint" and channel.kind.answers and channel.kind.derivative == 0
+    }  # fmt: skip
+
+
 def _from_same_frame(window: Window, waves: _Waves, poles: ComplexArray) -> _Waves:
     """What velocity and acceleration must be, from the channel with fewest derivatives."""
-    found: _Waves = {}
+    orders: dict[str, int] = {}
+    fewest: dict[tuple[str | None, str | None], str] = {}
     for name in waves:
-        channel = window.record.channel(name)
-        if channel.kind.name not in _POWERS:
-            continue
-        for kind in ("displacement", "velocity"):
-            other = f"{kind}.{channel.subject}.{channel.axis}"
-            if other in waves and _POWERS[kind] < _POWERS[channel.kind.name]:
-                found[name] = waves[other] * poles ** (
-                    _POWERS[channel.kind.name] - _POWERS[kind]
-                )  # fmt: skip
-                break
+        channel = window.channels[name]
+        place = channel.subject, channel.axis
+        if _is_of_frame(channel.kind) and not channel.kind.own_axes:
+            orders[name] = channel.kind.derivative or 0
+            if place not in fewest or orders[name] < orders[fewest[place]]:
+                fewest[place] = name
+    found: _Waves = {}
+    for name, order in orders.items():
+        channel = window.channels[name]
+        other = fewest[channel.subject, channel.axis]
+        if order > orders[other]:
+            found[name] = waves[other] * poles ** (order - orders[other])
     return found
 
 

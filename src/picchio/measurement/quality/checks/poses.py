@@ -72,9 +72,8 @@ class PosesCheck(Check):
 
     def _motion(self, scan: RecordScan) -> Iterator[Finding]:
         robot = self.context.robot
-        for name in scan.record.channels:
-            channel = scan.record.channel(name)
-            if channel.kind.name not in ("position", "motor_position"):
+        for name, channel in scan.window.channels.items():
+            if channel.kind.motion not in ("link", "motor"):
                 continue
             seen = scan.channels[name]
             if robot is None or channel.subject not in robot.joint_names:

@@ -1,20 +1,17 @@
-"""Do repeated records agree?"""
+"""Do repeated records agree, and are channels or records copies of one another?"""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from picchio.core.arrays import FloatArray
-from picchio.measurement.noise.estimate import repeat_key
+from picchio.measurement.noise.repeats import Repeats, overlap
 from picchio.measurement.noise.window import Window
 from picchio.measurement.quality.check import Check, Context, Finding
 from picchio.measurement.quality.scan import RecordScan
-
-_SAMPLES = 16384
-_BUDGET = 4 << 20
 
 
 @dataclass(frozen=True)
@@ -46,38 +43,26 @@ class RepeatsCheck(Check):
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self.comparisons: list[Comparison] = []
-        self._before: dict[tuple[object, ...], Window] = {}
-        self._kept = 0
+        self._repeats = Repeats(context.campaign)
 
     def record(self, scan: RecordScan) -> Iterator[Finding]:
         """Against the one before."""
-        key = repeat_key(scan.record)
-        if key is None:
-            return
-        before = self._before.pop(key, None)
-        if before is not None:
-            self._kept -= _numbers(before)
-            worst = self._compare(before, scan.window)
-            if worst is not None:
-                self.comparisons.append(worst)
-                yield from self._judge(worst)
-        if self._kept < _BUDGET:
-            window = scan.window
-            arrays = {name: v[:_SAMPLES].copy() for name, v in window.arrays.items()}
-            kept = Window(window.record, window.time[:_SAMPLES].copy(), arrays, False, window.rate)
-            self._before[key] = kept
-            self._kept += _numbers(kept)
+        before = self._repeats.before(scan.window)
+        worst = self._compare(before, scan.window) if before is not None else None
+        if worst is not None:
+            self.comparisons.append(worst)
+            yield from self._judge(worst)
 
     def _compare(self, one: Window, other: Window) -> Comparison | None:
-        if abs(one.rate / other.rate - 1.0) > 1e-6:
-            return None
-        shift = round((other.time[0] - one.time[0]) * one.rate)
+        first, second = overlap(one, other)
         worst: Comparison | None = None
         for name in one.arrays.keys() & other.arrays.keys():
-            a, b = _aligned(one.arrays[name], other.arrays[name], shift)
-            size = float(np.sqrt(np.mean(a**2)))
-            if a.size < 64 or name == "force" or np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
+            a, b = one.arrays[name][first], other.arrays[name][second]
+            if a.size < 64 or one.channels[name].kind.of_force:
                 continue
+            if np.ptp(a) == 0.0 or np.ptp(b) == 0.0:
+                continue
+            size = float(np.sqrt(np.mean(a**2)))
             expected = np.sqrt(2.0 * self.context.std(name) ** 2 + self.context.hum(name) ** 2)
             difference = float(np.sqrt(np.mean((b - a) ** 2)))
             over = difference / expected if expected > 0.0 else np.inf if difference else 1.0
@@ -102,11 +87,37 @@ class RepeatsCheck(Check):
             )  # fmt: skip
 
 
-def _aligned(a: FloatArray, b: FloatArray, shift: int) -> tuple[FloatArray, FloatArray]:
-    a, b = (a[shift:], b) if shift >= 0 else (a, b[-shift:])
-    m = min(a.size, b.size)
-    return a[:m], b[:m]
+class CopiesCheck(Check):
+    """Channels or records that are equal bit for bit: noise never is."""
 
+    name = "copies"
+    what = "channels or records that are exact copies"
 
-def _numbers(window: Window) -> int:
-    return window.time.size * (len(window.arrays) + 1)
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._records: dict[bytes, tuple[str, str]] = {}
+
+    def record(self, scan: RecordScan) -> Iterator[Finding]:
+        """Within one record, and against those before."""
+        seen: dict[bytes, str] = {}
+        told = False
+        for name, values in scan.window.arrays.items():
+            kind = scan.window.channels[name].kind
+            if scan.channels[name].constant or values.size < 16 or kind.condition:
+                continue
+            # A force without noise is as programmed: it may well be the same twice.
+            if kind.of_force and self.context.std(name) == 0.0:
+                continue
+            digest = hashlib.sha256(values.tobytes()).digest()
+            if digest in seen:
+                yield self.found("warning", f"equals {seen[digest]} in every sample",
+                                 "one of them is a copy: find out which sensor it is",
+                                 record=scan.file, channel=name)  # fmt: skip
+            seen.setdefault(digest, name)
+            known = self._records.get(digest)
+            if known and known[1] == name and not told and kind.motion != "reference":
+                told = True
+                yield self.found("warning", f"equals that of {known[0]} in every sample",
+                                 "one record was saved twice: leave it out",
+                                 record=scan.file, channel=name)  # fmt: skip
+            self._records.setdefault(digest, (scan.file, name))

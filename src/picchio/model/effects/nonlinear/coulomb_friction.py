@@ -22,7 +22,14 @@ class CoulombFriction(Effect):
         Parameter(
             "torque", "N*m", lower=0.0, upper=1e6, meaning="friction (N for a prismatic joint)"
         ),
-        Parameter("smoothing", "rad/s", lower=0.0, upper=5e-3, meaning="rate below which it fades"),
+        Parameter(
+            "smoothing",
+            "rad/s",
+            lower=0.0,
+            upper=5e-3,
+            meaning="rate below which it fades",
+            size=1e-3,
+        ),
     )
     linear = ("torque",)
     meaning = "dry friction between link and motor side"

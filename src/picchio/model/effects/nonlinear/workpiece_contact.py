@@ -16,7 +16,9 @@ class WorkpieceContact(Effect):
     parameters = (
         Parameter("stiffness", "N/m", lower=0.0, upper=1e9, meaning="of workpiece and tip"),
         Parameter("preload", "N", neutral=0.0, lower=0.0, upper=1e6, meaning="at rest"),
-        Parameter("damping", "N*s/m", lower=0.0, upper=1e6, meaning="of workpiece and tip"),
+        Parameter(
+            "damping", "N*s/m", lower=0.0, upper=1e6, meaning="of workpiece and tip", share=0.02
+        ),
     )
     meaning = "the workpiece holds the tool as long as it touches"
     mark = "plate"

@@ -16,7 +16,7 @@ class Cable(Effect):
     target_kind = "link"
     parameters = (
         Parameter("stiffness", "N/m", lower=0.0, upper=1e9, meaning="of the cable"),
-        Parameter("damping", "N*s/m", lower=0.0, upper=1e6, meaning="of the cable"),
+        Parameter("damping", "N*s/m", lower=0.0, upper=1e6, meaning="of the cable", share=0.02),
         MODAL_SHARE,
     )
     meaning = "a cable or hose holds the link"

@@ -7,17 +7,19 @@ from picchio.model.effects.effect import Parameter
 # See `Plant.modal_share`.
 MODAL_SHARE = Parameter(
     "modal_share",
+    "1",
     neutral=1.0,
     lower=0.0,
     upper=1.0,
     meaning="1: the stated damping is that of the modes with this effect; 0: of the joints alone",
+    size=1.0,
 )
 
 
 def stiffness(meaning: str, upper: float) -> Parameter:
     """Of what is rigid in the nominal model, N m/rad."""
     return Parameter("stiffness", "N*m/rad", neutral=float("inf"), lower=1e-3, upper=upper,
-                     logarithmic=True, meaning=meaning)  # fmt: skip
+                     logarithmic=True, meaning=meaning, by_inverse=True)  # fmt: skip
 
 
 def damping(meaning: str, upper: float) -> Parameter:

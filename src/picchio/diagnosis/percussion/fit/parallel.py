@@ -1,24 +1,93 @@
-"""Records predicted on several cores, where a search's steps depend on each other."""
+"""Work on several cores, by processes that share this one's memory.
+
+`worker_pool` maps functions over independent items; `parallel_records` has records predicted
+where a search's steps depend on each other.
+"""
 
 from __future__ import annotations
 
+import itertools
 import multiprocessing
 import os
 import signal
+import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from typing import Any
 
 from picchio.core.arrays import FloatArray
-from picchio.diagnosis.percussion.data.problem import Pin, Problem
-from picchio.diagnosis.percussion.data.record import MeasuredRecord
-from picchio.diagnosis.percussion.fit.workers import worker_count
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Pin, Problem
 from picchio.model.effects.effect import Effect
 
+_MOST = 8
 # Numbers of a residual (channels x samples, all records) below which sending costs what it saves.
 _WORTH_SENDING = 10_000
+_shared: dict[int, Mapping[str, Callable[[Any], Any]]] = {}
+_numbers = itertools.count()
+
+
+def cores() -> int:
+    """How many this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def worker_count(workers: int | None) -> int:
+    """As many as are asked for; as many as cores where None, eight at most.
+
+    One where a process can't be forked safely: not on Linux, or within such a process.
+    """
+    if sys.platform != "linux" or multiprocessing.current_process().daemon:
+        return 1
+    return min(cores(), _MOST) if workers is None else workers
+
+
+@contextmanager
+def worker_pool(
+    workers: int | None, functions: Mapping[str, Callable[[Any], Any]]
+) -> Iterator[Callable[[str, Iterable[Any]], list[Any]]]:
+    """Within the block, a function that maps others over items: (name, items) -> results in order.
+
+    The functions may use whatever exists when the block begins: processes are forked, so nothing
+    of that is copied or sent. Items and results are. Where a process can't be forked safely (not
+    on Linux, or within such a process), or one core is all there is, this one does the work itself.
+
+    Args:
+        workers: processes; as many as cores where None, eight at most.
+        functions: name -> function of one item.
+    """
+    number, count = next(_numbers), worker_count(workers)
+    pool: ProcessPoolExecutor | None = None
+    if count > 1:
+        _shared[number] = functions
+        pool = ProcessPoolExecutor(count, multiprocessing.get_context("fork"))
+
+    def mapped(name: str, items: Iterable[Any]) -> list[Any]:
+        todo = list(items)
+        if pool is None or len(todo) < 2:
+            return [functions[name](item) for item in todo]
+        return list(pool.map(_run, [(number, name, item) for item in todo]))
+
+    finished = False
+    try:
+        yield mapped
+        finished = True
+    finally:
+        _shared.pop(number, None)
+        if pool is not None:
+            pool.shutdown(wait=finished, cancel_futures=True)
+
+
+def _run(task: tuple[int, str, Any]) -> Any:
+    number, name, item = task
+    # Whatever shows warnings may have been in the middle of something when this was forked.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return _shared[number][name](item)
 
 
 @contextmanager
