@@ -10,8 +10,7 @@ from typing import Any
 from picchio.paper.assumptions import INPUTS
 from picchio.paper.run import Reproduction
 from picchio.paper.verdict import Verdict
-from picchio.studies.assessment.result import format_count
-from picchio.visuals.report.page import inline_svg, number
+from picchio.visuals.report.page import inline_svg, page_environment
 
 _MARKS = {"holds": "good", "holds only if": "partly", "does not hold": "bad",
           "cannot be known": "open"}  # fmt: skip
@@ -33,25 +32,22 @@ def reproduction_page(
     Returns:
         the HTML.
     """
-    from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
-    folder, shared = files("picchio.paper") / "page_files", files("picchio.visuals.report")
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+    environment = page_environment("picchio.paper")
     environment.filters.update(
-        number=number, count=format_count, mark=_MARKS.__getitem__, gap=_gap, value=_value,
+        mark=_MARKS.__getitem__, gap=_gap, value=_value,
         power=lambda x: Markup(power(float(x))),
     )  # fmt: skip
-    template = environment.from_string((folder / "page.html.j2").read_text("utf-8"))
-    style = (shared / "style.css").read_text("utf-8") + (folder / "page.css").read_text("utf-8")
+    template = environment.get_template("page.html.j2")
+    own = files("picchio.paper") / "page_files" / "page.css"
+    style = Markup(environment.globals["style"]) + Markup(own.read_text("utf-8"))
     shown: dict[str, Any] = {
         name: inline_svg(figure.plot().axes[0], figure.alt, name.replace("-", ""))
         for name, figure in found.figures.items()
     }
     return template.render(
-        style=Markup(style),
+        style=style,
         r=found,
         a=found.answer,
         printed=found.study.printed,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.resources import files
 from inspect import signature
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import matplotlib as mpl
 from markupsafe import Markup, escape
@@ -22,6 +22,9 @@ from picchio.core.provenance import package_version
 from picchio.core.results import Result
 from picchio.studies.assessment.result import format_count
 from picchio.visuals.plots.style import BLUE, INK, MUTED, STYLE, VERMILION
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 # A matplotlib figure as inline SVG that takes the page's text colour and has an alt text.
 
@@ -69,34 +72,39 @@ def inline_svg(ax: Axes, alt: str, name: str, *, themed: bool = False) -> Markup
     return Markup(head + body)
 
 
-def render(template: str, **content: Any) -> str:
-    """A page from a template of this folder; all that goes into it is escaped.
+def page_environment(package: str = "picchio.visuals.report") -> Environment:
+    """The templates of a package's folder `page_files`; all that goes into them is escaped.
 
     Args:
-        template: its file's name.
-        **content: what the template names, but for style sheet and version; what most pages leave
-            empty (a scene, headings below another's) may be left out.
+        package: its full name.
     """
-    from jinja2 import BaseLoader, Environment, StrictUndefined
-
-    folder = files("picchio.visuals.report")
-
-    class Folder(BaseLoader):
-        def get_source(self, environment: Environment, template: str) -> Any:
-            return (folder / template).read_text("utf-8"), None, lambda: True
+    from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-        loader=Folder(),
+        loader=PackageLoader(package, "page_files"),
     )
     environment.filters.update(number=number, percent=percent, count=format_count)
+    style = files("picchio.visuals.report") / "page_files" / "style.css"
+    environment.globals["style"] = Markup(style.read_text("utf-8"))
+    return environment
+
+
+def render(template: str, **content: Any) -> str:
+    """A page from a template of this package.
+
+    Args:
+        template: its file's name.
+        **content: what the template names, but for style sheet and version; what most pages leave
+            empty (a scene, headings below another's) may be left out.
+    """
+    environment = page_environment()
     # What most pages leave empty.
     nothing = ("at", "tone", "scene", "moves", "ask", "stiffness", "channels", "warnings")
     environment.globals.update(dict.fromkeys(nothing, ""), level=2, version=package_version())
-    environment.globals["style"] = Markup((folder / "style.css").read_text("utf-8"))
     return environment.get_template(template).render(**content)
 
 
