@@ -55,7 +55,7 @@ def test_it_teaches_in_small_steps(path: Path) -> None:
 
 def plots(source: str) -> bool:
     """Whether a cell draws with matplotlib."""
-    return "plots.plot_" in source or "plt.subplots" in source
+    return bool(re.search(r"\bplot_\w+\(", source)) or "plt.subplots" in source
 
 
 @pytest.mark.slow

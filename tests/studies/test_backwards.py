@@ -63,7 +63,7 @@ def test_each_answer_gives_the_wanted_life(robot: FlexibleRobot, survival: float
         other = dataclasses.replace(
             robot,
             flexible_joints=tuple(
-                dataclasses.replace(j, shaft=dataclasses.replace(j.shaft, radius=found.radius))
+                dataclasses.replace(j, shaft=j.shaft.model_copy(update={"radius": found.radius}))
                 for j in robot.flexible_joints
                 if j.shaft is not None
             ),
