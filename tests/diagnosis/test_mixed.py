@@ -15,6 +15,7 @@ import motion_records
 import numpy as np
 import pinocchio as pin
 import pytest
+from lxml import html as lxml_html
 
 import picchio
 from picchio.campaign.campaign import Campaign
@@ -213,6 +214,20 @@ def test_nothing_wrong_in_either_kind_is_nothing_wrong():
     found = picchio.diagnose(robot, campaign, workers=1)
     assert found.verdict == "nothing-wrong"
     assert not found.causes and not found.leads
+
+
+@pytest.mark.slow
+def test_a_checks_page_shows_both_kinds_of_records():
+    robot, campaign, _ = mixed([PAYLOAD], {("viscous", 2): 30.0}, records=3)
+    html = picchio.report(picchio.check(campaign, robot=robot)).text
+    page = lxml_html.fromstring(html)
+    heads = [h.text_content() for h in page.iter("h2", "h3")]
+    assert "The motion records" in heads and heads.count("Where it shows") == 2
+    ids = [e.get("id") for e in page.iter() if e.get("id")]
+    assert len(ids) == len(set(ids))
+    for link in page.xpath("//nav/a"):  # leads to a part of the page
+        assert link.get("href")[1:] in ids
+    assert "torque" in page.get_element_by_id("moves").getparent().text_content()
 
 
 GOOD = Gain(("a",), ("b",), 0.3, 0.011, 0.010, 4)

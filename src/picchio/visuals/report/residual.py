@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from markupsafe import Markup
+
 from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
-from picchio.diagnosis.motion.residual import motion_residual
+from picchio.diagnosis.motion.residual import MotionResidual, motion_residual
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.residual import PercussionResidual, percussion_residual
@@ -32,12 +34,12 @@ def check_page(
     warnings: Sequence[str] = (),
     gravity_stiffness: bool = True,
 ) -> str:
-    """How the nominal simulation differs from a campaign's percussion records.
+    """How the nominal simulation differs from a campaign's records, percussion and motion.
 
-    A campaign of motion records alone gets a page of those. What the tolerances allow is fitted
-    first, so that what is left is more than that: stiffness, damping and force of percussion
-    records; of motion records, which take a gear as rigid, each joint's torque and the friction
-    that the URDF states. The page needs nothing from outside and escapes every name.
+    What the tolerances allow is fitted first, so that what is left is more than that: stiffness,
+    damping and force of percussion records; of motion records, which take a gear as rigid, each
+    joint's torque and the friction that the URDF states. The page needs nothing from outside and
+    escapes every name.
 
     Args:
         found: of `picchio.check` with a robot; its errors and warnings are told on the page.
@@ -56,31 +58,36 @@ def check_page(
         raise InputError("needs a robot", key="report", hint="name one with --robot")
     serious = [f for f in found.findings if f.severity in ("error", "warning")]
     told = [*warnings, *(f"{f}." for f in serious[:_MOST_FINDINGS])]
-    kinds = [record.kind for record in campaign.records]
-    if "percussion" in kinds:
-        template = "residual.html.j2"
-        shown = _percussion(
-            percussion_residual(robot, campaign, gravity_stiffness=gravity_stiffness)
-        )
-        if others := kinds.count("motion"):
-            more = "motion records are not on this page; picchio diagnose uses both."
-            told.append(f"{others} {more}")
-    else:
-        template = "residual_motion.html.j2"
-        shown = _motion(MotionResidualFigures(motion_residual(robot, campaign)))
+    kinds = {record.kind for record in campaign.records}
+    moved: MotionResidual | None = None
+    if "motion" in kinds:
+        try:
+            moved = motion_residual(robot, campaign)
+        except InputError as error:
+            if "percussion" not in kinds:
+                raise
+            told.append(f"The motion records are left out: {error}.")
     folder = campaign.folder
-    return render(
-        template,
-        robot=robot.name,
-        warnings=list(dict.fromkeys(told)),
-        folder="in memory" if folder is None else folder.name,
-        command=command
+    page = {
+        "layout": "page.html.j2",
+        "robot": robot.name,
+        "warnings": list(dict.fromkeys(told)),
+        "folder": "in memory" if folder is None else folder.name,
+        "command": command
         or f"picchio check {folder or 'CAMPAIGN'} --robot {robot.name} --report OUT.html",
-        provenance=provenance(
+        "provenance": provenance(
             [*robot.files, *([] if folder is None else [folder / "campaign.toml"])]
         ),
-        **shown,
-    )
+    }
+    part = {"layout": "part.html.j2", "level": 3, "at": "motion-"} if "percussion" in kinds else {}
+    moves = ""
+    if moved is not None:
+        shown = page | _motion(MotionResidualFigures(moved)) | part
+        moves = render("residual_motion.html.j2", **shown)
+    if not part:
+        return moves
+    left = percussion_residual(robot, campaign, gravity_stiffness=gravity_stiffness)
+    return render("residual.html.j2", **page, **_percussion(left), moves=Markup(moves))
 
 
 def _percussion(left: PercussionResidual) -> dict[str, Any]:
