@@ -84,7 +84,7 @@ def luminance(colour: str) -> float:
 
 @pytest.mark.parametrize("theme", [0, 1])
 def test_contrast_of_both_themes(theme: int) -> None:
-    css = (files("picchio.visuals.report") / "style.css").read_text("utf-8")
+    css = (files("picchio.visuals.report") / "page_files/style.css").read_text("utf-8")
     block = css.split(":root {")[1 + theme].split("}")[0]
     colours = dict(re.findall(r"--(\w+): (#[0-9a-f]{6})", block))
     for ground in ("paper", "soft"):
