@@ -1,13 +1,17 @@
 """What may be said of the causes that were found."""
 
-from types import SimpleNamespace
-
 import pytest
 
 from picchio.diagnosis.percussion.conclude.verdict import verdict_of, why_not_claimed
+from picchio.diagnosis.percussion.criteria.whiteness import BAND_LIMIT, Evidence, Level
 from picchio.diagnosis.result import Cause
 
-NOISE, MORE = SimpleNamespace(is_noise=True), SimpleNamespace(is_noise=False)
+
+def evidence(z):
+    return Evidence((Level("deflection", "3-9 Hz", 1.0 + 0.1 * z, z),), (), 1.0)
+
+
+NOISE, MORE = evidence(BAND_LIMIT - 0.1), evidence(BAND_LIMIT + 0.1)
 COMMON = ("sensor_gain",)
 
 
