@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterable, Mapping
 from os import PathLike
@@ -15,11 +16,15 @@ if TYPE_CHECKING:
 def plain(value: Any) -> Any:
     """The same structure as `json.dumps` takes it.
 
-    Arrays and tuples become lists, paths become text, keys become text; numbers that JSON cannot
-    hold (NaN, infinity) become None.
+    Arrays and tuples become lists, paths become text, keys become text, records what their
+    `to_dict` gives or else their fields; numbers that JSON cannot hold (NaN, infinity) become None.
     """
     if hasattr(value, "tolist"):
         value = value.tolist()
+    elif hasattr(value, "to_dict"):
+        value = value.to_dict()
+    elif dataclasses.is_dataclass(value):
+        value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
     if isinstance(value, Mapping):
         return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):

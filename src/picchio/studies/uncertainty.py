@@ -74,13 +74,7 @@ class UncertainLife(TableResult):
         ]
 
     def _content(self) -> dict[str, Any]:
-        return {
-            "joints": {name: vars(spread) for name, spread in self.joints.items()},
-            "robot": vars(self.robot),
-            "inputs": {name: vars(value) for name, value in self.inputs.items()},
-            "assumptions": list(self.assumptions),
-            "seed": self.seed,
-        }
+        return vars(self)
 
 
 def uncertain_life(

@@ -31,6 +31,7 @@ from picchio.cli.output import (
     write_report,
 )
 from picchio.core.errors import InputError
+from picchio.core.results import plain
 from picchio.studies.assessment.result import format_count, verdict
 
 if TYPE_CHECKING:
@@ -145,7 +146,7 @@ def assess(
     content = found.to_dict()
     terms = method_terms(loaded, work, found) if compare_methods or report is not None else ()
     if terms:
-        content["method_terms"] = [term.to_dict() for term in terms]
+        content["method_terms"] = plain(terms)
     allowed = spread = None
     if for_life is not None:
         allowed = picchio.allowable(loaded, work, for_life, survival=survival, **options)

@@ -51,12 +51,12 @@ class SNFit(TableResult):
     Attributes:
         tests: what was fitted, their stresses in shear.
         slope: k of N ~ amplitude^-k.
-        knee: cycles at the knee; None where no run-out shows one.
         endurance_limit: Pa, median. Without a knee: the median strength at `reference_cycles`.
         design: Pa, the same at `design_survival`.
         scatter: standard deviation of log10 strength at a given life, free of the bias of maximum
             likelihood. It holds the specimens' strength and the scatter of life by itself, so at
             the endurance limit it is on the safe side.
+        knee: cycles at the knee; None where no run-out shows one.
         strength_share: share of the scatter's variance that is the specimens' strength, which
             alone counts at the endurance limit (maximum likelihood; few tests show it badly).
         design_survival: the probability that `design` is for.
@@ -72,10 +72,10 @@ class SNFit(TableResult):
 
     tests: SNTests
     slope: Estimate
-    knee: Estimate | None
     endurance_limit: Estimate
     design: Estimate
     scatter: Estimate
+    knee: Estimate | None
     strength_share: float
     design_survival: float
     reference_cycles: float
@@ -173,20 +173,11 @@ class SNFit(TableResult):
     def _content(self) -> dict[str, Any]:
         from picchio.core.provenance import provenance
 
-        names = ("slope", "endurance_limit", "design", "scatter")
+        left_out = ("tests", "covariance")
         return {
             "format": "picchio-sn/1",
             "method": METHOD,
-            **{name: vars(getattr(self, name)) for name in names},
-            "knee": None if self.knee is None else vars(self.knee),
-            "strength_share": self.strength_share,
-            "design_survival": self.design_survival,
-            "reference_cycles": self.reference_cycles,
-            "level": self.level,
-            "failures": self.failures,
-            "run_outs": self.run_outs,
-            "log_likelihood": self.log_likelihood,
-            "assumptions": self.assumptions,
+            **{name: value for name, value in vars(self).items() if name not in left_out},
             "provenance": provenance([] if self.tests.file is None else [self.tests.file]),
         }
 

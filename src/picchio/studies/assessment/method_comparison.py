@@ -6,14 +6,11 @@ import math
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import PicchioWarning
-from picchio.core.results import plain
-from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.miner import life
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, PAPER_SN_CURVE, load_sn_curve
@@ -44,13 +41,9 @@ class Term:
     against: str | None
     factor: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON; a life or factor without end is None."""
-        return {key: plain(value) for key, value in vars(self).items()}
-
 
 def compare_methods(
-    robot: FlexibleRobot | Model, task: Task, sn_curve: SNCurve, *, mean_stress: Rule = "fkm"
+    robot: FlexibleRobot | Model, task: Task, sn_curve: SNCurve
 ) -> tuple[Term, ...]:
     """From the paper's method to the default one, term by term.
 
@@ -61,7 +54,6 @@ def compare_methods(
         robot: with shafts; or a model of it.
         task: what it does.
         sn_curve: the curve in place of the paper's, for all joints.
-        mean_stress: what the mean stress term shows; the default method has "none".
 
     Raises:
         InputError: as `assess`.
@@ -74,9 +66,7 @@ def compare_methods(
         counted = assess(robot, task, sn_curve=paper_curve)
         real = assess(robot, task, sn_curve=sn_curve, miner="elementary")
         limit = assess(robot, task, sn_curve=sn_curve, miner="original")
-        corrected = assess(
-            robot, task, sn_curve=sn_curve, miner="elementary", mean_stress=mean_stress
-        )
+        corrected = assess(robot, task, sn_curve=sn_curve, miner="elementary", mean_stress="fkm")
         median = None
         if sn_curve.scatter and sn_curve.survival is not None:
             half = sn_curve.at_survival(0.5)
@@ -91,7 +81,7 @@ def compare_methods(
          _life(real), "counting"),
         ("endurance limit", "cycles below it do nothing (the default method)",
          _life(limit), "curve"),
-        ("mean stress", f"gravity and feed force by {mean_stress}, not none",
+        ("mean stress", "gravity and feed force by fkm, not none",
          _life(corrected), "curve"),
     ]  # fmt: skip
     if median is not None:

@@ -168,13 +168,13 @@ class Assessment(TableResult):
         robot: its name.
         method: "rainflow" or "paper", and its variant.
         sn_curve: names of the curves used.
-        assumptions: what was taken for granted, a sentence each.
         joints: one entry a flexible joint.
         operations: one entry an operation.
         limiting_joint: shortest life, or largest utilisation where no life has an end; None
             where no joint has a shaft.
         rivets_to_failure: of the limiting joint; infinite where the life has no end.
         steady_state: what the steady state misjudges, one entry a joint.
+        assumptions: what was taken for granted, a sentence each.
         origins: where each value of the robot came from.
         provenance: version and hashes.
     """
@@ -194,12 +194,12 @@ class Assessment(TableResult):
     robot: str
     method: str
     sn_curve: str
-    assumptions: tuple[str, ...]
     joints: tuple[JointLife, ...]
     operations: tuple[OperationResult, ...]
     limiting_joint: str | None
     rivets_to_failure: float
     steady_state: tuple[SteadyStateCheck, ...]
+    assumptions: tuple[str, ...]
     origins: Mapping[str, str]
     provenance: Mapping[str, Any]
 
@@ -252,20 +252,7 @@ class Assessment(TableResult):
         return sheet(f"Assessment of {self.robot}", facts, list(table), rows, verdict(self))
 
     def _content(self) -> dict[str, Any]:
-        return {
-            "format": FORMAT,
-            "robot": self.robot,
-            "method": self.method,
-            "sn_curve": self.sn_curve,
-            "joints": [vars(joint) for joint in self.joints],
-            "operations": [vars(operation) for operation in self.operations],
-            "limiting_joint": self.limiting_joint,
-            "rivets_to_failure": self.rivets_to_failure,
-            "steady_state": [check.to_dict() for check in self.steady_state],
-            "assumptions": list(self.assumptions),
-            "origins": dict(self.origins),
-            "provenance": dict(self.provenance),
-        }
+        return {"format": FORMAT, **vars(self)}
 
 
 def verdict(found: Assessment) -> str:
