@@ -7,7 +7,6 @@ import picchio
 from picchio.cli.life.assess import show
 from picchio.core.errors import PicchioWarning
 from picchio.fatigue.reducer import load_reducer
-from picchio.studies.assessment.checks import reducer_checks
 
 TASK = {
     "hits_per_rivet": 12,
@@ -61,14 +60,10 @@ def test_peak_torque_of_gravity_and_blows_against_the_limits(tmp_path):
     ],
 )
 def test_the_limit_that_binds(peak, held, binds, share, exceeded):
-    (name, check), none = reducer_checks(
-        (load_reducer("RV-40E-121"), None), np.array([[peak, held], [np.nan, np.nan]])
-    )
-    assert name == "RV-40E-121"
+    check = load_reducer("RV-40E-121").check_blows(peak, held)
     assert check.governed_by == binds
     assert check.utilisation == pytest.approx(share)
     assert len(check.warnings) == 1 + exceeded
-    assert none == ("", None)
 
 
 def test_the_task_s_largest_torques_count(tmp_path, capsys):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -137,8 +138,7 @@ def allowable(
         raise InputError("must be positive", key="rivets", value=rivets)
     model = Model.of(robot, gravity_stiffness=gravity_stiffness, gravity_balanced=gravity_balanced)
     stress = ShaftStress.of(model.robot, sn_curve, survival, residue, mean_stress)
-    loads = _Loads(stress, rivets_of(model, task))
-    search = _Backwards(stress, loads, task, rivets, survival)
+    search = _Backwards(stress, rivets_of(model, task), task, rivets, survival)
     return AllowableLoads(
         tuple(search.joint(k) for k in range(len(stress.joints))), model.without_load()
     )
@@ -148,40 +148,37 @@ Load = list[tuple[Cycles, float, float]]
 """For each rivet place: the stress cycles of a rivet, the steady stress, the rivets set there."""
 
 
-class _Loads:
-    """The loads under a force and a number of hits, computed once for all joints."""
-
-    def __init__(self, stress: ShaftStress, places: list[tuple[VariedRivet, float]]) -> None:
-        self._stress, self._places = stress, places
-        self._known: dict[tuple[float, int | None], list[Load]] = {}
-        self.nonlinear = any(place.nonlinear for place, _ in places)
-
-    def __call__(self, joint: int, force: float = 1.0, hits: int | None = None) -> Load:
-        """Of a joint, with the force times a factor; a linear model's cycles are scaled."""
-        solved = force if self.nonlinear else 1.0
-        if (solved, hits) not in self._known:
-            found = [
-                (self._stress.cycles(place.varied(force=solved, hits=hits, compiled=False)), count)
-                for place, count in self._places
-            ]
-            self._known[solved, hits] = [
-                [(*cycles[k], count) for cycles, count in found]
-                for k in range(len(self._stress.joints))
-            ]
-        load = self._known[solved, hits][joint]
-        rest = force / solved
-        return load if rest == 1.0 else [(c.scaled(rest), steady, n) for c, steady, n in load]
-
-
 @dataclass(frozen=True)
 class _Backwards:
-    """The search, joint by joint."""
+    """The search, joint by joint; the loads are computed once for all of them."""
 
     stress: ShaftStress
-    loads: _Loads
+    places: list[tuple[VariedRivet, float]]
     task: Task
     rivets: float
     survival: float | None
+    known: dict[tuple[float, int | None], list[Load]] = field(default_factory=dict)
+
+    @cached_property
+    def nonlinear(self) -> bool:
+        """Whether every trial must be integrated in time."""
+        return any(place.nonlinear for place, _ in self.places)
+
+    def _loads(self, joint: int, force: float = 1.0, hits: int | None = None) -> Load:
+        """Of a joint, with the force times a factor; a linear model's cycles are scaled."""
+        solved = force if self.nonlinear else 1.0
+        if (solved, hits) not in self.known:
+            found = [
+                (self.stress.cycles(place.varied(force=solved, hits=hits, compiled=False)), count)
+                for place, count in self.places
+            ]
+            self.known[solved, hits] = [
+                [(*cycles[k], count) for cycles, count in found]
+                for k in range(len(self.stress.joints))
+            ]
+        load = self.known[solved, hits][joint]
+        rest = force / solved
+        return load if rest == 1.0 else [(c.scaled(rest), steady, n) for c, steady, n in load]
 
     @property
     def limit(self) -> float:
@@ -192,15 +189,15 @@ class _Backwards:
         """What joint k allows."""
         shaft = self.stress.joints[k].shaft
         assert shaft is not None
-        load = self.loads(k)
+        load = self._loads(k)
         # A stress below one pascal is rounding: the blows do not move this joint.
         moved = any(len(cycles) and cycles.range.max() > 1.0 for cycles, _, _ in load)
         force = slimmer = math.inf
         if moved:
             force = largest_factor(
-                lambda f: self._spent(k, self.loads(k, f)),
+                lambda f: self._spent(k, self._loads(k, f)),
                 self.limit,
-                _NONLINEAR_TOLERANCE if self.loads.nonlinear else 0.0,
+                _NONLINEAR_TOLERANCE if self.nonlinear else 0.0,
             )
             # A thinner shaft raises every stress of the same torques.
             slimmer = largest_factor(lambda f: self._spent(k, load, f), self.limit)
@@ -231,7 +228,7 @@ class _Backwards:
             return None
 
         def too_much(hits: int) -> bool:
-            return self._spent(k, self.loads(k, hits=hits)) > self.limit
+            return self._spent(k, self._loads(k, hits=hits)) > self.limit
 
         if not too_much(_MOST_HITS):
             return None

@@ -10,7 +10,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, PicchioWarning
 from picchio.fatigue.miner import life
-from picchio.fatigue.reducer import Reducer, ReducerCheck, load_reducer
+from picchio.fatigue.reducer import Reducer, load_reducer
 from picchio.fatigue.shaft_stress import check_shaft
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.model import Model
@@ -33,30 +33,6 @@ def reducer_of(joint: Joint) -> Reducer | None:
     except InputError as error:
         warnings.warn(f"{joint.name}: {error}; it is left unchecked", PicchioWarning, stacklevel=3)
         return None
-
-
-def reducer_checks(
-    reducers: tuple[Reducer | None, ...], torques: FloatArray
-) -> list[tuple[str, ReducerCheck | None]]:
-    """Every joint's reducer, by name, against the largest torques of the whole task.
-
-    Args:
-        reducers: (n,) None where a joint names none.
-        torques: (n, 2) N m, largest magnitudes over the task: of gravity and blows together, and
-            of what is held; NaN where they are not known.
-
-    Returns:
-        name and check of each joint; "" and None where there is none.
-    """
-    found: list[tuple[str, ReducerCheck | None]] = []
-    for reducer, (peak, held) in zip(reducers, torques, strict=True):
-        # Each limit is for one of the two: their largest values give each limit's worst pose.
-        if reducer is None:
-            found.append(("", None))
-            continue
-        check = reducer.check_blows(peak, held) if np.isfinite(peak) else None
-        found.append((reducer.name, check))
-    return found
 
 
 def warn_about_shafts(robot: FlexibleRobot) -> None:

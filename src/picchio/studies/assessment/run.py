@@ -15,7 +15,7 @@ from picchio.core.provenance import provenance
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.miner import life, peak_damage
-from picchio.fatigue.reducer import Reducer, ReducerCheck
+from picchio.fatigue.reducer import Reducer
 from picchio.fatigue.shaft_stress import shear_stress
 from picchio.fatigue.sn.curve import MinerRule, SNCurve
 from picchio.fatigue.sn.library import PAPER_SN_CURVE, load_sn_curve
@@ -24,7 +24,6 @@ from picchio.robot.dynamics.pose import warn_beyond_limits
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.checks import (
     assumptions_of,
-    reducer_checks,
     reducer_of,
     steady_state_checks,
     warn_about_shafts,
@@ -111,22 +110,33 @@ def assess(
             done += 1
             if progress is not None:
                 progress(done, total)
-        results.append(_operation_result(operation, rows))
-        checks.append(np.array([row["check"] for row in rows]))
-        torques += [row["reducer_torques"] for row in rows]
+        stacked = {key: np.array([row[key] for row in rows]) for key in rows[0]}
+        checks.append(stacked.pop("check"))
+        torques.append(stacked.pop("reducer_torques").max(axis=0))
+        results.append(
+            OperationResult(
+                name=operation.name,
+                direction=operation.direction,
+                excitation=operation.excitation.describe(),
+                hits_per_rivet=operation.hits_per_rivet,
+                rivets=operation.rivets,
+                poses=operation.poses,
+                **stacked,
+            )
+        )
     if paper_mean_stress:
-        results = [_at_mean_stress(result, robot, curves) for result in results]
-    used = reducer_checks(reducers, np.max(torques, axis=0))
+        results = [_at_mean_stress(result, curves) for result in results]
+    largest = np.max(torques, axis=0)
     joints = tuple(
-        _joint_life(j, robot, task, results, curves, *used[j]) for j in range(len(curves))
+        _joint_life(j, robot, task, results, curves[j], reducers[j], largest[j])
+        for j in range(len(curves))
     )
     warn_about_yield(joints, curves)
     limiting = _limiting(joints)
-    named = [curve.name for curve in dict.fromkeys(c for c in curves if c is not None)]
     return Assessment(
         robot=robot.name,
         method="paper, at the poses' mean stress" if paper_mean_stress else method,
-        sn_curve=", ".join(dict.fromkeys(named)),
+        sn_curve=", ".join(dict.fromkeys(c.name for c in curves if c is not None)),
         assumptions=assumptions_of(rule, model, curves, reducers),
         joints=joints,
         operations=tuple(results),
@@ -193,23 +203,7 @@ class _Job:
         return out
 
 
-def _operation_result(operation: Operation, rows: list[dict[str, FloatArray]]) -> OperationResult:
-    columns = [key for key in rows[0] if key not in ("check", "reducer_torques")]
-    stacked = {key: np.array([row[key] for row in rows]) for key in columns}
-    return OperationResult(
-        name=operation.name,
-        direction=operation.direction,
-        excitation=operation.excitation.describe(),
-        hits_per_rivet=operation.hits_per_rivet,
-        rivets=operation.rivets,
-        poses=operation.poses,
-        **stacked,
-    )
-
-
-def _at_mean_stress(
-    result: OperationResult, robot: FlexibleRobot, curves: tuple[SNCurve | None, ...]
-) -> OperationResult:
+def _at_mean_stress(result: OperationResult, curves: tuple[SNCurve | None, ...]) -> OperationResult:
     """The same operation with every pose at the mean of the poses' peak stresses."""
     changed = result.damage_per_rivet.copy()
     for j, curve in enumerate(curves):
@@ -224,11 +218,15 @@ def _joint_life(
     robot: FlexibleRobot,
     task: Task,
     results: list[OperationResult],
-    curves: tuple[SNCurve | None, ...],
-    reducer: str,
-    check: ReducerCheck | None,
+    curve: SNCurve | None,
+    reducer: Reducer | None,
+    torques: FloatArray,
 ) -> JointLife:
-    joint, curve = robot.flexible_joints[j], curves[j]
+    joint = robot.flexible_joints[j]
+    # Each limit is for one of the two: their largest values give each limit's worst pose.
+    check = None
+    if reducer is not None and np.isfinite(torques[0]):
+        check = reducer.check_blows(*torques)
     # Miner over every pose and operation: eqs. 19-22 with a_i in the hits, b_i in the rivets.
     spent = {r.name: float(r.damage_per_rivet[:, j].sum() * r.rivets) for r in results}
     total = math.fsum(spent.values())
@@ -244,7 +242,7 @@ def _joint_life(
         name=joint.name,
         kind=joint.kind,
         **largest,
-        reducer=reducer,
+        reducer=reducer.name if reducer is not None else "",
         damage_per_rivet=per_rivet,
         rivets_to_failure=life(per_rivet) if curve is not None else math.nan,
         sn_curve=curve.name if curve is not None else "",

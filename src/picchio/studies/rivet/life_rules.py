@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal, NamedTuple, Protocol
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -18,8 +18,6 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
 from picchio.studies.rivet.pose import JointLoad
 
-Needed = Literal["rest", "steady"]
-
 
 class JointDamage(NamedTuple):
     """Peak deflection (rad), peak stress (Pa), utilisation and damage of one rivet."""
@@ -28,22 +26,6 @@ class JointDamage(NamedTuple):
     peak_stress: float
     utilisation: float
     damage: float
-
-
-class LifeRule(Protocol):
-    """A method that turns a joint's load into damage.
-
-    Attributes:
-        needs: which response it looks at.
-    """
-
-    needs: ClassVar[Needed]
-
-    def __call__(self, joint: Joint, load: JointLoad, hits: int, sn_curve: SNCurve) -> JointDamage:
-        """Damage of one rivet of `hits` blows; the joint has a shaft."""
-
-    def assumptions(self) -> tuple[str, ...]:
-        """What the method takes for granted, a sentence each."""
 
 
 def peak(values: FloatArray | None) -> float:
@@ -61,7 +43,7 @@ class RainflowRule:
         miner: what cycles below the endurance limit do; None leaves it to the curve.
     """
 
-    needs: ClassVar[Needed] = "rest"
+    needs: ClassVar[str] = "rest"
 
     residue: Residue = "half-cycles"
     mean_stress: Rule = "none"
@@ -94,7 +76,7 @@ class RainflowRule:
 class PaperRule:
     """Nie et al. 2016: steady state, peak stress as amplitude, one cycle a hit."""
 
-    needs: ClassVar[Needed] = "steady"
+    needs: ClassVar[str] = "steady"
 
     def __call__(self, joint: Joint, load: JointLoad, hits: int, sn_curve: SNCurve) -> JointDamage:
         """Damage of one rivet."""
@@ -115,6 +97,10 @@ class PaperRule:
             "Miner's sum of 1 is failure",
         )
 
+
+LifeRule = RainflowRule | PaperRule
+"""A method: it says which response it `needs`, turns a joint's load under `hits` blows into
+damage (the joint has a shaft), and says what it takes for granted."""
 
 # Which S-N curve belongs to which joint.
 
