@@ -195,9 +195,8 @@ def _record() -> FileFormat:
 
 def _map() -> FileFormat:
     keys = [
-        Key(name, f"({', '.join(dimensions)})", "" if unit == "1" else unit, "", known, meaning)
-        for known, variables in ((True, VARIABLES), (False, EXTRA))
-        for name, (dimensions, unit, meaning) in variables.items()
+        Key(name, f"({', '.join(d)})", "" if unit == "1" else unit, "", name not in EXTRA, meaning)
+        for name, (d, unit, meaning) in VARIABLES.items()
     ]
     return FileFormat(
         "map", "picchio-map/1", "netCDF or Zarr", "output",

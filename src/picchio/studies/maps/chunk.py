@@ -131,8 +131,9 @@ class MapJob:
             poses = rows
         else:
             poses, place = self._poses(rows, first)
+        direction = self._direction(place)
         found, stiffness = peaks_at(
-            self.model, poses, self.excitation, hits=self.hits, direction=self._direction(place)
+            self.model, poses, self.excitation, hits=self.hits, direction=direction
         )
         position = tool_places(robot, poses)
         torque = stiffness * found.peak_deflection
@@ -152,9 +153,8 @@ class MapJob:
             "limiting_joint": np.nan_to_num(rank, nan=-np.inf).argmax(axis=1).astype(np.int32),
         }
         if self.damage is not None:
-            own = self._direction(place)
             columns["damage_per_rivet"], columns["damage_direction"] = damage_of(
-                self.model, poses, self.excitation, self.damage, own, found.direction
+                self.model, poses, self.excitation, self.damage, direction, found.direction
             )
         return columns
 
@@ -171,11 +171,8 @@ class MapJob:
         from picchio.robot.ik.branch import branch_words, choose_branch
         from picchio.robot.ik.inverse_kinematics import solve_many
 
-        axes = None
-        if not isinstance(self.direction, str):
-            axes = np.tile(-np.asarray(self.direction, dtype=float), (len(points), 1))
-        elif self.direction == "normal":
-            axes = -np.asarray(self._direction(np.arange(first, first + len(points))))
+        along = self._direction(np.arange(first, first + len(points)))
+        axes = None if along is None else -along
         solved = solve_many(self.model.robot, points, axes=axes)
         if self.branch == "all":
             return solved.poses, solved.point + first

@@ -30,18 +30,12 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "peak_shear_stress": (("point", "joint"), "Pa", "largest shear stress of the vibration"),
     "worst_direction": (("point", "joint", "xyz"), "1", "unit vector of the force"),
     "limiting_joint": (("point",), "1", "index of the joint with the largest stress or torque"),
-}
-
-# Only in maps that were asked for it.
-EXTRA: dict[str, tuple[tuple[str, ...], str, str]] = {
     "damage_per_rivet": (("point", "joint"), "1", "Miner's sum of a rivet, cycles by rainflow"),
     "damage_direction": (("point", "joint", "xyz"), "1", "unit vector of the force for it"),
 }
 
-
-def variables_of(columns: Columns) -> dict[str, tuple[tuple[str, ...], str, str]]:
-    """The variables that a chunk holds."""
-    return VARIABLES | {name: entry for name, entry in EXTRA.items() if name in columns}
+EXTRA = ("damage_per_rivet", "damage_direction")
+"""Only in maps that were asked for it."""
 
 
 def join_chunks(target: Path, chunks: Iterable[Columns], attributes: dict[str, Any]) -> None:
@@ -54,7 +48,9 @@ def join_chunks(target: Path, chunks: Iterable[Columns], attributes: dict[str, A
     _remove(part)
     writer = _ZarrWriter if target.suffix == ".zarr" else _NetcdfWriter
     rows = 0
-    out = writer(part, attributes)
+    names = {name: attributes[name] for name in ("joint", "coordinate")} | {"xyz": list("xyz")}
+    labels = {name: np.array(values, dtype=object) for name, values in names.items()}
+    out = writer(part, labels, {k: v for k, v in attributes.items() if k not in names})
     try:
         for columns in _in_blocks(chunks):
             out.append(columns)
@@ -93,19 +89,11 @@ def _remove(path: Path) -> None:
         path.unlink(missing_ok=True)
 
 
-def _coordinates(attributes: dict[str, Any]) -> dict[str, list[str]]:
-    return {
-        "joint": attributes["joint"],
-        "coordinate": attributes["coordinate"],
-        "xyz": ["x", "y", "z"],
-    }
-
-
 class _NetcdfWriter:
-    def __init__(self, path: Path, attributes: dict[str, Any]) -> None:
+    def __init__(self, path: Path, labels: Columns, attributes: dict[str, Any]) -> None:
         import h5netcdf
 
-        self._attributes = attributes
+        self._labels, self._attributes = labels, attributes
         self._rows = 0
         self._file = h5netcdf.File(path, "w")
         self._ready = False
@@ -114,20 +102,18 @@ class _NetcdfWriter:
         import h5py
 
         file = self._file
-        names = _coordinates(self._attributes)
         file.dimensions = {"point": None, "mode": columns["natural_frequency"].shape[1]} | {
-            name: len(values) for name, values in names.items()
+            name: len(values) for name, values in self._labels.items()
         }
-        for name, values in names.items():
+        for name, values in self._labels.items():
             label = file.create_variable(name, (name,), dtype=h5py.string_dtype())
-            label[:] = np.array(values, dtype=object)
-        for name, (dims, unit, meaning) in variables_of(columns).items():
-            variable = file.create_variable(name, dims, columns[name].dtype)
+            label[:] = values
+        for name, values in columns.items():
+            dims, unit, meaning = VARIABLES[name]
+            variable = file.create_variable(name, dims, values.dtype)
             variable.attrs["units"] = unit
             variable.attrs["long_name"] = meaning
-        for key, value in self._attributes.items():
-            if key not in names:
-                file.attrs[key] = value
+        file.attrs.update(self._attributes)
         self._ready = True
 
     def append(self, columns: Columns) -> None:
@@ -135,35 +121,32 @@ class _NetcdfWriter:
             self._prepare(columns)
         first, self._rows = self._rows, self._rows + len(columns["place"])
         self._file.resize_dimension("point", self._rows)
-        for name in variables_of(columns):
-            self._file.variables[name][first : self._rows] = columns[name]
+        for name, values in columns.items():
+            self._file.variables[name][first : self._rows] = values
 
     def close(self) -> None:
         self._file.close()
 
 
 class _ZarrWriter:
-    def __init__(self, path: Path, attributes: dict[str, Any]) -> None:
-        self._path, self._attributes, self._mode = path, attributes, "w"
+    def __init__(self, path: Path, labels: Columns, attributes: dict[str, Any]) -> None:
+        self._path, self._labels, self._attributes, self._mode = path, labels, attributes, "w"
 
     def append(self, columns: Columns) -> None:
         import xarray
 
-        data = {
-            name: (dims, columns[name], {"units": unit, "long_name": meaning})
-            for name, (dims, unit, meaning) in variables_of(columns).items()
-        }
-        names = _coordinates(self._attributes)
-        others = {k: v for k, v in self._attributes.items() if k not in names}
+        data = {}
+        for name, values in columns.items():
+            dims, unit, meaning = VARIABLES[name]
+            data[name] = (dims, values, {"units": unit, "long_name": meaning})
         if self._mode == "w":
-            texts = {name: np.array(values, dtype=object) for name, values in names.items()}
-            chunk = xarray.Dataset(data, coords=texts, attrs=others)
+            chunk = xarray.Dataset(data, coords=self._labels, attrs=self._attributes)
             rows = {name: {"chunks": (_ROWS, *(columns[name].shape[1:]))} for name in data}
             chunk.to_zarr(self._path, mode="w", consolidated=False, encoding=rows)
             self._mode = "a"
         else:
             # An append writes the attributes anew: without them they, and provenance, are gone.
-            xarray.Dataset(data, attrs=others).to_zarr(
+            xarray.Dataset(data, attrs=self._attributes).to_zarr(
                 self._path, mode="a", append_dim="point", consolidated=False
             )
 

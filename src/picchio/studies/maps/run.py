@@ -165,20 +165,14 @@ def _folder_of(target: Path) -> Path:
 def _open_folder(target: Path, job: MapJob, chunk: int) -> Path:
     """The folder of finished chunks; one that belongs to another map is not touched."""
     folder = _folder_of(target)
-    plan = {
+    plan = _attributes(job) | {
         "robot": [hashlib.sha256(path.read_bytes()).hexdigest() for path in job.model.robot.files],
-        "effects": [repr(effect) for effect in job.model.effects],
         "tool": job.model.robot.tool_frame,
         "joints": [repr(joint) for joint in job.model.robot.flexible_joints],
         "mounting": repr(job.model.robot.mounting),
-        "excitation": job.excitation.describe(),
         "places": job.places.describe(),
-        "direction": job.direction,
-        "branch": job.branch,
-        "hits": job.hits,
-        "damage": job.damage,
         "chunk": chunk,
-        "picchio": provenance()["picchio"],
+        "provenance": provenance()["picchio"],
     }
     text = json.dumps(plan, sort_keys=True)
     label = folder / "plan.json"
