@@ -24,7 +24,6 @@ from picchio.visuals.kinematics import frames, world
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.compare import compare_scene
 from picchio.visuals.scene.live import controls
-from picchio.visuals.scene.overlay import envelope_surfaces
 from picchio.visuals.scene.page import script_json
 from picchio.visuals.scene.robot.mesh import arrow, turned_to
 
@@ -59,7 +58,7 @@ def test_surface_is_the_support_function(name: str, hits: int | None, blows) -> 
     robot = picchio.load_robot(name)
     pose = np.random.default_rng(3).uniform(-1.5, 1.5, len(robot.joint_names))
     envelope = envelope_of(picchio.Model(robot), pose, blows, hits=hits)
-    vertices, _ = envelope_surfaces(envelope, 3)
+    vertices, _ = envelope.surfaces(3)
     directions, _ = icosphere(3)
     radius = np.linalg.norm(vertices, axis=2)
     rows = np.random.default_rng(0).choice(len(directions), 25, replace=False)
@@ -77,7 +76,7 @@ def test_surface_is_the_support_function(name: str, hits: int | None, blows) -> 
 
 def test_page_holds_the_same_surface(scene) -> None:
     data, array = unpack(scene.html())
-    surfaces, _ = envelope_surfaces(scene.envelope, 3)
+    surfaces, _ = scene.envelope.surfaces(3)
     for item in data["items"]:
         if item["layer"] != "envelope":
             continue
@@ -216,7 +215,7 @@ def test_a_live_viewer_gets_the_same_things(scene) -> None:
     assert len(sent) == len(scene.items)
     number = next(k for k, item in enumerate(scene.items) if item.layer == "envelope")
     ((geometry, material),) = sent[f"/picchio/envelope/item{number}"]
-    surfaces, _ = envelope_surfaces(scene.envelope, 3)
+    surfaces, _ = scene.envelope.surfaces(3)
     np.testing.assert_allclose(geometry.vertices, surfaces[0], rtol=1e-6, atol=1e-12)
     assert material.opacity < 1.0
     hidden = [path for (path, name), given in viewer.calls.items()

@@ -113,12 +113,27 @@ class DirectionEnvelope(TableResult):
             vertices (v, 3), each a direction times the peak for it, and faces (f, 3).
         """
         j = self.joint_names.index(joint) if isinstance(joint, str) else joint
+        vertices, faces = self.surfaces(subdivisions, quantity)
+        return vertices[j], faces
+
+    def surfaces(
+        self, subdivisions: int = 3, quantity: Quantity = "deflection"
+    ) -> tuple[FloatArray, IndexArray]:
+        """The envelopes of all joints as meshes.
+
+        Args:
+            subdivisions: of an icosahedron.
+            quantity: as in `support`.
+
+        Returns:
+            vertices (n, v, 3) and faces (f, 3).
+        """
         directions, faces = icosphere(subdivisions)
         # The envelope is the same both ways along a line, so each line is computed once.
         line = np.where(_upper_half(directions)[:, None], directions, -directions).round(9)
         _, first, which = np.unique(line, axis=0, return_index=True, return_inverse=True)
-        radius = self.support(directions[first], quantity)[j][which.ravel()]
-        return directions * radius[:, None], faces
+        radius = self.support(directions[first], quantity)[:, which.ravel()]
+        return directions * radius[:, :, None], faces
 
     def _headline(self) -> str:
         peaks = dict(zip(self.joint_names, self.peak_deflection.tolist(), strict=True))

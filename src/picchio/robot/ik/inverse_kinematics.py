@@ -113,7 +113,7 @@ def solve_many(
         wanted = wanted / np.linalg.norm(wanted, axis=1, keepdims=True)
     weight = max(0.3 * chain.reach, 1e-3) if with_axis else 0.0
     redundant = joints > (5 if with_axis else 3)
-    lower, upper, centre = _ranges(chain)
+    lower, upper, centre = start_ranges(chain)
     guesses = _spread(starts or (64 if joints <= 3 else 256), lower, upper, seed)
     found = np.empty((len(targets), len(guesses), joints))
     errors = np.empty((len(targets), len(guesses)))
@@ -161,8 +161,15 @@ def _distinct(chain: Chain, centre: Array, candidates: Array, same: float) -> li
     return kept
 
 
-def _ranges(chain: Chain) -> tuple[Array, Array, Array]:
-    """Where starts are spread, and the middle; unlimited joints about zero."""
+def start_ranges(chain: Chain) -> tuple[Array, Array, Array]:
+    """Where starts are spread, at most one turn of each joint, unlimited ones about zero.
+
+    Args:
+        chain: the arm.
+
+    Returns:
+        lower and upper ends and the middle, each (k,) rad or m.
+    """
     half = np.where(chain.wraps, np.pi, 1.0)
     bounded = np.isfinite(chain.lower) & np.isfinite(chain.upper)
     safe_lower = np.where(np.isfinite(chain.lower), chain.lower, 0.0)
@@ -176,17 +183,30 @@ def _ranges(chain: Chain) -> tuple[Array, Array, Array]:
 
 
 def _spread(count: int, lower: Array, upper: Array, seed: int) -> Array:
-    """(count, k) evenly spread starts: the additive recurrence of generalised golden ratios.
+    """(count, k) evenly spread starts, the middle first."""
+    unit = spread_evenly(count, len(lower), seed)[1:]
+    return np.vstack([0.5 * (lower + upper), lower + unit * (upper - lower)])
 
-    M. Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018).
+
+def spread_evenly(count: int, dims: int, seed: int = 0) -> Array:
+    """Points that fill the unit box evenly, the same every time, the middle first.
+
+    The additive recurrence of generalised golden ratios: M. Roberts, "The unreasonable
+    effectiveness of quasirandom sequences" (2018).
+
+    Args:
+        count: how many.
+        dims: of the box.
+        seed: another seed continues where this one ends.
+
+    Returns:
+        (count, dims).
     """
-    dims = len(lower)
     ratio = 2.0
     for _ in range(60):
         ratio = (1.0 + ratio) ** (1.0 / (dims + 1))
     steps = ratio ** -np.arange(1.0, dims + 1.0)
-    unit = (0.5 + np.outer(np.arange(1, count) + seed * count, steps)) % 1.0
-    return np.vstack([0.5 * (lower + upper), lower + unit * (upper - lower)])
+    return np.asarray((0.5 + np.outer(np.arange(count) + seed * count, steps)) % 1.0)
 
 
 def _three(values: ArrayLike, key: str) -> Array:

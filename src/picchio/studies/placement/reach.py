@@ -10,25 +10,9 @@ import numpy as np
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.ik.chain import Chain, tool_chain
-from picchio.robot.ik.inverse_kinematics import TOLERANCE
+from picchio.robot.ik.inverse_kinematics import TOLERANCE, spread_evenly, start_ranges
 from picchio.robot.ik.kernel import solve_points
 from picchio.studies.placement.work import Work
-
-# Points that fill a box evenly, the same every time.
-
-
-def spread_evenly(count: int, dims: int, seed: int = 0) -> FloatArray:
-    """(count, dims) points in the unit box, the middle first.
-
-    The additive recurrence of generalised golden ratios: M. Roberts, "The unreasonable
-    effectiveness of quasirandom sequences" (2018). Another seed continues where this one ends.
-    """
-    ratio = 2.0
-    for _ in range(60):
-        ratio = (1.0 + ratio) ** (1.0 / (dims + 1))
-    steps = ratio ** -np.arange(1.0, dims + 1.0)
-    return np.asarray((0.5 + np.outer(np.arange(count) + seed * count, steps)) % 1.0)
-
 
 # Poses that reach the work where it stands: candidates by inverse kinematics, many at once.
 
@@ -61,8 +45,7 @@ class Reach:
     def __init__(self, robot: FlexibleRobot, work: Work) -> None:
         self.work = work
         self.chain: Chain = tool_chain(robot)
-        ends = self.chain.lower + self.chain.upper
-        self._middle = np.where(np.isfinite(ends), 0.5 * ends, 0.0)
+        self._lower, self._upper, self._middle = start_ranges(self.chain)
         # The outermost first: where a placement is out of reach they tell.
         groups: list[IndexArray] = [np.flatnonzero(work.group == g) for g in np.unique(work.group)]
         gap = np.linalg.norm(work.position - work.centre, axis=1)
@@ -80,12 +63,10 @@ class Reach:
             times: so many times as many.
             seed: of the random numbers.
         """
-        chain, middle = self.chain, self._middle
-        starts = times * (8 if len(chain.index) <= 3 else 24)
-        reach = np.where(chain.wraps, np.pi, 1.0)
-        lower = np.maximum(chain.lower, middle - reach)
-        upper = np.minimum(chain.upper, middle + reach)
-        return lower + spread_evenly(starts, len(lower), seed) * (upper - lower)
+        joints = len(self.chain.index)
+        starts = times * (8 if joints <= 3 else 24)
+        share = spread_evenly(starts, joints, seed)
+        return self._lower + share * (self._upper - self._lower)
 
     def candidates(self, moves: FloatArray, seeds: Sequence[FloatArray]) -> Candidates:
         """The poses within the limits, of the placements where every rivet can be reached.

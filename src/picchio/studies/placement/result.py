@@ -68,12 +68,12 @@ class Standing:
         Args:
             centre: (3,) m, about which the work turns.
         """
-        x, y, z, heading = (float(c) for c in self.spot.move)
+        move = self.spot.move
         return {
             "rivets_to_failure": self.rivets_to_failure,
             "utilisation": self.utilisation,
             "limiting_joint": self.limiting_joint,
-            "work": {"shift": [x, y, z], "heading": heading, "about": centre},
+            "work": {"shift": move[:3], "heading": move[3], "about": centre},
             "base": {"position": self.base_position, "heading": self.base_heading},
             "period": self.spot.period,
             "joints": [vars(joint) for joint in self.joints],

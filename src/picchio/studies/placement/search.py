@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.robot.ik.inverse_kinematics import spread_evenly
 from picchio.studies.placement.loads import Loads
-from picchio.studies.placement.reach import Candidates, Reach, spread_evenly
+from picchio.studies.placement.reach import Candidates, Reach
 from picchio.studies.placement.self_collision import SelfCollision
 from picchio.studies.placement.work import Work
 
@@ -342,12 +343,8 @@ def _trials(
     rng: np.random.Generator,
 ) -> FloatArray:
     """The centre, a step along every axis both ways, and as many in other directions."""
-    steps = [np.zeros(4)]
-    for axis in free:
-        for sign in (1.0, -1.0):
-            one = np.zeros(4)
-            one[axis] = sign * step[axis]
-            steps.append(one)
+    axes = np.diag(step)[free]
+    steps = [np.zeros(4), *axes, *-axes]
     for _ in range(2 * len(free)):
         one = rng.normal(size=4)
         steps.append(one / np.linalg.norm(one[free]) * step)

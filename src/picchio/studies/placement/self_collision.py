@@ -105,8 +105,7 @@ class SelfCollision:
 def _touching_by_design(model: Any, geometry: Any) -> list[int]:
     """Pairs on one body, or on bodies that one joint connects."""
     found = []
-    for k in range(len(geometry.collisionPairs)):
-        pair = geometry.collisionPairs[k]
+    for k, pair in enumerate(geometry.collisionPairs):
         first = geometry.geometryObjects[pair.first].parentJoint
         second = geometry.geometryObjects[pair.second].parentJoint
         if first == second or model.parents[first] == second or model.parents[second] == first:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from picchio.core.arrays import BoolArray, FloatArray, IndexArray
+from picchio.core.arrays import BoolArray, FloatArray
 from picchio.studies.assessment.result import Assessment
-from picchio.studies.envelopes import DirectionEnvelope, icosphere
+from picchio.studies.envelopes import DirectionEnvelope
 from picchio.visuals.kinematics import Frame
 from picchio.visuals.plots.style import CMAP
 from picchio.visuals.scene.robot.body import Body
@@ -52,29 +52,6 @@ class Scale:
                 "colours": [self.colour(value) for value in steps]}  # fmt: skip
 
 
-def envelope_surfaces(
-    envelope: DirectionEnvelope, subdivisions: int = 4
-) -> tuple[FloatArray, IndexArray]:
-    """The double ball of every joint, each direction solved once for all joints.
-
-    Args:
-        envelope: at a pose.
-        subdivisions: of an icosahedron.
-
-    Returns:
-        vertices (n, v, 3) rad, direction times peak, and faces (f, 3).
-    """
-    directions, faces = icosphere(subdivisions)
-    key = {tuple(row): i for i, row in enumerate(np.round(directions, 9) + 0.0)}
-    mirror = np.array([key[tuple(row)] for row in np.round(-directions, 9) + 0.0])
-    # Both ends of a line have the same peak: one of each pair is solved.
-    half = np.arange(len(directions)) < mirror
-    peak = np.empty((len(envelope.joint_names), len(directions)))
-    peak[:, half] = envelope.support(directions[half])
-    peak[:, ~half] = peak[:, mirror[~half]]
-    return directions[None] * peak[:, :, None], faces
-
-
 def envelope_meshes(
     envelope: DirectionEnvelope, units: Sequence[str], subdivisions: int = 4
 ) -> tuple[list[Mesh], list[Scale]]:
@@ -82,7 +59,7 @@ def envelope_meshes(
 
     Vertices are in rad (m for a prismatic joint); `units` are "mrad" or "mm".
     """
-    vertices, faces = envelope_surfaces(envelope, subdivisions)
+    vertices, faces = envelope.surfaces(subdivisions)
     meshes, scales = [], []
     for name, unit, surface, peak in zip(
         envelope.joint_names, units, vertices, envelope.peak_deflection, strict=True
