@@ -13,11 +13,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Literal, TypeVar, get_args
+from typing import Literal, TypeVar
 
 from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError
@@ -36,47 +36,45 @@ _EXCEEDED = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
-class Reducer:
-    """A reducer's ratings; every torque is at the output.
+class ReducerEntry(StrictModel):
+    """One reducer of a catalogue file; every torque is at the output.
 
     Attributes:
         name: as in the catalogue.
-        kind: "strain-wave" or "cycloidal".
-        manufacturer: who makes it.
-        ratio: input turns for one output turn; None where the name does not say.
-        rated_torque: N m.
-        rated_speed: rad/s at which the rated life is stated: of the input (strain-wave) or of the
-            output (cycloidal).
-        rated_life: s, life L10 at rated torque and speed.
-        repeated_peak_torque: N m, limit of peaks that belong to the duty: "repeated peak"
-            (strain-wave), "acceleration and deceleration" (cycloidal).
+        ratio: 1, input turns for one output turn; may be left out for cycloidal reducers.
+        rated_torque: N m, for which the life is stated.
+        repeated_peak_torque: N m, limit of peaks that belong to the duty.
         momentary_peak_torque: N m, limit for emergencies.
-        average_torque: N m, limit of the mean torque; None where the catalogue has none.
-        ratcheting_torque: N m, at which teeth skip; None where not known.
-        source: where the ratings come from.
+        average_torque: N m, limit of the mean torque.
+        ratcheting_torque: N m, at which teeth skip.
+        source: where the ratings come from, if not as for the whole file.
     """
 
     name: str
+    ratio: Positive | None = None
+    rated_torque: Positive
+    repeated_peak_torque: Positive
+    momentary_peak_torque: Positive
+    average_torque: Positive | None = None
+    ratcheting_torque: Positive | None = None
+    source: str | None = None
+
+
+class Reducer(ReducerEntry):
+    """A reducer's ratings, those of its entry and those that its whole file shares.
+
+    Attributes:
+        kind: "strain-wave" or "cycloidal".
+        manufacturer: who makes it.
+        rated_speed: rad/s at which the rated life is stated: of the input (strain-wave) or of the
+            output (cycloidal).
+        rated_life: s, life L10 at rated torque and speed.
+    """
+
     kind: Kind
     manufacturer: str
-    rated_torque: float
-    rated_speed: float
-    rated_life: float
-    repeated_peak_torque: float
-    momentary_peak_torque: float
-    ratio: float | None = None
-    average_torque: float | None = None
-    ratcheting_torque: float | None = None
-    source: str = ""
-
-    def __post_init__(self) -> None:
-        if self.kind not in get_args(Kind):
-            raise InputError("unknown kind", key="kind", value=self.kind, choices=get_args(Kind))
-        for key, value in asdict(self).items():
-            number = value if isinstance(value, int | float) else 1.0
-            if not (math.isfinite(number) and number > 0):
-                raise InputError("must be positive", key=f"{self.name}.{key}", value=value)
+    rated_speed: Positive
+    rated_life: Positive
 
     def shares(self, peak: Torque, held: Torque) -> dict[str, Torque]:
         """Torque over limit, by limit.
@@ -146,30 +144,6 @@ class ReducerCheck:
         return self.utilisations[self.governed_by]
 
 
-class ReducerEntry(StrictModel):
-    """One reducer of a catalogue file; every torque is at the output.
-
-    Attributes:
-        name: as in the catalogue.
-        ratio: 1, input turns for one output turn; may be left out for cycloidal reducers.
-        rated_torque: N m, for which the life is stated.
-        repeated_peak_torque: N m, limit of peaks that belong to the duty.
-        momentary_peak_torque: N m, limit for emergencies.
-        average_torque: N m, limit of the mean torque.
-        ratcheting_torque: N m, at which teeth skip.
-        source: where the ratings come from, if not as for the whole file.
-    """
-
-    name: str
-    ratio: Positive | None = None
-    rated_torque: Positive
-    repeated_peak_torque: Positive
-    momentary_peak_torque: Positive
-    average_torque: Positive | None = None
-    ratcheting_torque: Positive | None = None
-    source: str | None = None
-
-
 class ReducerFile(StrictModel):
     """A catalogue file: what its entries share, and the entries.
 
@@ -210,7 +184,8 @@ def load_reducer(name: str, *, catalogues: Iterable[str | Path] = ()) -> Reducer
         return known[name]
     found = re.fullmatch(r"(.+?)-(\d+(?:\.\d+)?)", name)
     if found and found.group(1) in known and known[found.group(1)].ratio is None:
-        return replace(known[found.group(1)], name=name, ratio=float(found.group(2)))
+        own = known[found.group(1)].model_dump()
+        return Reducer(**own | {"name": name, "ratio": float(found.group(2))})
     raise InputError("no such reducer", key="reducer", value=name, choices=known)
 
 
@@ -226,9 +201,8 @@ def read_reducers(path: str | Path) -> dict[str, Reducer]:
     for entry in content.reducer:
         if entry.name in found:
             raise InputError("duplicate name", file=path, key="reducer.name", value=entry.name)
-        values = entry.model_dump(exclude={"source"})
         found[entry.name] = Reducer(
-            **values,
+            **entry.model_dump(exclude={"source"}),
             kind=content.kind,
             manufacturer=content.manufacturer,
             rated_speed=content.rated_speed_rpm * _RPM,

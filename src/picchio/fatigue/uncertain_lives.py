@@ -116,9 +116,7 @@ class Design:
         log = np.log(size).reshape(-1, self.samples)
         first, total = _sobol(log[0], log[1], log[2:])
         both = life[: 2 * self.samples]
-        p10, p50, p90 = (
-            float(np.quantile(both, p, method="inverted_cdf")) for p in (0.1, 0.5, 0.9)
-        )
+        p10, p50, p90 = np.quantile(both, (0.1, 0.5, 0.9), method="inverted_cdf").tolist()
         return LifeSpread(
             p10=p10,
             p50=p50,

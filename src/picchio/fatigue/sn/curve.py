@@ -264,14 +264,12 @@ class SNCurve:
         knees, slopes = self.knees, self.slopes
         home = int(np.searchsorted(np.array(knees), self.cycles, side="left"))
         knots = np.empty(len(knees))
-        at, stress = self.cycles, self.strength
-        for i in range(home, len(knees)):
-            stress *= (knees[i] / at) ** (-1.0 / slopes[i])
-            knots[i], at = stress, knees[i]
-        at, stress = self.cycles, self.strength
-        for i in range(home - 1, -1, -1):
-            stress *= (knees[i] / at) ** (-1.0 / slopes[i + 1])
-            knots[i], at = stress, knees[i]
+        # From the given point up, by the line that ends in a knee; and down, by the next one.
+        for order, line in ((range(home, len(knees)), 0), (range(home - 1, -1, -1), 1)):
+            at, stress = self.cycles, self.strength
+            for i in order:
+                stress *= (knees[i] / at) ** (-1.0 / slopes[i + line])
+                knots[i], at = stress, knees[i]
         return knots
 
 

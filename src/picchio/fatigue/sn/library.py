@@ -75,12 +75,14 @@ def load_sn_curve(name_or_path: str | Path, *, quiet: bool = False) -> SNCurve:
         InputError: an unknown name, or a file that is missing or wrong.
     """
     text = str(name_or_path)
-    if text in _shipped():
-        curve = _read(_shipped()[text])
-    elif text.endswith(".toml") or "/" in text or Path(text).is_file():
-        curve = _read(Path(text))
-    else:
+    path = _shipped().get(text, Path(text))
+    if text not in _shipped() and not (text.endswith(".toml") or "/" in text or path.is_file()):
         raise InputError("no such S-N curve", key="sn_curve", value=text, choices=sn_curve_names())
+    content = parse_toml(path, SNCurveFile, format=SN_FORMAT)
+    try:
+        curve = SNCurve(**content.model_dump())
+    except InputError as error:
+        raise InputError(str(error), file=path) from None
     if curve.warning and not quiet:
         warnings.warn(f"S-N curve {curve.name}: {curve.warning}", PicchioWarning, stacklevel=2)
     return curve
@@ -105,14 +107,6 @@ def write_sn_curve(curve: SNCurve, path: str | Path) -> None:
     content = {"format": SN_FORMAT, **plain(known)}
     with atomic_write(path) as stream:
         stream.write(tomlkit.dumps(content))
-
-
-def _read(path: Path) -> SNCurve:
-    content = parse_toml(path, SNCurveFile, format=SN_FORMAT)
-    try:
-        return SNCurve(**content.model_dump())
-    except InputError as error:
-        raise InputError(str(error), file=path) from None
 
 
 @cache

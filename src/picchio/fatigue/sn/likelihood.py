@@ -145,13 +145,8 @@ class Profile:
         from scipy.optimize import minimize_scalar
 
         centre, step = float(self.theta[3]), self._step[3]
-        start = self.theta
-
-        def loss(lam: float) -> float:
-            return -self._adjusted(3, lam, start)[0]
-
         found = minimize_scalar(
-            loss,
+            lambda lam: -self._adjusted(3, lam, self.theta)[0],
             bounds=(centre - step, centre + 6.0 * step),
             method="bounded",
             options={"xatol": 1e-5},
