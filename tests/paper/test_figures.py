@@ -40,7 +40,7 @@ def test_each_can_be_drawn_and_told(figures):
 
 @pytest.mark.slow
 def test_every_conflict_has_its_number_and_its_figure(study, figures):
-    found = conflicts(study, figures)
+    found = tuple(conflicts(study, figures))
     assert len({conflict.name for conflict in found}) == len(found) >= 9
     for conflict in found:
         assert conflict.figure in figures

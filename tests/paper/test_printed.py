@@ -28,7 +28,7 @@ def test_the_equations_are_all_there():
 
 def test_every_input_has_a_base_value_within_its_range():
     base = Assumptions()
-    assert {entry.name for entry in INPUTS} == set(base.to_dict())
+    assert {entry.name for entry in INPUTS} == set(vars(base))
     for entry in INPUTS:
         value = getattr(base, entry.name)
         if entry.choices:

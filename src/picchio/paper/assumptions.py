@@ -82,10 +82,6 @@ class Assumptions:
         """
         return dataclasses.replace(self, **changes)
 
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return dataclasses.asdict(self)
-
 
 INPUTS: tuple[Input, ...] = (
     Input("period", "s", "T of eq. 12 is not given; rivet guns strike 7 to 50 times a second",

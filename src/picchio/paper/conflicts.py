@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -32,17 +31,10 @@ class Conflict:
     figure: str
 
 
-def conflicts(study: Study, figures: Mapping[str, PaperFigure]) -> tuple[Conflict, ...]:
+def conflicts(study: Study, figures: Mapping[str, PaperFigure]) -> Iterator[Conflict]:
     """All of them, by the numbers of the figures that show them."""
     shown = {name: figure.data for name, figure in figures.items()}
-    return (*_of_gravity(study, shown), *_of_reach(study, shown), *_of_life(study, shown),
-            *_of_joints(study, shown))  # fmt: skip
-
-
-_Shown = Mapping[str, Mapping[str, Any]]
-
-
-def _of_gravity(study: Study, shown: _Shown) -> Iterator[Conflict]:
+    # Gravity.
     need, have = shown["gravity"]["largest"][1], shown["gravity"]["actuators"][1]
     yield Conflict(
         "actuators",
@@ -59,9 +51,7 @@ def _of_gravity(study: Study, shown: _Shown) -> Iterator[Conflict]:
         "as a steady stress that the life does not know.",
         steady, "gravity-stress",
     )  # fmt: skip
-
-
-def _of_reach(study: Study, shown: _Shown) -> Iterator[Conflict]:
+    # Reach.
     path, heights = shown["range"], study.printed.task.path_heights
     yield Conflict(
         "range",
@@ -96,9 +86,7 @@ def _of_reach(study: Study, shown: _Shown) -> Iterator[Conflict]:
         "second comes right for joint 2, the first stays wrong for joint 1.",
         by_z["z"][-1], "z-force",
     )  # fmt: skip
-
-
-def _of_life(study: Study, shown: _Shown) -> Iterator[Conflict]:
+    # Life.
     blows, hits = shown["steady-state"], study.printed.task.hits_per_rivet
     yield Conflict(
         "steady-state",
@@ -125,9 +113,7 @@ def _of_life(study: Study, shown: _Shown) -> Iterator[Conflict]:
         "They follow from the means by another.",
         float(longer.max()), "table-2-lives",
     )  # fmt: skip
-
-
-def _of_joints(study: Study, shown: _Shown) -> Iterator[Conflict]:
+    # Joints.
     shaft = study.base.robot.flexible_joints[1].shaft
     assert shaft is not None
     slender = shaft.length / (2.0 * shaft.radius)

@@ -8,11 +8,9 @@ from functools import lru_cache
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.paper.arm import poses_at
 from picchio.paper.assumptions import INPUTS
 from picchio.paper.study import Study
 from picchio.paper.world import World
-from picchio.vibration.batch.peaks import batch_peaks
 
 _TRIED = 4000
 _NAMES = ("period", "duty", "damping_ratio", "path_x")
@@ -57,33 +55,26 @@ def search_dominance(study: Study) -> Dominance:
     """Random worlds on the vertical path, with the study's seed; kept for the last study."""
     rng = np.random.default_rng(study.seed)
     wanted = np.array(study.printed.task.dominant_joints) - 1
-    heights = study.printed.task.path_heights
     entries = {entry.name: entry for entry in INPUTS}
     values = np.empty((_TRIED, len(_NAMES)))
     agree = np.empty(_TRIED)
     best: tuple[float, World | None] = (-1.0, None)
-    hits = 0
     frames = [
-        World(study.given.but(inertia_about=about, elbow=elbow))
+        study.given.but(inertia_about=about, elbow=elbow)
         for about in ("cg", "joint")
         for elbow in ("down", "up")
     ]
     for k in range(_TRIED):
         changes = {name: entries[name].at(rng.random()) for name in _NAMES}
-        frame = frames[rng.integers(len(frames))]
-        world = World(frame.given.but(**changes))
-        poses = poses_at([(changes["path_x"], 0.0, z) for z in heights], frame.given.elbow)
-        mass, jacobian = frame.robot.mass_and_jacobian(poses)
-        peaks = batch_peaks(
-            mass, jacobian, frame.robot.stiffness, world.given.damping_ratio, world.blows
-        ).peak_deflection
+        world = World(frames[rng.integers(len(frames))].but(**changes))
+        peaks = world.path_peaks.peak_deflection
         values[k] = list(changes.values())
         same = peaks.argmax(axis=1) == wanted
         agree[k] = same.sum()
         if same.all():
-            hits += 1
             ordered = np.sort(peaks, axis=1)
             margin = float((ordered[:, -1] / ordered[:, -2]).min() - 1.0)
             if margin > best[0]:
                 best = (margin, world)
+    hits = int((agree == len(wanted)).sum())
     return Dominance(_TRIED, hits, values, agree, best[1], best[0])

@@ -52,20 +52,18 @@ class Equation:
     gap: float | None
 
 
-Check = Callable[[Study], float]
-Row = tuple[Callable[..., Any], str, Check]
+Row = tuple[Callable[..., Any], str, Callable[[Study], float]]
 
 
 def equations(study: Study) -> tuple[Equation, ...]:
     """All of them, checked in the base world."""
     found = []
     for number, remark in study.printed.equations.items():
-        if number not in DONE_BY:
-            found.append(Equation(number, remark.page, remark.says, "", "not in the text", None))
-            continue
-        function, check, gap = DONE_BY[number]
-        path = f"{function.__module__}.{function.__qualname__}"
-        found.append(Equation(number, remark.page, remark.says, path, check, gap(study)))
+        path, check, gap = "", "not in the text", None
+        if number in DONE_BY:
+            function, check, apart = DONE_BY[number]
+            path, gap = f"{function.__module__}.{function.__qualname__}", apart(study)
+        found.append(Equation(number, remark.page, remark.says, path, check, gap))
     return tuple(found)
 
 

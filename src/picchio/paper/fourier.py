@@ -9,8 +9,8 @@ import numpy as np
 from picchio.core.arrays import ComplexArray, FloatArray
 from picchio.excitation.pulse_train import PulseTrain
 from picchio.paper.world import World
-from picchio.vibration.closed_form.modes import modal_analysis
-from picchio.vibration.closed_form.response import Response, response_from_rest, steady_state
+from picchio.studies.rivet.pose import ModelAtPose
+from picchio.vibration.closed_form.response import Response
 
 _HARMONICS = 4000
 
@@ -32,9 +32,8 @@ def printed_force(blows: PulseTrain, harmonics: int, time: FloatArray) -> FloatA
 
 
 def printed_response(
-    omega: FloatArray, ratio: float, blows: PulseTrain, time: FloatArray, *,
-    plain: bool, harmonics: int = _HARMONICS,
-) -> FloatArray:  # fmt: skip
+    omega: FloatArray, ratio: float, blows: PulseTrain, time: FloatArray, *, plain: bool
+) -> FloatArray:
     """Eq. 13 for modes of unit mass and unit n_d: (modes, k).
 
     Args:
@@ -43,10 +42,9 @@ def printed_response(
         blows: the pulses.
         time: (k,) s.
         plain: the phase by a plain arctangent, as written; else by one of the full circle.
-        harmonics: N.
     """
-    terms = printed_series(blows, harmonics)
-    j = np.arange(1, harmonics + 1)
+    terms = printed_series(blows, _HARMONICS)
+    j = np.arange(1, _HARMONICS + 1)
     a, b = terms[1:].real, -terms[1:].imag
     wave = 2.0 * np.pi / blows.period
     found = np.empty((len(omega), len(time)))
@@ -91,12 +89,11 @@ def amplitude_and_phase(world: World) -> PhaseCheck:
     """Eq. 13's phase as written and as meant, against the exact steady state."""
     direction, rivet, joint = worst_of(world)
     n = world.printed.directions[direction]
-    pose = world.rivet_poses[rivet]
-    system = world.model.linear_system(pose)
-    modes = modal_analysis(system)
+    at = ModelAtPose(world.model, world.rivet_poses[rivet])
+    modes = at.modes
     time = np.linspace(0.0, world.blows.period, 400, endpoint=False)
-    exact = 1e3 * steady_state(modes, world.blows).deflection(time, n)[joint]
-    push = modes.mode_shapes.T @ (system.input_matrix @ n)
+    exact = 1e3 * at.response(world.blows, None).deflection(time, n)[joint]
+    push = modes.mode_shapes.T @ (at.linear.input_matrix @ n)
     omega = 2.0 * np.pi * modes.natural_frequencies
     ours = {
         plain: 1e3 * ((modes.mode_shapes[joint] * push) @ printed_response(
@@ -124,10 +121,6 @@ def worst_responses(world: World, hits: int) -> tuple[Response, Response, FloatA
     For Fig. 8 and the transient.
     """
     direction, rivet, joint = worst_of(world)
-    modes = modal_analysis(world.model.linear_system(world.rivet_poses[rivet]))
-    return (
-        response_from_rest(modes, world.blows, hits),
-        steady_state(modes, world.blows),
-        world.printed.directions[direction],
-        joint,
-    )
+    at = ModelAtPose(world.model, world.rivet_poses[rivet])
+    rest, steady = at.response(world.blows, hits), at.response(world.blows, None)
+    return rest, steady, world.printed.directions[direction], joint

@@ -25,8 +25,8 @@ class Influence:
     Attributes:
         name: of the input; words: with its range and unit.
         value: in the base world; tried: the values.
-        base_life: rivets to failure by the paper's method in the base world.
-        lives: at the values that can be reached.
+        lives: rivets to failure by the paper's method at the values that can be reached, the
+            base world's first.
         sequences: the dominant joints of Fig. 9 that were seen, such as "2 3 3 1".
         why: what is known of it.
     """
@@ -35,7 +35,6 @@ class Influence:
     words: str
     value: Any
     tried: tuple[Any, ...]
-    base_life: float
     lives: tuple[float, ...]
     sequences: tuple[str, ...]
     why: str
@@ -61,9 +60,8 @@ def influences(study: Study) -> tuple[Influence, ...]:
 
 def _one(study: Study, entry: Input) -> Influence:
     base = getattr(study.given, entry.name)
-    values = [base, *_values(entry)]
     tried, lives, sequences = [], [], []
-    for value in values:
+    for value in (base, *_values(entry)):
         world = World(study.given.but(**{entry.name: value}))
         try:
             life = float(paper_lives(world).min())
@@ -77,7 +75,7 @@ def _one(study: Study, entry: Input) -> Influence:
         except InputError:
             continue
     return Influence(
-        entry.name, _words(entry), base, tuple(tried), lives[0], tuple(lives),
+        entry.name, _words(entry), base, tuple(tried), tuple(lives),
         tuple(dict.fromkeys(sequences)), entry.why,
     )  # fmt: skip
 

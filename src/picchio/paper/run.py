@@ -157,7 +157,7 @@ def reproduce(
         return Reproduction(
             study=study,
             claims=claims,
-            conflicts=conflicts(study, figures),
+            conflicts=tuple(conflicts(study, figures)),
             equations=equations(study),
             figures=figures,
             steps=steps,

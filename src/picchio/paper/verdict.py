@@ -51,16 +51,6 @@ class Finding:
     number: float | None = None
     condition: str = ""
 
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "verdict": str(self.verdict),
-            "condition": self.condition or None,
-            "test": self.test,
-            "decides": self.decides,
-            "number": self.number,
-        }
-
 
 Test = Callable[["Study"], Finding]
 
@@ -200,31 +190,25 @@ def best_split(worlds: Sequence[World], true: Any, among: Sequence[str] = ()) ->
         tells right.
     """
     true = np.asarray(true, dtype=bool)
-    best = ("", 0.0)
-
-    def consider(words: str, chosen: Any) -> None:
-        nonlocal best
-        right = 0.5 * (chosen[true].mean() + (~chosen[~true]).mean())
-        if right > best[1] + 1e-12:
-            best = (words, float(right))
-
+    splits: list[tuple[str, Any]] = []
     for entry in INPUTS:
         if among and entry.name not in among:
             continue
-        values = [getattr(world.given, entry.name) for world in worlds]
+        name = _NAMES.get(entry.name, entry.name)
+        values = np.array([getattr(world.given, entry.name) for world in worlds])
         if entry.choices:
-            for choice in dict.fromkeys(values):
-                chosen = np.array([value == choice for value in values])
-                consider(f"{_NAMES.get(entry.name, entry.name)} is {choice}", chosen)
+            splits += [(f"{name} is {c}", values == c) for c in dict.fromkeys(values.tolist())]
             continue
-        array = np.array(values, dtype=float)
-        levels = np.unique(array)
+        levels = np.unique(values)
         for at in 0.5 * (levels[1:] + levels[:-1]):
-            words = f"{_NAMES.get(entry.name, entry.name)} is {{}} {at:.3g} {entry.unit}".rstrip(
-                " –"
-            )
-            consider(words.format("below"), array < at)
-            consider(words.format("above"), array > at)
+            level = f"{at:.3g} {entry.unit}".rstrip(" –")
+            splits += [(f"{name} is below {level}", values < at),
+                       (f"{name} is above {level}", values > at)]  # fmt: skip
+    best = ("", 0.0)
+    for words, chosen in splits:
+        right = 0.5 * (chosen[true].mean() + (~chosen[~true]).mean())
+        if right > best[1] + 1e-12:
+            best = (words, float(right))
     return best
 
 

@@ -11,14 +11,16 @@ from numpy.typing import ArrayLike
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.excitation.pulse_train import PulseTrain
+from picchio.fatigue.shaft_stress import stress_per_torque
 from picchio.model.model import Model
 from picchio.paper.arm import arm, poses_at, rivet_points
 from picchio.paper.assumptions import INPUTS, Assumptions
 from picchio.paper.printed import Printed, printed
 from picchio.paper.reach import ReachMap, reach_map
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.studies.rivet.poses import peaks_at
 from picchio.studies.tasks import Operation
-from picchio.vibration.batch.peaks import BatchPeaks, batch_peaks
+from picchio.vibration.batch.peaks import BatchPeaks
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +69,7 @@ class World:
             deflections and torques, (p, 3) each.
         """
         rows = np.ascontiguousarray(poses, dtype=float)
-        mass, jacobian = self.robot.mass_and_jacobian(rows)
-        return batch_peaks(
-            mass, jacobian, self.robot.stiffness, self.given.damping_ratio, self.blows,
-            hits=hits, direction=direction,
-        )  # fmt: skip
+        return peaks_at(self.model, rows, self.blows, hits=hits, direction=direction)[0]
 
     def stress(self, deflection: FloatArray) -> FloatArray:
         """The shear stress in MPa of deflections in rad, by Eqs. 14-17.
@@ -147,10 +145,8 @@ class World:
     @cached_property
     def gravity_stress(self) -> FloatArray:
         """(15, 3) MPa, gravity's steady stress in the shafts at the rivets."""
-        shafts = [joint.shaft for joint in self.robot.flexible_joints if joint.shaft]
-        factors = np.array([shaft.radius / shaft.polar_moment for shaft in shafts])
         torque = np.abs([self.robot.gravity_torque(pose) for pose in self.rivet_poses])
-        return np.asarray(torque * factors / 1e6)
+        return np.asarray(torque * stress_per_torque(self.robot.flexible_joints) / 1e6)
 
     def operations(self) -> tuple[Operation, ...]:
         """The three operations of section 4.3."""

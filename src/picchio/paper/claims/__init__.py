@@ -27,7 +27,11 @@ class Tried:
             "page": self.sentence.page,
             "quote": self.sentence.quote,
             "figure": self.claim.figure or None,
-            **self.finding.to_dict(),
+            "verdict": str(self.finding.verdict),
+            "condition": self.finding.condition or None,
+            "test": self.finding.test,
+            "decides": self.finding.decides,
+            "number": self.finding.number,
         }
 
 

@@ -8,8 +8,7 @@ from picchio.paper.study import Study
 from picchio.paper.verdict import PANEL, Finding, claim, claim_of_worlds, decided
 from picchio.paper.waterfall import peak_over_amplitude
 from picchio.paper.world import World
-from picchio.vibration.closed_form.modes import modal_analysis
-from picchio.vibration.closed_form.response import steady_state
+from picchio.studies.rivet.pose import ModelAtPose
 
 _CLEARLY = 1.10
 """A difference of 10 % is one."""
@@ -66,9 +65,8 @@ def direction(world: World) -> tuple[bool, float]:
 )
 def fluctuates(world: World) -> tuple[bool, float]:
     """The stress goes up and down."""
-    modes = modal_analysis(world.model.linear_system(world.rivet_poses[0]))
-    points = steady_state(modes, world.blows).turning_points(world.printed.directions[0])
-    value = points[1][1]
+    at = ModelAtPose(world.model, world.rivet_poses[0])
+    value = at.turning_points(world.blows, None, world.printed.directions[0])[1]
     share = float(np.ptp(value) / np.abs(value).max())
     return share > 0.05, share
 

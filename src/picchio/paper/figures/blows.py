@@ -69,9 +69,8 @@ def steady_state(study: Study) -> PaperFigure:
     rest, steady, n, joint = worst_responses(world, hits)
     end = (hits + 8) * world.blows.period
     time = np.linspace(0.0, end, 1500)
-    factor = world.given.stress_per_twist / 1e6
-    burst = factor * rest.deflection(time, n)[joint]
-    band = factor * steady.turning_points(n)[joint][1]
+    burst = world.stress(rest.deflection(time, n)[joint])
+    band = world.stress(steady.turning_points(n)[joint][1])
     ratio = float(np.abs(burst).max() / np.abs(band).max())
     slowest = -float(rest.modes.poles.real.max())
 

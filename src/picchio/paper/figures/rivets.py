@@ -76,7 +76,7 @@ def figures_13_to_15(study: Study) -> PaperFigure:
 def influence(study: Study) -> PaperFigure:
     """One input at a time from its least to its largest value: the effect on the life."""
     rows = influences(study)
-    base = rows[0].base_life
+    base = rows[0].lives[0]
 
     def draw(ax: Axes) -> None:
         for k, row in enumerate(reversed(rows)):

@@ -63,15 +63,12 @@ def hypotheses(study: Study) -> PaperFigure:
             errors = errors[np.isfinite(errors)]
             ax.plot(100 * errors.clip(1e-4), np.full(errors.size, k), "o", color=BLUE,
                     alpha=0.45, markersize=4.5)  # fmt: skip
-            ax.plot(100 * np.median(errors), k, "|", color=BLUE, markersize=15, markeredgewidth=2.4)
-            means = np.abs(h.left_out_mean)
-            ax.plot(100 * np.nanmedian(means), k, "|", color=ORANGE, markersize=15,
-                    markeredgewidth=2.4)  # fmt: skip
-        ax.plot(
-            [], [], "|", color=BLUE, markersize=11, markeredgewidth=2.4, label="lives N, median"
-        )
-        ax.plot([], [], "|", color=ORANGE, markersize=11, markeredgewidth=2.4,
-                label="mean stresses, median")  # fmt: skip
+            for left_out, colour in ((h.left_out_life, BLUE), (h.left_out_mean, ORANGE)):
+                ax.plot(100 * np.nanmedian(np.abs(left_out)), k, "|", color=colour, markersize=15,
+                        markeredgewidth=2.4)  # fmt: skip
+        for words, colour in (("lives N", BLUE), ("mean stresses", ORANGE)):
+            ax.plot([], [], "|", color=colour, markersize=11, markeredgewidth=2.4,
+                    label=f"{words}, median")  # fmt: skip
         ax.set_xscale("log")
         ax.set_yticks(range(len(found)), [h.name for h in reversed(found)])
         ax.set(xlabel="error of an entry predicted from the other 15 [% of ln]")

@@ -10,6 +10,7 @@ from picchio.core.arrays import FloatArray
 from picchio.paper.table2.by_curve import OTHER_CURVE, CurveOfTable
 from picchio.paper.table2.compare import Comparison
 from picchio.paper.table2.fit import described
+from picchio.paper.table2.place import FREE
 
 if TYPE_CHECKING:
     from picchio.paper.study import Study
@@ -105,9 +106,8 @@ def answer(study: Study) -> Answer:
     worlds = [described(f) for f in near]
     ranges = {
         name: (min(float(w[name]) for w in worlds), max(float(w[name]) for w in worlds))
-        for name in ("period", "duty", "damping_ratio", "panel_x", "panel_y", "panel_z", "pitch",
-                     "stress_per_twist")
-    }  # fmt: skip
+        for name in (*FREE, "stress_per_twist")
+    }
     return Answer(
         table, comparison, base, study.fitted.rivet_stress.mean(axis=1),
         printed.cycles(base), lead, (cycles, printed.a * cycles**printed.b),

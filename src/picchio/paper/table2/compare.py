@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -115,23 +116,14 @@ def compare_hypotheses(
     return Comparison(tuple(found), tuple(_starts(means, families[("peak", "cg")], blank)))
 
 
-def _places(rule: Rule, given: Assumptions) -> list[Place]:
-    return [
-        Place(
-            given.but(rows=r, columns=c, elbow=elbow, inertia_about=rule.inertia_about),
-            rule.measure,
-        )
-        for r, c in ((3, 5), (5, 3))
-        for elbow in ("down", "up")
-    ]
-
-
 def _trials(rule: Rule, given: Assumptions, printed: Printed) -> list[Trial]:
     """Random worlds with their deflections, for all rules that look at the same quantity."""
     rng = np.random.default_rng(SEED)
     low, high = limits()
     trials = []
-    for place in _places(rule, given):
+    for (r, c), elbow in product(((3, 5), (5, 3)), ("down", "up")):
+        base = given.but(rows=r, columns=c, elbow=elbow, inertia_about=rule.inertia_about)
+        place = Place(base, rule.measure)
         for v in low + (high - low) * rng.random((_TRIED, len(FREE))):
             found = place.deflections(v, printed)
             if found is not None:

@@ -15,12 +15,12 @@ from picchio.paper.fourier import printed_series
 from picchio.paper.printed import Printed
 from picchio.robot.flexible_robot import FlexibleRobot
 
-FREE = ("period", "duty", "damping_ratio", "panel_x", "panel_y", "panel_z", "pitch")
-"""Fitted with every hypothesis, and the stress per twist, which is solved for: the same freedom."""
 BOUNDS = {
     "period": (0.02, 0.3), "duty": (0.02, 0.5), "damping_ratio": (0.003, 0.15),
     "panel_x": (0.3, 1.45), "panel_y": (-0.1, 1.0), "panel_z": (-0.3, 1.8), "pitch": (0.02, 0.35),
 }  # fmt: skip
+FREE = tuple(BOUNDS)
+"""Fitted with every hypothesis, and the stress per twist, which is solved for: the same freedom."""
 _LOG = ("period", "duty", "damping_ratio", "pitch")
 _SAMPLES = 128
 
