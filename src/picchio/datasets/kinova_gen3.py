@@ -33,21 +33,16 @@ from picchio.datasets.fetch import Dataset, RemoteFile, content
 
 _JOINTWISE = "data/kinova/jointwise_motion/"
 _ALL = "data/kinova/identification_data/"
-_FILES = {
-    "RecordTrajectory_quadratic.csv": (
-        _ALL,
-        "82b68faf7b12f73f83e82acb6b6660b5cae28c702058f58269c87718f7ee9ed7",
-    ),
-    "RunTrajectory1.csv": (
-        _ALL,
-        "2389fbfa1149c7d8884a8a7433fdeaf4cd655f781ae2a8cbb9562a7101e309df",
-    ),
-    "Trajectory1.csv": (
-        _ALL,
-        "3a90a0ed7b88daafd1eb349e08a1a3d50b91cacc000aa7f587016268af76c7e6",
-    ),
-}
-_JOINT_HASHES = (
+_FILES = (
+    f"{_ALL}RecordTrajectory_quadratic.csv",
+    f"{_ALL}RunTrajectory1.csv",
+    f"{_ALL}Trajectory1.csv",
+    *(f"{_JOINTWISE}joint_{joint}_trapez.csv" for joint in range(1, 8)),
+)
+_HASHES = (
+    "82b68faf7b12f73f83e82acb6b6660b5cae28c702058f58269c87718f7ee9ed7",
+    "2389fbfa1149c7d8884a8a7433fdeaf4cd655f781ae2a8cbb9562a7101e309df",
+    "3a90a0ed7b88daafd1eb349e08a1a3d50b91cacc000aa7f587016268af76c7e6",
     "c83dda00c4e42494227ed7ff0e7a5ca06cf65a11d661b41a01b756f448b8ac98",
     "03395d0eab42fced8a31bed09f3dfe89a3c471751f364590c48a9ac5a1a926be",
     "18eea5bcfd48c2f7d9b315f098db2cd8efd391e2ea9c39559882b738eb3d334e",
@@ -56,17 +51,16 @@ _JOINT_HASHES = (
     "7f928b34a9402bb2afa01f9cdd5ec863b8af4e239bbad16e9eee327dffac75c1",
     "e3589c3713b3def2a13f06bc6b972c4c29c2e1e83573f94880d741e5de794c43",
 )
-_FILES |= {
-    f"joint_{joint}_trapez.csv": (_JOINTWISE, sha256)
-    for joint, sha256 in enumerate(_JOINT_HASHES, start=1)
-}
 DATASET = Dataset(
     name="kinova-gen3",
     repository="SedkiLmm/dynamic-identification",
     commit="ff2f3becf7b0f25d4959491404844a29a27d286b",
     licence="MIT",
     cite="W. Chiha, github.com/SedkiLmm/dynamic-identification, 2024",
-    files={name: RemoteFile(folder + name, sha256) for name, (folder, sha256) in _FILES.items()},
+    files={
+        path.rpartition("/")[2]: RemoteFile(path, sha256)
+        for path, sha256 in zip(_FILES, _HASHES, strict=True)
+    },
 )
 JOINTS = tuple(f"joint_{joint}" for joint in range(1, 8))
 _COLUMNS = {"position": "Position", "velocity": "Velocity", "torque": "TorqueCur",
@@ -78,7 +72,7 @@ def build(files: Mapping[str, Path]) -> Campaign:
     """The campaign: one motion record a file, each read when it is first used."""
     names = [f"{kind}.{joint}" for kind in _COLUMNS for joint in JOINTS]
     records = []
-    for name in _FILES:
+    for name in DATASET.files:
         read = partial(_read, files[name])
         records.append(
             Record.from_function(name.lower(), names, read, kind="motion", notes=_note(name))

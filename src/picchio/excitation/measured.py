@@ -73,11 +73,8 @@ class MeasuredForce(Excitation):
     @classmethod
     def from_table(cls, values: dict[str, Any], folder: Path) -> Self:
         """As `Excitation.from_table`; the CSV is `file`."""
-        return cls.from_csv(
-            folder / values["file"],
-            period=values.get("period"),
-            preload=values.get("preload", 0.0),
-        )
+        given = {key: values[key] for key in cls.optional if key in values}
+        return cls.from_csv(folder / values["file"], **given)
 
     @classmethod
     def from_csv(

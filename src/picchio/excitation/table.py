@@ -134,6 +134,4 @@ class ExcitationTable(StrictModel):
         except InputError as error:
             if error.file is not None:
                 raise
-            raise InputError(
-                error.problem, file=file, key=f"{key}.{error.key}", value=error.value
-            ) from None
+            raise error.placed(file=file, key=f"{key}.{error.key}") from None

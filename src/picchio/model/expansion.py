@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from picchio.core.arrays import FloatArray, symmetric
+from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.robot.dynamics.rigid_model import unit_inertia
 from picchio.robot.flexible_robot import FlexibleRobot
 
 BASE_AXES = ("x", "y", "z", "rx", "ry", "rz")
@@ -186,19 +187,6 @@ class WideChain:
             joint = self._model.joints[self._model.getJointId(name)]
             self._columns[joint.idx_v, column] = 1.0
 
-    def index(self, coordinate: str) -> int:
-        """Where a coordinate stands in `coordinates`.
-
-        Raises:
-            InputError: there is no such coordinate.
-        """
-        try:
-            return self.coordinates.index(coordinate)
-        except ValueError:
-            raise InputError(
-                "no such coordinate", value=coordinate, choices=self.coordinates
-            ) from None
-
     def _q(self, pose: FloatArray) -> FloatArray:
         rigid, q = self.robot.rigid, np.zeros(self._model.nq)
         q[self._own] = rigid._follow @ pose + rigid._offset
@@ -209,10 +197,7 @@ class WideChain:
         if what == "robot":
             return self._model
         joint, placement = self._frame(what)
-        if point is None:
-            own = link_inertia(self.robot, what)
-        else:
-            own = pin.Inertia(1.0, np.array(point, dtype=float), np.zeros((3, 3)))
+        own = unit_inertia(self.robot.tree, what, point)
         model = self._model.copy()
         for i in range(model.njoints):
             model.inertias[i] = pin.Inertia.Zero()
@@ -298,20 +283,3 @@ class WideChain:
             (jacobian(q + _STEP * s) - jacobian(q - _STEP * s)) / (2 * _STEP) for s in columns.T
         ]
         return Motion(here, np.array(gradient), rotation)
-
-
-def link_inertia(robot: FlexibleRobot, link: str) -> pin.Inertia:
-    """A link's own inertia in its frame, as the URDF has it.
-
-    Raises:
-        InputError: the URDF gives the link none.
-    """
-    own = robot.tree.links.get(link)
-    if own is None:
-        raise InputError(
-            "the URDF gives this link no mass",
-            value=link,
-            choices=[name for name, inertial in robot.tree.links.items() if inertial],
-        )
-    turn = pin.rpy.rpyToMatrix(*own.rpy)
-    return pin.Inertia(own.mass, np.array(own.xyz), turn @ symmetric(own.inertia) @ turn.T)

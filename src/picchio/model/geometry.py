@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
@@ -11,12 +10,12 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.recent import Recent
 from picchio.model.expansion import Inertia, Motion, WideChain
+from picchio.robot.dynamics.rigid_model import Mass
 from picchio.robot.flexible_robot import FlexibleRobot
 
 if TYPE_CHECKING:
     from picchio.model.plant import Plant
 
-Mass = tuple[float, str, tuple[float, ...] | None]
 # How many sums of inertias are kept: those of a robot with a few payloads tried in turn.
 _KEPT_TOTALS = 32
 _KEPT_PLANTS = 4
@@ -36,7 +35,8 @@ class Geometry:
         self._inertias: dict[object, Inertia] = {}
         self._motions: dict[object, Motion] = {}
         self._totals: Recent[Inertia] = Recent(_KEPT_TOTALS)
-        self._plants: Recent[Plant] = Recent(_KEPT_PLANTS)
+        # Records of one pose share theirs.
+        self.plants: Recent[Plant] = Recent(_KEPT_PLANTS)
         state = chain.robot.state(pose)
         self.stiffness = state.stiffness
         self.gravity_torque = state.gravity_torque
@@ -86,15 +86,6 @@ class Geometry:
             return Inertia(**{f.name: add(f.name) for f in fields(Inertia)})
 
         return self._totals.get((masses, taken), make)
-
-    def plant(self, key: Hashable, make: Callable[[], Plant]) -> Plant:
-        """The plant of a key, made where it is not known: records of one pose share theirs.
-
-        Args:
-            key: what tells one plant from another.
-            make: computes it where it is not kept.
-        """
-        return self._plants.get(key, make)
 
     def motion(self, frame: str, taken: tuple[int, ...] | None = None) -> Motion:
         """As `WideChain.motion`; a joint's name means the link that it carries.

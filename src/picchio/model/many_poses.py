@@ -6,10 +6,9 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.model.conditions import Conditions
-from picchio.model.expansion import link_inertia
 from picchio.model.model import Model
 from picchio.model.plant import Changes
-from picchio.robot.dynamics.rigid_model import Body, RigidModel
+from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.dynamics.statics import balancing, stiffness_at_torque
 
 
@@ -40,35 +39,25 @@ class ManyPoses:
         self.stiffness = np.tile(robot.stiffness, (len(poses), 1))
         if any(joint.stiffness_curve is not None for joint in robot.flexible_joints):
             self.stiffness = stiffness_at_torque(robot.flexible_joints, self._held(robot.rigid))
-        self.compiled = not model.gravity_stiffness
-        if model.changes_structure:
+        self.compiled = not (model.gravity_stiffness or model.nonlinear)
+        if model.changes_structure and not model.nonlinear:
             self._change()
 
     def _change(self) -> None:
         """Take the effects in: what they do to the springs may depend on the pose."""
         first: Changes | None = None
+        names = self._robot.flexible_names
         for k, row in enumerate(self.stiffness):
-            changes = Changes(
-                self._robot, dict(zip(self._robot.flexible_names, row, strict=True)), Conditions()
-            )
-            if self._model.nonlinear:
-                self.compiled = False
-                return
+            changes = Changes(self._robot, dict(zip(names, row, strict=True)), Conditions())
             for effect in self._model.ordered:
                 effect.structure(changes)
             self.stiffness[k] = list(changes.springs.values())
-            first = changes if first is None else first
+            first = first or changes
         if first is None:
             return
         self.compiled = self.compiled and first.joints_only and not first.force_offset.any()
         self.damping_ratio = first.damping_scale * self._robot.damping_ratio
-        self._rigid = self._robot.rigid.with_bodies(
-            [
-                Body(link, point, weight, None if point else link_inertia(self._robot, link))
-                for weight, link, point in first.added_masses
-            ]
-        )
-        names = self._robot.flexible_names
+        self._rigid = self._robot.rigid.with_masses(first.added_masses)
         for joint, inertia in first.added_inertias:
             if joint in names:
                 self._joint_inertia[names.index(joint)] += inertia

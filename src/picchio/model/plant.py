@@ -11,9 +11,10 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.model.conditions import Conditions
 from picchio.model.expansion import Motion
-from picchio.model.geometry import Geometry, Mass
+from picchio.model.geometry import Geometry
 from picchio.model.linear_system import shared_damping
 from picchio.model.system import Element, ElementKind, VibratingSystem
+from picchio.robot.dynamics.rigid_model import Mass
 from picchio.robot.flexible_robot import FlexibleRobot
 
 Row = dict[str, float]
@@ -212,8 +213,9 @@ class Plant(Changes):
         """All that does not depend on the force's direction, and how the force's point moves."""
         geometry, names = self.geometry, self.coordinates
         size = len(names)
-        wide = [i for i, name in enumerate(names) if name in geometry.chain.coordinates]
-        taken = [geometry.chain.index(names[i]) for i in wide]
+        chain = geometry.chain.coordinates
+        wide = [i for i, name in enumerate(names) if name in chain]
+        taken = [chain.index(names[i]) for i in wide]
 
         def among_all(values: FloatArray) -> FloatArray:
             """Of the chain's coordinates, as rows and columns of all: nothing on the others."""

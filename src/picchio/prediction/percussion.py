@@ -222,7 +222,7 @@ class PercussionSetup:
         def make() -> VibratingSystem:
             # Only what drifts asks for more than the pose.
             when = self.conditions if model.key("over-time") else None
-            plant = self.geometry.plant(
+            plant = self.geometry.plants.get(
                 (moving, model.gravity_stiffness, when),
                 lambda: model.plant(self.geometry, self.conditions),
             )

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-import numpy as np
-
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 
@@ -71,21 +69,6 @@ class Names:
         """The name, or with its number where it was given out before."""
         self._seen[name] = self._seen.get(name, 0) + 1
         return name if self._seen[name] == 1 else f"{name}#{self._seen[name]}"
-
-
-def as_series(values: object, what: str, path: Path) -> FloatArray:
-    """(m,) float64 from a reader's array.
-
-    Raises:
-        InputError: complex, or not one-dimensional numbers.
-    """
-    array = np.asarray(values)
-    if array.dtype.kind == "c":
-        raise InputError("holds complex numbers; only time histories can be imported",
-                         file=path, key=what)  # fmt: skip
-    if array.dtype.kind not in "fiub" or array.ndim != 1:
-        raise InputError("is not a series of numbers", file=path, key=what)
-    return array.astype(np.float64)
 
 
 def reason(error: Exception) -> str:

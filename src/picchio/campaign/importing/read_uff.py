@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from picchio.campaign.importing.mapping import Mapping
-from picchio.campaign.importing.raw import Names, RawChannel, RawFile, as_series, reason
+from picchio.campaign.importing.raw import Names, RawChannel, RawFile, reason
 from picchio.core.errors import InputError, PicchioWarning
 
 # Function types of data set 58 that are histories in time: general, and time response.
@@ -66,7 +66,12 @@ def read(path: Path, mapping: Mapping | None) -> RawFile:
 def _channel(data: dict[str, Any], unique: Names, path: Path) -> RawChannel:
     direction = _DIRECTIONS.get(int(data.get("rsp_dir", 0)), "")
     name = unique(f"{int(data.get('rsp_node', 0))}{direction}")
-    values = as_series(data["data"], name, path)
+    values = np.asarray(data["data"])
+    if values.dtype.kind == "c":
+        raise InputError("holds complex numbers; only time histories can be imported",
+                         file=path, key=name)  # fmt: skip
+    if values.dtype.kind not in "fiub" or values.ndim != 1:
+        raise InputError("is not a series of numbers", file=path, key=name)
     if values.size != int(data.get("num_pts", values.size)):
         raise InputError(f"must hold {int(data['num_pts'])} samples as its header says", file=path,
                          key=name, value=values.size)  # fmt: skip
@@ -74,7 +79,7 @@ def _channel(data: dict[str, Any], unique: Names, path: Path) -> RawChannel:
     label = " ".join(str(data.get(key) or "").strip() for key in ("id1", "rsp_ent_name"))
     return RawChannel(
         name,
-        values,
+        values.astype(np.float64),
         np.asarray(data["x"], dtype=np.float64),
         None if unit.lower() in _NO_UNIT else unit,
         note=label.strip(),

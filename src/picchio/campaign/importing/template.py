@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from picchio.campaign.channels import patterns
@@ -104,6 +105,4 @@ def _channel(channel: RawChannel) -> list[str]:
 
 def _quoted(text: str) -> str:
     """A TOML basic string."""
-    import json
-
     return json.dumps(text, ensure_ascii=False)

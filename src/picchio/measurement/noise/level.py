@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -87,8 +87,7 @@ class Noise:
             if abs(other / rate - 1.0) < 1e-3:
                 return noise
         white = AutoRegression(np.zeros(0), self.std**2)
-        return Noise(self.channel, self.unit, rate, self.std, self.error, white, self.hum,
-                     self.resolution, self.sources, self.rough)  # fmt: skip
+        return replace(self, rate=rate, model=white, others={})
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""

@@ -59,11 +59,11 @@ def fit_ring_down(series: FloatArray, rate: float) -> RingDown | None:
     best: tuple[float, ComplexArray, FloatArray, FloatArray] | None = None
     for poles in _trials(y, rate):
         refined = _refine(poles, y, time)
-        basis = _basis(refined, time)
-        left = _leave(basis, y)
+        q, _ = np.linalg.qr(_basis(refined, time))
+        left = y - (y @ q) @ q.T
         # By what remains unpredictable: slow noise must not be taken for more waves.
         power = [fit_autoregression([one], _COLOUR).variances[-1] for one in left]
-        count = basis.shape[1] + 2.0 * refined.size / len(y)
+        count = q.shape[1] + 2.0 * refined.size / len(y)
         criterion = m * np.log(power).sum() + len(y) * count * np.log(m)
         if best is None or criterion < best[0]:
             best = (criterion, refined, left, np.array(count))
@@ -110,11 +110,6 @@ def _basis(poles: ComplexArray, time: FloatArray) -> FloatArray:
     waves = np.exp(np.outer(time, poles))
     mains = [f(2.0 * np.pi * hz * time) for hz in MAINS for f in (np.cos, np.sin)]
     return np.column_stack([np.ones(time.size), *mains, waves.real, waves.imag])
-
-
-def _leave(basis: FloatArray, y: FloatArray) -> FloatArray:
-    q, _ = np.linalg.qr(basis)
-    return y - (y @ q) @ q.T
 
 
 def _refine(poles: ComplexArray, y: FloatArray, time: FloatArray) -> ComplexArray:

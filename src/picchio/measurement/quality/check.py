@@ -86,6 +86,7 @@ class Check:
         name: in findings.
         what: what it looks for, in words.
         of: the kind of records that it sees, "percussion" or "motion"; all where empty.
+        told: what has been reported, and is not to be at the next record.
     """
 
     name: ClassVar[str]
@@ -94,6 +95,7 @@ class Check:
 
     def __init__(self, context: Context) -> None:
         self.context = context
+        self.told: set[str] = set()
 
     def record(self, scan: RecordScan) -> Iterable[Finding]:
         """Findings in one record."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import permutations, product
 
 import numpy as np
 
 from picchio.campaign.channels import AXES
 from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.model.effects.sensors.sensor_axes import CHOICES
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,7 @@ def relabel(seen: Sequence[ComplexArray], must: Sequence[ComplexArray]) -> Relab
     )  # fmt: skip
     scores = {
         (order, signs): float(sum(signs[a] * products[a, order[a]] for a in range(3)))
-        for order in permutations(range(3))
-        for signs in product((1, -1), repeat=3)
+        for order, signs in CHOICES
     }
     labelled = scores[(0, 1, 2), (1, 1, 1)]
     (order, signs), best = max(scores.items(), key=lambda item: item[1])

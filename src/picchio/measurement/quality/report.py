@@ -233,7 +233,57 @@ def check(
     """
     campaign = load_campaign(campaign, clock_tolerance=math.inf)
     found, problem = _robot(campaign, robot, flex, tool) if use_robot else (None, None)
-    return _look_through(campaign, found, problem, keep_going, progress)
+    records = [replace(record, clock_tolerance=math.inf) for record in campaign.records]
+    campaign = replace(campaign, records=tuple(records))
+    findings: list[Finding] = []
+
+    def tried(read: Callable[[Record], T], record: Record) -> T | None:
+        try:
+            return read(record)
+        except InputError as error:
+            if not keep_going:
+                raise
+            advice = "mend the file, or leave the record out"
+            findings.append(Finding("readable", "error", str(error), advice, record=record.file))
+            return None
+
+    collector = NoiseCollector(campaign)
+    readable: list[Record] = []
+    say = progress or (lambda done, total: None)
+    total = 2 * len(records)
+    for index, record in enumerate(records):
+        window = tried(read_window, record)
+        if window is not None:
+            collector.add(window)
+            readable.append(record)
+        say(index + 1, total)
+    context = Context(campaign, found, collector.finish(), collector.periods)
+    checkers: list[Check] = [kind(context) for kind in CHECKS]
+    summaries = []
+    for index, record in enumerate(readable):
+        scan = tried(scan_record, record)
+        if scan is None:
+            continue
+        for checker in checkers:
+            if checker.of in ("", record.kind):
+                findings.extend(checker.record(scan))
+        summaries.append(summarise(scan))
+        say(len(records) + index + 1, total)
+    for checker in checkers:
+        findings.extend(checker.finish())
+    repeats = next((c.comparisons for c in checkers if isinstance(c, RepeatsCheck)), [])
+    findings.sort(key=lambda finding: SEVERITIES.index(finding.severity))
+    if problem is not None:
+        findings.insert(0, problem)
+    return QualityReport(
+        campaign,
+        found,
+        tuple(summaries),
+        tuple(findings),
+        context.noise,
+        tuple(repeats),
+        {kind.name: kind.what for kind in CHECKS},
+    )
 
 
 def _robot(
@@ -263,63 +313,3 @@ def _robot(
             "correct `robot` or `tool` in campaign.toml, or give another with --robot; what needs "
             "a robot was not checked",
         )
-
-
-def _look_through(
-    campaign: Campaign,
-    robot: FlexibleRobot | None,
-    problem: Finding | None,
-    keep_going: bool,
-    progress: Callable[[int, int], None] | None,
-) -> QualityReport:
-    records = [replace(record, clock_tolerance=math.inf) for record in campaign.records]
-    campaign = replace(campaign, records=tuple(records))
-    findings: list[Finding] = []
-
-    def tried(read: Callable[[Record], T], record: Record) -> T | None:
-        try:
-            return read(record)
-        except InputError as error:
-            if not keep_going:
-                raise
-            advice = "mend the file, or leave the record out"
-            findings.append(Finding("readable", "error", str(error), advice, record=record.file))
-            return None
-
-    collector = NoiseCollector(campaign)
-    readable: list[Record] = []
-    say = progress or (lambda done, total: None)
-    total = 2 * len(records)
-    for index, record in enumerate(records):
-        window = tried(read_window, record)
-        if window is not None:
-            collector.add(window)
-            readable.append(record)
-        say(index + 1, total)
-    context = Context(campaign, robot, collector.finish(), collector.periods)
-    checkers: list[Check] = [kind(context) for kind in CHECKS]
-    summaries = []
-    for index, record in enumerate(readable):
-        scan = tried(scan_record, record)
-        if scan is None:
-            continue
-        for checker in checkers:
-            if checker.of in ("", record.kind):
-                findings.extend(checker.record(scan))
-        summaries.append(summarise(scan))
-        say(len(records) + index + 1, total)
-    for checker in checkers:
-        findings.extend(checker.finish())
-    repeats = next((c.comparisons for c in checkers if isinstance(c, RepeatsCheck)), [])
-    findings.sort(key=lambda finding: SEVERITIES.index(finding.severity))
-    if problem is not None:
-        findings.insert(0, problem)
-    return QualityReport(
-        campaign,
-        robot,
-        tuple(summaries),
-        tuple(findings),
-        context.noise,
-        tuple(repeats),
-        {kind.name: kind.what for kind in CHECKS},
-    )

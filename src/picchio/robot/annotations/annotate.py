@@ -17,7 +17,7 @@ from xml.sax.saxutils import quoteattr
 from lxml import etree
 
 from picchio.core.errors import InputError
-from picchio.robot.annotations.flexibility import Source, check_names
+from picchio.robot.annotations.flexibility import EXCLUDED, Source, check_names
 from picchio.robot.annotations.inline import IN_JOINT, IN_ROBOT, read_annotations
 from picchio.robot.annotations.sidecar import JointEntry, Sidecar, given
 from picchio.robot.urdf.check import read_tree
@@ -177,10 +177,8 @@ def annotate(urdf: str | Path, sidecar: Sidecar) -> bytes:
         edits.append((places.root_name_end, places.root_name_end, f' xmlns:{prefix}="{NAMESPACE}"'))
     for name, entry in sidecar.joint.items():
         merged = {**given(before.joint.get(name)), **given(entry)}
-        if "stiffness" in given(entry):
-            merged.pop("stiffness_curve", None)
-        if "stiffness_curve" in given(entry):
-            merged.pop("stiffness", None)
+        for key in given(entry):
+            merged.pop(EXCLUDED.get(key, ""), None)
         JointEntry.model_validate(merged)
         expected["joint", name] = merged
         edits += _replace(places, ("joint", name), _joint_elements(prefix, merged))

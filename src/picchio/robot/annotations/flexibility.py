@@ -19,7 +19,7 @@ from picchio.robot.urdf.tree import MOVABLE, UrdfJoint, UrdfTree
 
 DEFAULT_DAMPING_RATIO = 0.03
 # One of these excludes the other, wherever they stand.
-_TOGETHER = {"stiffness": "stiffness_curve", "stiffness_curve": "stiffness"}
+EXCLUDED = {"stiffness": "stiffness_curve", "stiffness_curve": "stiffness"}
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def _merge(name: str, sources: Sequence[Source]) -> tuple[dict[str, Any], dict[s
         if entry is None:
             continue
         for key, value in given(entry).items():
-            if key == "source" or key in values or _TOGETHER.get(key) in values:
+            if key == "source" or key in values or EXCLUDED.get(key) in values:
                 continue
             # An estimate is a statement about the stiffness given beside it.
             if key == "estimated" and not entry.flexible:

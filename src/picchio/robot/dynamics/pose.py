@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, PicchioWarning
@@ -15,12 +14,11 @@ from picchio.core.errors import InputError, PicchioWarning
 if TYPE_CHECKING:
     from picchio.robot.flexible_robot import FlexibleRobot
 
-Array = NDArray[np.float64]
 # An angle of more than three turns either way is probably in degrees.
 _TURNS = 3.0
 
 
-def check_pose(robot: FlexibleRobot, values: Any) -> Array:
+def check_pose(robot: FlexibleRobot, values: Any) -> FloatArray:
     """A pose (nv,).
 
     Args:

@@ -13,13 +13,13 @@ import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from picchio.core.arrays import Vector
+from picchio.core.arrays import Vector, symmetric
 from picchio.core.errors import InputError
 from picchio.robot.urdf.tree import UrdfTree
 
@@ -27,20 +27,8 @@ Array = NDArray[np.float64]
 _STDERR_LOCK = threading.Lock()
 
 
-class Body(NamedTuple):
-    """A body to add to a link.
-
-    Attributes:
-        link: its name.
-        point: (3,) m in the link's frame, where a point mass is; None for an extended body.
-        weight: kg of the point mass, or the factor on `inertia`; may be negative.
-        inertia: in the link's frame; None for a point mass.
-    """
-
-    link: str
-    point: tuple[float, ...] | None
-    weight: float
-    inertia: pin.Inertia | None
+Mass = tuple[float, str, tuple[float, ...] | None]
+"""How often what `unit_inertia` gives of a link and a point: kg, or a factor; may be negative."""
 
 
 class RigidModel:
@@ -73,25 +61,25 @@ class RigidModel:
         }
         self._local = threading.local()
 
-    def with_bodies(self, bodies: Sequence[Body]) -> RigidModel:
-        """The same robot with bodies added to its links; not picklable, unlike the original.
+    def with_masses(self, masses: Sequence[Mass]) -> RigidModel:
+        """The same robot with masses added to its links; not picklable, unlike the original.
 
         Args:
-            bodies: what is fixed to which link.
+            masses: what is fixed to which link.
 
         Raises:
-            InputError: no such link.
+            InputError: no such link, or one without a mass of its own.
         """
-        if not bodies:
+        if not masses:
             return self
         changed = object.__new__(RigidModel)
         changed.__dict__.update(self.__dict__)
         changed._model, changed._local = self._model.copy(), threading.local()
-        for body in bodies:
-            frame = self._model.frames[self.frame(body.link)]
-            own = body.inertia or pin.Inertia(1.0, np.array(body.point), np.zeros((3, 3)))
+        for weight, link, point in masses:
+            own = unit_inertia(self._tree, link, point)
+            frame = self._model.frames[self.frame(link)]
             # The ten parameters are linear in the mass: a body may be taken off, too.
-            added = body.weight * frame.placement.act(own).toDynamicParameters()
+            added = weight * frame.placement.act(own).toDynamicParameters()
             joint = frame.parentJoint
             now = changed._model.inertias[joint].toDynamicParameters()
             changed._model.inertias[joint] = pin.Inertia.FromDynamicParameters(now + added)
@@ -289,6 +277,30 @@ class RigidModel:
     def total_mass(self) -> float:
         """The mass of all bodies that can move, kg."""
         return float(sum(body.mass for body in list(self._model.inertias)[1:]))
+
+
+def unit_inertia(tree: UrdfTree, link: str, point: tuple[float, ...] | None) -> pin.Inertia:
+    """The inertia, in a link's frame, of 1 kg at a point; of the link itself without a point.
+
+    Args:
+        tree: the robot.
+        link: its name.
+        point: (3,) m in the link's frame.
+
+    Raises:
+        InputError: the URDF gives the link none.
+    """
+    if point is not None:
+        return pin.Inertia(1.0, np.array(point, dtype=float), np.zeros((3, 3)))
+    own = tree.links.get(link)
+    if own is None:
+        raise InputError(
+            "the URDF gives this link no mass",
+            value=link,
+            choices=[name for name, inertial in tree.links.items() if inertial],
+        )
+    turn = pin.rpy.rpyToMatrix(*own.rpy)
+    return pin.Inertia(own.mass, np.array(own.xyz), turn @ symmetric(own.inertia) @ turn.T)
 
 
 def _mimic_matrix(tree: UrdfTree, every: list[str], free: list[str]) -> tuple[Array, Array]:

@@ -10,33 +10,31 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.robot.urdf.tree import MOVABLE
 
 if TYPE_CHECKING:
     from picchio.robot.flexible_robot import FlexibleRobot
 
-Array = NDArray[np.float64]
 ELBOW = ("elbow-up", "elbow-down")
 
 
 def choose_branch(
-    robot: FlexibleRobot, poses: list[Array], branch: str | Sequence[str], point: Any = None
-) -> Array:
+    robot: FlexibleRobot, poses: list[FloatArray], words: Sequence[str], point: Any = None
+) -> FloatArray:
     """The first pose on a branch.
 
     Args:
         robot: the robot.
         poses: (nv,) each, the preferred first; at least one.
-        branch: "any", "elbow-up", "elbow-down", one sign word or several.
+        words: of `branch_words`.
         point: named in errors.
 
     Raises:
-        InputError: an unknown word, or no pose on this branch.
+        InputError: no pose on this branch.
     """
-    words = branch_words(robot, branch)
     for pose in poses:
         if all(_fits(robot, pose, word) for word in words):
             return pose
@@ -46,7 +44,7 @@ def choose_branch(
                      hint=f"point {point}")  # fmt: skip
 
 
-def branch_label(robot: FlexibleRobot, pose: Array) -> str:
+def branch_label(robot: FlexibleRobot, pose: FloatArray) -> str:
     """The branch a pose is on: "elbow-up" or "elbow-down", or the signs of the joints."""
     names = tool_joints(robot)
     if len(names) == 3:
@@ -78,7 +76,7 @@ def branch_words(robot: FlexibleRobot, branch: str | Sequence[str]) -> list[str]
     return words
 
 
-def _fits(robot: FlexibleRobot, pose: Array, word: str) -> bool:
+def _fits(robot: FlexibleRobot, pose: FloatArray, word: str) -> bool:
     if word == "any":
         return True
     if word in ELBOW:
@@ -87,7 +85,7 @@ def _fits(robot: FlexibleRobot, pose: Array, word: str) -> bool:
     return bool(value >= 0) if word[-1] == "+" else bool(value <= 0)
 
 
-def _elbow_is_up(robot: FlexibleRobot, pose: Array, names: list[str]) -> bool:
+def _elbow_is_up(robot: FlexibleRobot, pose: FloatArray, names: list[str]) -> bool:
     """Whether the third joint lies above the line from the second joint to the tool."""
     shoulder, _ = robot.frame_placement(pose, names[1])
     elbow, _ = robot.frame_placement(pose, names[2])

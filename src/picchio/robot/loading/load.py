@@ -61,7 +61,11 @@ def load_robot(
                                  hint="give the robot's name or file with it")  # fmt: skip
         return robot
     if is_saved_model(robot):
-        return _load_saved(Path(robot), flex=flex, tool=tool, values=values)
+        saved = read_saved_model(Path(robot))
+        flex, tool = flex or saved.flex, tool or saved.tool
+        loaded = load_robot(saved.robot, flex=flex, tool=tool, values=values)
+        tables = tuple(table.model_dump() for table in saved.effect)
+        return replace(loaded, effect_tables=tables, files=(*loaded.files, Path(robot)))
     found = find_robot(robot)
     root = parse_urdf(read_urdf_bytes(found.urdf), found.urdf)
     tree = read_tree(root, found.urdf)
@@ -74,12 +78,10 @@ def load_robot(
     chosen_tool, tool_origins = choose_tool(tree, tool, sources, srdf)
     gun, gun_origins = choose_gun(sources)
     mounting, base_origins = choose_mounting(sources)
-    urdf = normalise(tree, chosen_tool, gun, mounting)
-    rigid = RigidModel(urdf.text, tree, mounting.gravity)
-    if gun is not None and gun.recoil_stiffness is not None and urdf.recoil_joint is not None:
-        joints[urdf.recoil_joint] = Joint(
-            urdf.recoil_joint, "prismatic", gun.recoil_stiffness, gun.damping_ratio
-        )
+    urdf, tool_point, recoil = normalise(tree, chosen_tool, gun, mounting)
+    rigid = RigidModel(urdf, tree, mounting.gravity)
+    if gun is not None and gun.recoil_stiffness is not None and recoil is not None:
+        joints[recoil] = Joint(recoil, "prismatic", gun.recoil_stiffness, gun.damping_ratio)
     if not joints and not allow_rigid:
         raise InputError(
             "no joint of this robot has a stiffness",
@@ -104,24 +106,10 @@ def load_robot(
             for pose, values in (srdf.poses if srdf else {}).items()
         },
         rigid=rigid,
-        tool_point=urdf.tool_point,
+        tool_point=tool_point,
     )
     check_masses(result)
     return result
-
-
-def _load_saved(
-    path: Path,
-    *,
-    flex: str | Path | None,
-    tool: str | None,
-    values: Mapping[str, Mapping[str, object]] | None,
-) -> FlexibleRobot:
-    """The robot of a saved model, its effects with it."""
-    saved = read_saved_model(path)
-    robot = load_robot(saved.robot, flex=flex or saved.flex, tool=tool or saved.tool, values=values)
-    tables = tuple(table.model_dump() for table in saved.effect)
-    return replace(robot, effect_tables=tables, files=(*robot.files, path))
 
 
 def _sources(

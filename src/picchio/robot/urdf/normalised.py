@@ -9,7 +9,6 @@ links of their own, so that they are counted once.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from lxml import etree
 
@@ -17,23 +16,10 @@ from picchio.robot.tool import RECOIL_JOINT, Gun, Mounting, Tool
 from picchio.robot.urdf.tree import INERTIA, MOVABLE, ZERO, Inertial, UrdfTree, Vector
 
 
-@dataclass(frozen=True)
-class NormalisedUrdf:
-    """The text and the names of what was added to it.
-
-    Args:
-        text: the URDF.
-        tool_point: link at whose origin the force acts.
-        recoil_joint: name of the gun's joint, or None.
-    """
-
-    text: str
-    tool_point: str
-    recoil_joint: str | None
-
-
-def normalise(tree: UrdfTree, tool: Tool, gun: Gun | None, mounting: Mounting) -> NormalisedUrdf:
-    """Write the URDF for Pinocchio."""
+def normalise(
+    tree: UrdfTree, tool: Tool, gun: Gun | None, mounting: Mounting
+) -> tuple[str, str, str | None]:
+    """The URDF for Pinocchio, the link at whose origin the force acts, the gun's joint or None."""
     robot = etree.Element("robot", name="robot")
     taken = {*tree.links, *tree.joints}
 
@@ -68,7 +54,7 @@ def normalise(tree: UrdfTree, tool: Tool, gun: Gun | None, mounting: Mounting) -
     else:
         recoil = new(RECOIL_JOINT)
         _joint(robot, recoil, "prismatic", tool.frame, point, tool.xyz, ZERO, tool.axis)
-    return NormalisedUrdf(etree.tostring(robot, encoding="unicode"), point, recoil)
+    return etree.tostring(robot, encoding="unicode"), point, recoil
 
 
 def _link(robot: etree._Element, name: str, inertial: Inertial | None) -> None:

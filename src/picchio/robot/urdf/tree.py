@@ -17,7 +17,7 @@ from lxml import etree
 
 from picchio.core.arrays import Vector
 from picchio.core.errors import InputError
-from picchio.robot.urdf.xml import children
+from picchio.robot.urdf.xml import children, local_name
 
 T = TypeVar("T")
 MOVABLE = ("revolute", "continuous", "prismatic")
@@ -178,10 +178,10 @@ def _inertial(link: etree._Element, name: str) -> Inertial | None:
     for tag, elements in (("mass", mass), ("inertia", inertia)):
         if len(elements) != 1:
             raise InputError(f"<inertial> needs one <{tag}>, it has {len(elements)}")
-    value = number(mass[0], "value")
+    value = _number(mass[0], "value")
     if value < 0:
         raise InputError("the mass is negative", value=value)
-    tensor = tuple(number(inertia[0], each) for each in INERTIA)
+    tensor = tuple(_number(inertia[0], each) for each in INERTIA)
     return Inertial(value, *_origin(found[0]), tensor)
 
 
@@ -191,7 +191,7 @@ def _joint(element: etree._Element, name: str) -> UrdfJoint:
         raise InputError("unknown joint type", value=kind, choices=JOINT_TYPES)
     axis: Vector = (1.0, 0.0, 0.0)
     if kind in MOVABLE and (found := children(element, "axis")):
-        axis = three_numbers(found[0], "xyz", default=axis)
+        axis = _three_numbers(found[0], "xyz", axis)
         if not any(abs(part) > 1e-12 for part in axis):
             raise InputError("the axis has length zero", value=axis)
     xyz, rpy = _origin(element)
@@ -208,14 +208,14 @@ def _limits(element: etree._Element, kind: str) -> tuple[float, float, float]:
     if not found:
         raise InputError(f"a {kind} joint needs <limit lower= upper= effort= velocity=>, "
                          "it has none")  # fmt: skip
-    number(found[0], "velocity", infinite=True)
-    effort = number(found[0], "effort", infinite=True)
+    _number(found[0], "velocity", infinite=True)
+    effort = _number(found[0], "effort", infinite=True)
     if effort < 0:
         raise InputError("the effort limit is negative", value=effort)
     if kind == "continuous":
         return -unlimited, unlimited, effort
-    lower = number(found[0], "lower", default=0.0, infinite=True)
-    upper = number(found[0], "upper", default=0.0, infinite=True)
+    lower = _number(found[0], "lower", default=0.0, infinite=True)
+    upper = _number(found[0], "upper", default=0.0, infinite=True)
     if lower > upper:
         raise InputError("the lower limit is above the upper limit", value=(lower, upper))
     return lower, upper, effort
@@ -225,18 +225,15 @@ def _mimic(element: etree._Element) -> Mimic | None:
     for found in children(element, "mimic"):
         return Mimic(
             found.get("joint") or "",
-            number(found, "multiplier", default=1.0),
-            number(found, "offset", default=0.0),
+            _number(found, "multiplier", default=1.0),
+            _number(found, "offset", default=0.0),
         )
     return None
 
 
 def _origin(element: etree._Element) -> tuple[Vector, Vector]:
     for found in children(element, "origin"):
-        return (
-            three_numbers(found, "xyz", default=ZERO),
-            three_numbers(found, "rpy", default=ZERO),
-        )
+        return _three_numbers(found, "xyz", ZERO), _three_numbers(found, "rpy", ZERO)
     return ZERO, ZERO
 
 
@@ -271,45 +268,39 @@ def to_number(text: str, *, infinite: bool = False) -> float:
     return value
 
 
-def number(
+def _number(
     element: etree._Element,
     attribute: str,
     *,
     default: float | None = None,
     infinite: bool = False,
 ) -> float:
-    """A number from an attribute.
-
-    Raises:
-        InputError: missing without a default, or `to_number` refuses it.
-    """
+    """A number from an attribute; one without a default must be there."""
     text = element.get(attribute)
-    tag = etree.QName(element).localname
     if text is None:
         if default is None:
-            raise InputError(f"<{tag}> has no {attribute}")
+            raise InputError(f"<{local_name(element)}> has no {attribute}")
         return default
-    try:
-        return to_number(text, infinite=infinite)
-    except ValueError as error:
-        raise InputError(f"<{tag} {attribute}> {error}", value=text) from None
+    return _numbers(element, attribute, [text], infinite)[0]
 
 
-def three_numbers(element: etree._Element, attribute: str, *, default: Vector) -> Vector:
-    """Three numbers from an attribute, such as xyz or rpy.
-
-    Raises:
-        InputError: not three, or `to_number` refuses one.
-    """
+def _three_numbers(element: etree._Element, attribute: str, default: Vector) -> Vector:
+    """Three numbers from an attribute, such as xyz or rpy."""
     text = element.get(attribute)
     if text is None:
         return default
-    tag = etree.QName(element).localname
     parts = text.split()
     if len(parts) != 3:
-        raise InputError(f"<{tag} {attribute}> needs three numbers", value=text)
-    try:
-        x, y, z = (to_number(part) for part in parts)
-    except ValueError as error:
-        raise InputError(f"<{tag} {attribute}> {error}", value=text) from None
+        raise InputError(f"<{local_name(element)} {attribute}> needs three numbers", value=text)
+    x, y, z = _numbers(element, attribute, parts)
     return x, y, z
+
+
+def _numbers(
+    element: etree._Element, attribute: str, parts: list[str], infinite: bool = False
+) -> list[float]:
+    try:
+        return [to_number(part, infinite=infinite) for part in parts]
+    except ValueError as error:
+        raise InputError(f"<{local_name(element)} {attribute}> {error}",
+                         value=element.get(attribute)) from None  # fmt: skip

@@ -176,13 +176,11 @@ class MapJob:
         solved = solve_many(self.model.robot, points, axes=axes)
         if self.branch == "all":
             return solved.poses, solved.point + first
-        branch_words(self.model.robot, self.branch)
+        words = branch_words(self.model.robot, self.branch)
         chosen, place = [], []
         for k in np.unique(solved.point):
             try:
-                pose = choose_branch(
-                    self.model.robot, list(solved.poses[solved.point == k]), self.branch
-                )
+                pose = choose_branch(self.model.robot, list(solved.poses[solved.point == k]), words)
             except InputError:
                 continue  # this point has no pose on the branch
             chosen.append(pose)

@@ -98,17 +98,11 @@ def damages(  # type: ignore[no-untyped-def]
             frequency[s, :] = np.nan
             lowest[s, :] = np.nan
             if not modes_of(
-                mass[s], stiffness[s], joint_ratio, work, vectors, omega, ratio, shapes
-            ):
-                continue
-            under = True
-            for i in range(n):
-                frequency[s, i] = omega[i] / (2.0 * np.pi)
-                under = under and 0.0 < ratio[i] < 1.0 - 1e-6
-            if not under:
+                mass[s], stiffness[s], joint_ratio, work, vectors, omega, ratio, shapes,
+                frequency[s], poles,
+            ):  # fmt: skip
                 continue
             for i in range(n):
-                poles[i] = complex(-ratio[i] * omega[i], omega[i] * np.sqrt(1.0 - ratio[i] ** 2))
                 moved = 0.0
                 for d in range(3):
                     for j in range(n):

@@ -78,14 +78,16 @@ def modes_of(
     omega: FloatArray,
     ratio: FloatArray,
     shapes: FloatArray,
+    frequency: FloatArray,
+    poles: ComplexArray,
 ) -> bool:
-    """Undamped modes of M x'' + diag(k) x = 0, ascending, with S^T M S = I.
+    """Undamped modes of M x'' + diag(k) x = 0, ascending, with S^T M S = I; Hz, and their poles.
 
     From B = K^-1/2 M K^-1/2 with B V = V diag(1 / omega^2): S = K^-1/2 V diag(omega). A mode's
     damping ratio is the joints' weighted by strain energy, which is V squared.
 
     Returns:
-        whether the mass matrix is positive definite.
+        whether the mass matrix is positive definite, and every mode underdamped.
     """
     n = mass.shape[0]
     for i in range(n):
@@ -112,7 +114,12 @@ def modes_of(
         ratio[k] = 0.0
         for i in range(n):
             ratio[k] += joint_ratio[i] * vectors[k, i] ** 2
-    return True
+    under = True
+    for k in range(n):
+        frequency[k] = omega[k] / (2.0 * np.pi)
+        under = under and 0.0 < ratio[k] < 1.0 - 1e-6
+        poles[k] = complex(-ratio[k] * omega[k], omega[k] * np.sqrt(1.0 - ratio[k] ** 2))
+    return under
 
 
 @njit(cache=True, error_model="numpy", inline="always")

@@ -35,7 +35,7 @@ def _block_peaks(  # type: ignore[no-untyped-def]
     omega = np.empty(n)
     ratio = np.empty(n)
     shapes = np.empty((n, n))
-    push = np.empty((n, 3))
+    pull = np.empty((n, n, 3))  # of a joint, by a mode, for an axis of the force
     found = np.empty((n, 3))
     g = np.empty(3)
     terms = np.empty((TERMS, 3))
@@ -47,26 +47,21 @@ def _block_peaks(  # type: ignore[no-untyped-def]
         frequency[s, :] = np.nan
         peak[s, :] = np.nan
         direction[s, :, :] = np.nan
-        if not modes_of(mass[s], stiffness[s], joint_ratio, work, vectors, omega, ratio, shapes):
+        if not modes_of(
+            mass[s], stiffness[s], joint_ratio, work, vectors, omega, ratio, shapes, frequency[s],
+            poles,
+        ):  # fmt: skip
             continue
-        under = True
+        pull[:] = 0.0
         for i in range(n):
-            frequency[s, i] = omega[i] / (2.0 * np.pi)
-            under = under and 0.0 < ratio[i] < 1.0 - 1e-6
-        if not under:
-            continue
-        push[:] = 0.0
-        for i in range(n):
+            push = 0.0
             for d in range(3):
                 moved = 0.0
                 for j in range(n):
                     moved += jacobian[s, d, j] * shapes[j, i]
-                if dims == 3:
-                    push[i, d] = moved
-                else:
-                    push[i, 0] += moved * along[s, d]
-        for i in range(n):
-            poles[i] = complex(-ratio[i] * omega[i], omega[i] * np.sqrt(1.0 - ratio[i] ** 2))
+                push = moved if dims == 3 else push + moved * along[s, d]
+                for j in range(n):
+                    pull[j, i, d if dims == 3 else 0] = shapes[j, i] * push
         coefficients(poles, duration, constant, slope, amplitude, wave, periodic, rows)
         if endless:
             length[-1] = 2.0 * np.pi / omega[0]
@@ -80,7 +75,7 @@ def _block_peaks(  # type: ignore[no-untyped-def]
             sample(poles, rows, length, wave, omega[n - 1], room.eta, room.rate, room.time)
             done = True
             for j in range(n):
-                peak[s, j] = joint_norms(j, count, room.eta, shapes, push, dims, room.g, room.norm)
+                peak[s, j] = joint_norms(j, count, room.eta, pull[j], dims, room.g, room.norm)
                 if endless and done:
                     # Nothing after the samples can be larger than what is left of the modes.
                     left = 0.0
@@ -88,7 +83,7 @@ def _block_peaks(  # type: ignore[no-untyped-def]
                         most = 0.0
                         for i in range(n):
                             z = rows[i, -1, 0] * exponential(poles[i], length[-1])
-                            most += abs(shapes[j, i] * push[i, d]) * abs(z) / poles[i].imag
+                            most += abs(pull[j, i, d]) * abs(z) / poles[i].imag
                         left += most * most
                     done = left <= peak[s, j]
             if done or length[-1] > 1e3 * np.pi / (ratio[0] * omega[0]):
@@ -98,8 +93,9 @@ def _block_peaks(  # type: ignore[no-untyped-def]
             found[j, 0], found[j, 1], found[j, 2] = 0.0, 0.0, 1.0
             if peak[s, j] > 0.0:
                 peak[s, j] = highest(
-                    j, count, periodic, total, room.time, room.norm, room.eta, room.rate, start,
-                    poles, rows, constant, slope, amplitude, wave, shapes, push, g, terms, found,
+                    j, count, periodic, total, peak[s, j], room.time, room.norm, room.eta,
+                    room.rate, start, poles, rows, constant, slope, amplitude, wave, pull[j], g,
+                    terms, found,
                 )  # fmt: skip
         for j in range(n):
             for d in range(3):

@@ -149,29 +149,28 @@ def joint_norms(
     joint: int,
     count: int,
     eta: FloatArray,
-    shapes: FloatArray,
-    push: FloatArray,
+    pull: FloatArray,
     dims: int,
     g: FloatArray,
     norm: FloatArray,
 ) -> float:
     """|g|^2 of a joint on the samples, into its row (joint, k), and its largest; g is scratch.
 
-    `dims` is 1 where only the first column of `push` (n, 3) is not zero.
+    `dims` is 1 where only the first column of `pull` (n, 3) is not zero.
     """
-    n = push.shape[0]
+    n = pull.shape[0]
     for d in range(dims):
-        weight = shapes[joint, 0] * push[0, d]
+        weight = pull[0, d]
         for k in range(count):
             g[d, k] = weight * eta[0, k]
         i = 1
         while i + 1 < n:  # two modes at a time: half as many ways to memory and back
-            first, second = shapes[joint, i] * push[i, d], shapes[joint, i + 1] * push[i + 1, d]
+            first, second = pull[i, d], pull[i + 1, d]
             for k in range(count):
                 g[d, k] += first * eta[i, k] + second * eta[i + 1, k]
             i += 2
         if i < n:
-            weight = shapes[joint, i] * push[i, d]
+            weight = pull[i, d]
             for k in range(count):
                 g[d, k] += weight * eta[i, k]
     largest = 0.0
@@ -196,7 +195,6 @@ def piece_at(time: float, start: FloatArray) -> int:
 
 @njit(cache=True, error_model="numpy")
 def refine(
-    joint: int,
     a: float,
     t: float,
     b: float,
@@ -208,8 +206,7 @@ def refine(
     slope: FloatArray,
     amplitude: ComplexArray,
     wave: FloatArray,
-    shapes: FloatArray,
-    push: FloatArray,
+    pull: FloatArray,
     g: FloatArray,
 ) -> float:
     """|g|^2 at the maximum in (a, b), and g (3,) there; Newton on its slope, in the bracket.
@@ -251,9 +248,7 @@ def refine(
             x = imag / spin
             v = real + fall * x
             change = force + 2.0 * fall * v - (fall * fall + spin * spin) * x
-            q0 = shapes[joint, i] * push[i, 0]
-            q1 = shapes[joint, i] * push[i, 1]
-            q2 = shapes[joint, i] * push[i, 2]
+            q0, q1, q2 = pull[i, 0], pull[i, 1], pull[i, 2]
             x0, x1, x2 = x0 + q0 * x, x1 + q1 * x, x2 + q2 * x
             v0, v1, v2 = v0 + q0 * v, v1 + q1 * v, v2 + q2 * v
             a0, a1, a2 = a0 + q0 * change, a1 + q1 * change, a2 + q2 * change
@@ -284,7 +279,6 @@ def refine(
 
 @njit(cache=True, error_model="numpy", inline="always")
 def series_top(
-    joint: int,
     k: int,
     hint: float,
     low: float,
@@ -294,8 +288,7 @@ def series_top(
     poles: ComplexArray,
     eta: FloatArray,
     rate: FloatArray,
-    shapes: FloatArray,
-    push: FloatArray,
+    pull: FloatArray,
     terms: FloatArray,
     g: FloatArray,
 ) -> float:
@@ -304,7 +297,6 @@ def series_top(
     The sample has every mode's state already, so that no exponential is taken.
 
     Args:
-        joint: whose response.
         k: the sample.
         hint: s, from the sample to where the top is thought to be.
         low: s, how far back the sample's piece of the force goes.
@@ -314,8 +306,7 @@ def series_top(
         poles: (n,) ascending, 1/s.
         eta: (n, samples) deflections of the modes.
         rate: (n, samples) real parts of their states.
-        shapes: (joints, n).
-        push: (n, 3).
+        pull: (n, 3) of the joint: its deflection by each mode's, for each axis of the force.
         terms: (TERMS, 3) scratch: derivatives of g, then its series.
         g: (3,) out.
     """
@@ -326,9 +317,7 @@ def series_top(
     for i in range(n):
         fall, spin = poles[i].real, poles[i].imag
         twice, square = 2.0 * fall, fall * fall + spin * spin
-        q0 = shapes[joint, i] * push[i, 0]
-        q1 = shapes[joint, i] * push[i, 1]
-        q2 = shapes[joint, i] * push[i, 2]
+        q0, q1, q2 = pull[i, 0], pull[i, 1], pull[i, 2]
         before = eta[i, k]
         here = rate[i, k] + fall * before
         drive, next_drive = force, tilt
@@ -371,14 +360,12 @@ def series_top(
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _moving(
-    joint: int,
     k: int,
     force: float,
     poles: ComplexArray,
     eta: FloatArray,
     rate: FloatArray,
-    shapes: FloatArray,
-    push: FloatArray,
+    pull: FloatArray,
 ) -> tuple[float, float]:
     """Half the slope of |g|^2 at a sample, and a bound of how fast g's own slope changes."""
     x0, x1, x2, v0, v1, v2, bound = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -387,9 +374,7 @@ def _moving(
         x = eta[i, k]
         v = rate[i, k] + fall * x
         change = force + 2.0 * fall * v - (fall * fall + spin * spin) * x
-        q0 = shapes[joint, i] * push[i, 0]
-        q1 = shapes[joint, i] * push[i, 1]
-        q2 = shapes[joint, i] * push[i, 2]
+        q0, q1, q2 = pull[i, 0], pull[i, 1], pull[i, 2]
         x0, x1, x2 = x0 + q0 * x, x1 + q1 * x, x2 + q2 * x
         v0, v1, v2 = v0 + q0 * v, v1 + q1 * v, v2 + q2 * v
         bound += np.sqrt(q0 * q0 + q1 * q1 + q2 * q2) * abs(change)
@@ -443,6 +428,7 @@ def highest(
     count: int,
     periodic: bool,
     total: float,
+    largest: float,
     time: FloatArray,
     norm: FloatArray,
     eta: FloatArray,
@@ -454,18 +440,13 @@ def highest(
     slope: FloatArray,
     amplitude: ComplexArray,
     wave: FloatArray,
-    shapes: FloatArray,
-    push: FloatArray,
+    pull: FloatArray,
     g: FloatArray,
     terms: FloatArray,
     direction: FloatArray,
 ) -> float:
-    """The largest |g| of a joint; into `direction`, where it points."""
-    likely = 0.0
-    for k in range(count):
-        if norm[joint, k] > likely:
-            likely = norm[joint, k]
-    best, floor = -1.0, _CANDIDATE * likely
+    """The largest |g| of a joint, from that of |g|^2 on the samples; its way into `direction`."""
+    best, floor = -1.0, _CANDIDATE * largest
     for k in range(count):
         before = k - 1 if k > 0 else (count - 1 if periodic else 0)
         after = k + 1 if k + 1 < count else (0 if periodic else count - 1)
@@ -479,12 +460,12 @@ def highest(
             b += total
         p = piece_at(t, start)
         force = _force(p, t - start[p], constant, slope, amplitude, wave)
-        climb, bound = _moving(joint, k, force, poles, eta, rate, shapes, push)
+        climb, bound = _moving(k, force, poles, eta, rate, pull)
         beside, length = (after, b - t) if climb >= 0.0 else (before, t - a)
         guess, top = t, here
         if length > 0.0:
             # Where a piece ends the force may jump, but no slope does: any piece's will do.
-            descent = _moving(joint, beside, 0.0, poles, eta, rate, shapes, push)[0]
+            descent = _moving(beside, 0.0, poles, eta, rate, pull)[0]
             sign = 1.0 if climb >= 0.0 else -1.0
             move, top = _cubic_top(
                 here, norm[joint, beside], 2.0 * sign * climb, 2.0 * sign * descent, length
@@ -497,13 +478,12 @@ def highest(
             u = t - start[p]
             stop = start[p + 1] if p + 1 < start.shape[0] else total
             value = series_top(
-                joint, k, guess - t, -u, stop - t, force, slope[p],
-                poles, eta, rate, shapes, push, terms, g,
-            )  # fmt: skip
+                k, guess - t, -u, stop - t, force, slope[p], poles, eta, rate, pull, terms, g
+            )
         if value < 0.0:  # the top is in another piece, or not near
             value = refine(
-                joint, a, guess, b, total if periodic else np.inf, start, poles, rows, constant,
-                slope, amplitude, wave, shapes, push, g,
+                a, guess, b, total if periodic else np.inf, start, poles, rows, constant,
+                slope, amplitude, wave, pull, g,
             )  # fmt: skip
         if value > best:
             best = value

@@ -17,8 +17,6 @@ SMOOTH_STEP = 1e-3
 KINKED_STEP = 5e-4
 STICKING_STEP = 4e-4
 ROUGH_STEP = 2e-4
-_ROUGH = (ElementKind.BOUC_WEN,)
-_STICKING = (ElementKind.COULOMB,)
 _EDGE = 1e-10
 _ON = 1e-6  # of a step: a jump so near a sample is at it
 AtJumps = Literal["after", "mean", "moments"]
@@ -134,11 +132,12 @@ def follow(system: VibratingSystem, plan: Plan, count: int) -> CoordinateMotion:
 
 def default_step(system: VibratingSystem) -> float:
     """How fine the steps should be, s."""
-    if any(element.kind in _ROUGH for element in system.elements):
+    kinds = [element.kind for element in system.elements]
+    if ElementKind.BOUC_WEN in kinds:
         return ROUGH_STEP
-    if any(element.kind in _STICKING for element in system.elements):
+    if ElementKind.COULOMB in kinds:
         return STICKING_STEP
-    return KINKED_STEP if system.elements else SMOOTH_STEP
+    return KINKED_STEP if kinds else SMOOTH_STEP
 
 
 def _rest(system: VibratingSystem) -> FloatArray:
@@ -278,10 +277,7 @@ def _run(
     for row, element in zip(parameters, system.elements, strict=True):
         row[: len(element.parameters)] = element.parameters
     elements = (kinds if kinds.size else None, parameters, system.rows, start[2 * n :])
-    if any(element.kind in _STICKING for element in system.elements):
-        run = kernel.integrate_with_friction
-    else:
-        run = kernel.integrate
+    run = kernel.integrate_with_friction if ElementKind.COULOMB in kinds else kernel.integrate
     run(*equations, *elements, *steps, x, v, a, end)
     return CoordinateMotion(x, v, a), end
 

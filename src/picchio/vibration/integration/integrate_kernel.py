@@ -63,8 +63,10 @@ def packed(inverse, gradient, curvature):
 
 
 @njit(cache=True, nogil=True)
-def _prepared(mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, same):
-    """What `integrate` needs of the equations, M^-1 on all, and room for steps of other lengths."""
+def _prepared(
+    mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, step, lengths, regular, same
+):
+    """What `integrate` needs of the equations, M^-1 on all, of its steps, and room to work in."""
     n = b.size
     inverse = np.linalg.inv(mass)
     held = np.empty((n, 2 * n))
@@ -73,14 +75,23 @@ def _prepared(mass, gradient, curvature, damping, stiffness, b, b_gradient, rows
     ik, ic = held[:, :n].copy(), held[:, n:].copy()
     quadratic, tilts = packed(inverse, gradient, curvature)
     pushed = inverse @ b, inverse @ b_gradient, rows @ inverse
-    kept = 0
+    fastest = fastest_rate(ik, ic)
+    kept = 1
     for k in range(same.size):
-        kept = max(kept, same[k] + 1)
+        kept = max(kept, same[k] + 2)
     made = np.zeros(kept, dtype=np.bool_)
-    short = np.empty((kept, 2 * n, 2 * n))
-    short_start, short_end = np.empty((kept, 2 * n, n)), np.empty((kept, 2 * n, n))
+    matrices = np.empty((kept, 2 * n, 2 * n))
+    by_start, by_end = np.empty((kept, 2 * n, n)), np.empty((kept, 2 * n, n))
+    which = np.full(same.size, -1)  # of the matrices each step takes; of a series none
+    for k in range(same.size):
+        if regular[k] or lengths[k] * fastest > _STIFF:
+            u = which[k] = same[k] + 1
+            if not made[u]:
+                made[u], length = True, step if regular[k] else lengths[k]
+                matrices[u], by_start[u], by_end[u] = step_matrices(ik, ic, length)
     room = np.empty(n * (n + 1)), np.empty((n, n)), np.empty(n), np.empty(n)
-    return (ik, ic, held, quadratic, tilts), pushed, (made, short, short_start, short_end), room
+    steps = which, matrices, by_start, by_end, fastest
+    return (ik, ic, held, quadratic, tilts), pushed, steps, room
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -194,15 +205,14 @@ def integrate(
     (2N + elements,), the last state.
     """
     n = b.size
-    equations, pushed, others, room = _prepared(
-        mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, same
-    )
+    equations, pushed, steps, room = _prepared(
+        mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, step, lengths, regular,
+        same,
+    )  # fmt: skip
     ik, ic, held, quadratic, tilts = equations
     own, push, pulls = pushed
-    made, short, short_start, short_end = others
+    which, matrices, by_start, by_end, fastest = steps
     products, square, rest, a = room
-    fastest = fastest_rate(ik, ic)
-    exponential, by_start, by_end = step_matrices(ik, ic, step)
     states, new_states = start_states.copy(), start_states.copy()
     given = np.zeros(states.size)
     y, new, there = start.copy(), np.empty(2 * n), np.empty(2 * n)
@@ -225,18 +235,12 @@ def integrate(
             at_last[i] = p1[i] + share * (p1[i] - p0[i])
             p0[i] = p1[i]
         # Two evaluations after a jump, from which nothing can be extrapolated, and about a kink.
+        u = which[k]
+        matrix, at_start, at_end, by_matrix = matrices[u], by_start[u], by_end[u], u >= 0
         for _look in range(2):
             for i in range(n):
                 f0[i] = own[i] * force0[k] + at_first[i]
                 f1[i] = own[i] * force1[k] + at_last[i]
-            matrix, at_start, at_end = exponential, by_start, by_end
-            by_matrix = regular[k]
-            if not by_matrix and length * fastest > _STIFF:
-                u, by_matrix = same[k], True
-                if not made[u]:
-                    made[u] = True
-                    short[u], short_start[u], short_end[u] = step_matrices(ik, ic, length)
-                matrix, at_start, at_end = short[u], short_start[u], short_end[u]
             if by_matrix:
                 for i in range(2 * n):
                     total = 0.0
@@ -316,15 +320,14 @@ def integrate_with_friction(
 ):  # fmt: skip
     """As `integrate`, where there is friction among the elements."""
     n, elements = b.size, kinds.size
-    equations, pushed, others, room = _prepared(
-        mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, same
-    )
+    equations, pushed, steps, room = _prepared(
+        mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, step, lengths, regular,
+        same,
+    )  # fmt: skip
     ik, ic, held, quadratic, tilts = equations
     own, push, pulls = pushed
-    made, short, short_start, short_end = others
+    which, matrices, by_start, by_end, fastest = steps
     products, square, rest, a = room
-    fastest = fastest_rate(ik, ic)
-    exponential, by_start, by_end = step_matrices(ik, ic, step)
     states, new_states = start_states.copy(), start_states.copy()
     friction, last, given = np.zeros(elements), np.zeros(elements), np.zeros(elements)
     y, new, zero = start.copy(), np.empty(2 * n), np.zeros(2 * n)
@@ -340,14 +343,8 @@ def integrate_with_friction(
         for i in range(n):
             f0[i] = own[i] * force0[k] + p0[i]
             f1[i] = own[i] * force1[k] + p0[i]
-        matrix, at_start, at_end = exponential, by_start, by_end
-        by_matrix = regular[k]
-        if not by_matrix and lengths[k] * fastest > _STIFF:
-            u, by_matrix = same[k], True
-            if not made[u]:
-                made[u] = True
-                short[u], short_start[u], short_end[u] = step_matrices(ik, ic, lengths[k])
-            matrix, at_start, at_end = short[u], short_start[u], short_end[u]
+        u = which[k]
+        matrix, at_start, at_end, by_matrix = matrices[u], by_start[u], by_end[u], u >= 0
         for e in range(elements):  # what a unit of friction all through the step does
             if kinds[e] == COULOMB and by_matrix:
                 for i in range(2 * n):

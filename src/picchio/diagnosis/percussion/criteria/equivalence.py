@@ -96,7 +96,7 @@ def _in_series(labels: Set[str], records: Sequence[MeasuredRecord]) -> bool:
         return False
     for geometry in {record.setup.geometry for record in records}:
         jacobian = geometry.motion(geometry.robot.tool_point).jacobian
-        a, b = (jacobian[:, geometry.chain.index(name)] for name in springs)
+        a, b = (jacobian[:, geometry.chain.coordinates.index(name)] for name in springs)
         if abs(a @ b) < _PARALLEL * np.linalg.norm(a) * np.linalg.norm(b):
             return False
     return True

@@ -20,7 +20,6 @@ class ChannelsCheck(Check):
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self._names: dict[str, dict[str, set[str]]] = defaultdict(dict)
-        self._told: set[str] = set()
 
     def record(self, scan: RecordScan) -> Iterator[Finding]:
         """What one record lacks for its purpose, and names that the robot does not know."""
@@ -44,7 +43,7 @@ class ChannelsCheck(Check):
                                  "record torque.<joint> (motor current times its constant)",
                                  record=record.file)  # fmt: skip
         for group, members in sorted(scan.window.groups.items()):
-            if f"group {group}" not in self._told:
+            if f"group {group}" not in self.told:
                 yield from self._of_group(scan, group, members)
         yield from self._against_robot(scan)
 
@@ -52,13 +51,13 @@ class ChannelsCheck(Check):
         kind = members[0].kind
         lacking = [axis for axis in AXES if axis not in {channel.axis for channel in members}]
         if kind.axes and lacking:
-            self._told.add(f"group {group}")
+            self.told.add(f"group {group}")
             yield self.found("note", f"has no {' and no '.join(lacking)} axis",
                              "three axes tell more about directions than one",
                              record=scan.file, channel=group)  # fmt: skip
         unsaid = [key for key in ("derivative", "plausible") if getattr(kind, key) in (None, ())]
         if kind.answers and unsaid:
-            self._told.add(f"group {group}")
+            self.told.add(f"group {group}")
             yield self.found("note", "its axes, its phase or its size are not checked: its kind "
                              f"does not declare {' and '.join(unsaid)}",
                              "declare them in its ChannelKind", channel=group)  # fmt: skip
@@ -69,10 +68,10 @@ class ChannelsCheck(Check):
             return
         for name, channel in scan.window.channels.items():
             subject = channel.subject
-            if subject is None or f"{channel.kind.of} {subject}" in self._told:
+            if subject is None or f"{channel.kind.of} {subject}" in self.told:
                 continue
             if channel.kind.of == "joint" and subject not in robot.joint_names:
-                self._told.add(f"joint {subject}")
+                self.told.add(f"joint {subject}")
                 yield self.found("error", f"{robot.name} has no joint {subject!r}; "
                                  + describe_choices(subject, robot.joint_names),
                                  record=scan.file, channel=name)  # fmt: skip
@@ -80,12 +79,12 @@ class ChannelsCheck(Check):
                 try:
                     robot.link_of(subject)
                 except InputError:
-                    self._told.add(f"frame {subject}")
+                    self.told.add(f"frame {subject}")
                     yield self.found("error", f"{robot.name} has no frame {subject!r}; "
                                      + describe_choices(subject, robot.tree.links),
                                      record=scan.file, channel=name)  # fmt: skip
             elif channel.kind.answers and subject not in robot.flexible_names:
-                self._told.add(f"joint {subject}")
+                self.told.add(f"joint {subject}")
                 yield self.found("warning", f"{subject} has no stiffness in the model, so that it "
                                  "cannot deflect", "give its stiffness in a sidecar (--flex)",
                                  record=scan.file, channel=name)  # fmt: skip
@@ -113,23 +112,19 @@ class UnitsCheck(Check):
     name = "units"
     what = "sizes plausible in the header's unit"
 
-    def __init__(self, context: Context) -> None:
-        super().__init__(context)
-        self._told: set[str] = set()
-
     def record(self, scan: RecordScan) -> Iterator[Finding]:
         """Every channel of one record; of one that moves, its conditions alone."""
         for name, seen in scan.channels.items():
             channel = scan.window.channels[name]
             kind, group = channel.kind, channel.group
-            if not kind.plausible or group in self._told:
+            if not kind.plausible or group in self.told:
                 continue
             if scan.record.kind == "motion" and not kind.condition:
                 continue
             least, most, guess = kind.plausible[kind.units.index(channel.unit)]
             if least <= seen.least and seen.most <= most:
                 continue
-            self._told.add(group)
+            self.told.add(group)
             size = max(-seen.least, seen.most)
             yield self.found(
                 "warning", f"reaches {size:.4g} {channel.unit}, which no arm survives",

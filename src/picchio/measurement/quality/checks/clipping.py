@@ -25,7 +25,6 @@ class ClippingCheck(Check):
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self._tops: dict[str, list[tuple[str, str, FloatArray, FloatArray]]] = defaultdict(list)
-        self._told: set[str] = set()
 
     def record(self, scan: RecordScan) -> Iterator[Finding]:
         """Flat tops that are exact; what may be one under noise is kept until the end."""
@@ -42,7 +41,7 @@ class ClippingCheck(Check):
             flat = _exact(values, seen)
             if flat:
                 limit, samples = flat
-                self._told.add(channel.group)
+                self.told.add(channel.group)
                 yield self.found(
                     "warning",
                     f"reaches its limit of {limit:.4g} {channel.unit}: {samples} samples lie "
@@ -57,7 +56,7 @@ class ClippingCheck(Check):
     def finish(self) -> Iterator[Finding]:
         """Groups whose largest values pile up within the noise of one level."""
         for group, tops in self._tops.items():
-            if group in self._told:
+            if group in self.told:
                 continue
             # Channel by channel: one limit may be reached by a small one of the group alone.
             found = [
