@@ -1,15 +1,15 @@
 """What numbers of one distribution cost, against the likelihood integrated over them."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 from scipy.optimize import minimize_scalar
 from scipy.stats import norm
 
+from picchio.campaign.tables import Tolerance
 from picchio.diagnosis.percussion.conclude.causes import with_solved
 from picchio.diagnosis.percussion.fit.drawn import drawn_cost, width_spread
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.result import Cause, Value
 from picchio.model.effects.registry import effect_class
 
@@ -75,7 +75,8 @@ def test_a_hum_is_as_strong_as_it_is_without_noise():
         lines = lines + rng.standard_normal(lines.shape)
         seen = float(np.sqrt((lines**2).sum() / records))
         label = ("mains_hum:deflection", float((lines**2).sum()), 2 * records)
-        found = SimpleNamespace(effects=(hum("deflection", amplitude=seen),), drawn=(label,))
+        effects = (hum("deflection", amplitude=seen),)
+        found = Hypothesis(effects, Tolerance(), n_nuisances=0, drawn=(label,))
         told.append(with_solved([cause], found)[0].parameters["amplitude"])
     values = np.array([t.value for t in told])
     assert values.mean() == pytest.approx(amplitude, rel=0.01)

@@ -1,12 +1,17 @@
 """What a difference leaves when unknowns, known so far, make up for it: against the closed form."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
+import picchio
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.fit.least_squares import fit
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.follow_up.next_measurement import _Proposal, _why
+from picchio.diagnosis.percussion.follow_up.records import possible_records
 from picchio.diagnosis.percussion.follow_up.separation import Separation, _left, _root, new_noise
+from picchio.prediction.plan import Plan
+from picchio.prediction.simulation import simulate
 
 
 @pytest.fixture
@@ -77,19 +82,22 @@ def test_what_a_record_tells_is_said_in_words(if_best, if_rival, words):
 
 def test_a_new_sensor_is_as_noisy_where_little_moves():
     """A hundredth of what it reads in all records, not in each: the stillest would tell most."""
-    channels = [SimpleNamespace(name=f"deflection.{j}", group="deflection") for j in "ab"]
-    channels.append(SimpleNamespace(name="accelerometer.x", group="accelerometer"))
-
-    def setup(a, b):
-        read = {"deflection.a": np.full(4, a), "deflection.b": np.full(4, b)}
-        return SimpleNamespace(
-            channels=channels, predict=lambda model: read | {"accelerometer.x": np.ones(4)}
-        )
-
-    problem = SimpleNamespace(
-        noise={"accelerometer.x": SimpleNamespace(std=0.5)},
-        model=SimpleNamespace(with_effects=lambda effects: None),
-    )
-    best = SimpleNamespace(hypothesis=SimpleNamespace(effects=()))
-    found = new_noise(problem, [setup(0.0, 2.0), setup(1e-20, 2.0)], best)
-    assert found == {"deflection": pytest.approx(0.01 * np.sqrt(2.0))}
+    arm = picchio.load_robot("fanuc_like_3dof")
+    plan = Plan(
+        poses=[[0.3, 0.5, -0.8]], directions=[[0.6, 0.0, 0.8]], sample_rate=1000.0, quiet=0.3,
+        length=0.15, sensor=[{"channels": "accelerometer.tool", "noise": 0.1}],
+        excitation={"kind": "pulse_train", "force": 300.0, "period": 0.04, "width": 0.004,
+                    "hits": 2},
+    )  # fmt: skip
+    problem = Problem(arm, simulate(arm, plan).campaign)
+    best = fit(problem, Hypothesis.baseline(arm, problem.campaign.tolerance), iterations=0)
+    setups = list(possible_records(problem, problem.records[0]))
+    names = [f"deflection.joint_{n}" for n in (1, 2, 3)]
+    read = [[s.predict(problem.model)[name] for name in names] for s in setups]
+    rms = np.array([np.sqrt(np.mean(np.square(record))) for record in read])
+    still, moving = np.argmin(rms), np.argmax(rms)
+    assert rms[still] < 0.5 * rms[moving]
+    found = new_noise(problem, [setups[still], setups[moving]], best)
+    assert "accelerometer.tool" not in found  # it is there, with a noise of its own
+    both = np.sqrt(np.mean(rms[[still, moving]] ** 2))
+    assert found["deflection"] == pytest.approx(0.01 * both, rel=1e-9)
