@@ -33,20 +33,20 @@ def files(logs):
 def test_the_simplest_records_are_fitted_to_and_the_rest_is_held_out():
     both = log("both.csv", {"a": 1.0, "b": 1.0})
     one, other = log("a.csv", {"a": 1.0, "b": 0.0}), log("b.csv", {"a": 0.0, "b": 1.0})
-    train, held_out = split([both, one, other], None, None)
+    train, held_out = split([both, one, other])
     assert (files(train), files(held_out)) == (["a.csv", "b.csv"], ["both.csv"])
 
 
 def test_nothing_faster_than_what_was_fitted_is_judged():
     slow = [log(f"{i}.csv", {"a": 1.0}) for i in range(3)]
     fast = [log("fast.csv", {"a": 3.0}), log("fastest.csv", {"a": 3.1})]
-    train, held_out = split([*slow, *fast], None, None)
+    train, held_out = split([*slow, *fast])
     assert "fastest.csv" in files(train)
     assert "fast.csv" in files(held_out)
 
 
 def test_one_record_alone_is_fitted_to():
-    train, held_out = split([log("a.csv", {"a": 1.0})], None, None)
+    train, held_out = split([log("a.csv", {"a": 1.0})])
     assert (len(train), len(held_out)) == (1, 0)
 
 

@@ -58,8 +58,6 @@ def diagnose_motion(
     campaign: Campaign,
     *,
     without: Collection[str] = (),
-    train: Sequence[str] | None = None,
-    held_out: Sequence[str] | None = None,
     known: Sequence[Estimate] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> Diagnosis:
@@ -74,8 +72,6 @@ def diagnose_motion(
         robot: the nominal robot.
         campaign: its motion records; others are passed over.
         without: names of effects that must not be considered.
-        train: files of the records to fit to; see `picchio.diagnosis.motion.data.split`.
-        held_out: files of the records to judge on.
         known: causes that other records tell; the search starts from them, and takes out those
             that are not needed here.
         progress: told (step, steps).
@@ -86,11 +82,11 @@ def diagnose_motion(
         and, of joints whose elasticity was found, how it compares with what is documented.
 
     Raises:
-        InputError: no motion record, a joint that the robot lacks, an unknown effect or file.
+        InputError: no motion record, a joint that the robot lacks, an unknown effect.
     """
     for name in without:
         effect_class(name)
-    inside, outside = split(read_logs(robot, campaign), train, held_out)
+    inside, outside = split(read_logs(robot, campaign))
     system = System(robot, inside)
     if not system.groups:
         raise InputError("the records hold no torque and no second encoder of a joint that moves",
