@@ -9,7 +9,7 @@ from typing import Any
 from picchio.campaign.campaign import Campaign
 from picchio.core.errors import InputError
 from picchio.diagnosis.motion.conclude.holdout import judge, judged_groups, table
-from picchio.diagnosis.motion.conclude.values import cause, nuisances
+from picchio.diagnosis.motion.conclude.values import nuisances, parameters
 from picchio.diagnosis.motion.criteria.holdout import validate
 from picchio.diagnosis.motion.criteria.score import Scorer, necessity
 from picchio.diagnosis.motion.data.noise import noise_levels
@@ -135,11 +135,11 @@ def _conclude(search: _Search, found: Fit) -> Diagnosis:
         score = necessity(scorer, index)
         sure.append(min(_SURE, score.confidence) if score is not None else 0.5)
     rivals = alternatives(system, found, search.kinds)
-    order = sorted(
-        range(len(found.state.effects)),
-        key=lambda i: (found.state.effects[i].periodic, i),
-    )  # fmt: skip
-    causes = tuple(cause(system, found, i, sure[i]) for i in order)
+    valued = zip(found.state.effects, sure, strict=True)
+    causes = tuple(
+        Cause(effect.name, effect.target, confidence, parameters(system, found, effect))
+        for effect, confidence in sorted(valued, key=lambda each: each[0].periodic)
+    )
     verdict = _verdict(system, before, found, noise, gain)
     # The search stopped where nothing more could be claimed: what helped a little then.
     leads = _leads(search, found.state)
