@@ -242,9 +242,10 @@ def _compared(
     every = ((candidate, _comparisons(candidate, motion)) for candidate in candidates)
     first = next(every)
     agreeing = (
-        found for found in chain([first], every)
+        found
+        for found in chain([first], every)
         if not any(c.status == "contradiction" for c in found[1])
-    )  # fmt: skip
+    )
     return next(agreeing, first)
 
 
