@@ -9,7 +9,7 @@ from picchio.diagnosis.percussion.fit.least_squares import fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.follow_up.next_measurement import _Proposal, _why
 from picchio.diagnosis.percussion.follow_up.records import possible_records
-from picchio.diagnosis.percussion.follow_up.separation import Separation, _left, _root, new_noise
+from picchio.diagnosis.percussion.follow_up.separation import _left, _root, new_noise
 from picchio.prediction.plan import Plan
 from picchio.prediction.simulation import simulate
 
@@ -49,9 +49,7 @@ def test_the_root_is_one(drawn):
 
 
 def shot(if_best, if_rival):
-    return _Proposal(
-        None, "", "deflection", False, Separation(np.array(if_best), np.array(if_rival))
-    )
+    return _Proposal(None, "", "deflection", False, np.array([if_best, if_rival]))
 
 
 def test_what_is_told_either_way_comes_before_what_is_told_one_way():

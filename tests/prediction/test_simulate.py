@@ -144,7 +144,7 @@ def test_the_plan_says_which_records(robot):
     assert {r.excitation.force for r in every} == {100.0, 200.0, 300.0}
     turned = plan(**two, combine="in-turn")
     assert turned.count == 2
-    assert [r.level for r in turned.records()] == [100.0, 200.0]
+    assert [r["force"] for r in turned.records()] == [100.0, 200.0]
     assert every.records[0].clock.start == 0.0
 
 

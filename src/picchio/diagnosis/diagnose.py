@@ -73,7 +73,7 @@ def diagnose(
     """
     for name in without:
         effect_class(name)
-    records = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
+    records = load_campaign(campaign)
     kinds = {record.kind for record in records}
     # What a drive's torque tells needs no stiffness.
     loaded = load_robot(robot, flex=flex, tool=tool, allow_rigid=kinds == {"motion"})

@@ -13,6 +13,7 @@ from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.tables import Tolerance
 from picchio.core.errors import InputError
 from picchio.core.results import TableResult
+from picchio.core.toml import StrictModel
 from picchio.diagnosis.diagnose import diagnose
 from picchio.diagnosis.result import Cause, Diagnosis, Value, unit_of
 from picchio.model.effects.registry import effect_class
@@ -110,8 +111,7 @@ class Identification(TableResult):
         )
         for line in remarks:
             document.add(tomlkit.comment(f"  {line}"))
-        for key, value in table.items():
-            document[key] = value
+        document.update(table)
         return tomlkit.dumps(document)
 
     def _content(self) -> dict[str, Any]:
@@ -165,7 +165,7 @@ def identify(
     Raises:
         InputError: as `diagnose`.
     """
-    records = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
+    records = load_campaign(campaign)
     moves = any(record.kind == "motion" for record in records)
     loaded = load_robot(robot, flex=flex, tool=tool, allow_rigid=moves)
     return identification(records, diagnose(loaded, records, workers=workers, progress=progress))
@@ -244,7 +244,10 @@ def _sidecar(
     joints = {joint.name: _joint(robot, joint) for joint in robot.flexible_joints}
     table: dict[str, Any] = {"format": SIDECAR, "description": f"{robot.name}, identified"}
     remarks: list[str] = []
-    tool = _tool(robot)
+    # Without a mass there is neither its centre nor an inertia.
+    left_out = {"source"} if robot.tool.mass > 0.0 else {"source", "com", "inertia"}
+    tool = robot.tool.model_dump(mode="json", exclude=left_out)
+    ratios = {joint.name: abs(joint.gear_ratio or 0.0) for joint in robot.flexible_joints}
     for cause in diagnosis.causes:
         key = effect_class(cause.effect).sidecar
         if key == "stiffness" and cause.target in joints:
@@ -253,8 +256,7 @@ def _sidecar(
             entry.pop("stiffness_curve", None)
             entry.pop("estimated", None)
             entry |= {"stiffness": value.value, "source": _said(source, "stiffness", value)}
-        elif key == "rotor_inertia" and _ratio(robot, cause.target):
-            ratio = _ratio(robot, cause.target)
+        elif key == "rotor_inertia" and (ratio := ratios.get(cause.target)):
             value = cause.parameters["inertia"]
             joints[cause.target]["rotor_inertia"] = max(value.value, 0.0) / ratio**2
             remarks.append(_remark(cause) + f" (written as rotor_inertia, over {ratio:g}^2)")
@@ -279,27 +281,15 @@ def _joint(robot: FlexibleRobot, joint: Joint) -> dict[str, Any]:
     found: dict[str, Any] = {"stiffness": joint.stiffness, "damping_ratio": joint.damping_ratio}
     if joint.stiffness_curve is not None:
         del found["stiffness"]
-        found["stiffness_curve"] = joint.stiffness_curve.model_dump()
-    for key in ("reducer", "rotor_inertia", "gear_ratio"):
+    for key in ("stiffness_curve", "reducer", "rotor_inertia", "gear_ratio", "shaft", "balancer"):
         if (value := getattr(joint, key)) is not None:
-            found[key] = value
-    for key in ("shaft", "balancer"):
-        if (value := getattr(joint, key)) is not None:
-            found[key] = value.model_dump(exclude_none=True)
+            model = isinstance(value, StrictModel)
+            found[key] = value.model_dump(exclude_none=True) if model else value
     if joint.estimated:
         found["estimated"] = True
     origin = robot.origins.get(f"{joint.name}.stiffness")
     if origin:
         found["source"] = origin
-    return found
-
-
-def _tool(robot: FlexibleRobot) -> dict[str, Any]:
-    tool = robot.tool
-    found: dict[str, Any] = {"frame": tool.frame, "xyz": list(tool.xyz), "axis": list(tool.axis),
-                             "mass": tool.mass}  # fmt: skip
-    if tool.mass > 0.0:
-        found |= {"com": list(tool.com), "inertia": list(tool.inertia)}
     return found
 
 
@@ -311,11 +301,6 @@ def _standing(robot: FlexibleRobot) -> dict[str, Any]:
     if robot.mounting != Mounting():
         found["base"] = robot.mounting.model_dump(exclude_none=True)
     return found
-
-
-def _ratio(robot: FlexibleRobot, joint: str) -> float:
-    found = {j.name: j.gear_ratio for j in robot.flexible_joints}
-    return abs(found.get(joint) or 0.0)
 
 
 def _stiffness(robot: FlexibleRobot, cause: Cause) -> Value:

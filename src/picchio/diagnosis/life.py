@@ -45,8 +45,8 @@ class Uncertain:
     effects: Callable[[FloatArray], Sequence[Effect]]
     centre: FloatArray
     covariance: FloatArray
-    lower: FloatArray | None = None
-    upper: FloatArray | None = None
+    lower: FloatArray | float = -math.inf
+    upper: FloatArray | float = math.inf
 
     def room(self, step: FloatArray) -> float:
         """How many such steps there are to the nearest bound.
@@ -54,8 +54,6 @@ class Uncertain:
         Args:
             step: (parameters,) in the unit of each.
         """
-        if self.lower is None or self.upper is None:
-            return math.inf
         ends = np.where(step > 0.0, self.upper - self.centre, self.centre - self.lower)
         moved = np.abs(step) > 1e-12
         return float((ends[moved] / np.abs(step[moved])).min()) if moved.any() else math.inf

@@ -44,6 +44,7 @@ from picchio.diagnosis.percussion.fit.parallel import parallel_records
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.result import (
     MOSTLY,
+    VERDICTS,
     Cause,
     Diagnosis,
     Estimate,
@@ -62,8 +63,6 @@ _SYSTEMATIC = 0.05
 # Rise of chi-square by which records rule a cause out: three standard deviations.
 _RULED_OUT = _SURE**2
 _TOGETHER = "the life above takes the causes of both kinds of records into account"
-# From the most to the least that may be said.
-_ORDER: tuple[Verdict, ...] = ("nothing-wrong", "named", "ambiguous", "partial", "unexplained")
 
 Status = Literal["both", "percussion", "motion", "drive", "contradiction"]
 Values = Mapping[str, Value]
@@ -167,10 +166,9 @@ def _motion_estimates(motion: Diagnosis) -> dict[str, Estimate]:
     system: System = motion.details["systems"]["train"]
     state: State = motion.details["extended"]
     alone = fit_motion(system, replace(state, priors=()))
-    first = len(alone.state.nuisances)
     return _estimates(
-        (effect, parameters(system, alone, effect, first + index))
-        for index, effect in enumerate(alone.state.effects)
+        (effect, parameters(system, alone, effect))
+        for effect in alone.state.effects
         if _shared(type(effect))
     )
 
@@ -240,14 +238,15 @@ def _compared(
     percussion: PercussionDiagnosis, motion: Diagnosis
 ) -> tuple[PercussionDiagnosis, list[Comparison]]:
     """Comparisons with the first of percussion's equivalent sets that no motion contradicts."""
-    first: tuple[PercussionDiagnosis, list[Comparison]] | None = None
-    for candidate in chain([percussion], _with_alternatives(percussion)):
-        found = candidate, _comparisons(candidate, motion)
-        first = first or found
-        if not any(c.status == "contradiction" for c in found[1]):
-            return found
-    assert first is not None
-    return first
+    candidates = chain([percussion], _with_alternatives(percussion))
+    every = ((candidate, _comparisons(candidate, motion)) for candidate in candidates)
+    first = next(every)
+    agreeing = (
+        found
+        for found in chain([first], every)
+        if not any(c.status == "contradiction" for c in found[1])
+    )
+    return next(agreeing, first)
 
 
 def _with_alternatives(percussion: PercussionDiagnosis) -> Iterator[PercussionDiagnosis]:
@@ -343,9 +342,8 @@ def _joined(
     moves, blows = _motion_estimates(motion), _percussion_estimates(percussion)
     problem, said = percussion.problem, percussion.diagnosis
     start = percussion.extended if said.verdict != "unexplained" else percussion.baseline
-    hypothesis = replace(start.hypothesis, priors=())
-    for label in sorted((both | carried) & percussion.search.considered):
-        hypothesis = hypothesis.informed(moves[label].effect, moves[label].std)
+    told = [moves[label] for label in sorted((both | carried) & percussion.search.considered)]
+    hypothesis = _informed(replace(start.hypothesis, priors=()), told)
     if hypothesis.priors:
         whole = refit(problem, hypothesis, problem.records)
         effects = {e.label: e for e in whole.hypothesis.causes}
@@ -456,7 +454,7 @@ def joint_verdict(
         causes: whether any cause is claimed in either kind.
         contradicted: whether the kinds contradict each other.
     """
-    worst = max(verdicts.values(), key=_ORDER.index)
+    worst = max(verdicts.values(), key=list(VERDICTS).index)
     if contradicted:
         return "unexplained"
     if worst == "unexplained" and causes:

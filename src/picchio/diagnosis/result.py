@@ -160,14 +160,9 @@ class Gain:
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""
-        return {
-            "train_records": list(self.train_records),
-            "held_out_records": list(self.held_out_records),
-            "baseline_nrmse": self.baseline_nrmse,
-            "extended_nrmse": self.extended_nrmse,
-            "noise_floor_nrmse": self.noise_floor_nrmse,
-            "explained": self.explained,
-        }
+        found = asdict(self)
+        del found["channels"]
+        return {**found, "explained": self.explained}
 
 
 @dataclass(frozen=True, repr=False)

@@ -126,16 +126,6 @@ class PercussionSetup:
             found.setdefault(channel.group, []).append(channel)
         return found
 
-    def cut(self, end: float) -> PercussionSetup:
-        """The same record up to a time, s.
-
-        Args:
-            end: s.
-        """
-        count = int(np.searchsorted(self.samples.times, end + 1e-9))
-        mine = self.samples
-        return replace(self, samples=Samples(mine.start, mine.step, min(count, mine.count)))
-
     def predict(self, model: Model) -> dict[str, FloatArray]:
         """Every channel at the record's samples, (count,) in its SI unit.
 

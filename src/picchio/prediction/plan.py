@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -123,24 +122,6 @@ class EffectTable(StrictModel):
         return from_dict(self.model_dump())
 
 
-@dataclass(frozen=True)
-class PlannedRecord:
-    """One record to be taken.
-
-    Attributes:
-        pose: as written.
-        direction: world.
-        level: N; None for the excitation's own force.
-        time, temperature: as in a campaign.
-    """
-
-    pose: dict[str, float] | list[float]
-    direction: list[float]
-    level: float | None
-    time: datetime | None = None
-    temperature: float | None = None
-
-
 class Plan(StrictModel):
     """A plan as it is written.
 
@@ -194,8 +175,8 @@ class Plan(StrictModel):
         before = 0 if self.burst is None else round(self.quiet * self.sample_rate)
         return before, max(round(self.length * self.sample_rate), 2)
 
-    def records(self) -> Iterator[PlannedRecord]:
-        """What is to be taken, in order."""
+    def records(self) -> Iterator[dict[str, Any]]:
+        """What is to be taken, in order: what a campaign's table of each record says."""
         levels: list[float | None] = [*self.levels] if self.levels else [None]
         kinds = list(itertools.product(self.directions, levels))
         number = 0
@@ -203,13 +184,14 @@ class Plan(StrictModel):
             chosen = kinds if self.combine == "all" else [kinds[turn % len(kinds)]]
             for direction, level in chosen:
                 for _ in range(self.repeats):
-                    yield PlannedRecord(
-                        pose,
-                        direction,
-                        level,
-                        self.times[number] if self.times else None,
-                        self.temperatures[number] if self.temperatures else None,
-                    )
+                    told = {
+                        "pose": pose,
+                        "direction": direction,
+                        "force": level,
+                        "time": self.times[number] if self.times else None,
+                        "temperature": self.temperatures[number] if self.temperatures else None,
+                    }
+                    yield {key: value for key, value in told.items() if value is not None}
                     number += 1
 
     @property
@@ -241,24 +223,16 @@ class Plan(StrictModel):
             raise InputError(f"that is {total} samples a channel; at most {MOST_SAMPLES}",
                              key="sample_rate", value=self.sample_rate)  # fmt: skip
         first = next(self.records())
-        self.excitation.overridden_by(CampaignExcitation(force=first.level)).blows.build()
+        self.excitation.overridden_by(CampaignExcitation(force=first.get("force"))).blows.build()
 
 
 def plan_toml(plan: Plan) -> str:
     """The plan as a file."""
     import tomlkit
 
-    document = tomlkit.document()
-    document["format"] = FORMAT
     content = plan.model_dump(exclude_none=True, exclude_defaults=True)
     tables = ("excitation", "tolerance", "sensor", "effect")
-    for key in sorted(content, key=lambda name: (name in tables, name in ("sensor", "effect"))):
-        value = content[key]
-        if isinstance(value, list) and key in ("sensor", "effect"):
-            array = tomlkit.aot()
-            for entry in value:
-                array.append(tomlkit.item(entry))
-            document[key] = array
-        else:
-            document[key] = value
+    keys = sorted(content, key=lambda name: (name in tables, name in ("sensor", "effect")))
+    document = tomlkit.document()
+    document |= {"format": FORMAT, **{key: content[key] for key in keys}}
     return tomlkit.dumps(document)

@@ -20,7 +20,7 @@ from picchio.core.toml import parse_toml
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 from picchio.prediction.percussion import PercussionSetup, percussion_setups
-from picchio.prediction.plan import FORMAT, Plan, PlannedRecord
+from picchio.prediction.plan import FORMAT, Plan
 from picchio.robot.dynamics.pose import warn_beyond_limits
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
@@ -197,21 +197,17 @@ def _excitation(plan: Plan) -> dict[str, Any]:
     return table
 
 
-def _blank(name: str, planned: PlannedRecord, plan: Plan, channels: Sequence[Channel]) -> Record:
+def _blank(name: str, planned: dict[str, Any], plan: Plan, channels: Sequence[Channel]) -> Record:
     """The record with its clock and nothing in its channels."""
     before, after = plan.samples
     time = np.arange(-before, after) / plan.sample_rate
-    direction = np.array(planned.direction, dtype=float)
-    more: dict[str, Any] = {"force": planned.level, "time": planned.time,
-                            "temperature": planned.temperature}  # fmt: skip
+    direction = np.array(planned["direction"], dtype=float)
     return Record.from_arrays(
         name,
         time,
         {channel.name: np.zeros(time.size) for channel in channels},
         units={channel.name: channel.unit for channel in channels},
-        pose=planned.pose,
-        direction=(direction / np.linalg.norm(direction)).tolist(),
-        **{key: value for key, value in more.items() if value is not None},
+        **{**planned, "direction": (direction / np.linalg.norm(direction)).tolist()},
     )
 
 

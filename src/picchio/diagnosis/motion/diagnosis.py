@@ -9,7 +9,7 @@ from typing import Any
 from picchio.campaign.campaign import Campaign
 from picchio.core.errors import InputError
 from picchio.diagnosis.motion.conclude.holdout import judge, judged_groups, table
-from picchio.diagnosis.motion.conclude.values import cause, nuisances
+from picchio.diagnosis.motion.conclude.values import nuisances, parameters
 from picchio.diagnosis.motion.criteria.holdout import validate
 from picchio.diagnosis.motion.criteria.score import Scorer, necessity
 from picchio.diagnosis.motion.data.noise import noise_levels
@@ -58,8 +58,6 @@ def diagnose_motion(
     campaign: Campaign,
     *,
     without: Collection[str] = (),
-    train: Sequence[str] | None = None,
-    held_out: Sequence[str] | None = None,
     known: Sequence[Estimate] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> Diagnosis:
@@ -74,8 +72,6 @@ def diagnose_motion(
         robot: the nominal robot.
         campaign: its motion records; others are passed over.
         without: names of effects that must not be considered.
-        train: files of the records to fit to; see `picchio.diagnosis.motion.data.split`.
-        held_out: files of the records to judge on.
         known: causes that other records tell; the search starts from them, and takes out those
             that are not needed here.
         progress: told (step, steps).
@@ -86,11 +82,11 @@ def diagnose_motion(
         and, of joints whose elasticity was found, how it compares with what is documented.
 
     Raises:
-        InputError: no motion record, a joint that the robot lacks, an unknown effect or file.
+        InputError: no motion record, a joint that the robot lacks, an unknown effect.
     """
     for name in without:
         effect_class(name)
-    inside, outside = split(read_logs(robot, campaign), train, held_out)
+    inside, outside = split(read_logs(robot, campaign))
     system = System(robot, inside)
     if not system.groups:
         raise InputError("the records hold no torque and no second encoder of a joint that moves",
@@ -139,11 +135,11 @@ def _conclude(search: _Search, found: Fit) -> Diagnosis:
         score = necessity(scorer, index)
         sure.append(min(_SURE, score.confidence) if score is not None else 0.5)
     rivals = alternatives(system, found, search.kinds)
-    order = sorted(
-        range(len(found.state.effects)),
-        key=lambda i: (found.state.effects[i].periodic, i),
-    )  # fmt: skip
-    causes = tuple(cause(system, found, i, sure[i]) for i in order)
+    valued = zip(found.state.effects, sure, strict=True)
+    causes = tuple(
+        Cause(effect.name, effect.target, confidence, parameters(system, found, effect))
+        for effect, confidence in sorted(valued, key=lambda each: each[0].periodic)
+    )
     verdict = _verdict(system, before, found, noise, gain)
     # The search stopped where nothing more could be claimed: what helped a little then.
     leads = _leads(search, found.state)

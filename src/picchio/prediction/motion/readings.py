@@ -71,14 +71,6 @@ class Predictor:
         self._terms: dict[Hashable, _Term] = {}
         self._heavy: dict[type[Effect], bool] = {}
 
-    def body(self, effects: Sequence[Effect]) -> dict[str, FloatArray]:
-        """Joint -> torque that the bodies take, with the effects that add masses, N m."""
-        motion = self._motion(self.nominal.body)
-        for effect in effects:
-            if self.concerns(effect):
-                effect.motion(motion)
-        return motion.body
-
     def concerns(self, effect: Effect) -> bool:
         """Whether the effect can show in this record: a joint that stands tells nothing."""
         return effect.target_kind != "joint" or effect.target in self._moving
@@ -86,19 +78,21 @@ class Predictor:
     def around(self, effects: Sequence[Effect]) -> Around:
         """What these effects do to the terms of each."""
         heavy = [e for e in effects if self._is_body(e)]
-        body = self.body(heavy) if heavy else self.nominal.body
+        loaded = self._motion(self.nominal.body)
+        for effect in heavy:
+            effect.motion(loaded)
         key = tuple(e.key for e in heavy)
         gains: dict[str, float] = {}
         delays: dict[str, float] = {}
         for effect in effects:
             if effect.linear or not self.concerns(effect):
                 continue
-            term = self._of(effect, body, key)
+            term = self._of(effect, loaded.body, key)
             for name, gain in term.gains.items():
                 gains[name] = gains.get(name, 1.0) * gain
             for group, delay in term.delays.items():
                 delays[group] = delays.get(group, 0.0) + delay
-        return Around(body, key, gains, delays)
+        return Around(loaded.body, key, gains, delays)
 
     def predict(
         self,

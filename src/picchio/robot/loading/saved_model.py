@@ -109,17 +109,15 @@ def saved_model_text(
     for key, value in (("tool", tool), ("notes", notes), ("provenance", provenance)):
         if value is not None:
             document[key] = value
-    tables = tomlkit.aot()
+    tables = []
     for effect in effects:
-        table = tomlkit.table()
-        table["effect"], table["target"] = effect["effect"], effect["target"]
+        table = {"effect": effect["effect"], "target": effect["target"]}
         for key in ("parameters", "hidden"):
             if effect.get(key):
-                inner = tomlkit.inline_table()
-                inner.update(effect[key])
-                table[key] = inner
+                table[key] = tomlkit.inline_table()
+                table[key].update(effect[key])
         tables.append(table)
-    if effects:
+    if tables:
         document["effect"] = tables
     return tomlkit.dumps(document)
 

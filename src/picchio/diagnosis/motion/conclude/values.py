@@ -8,23 +8,15 @@ import numpy as np
 
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit
-from picchio.diagnosis.result import Cause, Value, unit_of
+from picchio.diagnosis.result import Value, unit_of
 from picchio.model.effects.effect import Effect
 
 _POSES = 50
 
 
-def cause(system: System, current: Fit, index: int, confidence: float) -> Cause:
-    """An effect of a fit as a cause, with standard deviations."""
-    effect = current.state.effects[index]
-    number = len(current.state.nuisances) + index
-    return Cause(effect.name, effect.target, confidence,
-                 parameters(system, current, effect, number))  # fmt: skip
-
-
-def parameters(system: System, current: Fit, effect: Effect, number: int) -> dict[str, Value]:
-    """The parameters that were fitted, and what follows from them."""
-    robot = system.robot
+def parameters(system: System, current: Fit, effect: Effect) -> dict[str, Value]:
+    """The parameters of an effect that were fitted, and what follows from them."""
+    robot, number = system.robot, current.state.every.index(effect)
     std = {
         c.name: float(s)
         for c, s in zip(current.coordinates, current.std, strict=True) if c.index == number

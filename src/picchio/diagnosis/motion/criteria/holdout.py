@@ -64,11 +64,6 @@ def _gains(train: System, held_out: System, current: Fit) -> list[dict[str, floa
     """Of every effect: file -> part of the power in its equations that it takes away, linearised.
 
     Without the effect everything else is fitted anew to the training records.
-
-    Args:
-        train: the equations fitted to.
-        held_out: those of the records held out.
-        current: the fit to the training records.
     """
     weight = row_weights(train, current.level)
     left = current.columns * weight[:, None]

@@ -12,7 +12,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.motion.data.system import Group, Segment, System
-from picchio.diagnosis.motion.fit.least_squares import Fit, correlation_length
+from picchio.diagnosis.motion.fit.least_squares import Fit, correlation_length, row_weights
 from picchio.diagnosis.motion.fit.orders import Spectrum, order_spectrum
 from picchio.diagnosis.motion.fit.state import Coordinate
 from picchio.diagnosis.motion.fit.stretches import (
@@ -72,9 +72,7 @@ class Scorer:
 
     def __init__(self, system: System, base: Fit) -> None:
         self.system, self.base = system, base
-        self.weight = np.empty(system.size)
-        for s in system.segments:
-            self.weight[s.rows] = 1.0 / max(base.level[s.group], _TINY)
+        self.weight = row_weights(system, base.level)
         self.left = base.columns * self.weight[:, None]
         self.right = base.residual * self.weight
         self.prior = np.array([c.precision for c in base.coordinates])
@@ -220,13 +218,14 @@ def _compare(
     differences: dict[int, float] = {}
     raw: dict[int, float] = {}
     for group in groups:
-        samples = base.rows[group] / correlation[group]
+        rows = sum(number for (g, _), number in base.count.items() if g == group)
+        samples = rows / correlation[group]
         before = sum(x for (g, _), x in base.outside.items() if g == group)
         after = sum(x for (g, _), x in wide.outside.items() if g == group)
         effective += samples
         fall = np.log(max(before, _TINY) / max(after, _TINY))
         gain += 0.5 * samples * fall
-        rank += 0.5 * base.rows[group] / common[group] * fall
+        rank += 0.5 * rows / common[group] * fall
         inside = max(base.inside[group], _TINY) / max(wide.inside[group], _TINY)
         bic += 0.5 * samples * np.log(inside)
         removed, total = removed + before - after, total + before
@@ -238,7 +237,7 @@ def _compare(
                 fall = np.log(max(x, _TINY) / max(other, _TINY))
                 change = 0.5 * base.count[g, number] / correlation[g] * fall
                 differences[number] = differences.get(number, 0.0) + change
-                power = max(wide.inside[g], _TINY) / base.rows[g]
+                power = max(wide.inside[g], _TINY) / rows
                 raw[number] = raw.get(number, 0.0) + (x - other) / correlation[g] / power
     penalty = 0.5 * added * np.log(max(effective, 2.0))
     bic -= penalty

@@ -6,51 +6,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from picchio.core.errors import InputError
 from picchio.prediction.motion.log import MotionLog
 
 _COVERED = 0.9
 _LEAST_SHARE = 3
 
 
-def split(
-    logs: Sequence[MotionLog], train: Sequence[str] | None, held_out: Sequence[str] | None
-) -> tuple[list[MotionLog], list[MotionLog]]:
+def split(logs: Sequence[MotionLog]) -> tuple[list[MotionLog], list[MotionLog]]:
     """Training and held-out records.
 
-    Where the caller does not say: records in which the fewest joints move come first (so that
-    joints are known one by one before they move together), in the campaign's order. They are
-    taken until every joint that ever moves has moved and a third of the records is in. Then, as
-    long as two records would be left, the fastest is added while the others are faster by more
-    than a tenth in some joint than what is in: a model is not to be judged where it was never
-    fitted. At least one record is held out where there are two.
+    Records in which the fewest joints move come first (so that joints are known one by one before
+    they move together), in the campaign's order. They are taken until every joint that ever moves
+    has moved and a third of the records is in. Then, as long as two records would be left, the
+    fastest is added while the others are faster by more than a tenth in some joint than what is
+    in: a model is not to be judged where it was never fitted. At least one record is held out where
+    there are two.
 
     Args:
         logs: all motion records.
-        train: files to fit to.
-        held_out: files to judge on.
-
-    Raises:
-        InputError: a file that is none of the records, or in both.
     """
-    names = [log.file for log in logs]
-    for given in (train, held_out):
-        for file in given or ():
-            if file not in names:
-                raise InputError("no such motion record", value=file, choices=names)
-    if both := set(train or ()) & set(held_out or ()):
-        raise InputError("a record is fitted to or judged on, not both", value=sorted(both)[0])
-    if train is not None:
-        inside = [log for log in logs if log.file in train]
-        rest = held_out if held_out is not None else [n for n in names if n not in train]
-        return inside, [log for log in logs if log.file in rest]
-    if held_out is not None:
-        inside = [log for log in logs if log.file not in held_out]
-        return inside, [log for log in logs if log.file in held_out]
-    return _by_itself(logs)
-
-
-def _by_itself(logs: Sequence[MotionLog]) -> tuple[list[MotionLog], list[MotionLog]]:
     order = sorted(range(len(logs)), key=lambda i: (len(logs[i].moving), i))
     every = {joint for log in logs for joint in log.moving}
     inside: list[int] = []

@@ -83,10 +83,8 @@ def finish(system: System, state: State) -> Fit:
     coordinates, columns = jacobian(system, state, predicted, state.coordinates(rate))
     level = levels(system, residual)
     correlation = {group: correlation_length(system, residual, group) for group in system.groups}
-    weight = np.empty(system.size)
-    for s in system.segments:
-        weight[s.rows] = 1.0 / (max(level[s.group], _TINY) * np.sqrt(correlation[s.group]))
-    weighted = columns * weight[:, None]
+    spread = {g: max(each, _TINY) * np.sqrt(correlation[g]) for g, each in level.items()}
+    weighted = columns * row_weights(system, spread)[:, None]
     normal = weighted.T @ weighted + np.diag([c.precision for c in coordinates])
     scale = np.sqrt(np.maximum(np.diag(normal), _TINY))
     covariance = np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True)
@@ -117,13 +115,10 @@ def jacobian(
     for c in coordinates:
         if c.index < 0:
             column = system.by_scale(around, c.name)
-            if np.any(column):
-                kept.append(c)
-                columns.append(column)
-            continue
-        step = _inward(c)
-        effect = state.moved(c, c.value + step).every[c.index]
-        column = system.by_parameter(around, state.every[c.index], effect, c.name, step)
+        else:
+            step = _inward(c)
+            effect = state.moved(c, c.value + step).every[c.index]
+            column = system.by_parameter(around, state.every[c.index], effect, c.name, step)
         if column is None:
             column = difference(system, state, c, predicted)
         if np.any(column):

@@ -113,7 +113,7 @@ def order_spectrum(
     found = []
     orders = np.zeros(0)
     for piece, inside in zip(pieces, ranges, strict=True):
-        orders, power = power_spectrum([piece], lowest, highest, step)
+        orders, power = power_spectrum(piece, lowest, highest, step)
         within = (orders >= inside[0]) & (orders <= inside[1])
         if np.count_nonzero(within) > _FEWEST:
             found.append(_cleaned(piece, orders, power, within, (lowest, highest, step)))
@@ -141,7 +141,7 @@ def _cleaned(piece: Piece, orders: FloatArray, power: FloatArray, within: FloatA
             break
         taken |= np.abs(place - at) <= spacing
         left = _without(angle, left, orders[at], grid[2])
-        power = power_spectrum([(angle, left)], *grid)[1] * (float(left @ left) / scale)
+        power = power_spectrum((angle, left), *grid)[1] * (float(left @ left) / scale)
         top = np.where(taken, np.maximum(top, power), power)
         lines = _lines(piece, power, top, within, spacing)
     return lines
@@ -150,7 +150,7 @@ def _cleaned(piece: Piece, orders: FloatArray, power: FloatArray, within: FloatA
 def _without(angle: FloatArray, values: FloatArray, order: float, step: float) -> FloatArray:
     """The values less the wave of an order, or of one within a step of it that takes more."""
     near = order + step * np.linspace(-1.0, 1.0, 21)
-    best = near[int(np.argmax(power_at([(angle, values)], near)))]
+    best = near[int(np.argmax(power_at((angle, values), near)))]
     waves = np.column_stack([np.cos(best * angle), np.sin(best * angle)])
     return np.asarray(values - waves @ np.linalg.solve(waves.T @ waves, waves.T @ values))
 
@@ -184,7 +184,7 @@ def _range(angle: FloatArray, rate: float) -> tuple[float, float]:
     return 6.0 * np.pi / max(travel, 1e-12), 2.0 * np.pi * _FASTEST * rate / max(fastest, 1e-12)
 
 
-def power_spectrum(pieces: list[Piece], lowest: float, highest: float,
+def power_spectrum(piece: Piece, lowest: float, highest: float,
               step: float) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Power at orders from lowest to highest, rad^-1: values spread over a grid of angles, FFT."""
     spacing = _FINE / highest
@@ -192,27 +192,24 @@ def power_spectrum(pieces: list[Piece], lowest: float, highest: float,
     orders = np.arange(size // 2 + 1) * (2.0 * np.pi / (size * spacing))
     # Linear spreading is a convolution with a triangle, whose transform is sinc^2.
     response = np.sinc(orders * spacing / (2.0 * np.pi)) ** 2
-    power = np.zeros(orders.size)
-    for angle, values in pieces:
-        place = (angle - angle.min()) / spacing
-        cell = np.floor(place).astype(np.intp)
-        part = place - cell
-        grid = np.bincount(cell, (1.0 - part) * values, size) + (
-            np.bincount(cell + 1, part * values, size)
-        )  # fmt: skip
-        scale = float(values @ values) or 1.0
-        power += np.abs(np.fft.rfft(grid[:size]) / response) ** 2 / scale
+    angle, values = piece
+    place = (angle - angle.min()) / spacing
+    cell = np.floor(place).astype(np.intp)
+    part = place - cell
+    grid = np.bincount(cell, (1.0 - part) * values, size) + (
+        np.bincount(cell + 1, part * values, size)
+    )  # fmt: skip
+    scale = float(values @ values) or 1.0
+    power = np.abs(np.fft.rfft(grid[:size]) / response) ** 2 / scale
     inside = (orders >= lowest) & (orders <= highest)
     return orders[inside], power[inside]
 
 
-def power_at(pieces: list[Piece], orders: FloatArray) -> FloatArray:
+def power_at(piece: Piece, orders: FloatArray) -> FloatArray:
     """The same at few orders, exactly."""
-    power = np.zeros(orders.size)
-    for angle, values in pieces:
-        scale = float(values @ values) or 1.0
-        power += np.abs(np.exp(-1j * np.outer(orders, angle)) @ values) ** 2 / scale
-    return power
+    angle, values = piece
+    scale = float(values @ values) or 1.0
+    return np.asarray(np.abs(np.exp(-1j * np.outer(orders, angle)) @ values) ** 2 / scale)
 
 
 def _lines(piece: Piece, power: FloatArray, top: FloatArray, within: FloatArray,
@@ -262,20 +259,9 @@ _SIDE_LOBES = 4.0  # times those of an even sweep
 _APART = 3.0  # independent lines between two that are found at once
 
 
-@dataclass(frozen=True)
-class Line:
-    """One that stands out.
-
-    Attributes:
-        order: cycles a turn of the motor (of the joint, where the gear ratio is not known).
-        noise: power of a sample's noise as this line sees it, N^2 m^2 or N^2.
-    """
-
-    order: float
-    noise: float
-
-
-def find_orders(system: System, residual: FloatArray, joint: str, state: State) -> list[Line]:
+def find_orders(
+    system: System, residual: FloatArray, joint: str, state: State
+) -> list[tuple[float, float]]:
     """Orders whose line stands out of its neighbourhood, the strongest first.
 
     The residual of each record, band and above together, is held against exp(i order angle) for
@@ -290,13 +276,17 @@ def find_orders(system: System, residual: FloatArray, joint: str, state: State) 
         joint: whose torque.
         state: whose delays say where the joint was when a torque was made; what is left close to
             one of its ripples is that ripple's size changing, and no line of its own.
+
+    Returns:
+        cycles a turn of the motor (of the joint, where the gear ratio is not known), and
+        `Spectrum.noise` there.
     """
     spectrum = order_spectrum(system, residual, joint, state)
     if spectrum is None:
         return []
     known = [e.values["order"] for e in state.every if e.periodic and e.target == joint]
     found = [_finer(spectrum, i) / spectrum.ratio for i in _peaks(spectrum, known)]
-    return [Line(order, spectrum.noise(order)) for order in found]
+    return [(order, spectrum.noise(order)) for order in found]
 
 
 def _together(evidence: list[FloatArray]) -> FloatArray:
@@ -338,5 +328,5 @@ def _peaks(spectrum: Spectrum, known: Sequence[float]) -> list[int]:
 def _finer(spectrum: Spectrum, peak: int) -> float:
     """The order of a peak, between the grid's lines, rad^-1."""
     near = spectrum.orders[peak] + spectrum.step * np.linspace(-1.0, 1.0, 41)
-    power = sum(power_at([(r.angle, r.values)], near) / r.level[peak] for r in spectrum.records)
+    power = sum(power_at((r.angle, r.values), near) / r.level[peak] for r in spectrum.records)
     return float(near[int(np.argmax(power))])

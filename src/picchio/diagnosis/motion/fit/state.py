@@ -122,14 +122,9 @@ class State:
             return replace(self, scales={**self.scales, coordinate.name: value})
         effect = self.every[coordinate.index]
         changed = with_coordinate(effect, coordinate.name, value)
-        count = len(self.nuisances)
-        if coordinate.index < count:
-            every = list(self.nuisances)
-            every[coordinate.index] = changed
-            return replace(self, nuisances=tuple(every))
-        every = list(self.effects)
-        every[coordinate.index - count] = changed
-        return replace(self, effects=tuple(every))
+        every, count = list(self.every), len(self.nuisances)
+        every[coordinate.index] = changed
+        return replace(self, nuisances=tuple(every[:count]), effects=tuple(every[count:]))
 
     def with_effect(self, effect: Effect) -> State:
         """With one effect more.

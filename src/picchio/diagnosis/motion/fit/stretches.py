@@ -102,7 +102,6 @@ class Validated:
     Attributes:
         solution: of all rows.
         inside: group -> power that it leaves.
-        rows: group -> how many.
         outside: (group, stretch) -> power left there by the solution of all other stretches.
         count: (group, stretch) -> rows.
         own: the largest part of an added column that the others can't make up.
@@ -110,7 +109,6 @@ class Validated:
 
     solution: FloatArray
     inside: Mapping[Group, float]
-    rows: Mapping[Group, int]
     outside: Mapping[tuple[Group, int], float]
     count: Mapping[tuple[Group, int], int]
     own: float
@@ -147,16 +145,14 @@ def cross_validate(
     here = _left(power, normals, rights, np.broadcast_to(solution, others.shape))
     there = _left(power, normals, rights, others)
     inside: dict[Group, float] = {}
-    rows: dict[Group, int] = {}
     outside: dict[tuple[Group, int], float] = {}
     count: dict[tuple[Group, int], int] = {}
     for b, own, foreign in zip(blocks, here.tolist(), there.tolist(), strict=True):
         place = (b.group, b.block)
         inside[b.group] = inside.get(b.group, 0.0) + own
-        rows[b.group] = rows.get(b.group, 0) + b.rows
         outside[place] = outside.get(place, 0.0) + foreign
         count[place] = count.get(place, 0) + b.rows
-    return Validated(solution, inside, rows, outside, count, _own(normal, base))
+    return Validated(solution, inside, outside, count, _own(normal, base))
 
 
 def _own(normal: FloatArray, count: int) -> float:

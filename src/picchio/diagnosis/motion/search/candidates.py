@@ -96,10 +96,10 @@ def candidates(
             if near not in (None, target) and kind.target_kind == "joint":
                 continue
             if kind.periodic:
-                for line in find_orders(system, base.residual, target, base.state):
-                    effect = kind(target, order=line.order)
+                for order, noise in find_orders(system, base.residual, target, base.state):
+                    effect = kind(target, order=order)
                     made = _make(system, base, predicted, effect, {"order"}, around)
-                    found += [replace(each, noise=line.noise) for each in made]
+                    found += [replace(each, noise=noise) for each in made]
             elif (name, target) not in taken and (not kind.needs or (kind.needs, target) in taken):
                 for trial in _trials(system, kind, target):
                     effect = kind(target, **trial)

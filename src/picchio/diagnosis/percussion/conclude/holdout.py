@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
-from picchio.diagnosis.percussion.fit.drawn import fit_latent
+from picchio.diagnosis.percussion.fit.drawn import current_hidden, fit_latent, with_hidden
 from picchio.diagnosis.percussion.fit.least_squares import fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.result import Gain
@@ -63,10 +63,6 @@ def _own_latent(
     for effect in drawing:
         found = fit(problem, hypothesis, records, None, iterations=0)
         found = fit_latent(problem, found, effect)
-        own = next(e for e in found.hypothesis.effects if e.label == effect.label)
-        effects = tuple(
-            e.with_hidden({**e.hidden, **own.hidden}) if e.label == effect.label else e
-            for e in hypothesis.effects
-        )
-        hypothesis = replace(hypothesis, effects=effects, drawn=(), priors=())
+        whole = {**effect.hidden, **current_hidden(found.hypothesis, effect.label)}
+        hypothesis = replace(with_hidden(hypothesis, effect, whole), drawn=(), priors=())
     return hypothesis

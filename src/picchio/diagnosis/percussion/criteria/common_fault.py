@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
+import numpy as np
+
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.model.effects.effect import Effect
@@ -61,15 +63,9 @@ def _spread(
     found: Hypothesis, covariance: FloatArray, pair: tuple[Effect, Effect], name: str
 ) -> float:
     """Standard deviation of the difference of two effects' values, which may vary together."""
-    weights, vector = [0.0] * len(covariance), found.vector()
+    weights, vector = np.zeros(len(covariance)), found.vector()
     for k, unknown in enumerate(found.unknowns()):
         for effect, sign in zip(pair, (1.0, -1.0), strict=True):
             if found.effects[unknown.effect] is effect and unknown.name == name:
                 weights[k] = sign * abs(unknown.slope(vector[k]))
-    variance = sum(
-        wi * covariance[i, j] * wj
-        for i, wi in enumerate(weights)
-        for j, wj in enumerate(weights)
-        if wi and wj
-    )
-    return math.sqrt(max(variance, 0.0))
+    return math.sqrt(max(float(weights @ covariance @ weights), 0.0))

@@ -99,14 +99,12 @@ def whiteness_test(problem: Problem, found: Fit) -> Evidence:
     errors: dict[str, list[float]] = {}
     total, count = 0.0, 0
     for record, residual in zip(found.records, found.residuals, strict=True):
-        channels = {c.name: c.group for c in record.setup.channels}
         first = int(np.searchsorted(record.setup.samples.times, 0.0))
         frequency = np.fft.rfftfreq(residual.shape[1] - first, record.setup.samples.step)[1:-1]
-        for name, row in zip(record.values, residual, strict=True):
+        for channel, row in zip(record.channels, residual, strict=True):
             spectrum = np.abs(np.fft.rfft(row[first:])[1:-1]) ** 2 / (row.size - first)
-            group = channels[name]
-            powers.setdefault(group, []).append((record.pose, frequency, spectrum))
-            errors.setdefault(group, []).append(record.noise[name].error)
+            powers.setdefault(channel.group, []).append((record.pose, frequency, spectrum))
+            errors.setdefault(channel.group, []).append(record.noise[channel.name].error)
             total += float((row[first:] ** 2).sum())
             count += row.size - first
     bands: list[Level] = []

@@ -70,14 +70,8 @@ def _group(
         name: float(np.sqrt(np.mean(np.concatenate([p - p.mean() for p in pieces]) ** 2))) or 1.0
         for name, pieces in channels.items()
     }
-    stacks: dict[int, FloatArray] = {}
-    for name, pieces in channels.items():
-        for n in basis_of:
-            same = [p / rough[name] for p in pieces if p.size == n]
-            if same:
-                old = stacks.get(n)
-                new = np.stack(same, axis=1)
-                stacks[n] = new if old is None else np.concatenate([old, new], axis=1)
+    scaled = [p / rough[name] for name, pieces in channels.items() for p in pieces]
+    stacks = {n: np.stack([p for p in scaled if p.size == n], axis=1) for n in basis_of}
 
     def cost(u: FloatArray) -> float:
         share, slow = 1.0 / (1.0 + np.exp(-u[0])), np.tanh(u[1])
@@ -155,17 +149,10 @@ def _hum(channels: Mapping[str, list[FloatArray]], step: float) -> dict[str, lis
                 continue
             here, beside = [], []
             for p in pieces:
-                window = np.hanning(p.size)
-                time = step * np.arange(p.size)
                 width = 4.0 / (p.size * step)
-
-                def power(
-                    f: float, w: FloatArray = window, t: FloatArray = time, p: FloatArray = p
-                ) -> float:
-                    return float(np.abs((w * p) @ np.exp(-2j * np.pi * f * t)) ** 2)
-
-                here.append(power(frequency))
-                beside += [power(frequency + width), power(max(frequency - width, width))]
+                here.append(_power(p, step, frequency))
+                beside.append(_power(p, step, frequency + width))
+                beside.append(_power(p, step, max(frequency - width, width)))
             ratio = (
                 len(pieces) * float(np.mean(here)) / max(float(np.median(beside)) / 0.69, 1e-300)
             )
@@ -174,6 +161,12 @@ def _hum(channels: Mapping[str, list[FloatArray]], step: float) -> dict[str, lis
                 amplitude = 2.0 * float(np.sqrt(np.mean(here))) / gain
                 found.setdefault(name, []).append(Line(frequency, amplitude))
     return found
+
+
+def _power(piece: FloatArray, step: float, frequency: float) -> float:
+    time = step * np.arange(piece.size)
+    line = np.exp(-2j * np.pi * frequency * time)
+    return float(np.abs((np.hanning(piece.size) * piece) @ line) ** 2)
 
 
 def _reflection(share: float, slow: float) -> FloatArray:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +25,9 @@ from picchio.model.model import Model
 from picchio.prediction.percussion import PercussionSetup, percussion_setups
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.vibration.integration.integrate import Samples
+
+if TYPE_CHECKING:
+    from picchio.diagnosis.percussion.fit.parallel import _Helpers
 
 # A sample this near a jump of the force, but not on it, holds neither side for sure: a sensor of
 # finite bandwidth smears a jump, and what keeps it from aliasing by about half a sample.
@@ -88,10 +90,12 @@ class MeasuredRecord:
         Args:
             end: s; None for all of the record.
         """
-        if end is None or end >= self.setup.samples.last:
+        clock = self.setup.samples
+        if end is None or end >= clock.last:
             return self.setup
         if end not in self._cuts:
-            self._cuts[end] = self.setup.cut(end)
+            count = int(np.searchsorted(clock.times, end + 1e-9))
+            self._cuts[end] = replace(self.setup, samples=replace(clock, count=count))
         return self._cuts[end]
 
 
@@ -130,19 +134,8 @@ def _marked(force: PiecewiseForce, clock: Samples, delay: float, rate: float) ->
     return out
 
 
-# Effects whose edges are held fixed, with a number of their own.
-Pin = tuple[int, tuple[Effect, ...]]
-_numbers = itertools.count()
-
-
-class Helpers(Protocol):
-    """Whoever predicts part of the records elsewhere (`shared_records`)."""
-
-    def residuals(
-        self, effects: Sequence[Effect], records: Sequence[MeasuredRecord], end: float | None
-    ) -> list[FloatArray] | None:
-        """As `Problem.residuals`; None where that is not worth it."""
-        ...
+# Effects of the model whose edges are held fixed.
+Pin = tuple[Effect, ...]
 
 
 class Problem:
@@ -167,13 +160,17 @@ class Problem:
         workers: int | None = 1,
     ) -> None:
         self.workers = workers
-        self.helpers: Helpers | None = None
+        self.helpers: _Helpers | None = None
         self.pins: list[Pin] = []
         self.robot, self.campaign = robot, campaign
         self.model = Model(robot, gravity_stiffness)
         setups = percussion_setups(robot, campaign)
         values = [campaign[s.name].read([c.name for c in s.channels]) for s in setups]
-        self.noise = noise = _noise(campaign, setups, values)
+        # From the quiet time where there is enough of it, else from all that can be used.
+        noise = quiet_noise(setups, values)
+        if any(c.name not in noise for s in setups for c in s.channels):
+            noise = {**noise_levels(campaign), **noise}
+        self.noise = noise
         poses: dict[bytes, int] = {}
         self.records: list[MeasuredRecord] = []
         for setup, data in zip(setups, values, strict=True):
@@ -264,7 +261,7 @@ class Problem:
         Returns:
             a context manager.
         """
-        self.pin((next(_numbers), tuple(effects)))
+        self.pin(tuple(effects))
         try:
             yield
         finally:
@@ -274,9 +271,9 @@ class Problem:
         """As `pinned`, until `unpin`.
 
         Args:
-            pin: its number, and the effects of the model whose edges count.
+            pin: the effects of the model whose edges count.
         """
-        model = self.model.with_effects(pin[1])
+        model = self.model.with_effects(pin)
         self.pins.append(pin)
         for record in self.records:
             record._pinned.append(near_edges(record.setup, model))
@@ -299,18 +296,6 @@ class Problem:
         model = self.model.with_effects(effects)
         chosen = self.records if records is None else records
         return [record.setup.predict(model) for record in chosen]
-
-
-def _noise(
-    campaign: Campaign,
-    setups: Sequence[PercussionSetup],
-    values: Sequence[Mapping[str, FloatArray]],
-) -> dict[str, Noise]:
-    """From the quiet time where there is enough of it, else from all that can be used."""
-    found = quiet_noise(setups, values)
-    if any(c.name not in found for s in setups for c in s.channels):
-        found = {**noise_levels(campaign), **found}
-    return found
 
 
 def residual(record: MeasuredRecord, model: Model, end: float | None = None) -> FloatArray:

@@ -396,10 +396,8 @@ def _in_turns(problem: Problem, here: Fit, effect: Effect, columns: Sequence[Flo
             numbers[latent.first :] += moved
         numbers = np.clip(numbers, *_bounds(here, latent))
         wanted[record.name] = np.round(numbers) if latent.whole else numbers
-    hidden = {name: tuple(numbers) for name, numbers in wanted.items()}
-    if not latent.whole:
-        hidden = _shortened(problem, here, effect, known, wanted)
-    hypothesis = with_hidden(here.hypothesis, effect, hidden)
+    shortened = wanted if latent.whole else _shortened(problem, here, effect, known, wanted)
+    hypothesis = with_hidden(here.hypothesis, effect, shortened)
     return fit(problem, hypothesis, here.records, here.end, iterations=2)
 
 

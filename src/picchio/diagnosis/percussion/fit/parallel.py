@@ -29,13 +29,6 @@ _shared: dict[int, Mapping[str, Callable[[Any], Any]]] = {}
 _numbers = itertools.count()
 
 
-def cores() -> int:
-    """How many this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 def worker_count(workers: int | None) -> int:
     """As many as are asked for; as many as cores where None, eight at most.
 
@@ -43,7 +36,7 @@ def worker_count(workers: int | None) -> int:
     """
     if sys.platform != "linux" or multiprocessing.current_process().daemon:
         return 1
-    return min(cores(), _MOST) if workers is None else workers
+    return min(len(os.sched_getaffinity(0)), _MOST) if workers is None else workers
 
 
 @contextmanager
@@ -207,7 +200,7 @@ def _pin(problem: Problem, pins: Sequence[Pin]) -> None:
     """Pin what is pinned there, no more and no less."""
     same = 0
     for mine, wanted in zip(problem.pins, pins, strict=False):
-        if mine[0] != wanted[0]:
+        if mine != wanted:
             break
         same += 1
     while len(problem.pins) > same:

@@ -180,19 +180,15 @@ class Hypothesis:
         Returns:
             the hypothesis that is left.
         """
-        if label in self.freed:
-            effects = tuple(
-                self._tolerated(effect) if effect.label == label else effect
-                for effect in self.effects
-            )
-            priors = tuple(item for item in self.priors if item[0] != label)
-            return replace(self, effects=effects, freed=self.freed - {label}, priors=priors)
-        kept = tuple(
-            e for i, e in enumerate(self.effects) if i < self.n_nuisances or e.label != label
-        )
+        tolerated = [
+            self._tolerated(e) if e.label == label and label in self.freed else e
+            for e in self.effects[: self.n_nuisances]
+        ]
+        causes = [e for e in self.effects[self.n_nuisances :] if e.label != label]
         drawn = tuple(item for item in self.drawn if item[0] != label)
         priors = tuple(item for item in self.priors if item[0] != label)
-        return replace(self, effects=kept, drawn=drawn, priors=priors)
+        rest = replace(self, freed=self.freed - {label}, drawn=drawn, priors=priors)
+        return replace(rest, effects=(*tolerated, *causes))
 
     def _tolerated(self, nuisance: Effect) -> Effect:
         """At the tolerated value nearest to where it is: a jump from there would skip cycles."""

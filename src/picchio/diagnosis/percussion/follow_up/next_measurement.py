@@ -22,7 +22,7 @@ from picchio.diagnosis.percussion.follow_up.records import (
     varied,
     when,
 )
-from picchio.diagnosis.percussion.follow_up.separation import Contest, Separation, new_noise
+from picchio.diagnosis.percussion.follow_up.separation import Contest, new_noise
 from picchio.diagnosis.percussion.search.state import Trial
 from picchio.prediction.percussion import PercussionSetup
 
@@ -35,23 +35,23 @@ _TRIED_AGAIN = 2
 
 @dataclass(frozen=True, eq=False)
 class _Proposal:
-    """One record that might be taken, and by how much chi-square would tell each rival."""
+    """One record that might be taken, and its `Contest.separations` by one sensor."""
 
     setup: PercussionSetup
     varied: str
     sensor: str
     at_hand: bool
-    told: Separation
+    told: FloatArray
 
     @property
     def surely(self) -> FloatArray:
         """(rivals,) chi-square, whichever is the true one."""
-        return np.minimum(self.told.if_best, self.told.if_rival)
+        return np.asarray(self.told.min(axis=0))
 
     @property
     def perhaps(self) -> FloatArray:
         """(rivals,) chi-square, should the right one of the two be true."""
-        return np.maximum(self.told.if_best, self.told.if_rival)
+        return np.asarray(self.told.max(axis=0))
 
     @property
     def least(self) -> float:
@@ -143,7 +143,7 @@ def _why(shot: _Proposal, best: str, names: Sequence[str], where: str) -> str:
     halves = [
         f"from {name}: chi-square would fall by {max(ways):.3g} should it be "
         f"{best if ways[0] > ways[1] else name}, by {min(ways):.3g} otherwise"
-        for name, *ways in zip(names, shot.told.if_best, shot.told.if_rival, strict=True)
+        for name, *ways in zip(names, *shot.told, strict=True)
         if name not in (*surely, *alike)
     ]
     if len(alike) == len(names):
@@ -174,14 +174,14 @@ def _best(contest: Contest, shots: Sequence[_Proposal]) -> _Proposal:
         firsts.setdefault(shot.sensor, shot)
     checked: list[_Proposal] = []
     for shot in firsts.values():
-        ways = np.array([shot.told.if_best, shot.told.if_rival])
+        ways = shot.told.copy()
         for k, rival in enumerate(contest.rivals):
             if shot.perhaps[k] >= _ENOUGH:
                 ways[:, k] = [
                     contest.expected_rise(shot.setup, shot.sensor, true, other)
                     for true, other in ((contest.best, rival), (rival, contest.best))
                 ]
-        checked.append(replace(shot, told=Separation(ways[0], ways[1])))
+        checked.append(replace(shot, told=ways))
         if (checked[-1].surely >= _ENOUGH).all():
             break
     return max(checked, key=lambda s: s.worth)

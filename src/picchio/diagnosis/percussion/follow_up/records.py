@@ -46,22 +46,18 @@ def possible_records(problem: Problem, like: MeasuredRecord) -> Iterator[Percuss
             yield _setup(problem, usual, geometry, direction)
 
 
-def _span(problem: Problem) -> float:
-    """Days from the first record to the last."""
-    known = [r.setup.conditions.days for r in problem.records]
-    days = [day for day in known if day is not None]
-    return max(days) - min(days) if days else 0.0
-
-
 def varied(problem: Problem, setup: PercussionSetup) -> dict[str, PercussionSetup]:
     """The same record with softer blows, in a warmer or cooler room, later."""
-    now, span = setup.conditions, _span(problem)
+    now = setup.conditions
+    known = [r.setup.conditions.days for r in problem.records]
+    days = [day for day in known if day is not None]
     found = {"force": replace(setup, blows=setup.blows.change(height=_SOFTER * setup.blows.height))}
     if now.temperature is not None:
         kelvin = now.temperature + _OTHERWISE * (-1.0 if now.temperature > 0.0 else 1.0)
         found["temperature"] = replace(setup, conditions=replace(now, temperature=kelvin))
-    if now.days is not None and span > 0.0:  # as long again: what drifts is known no further
-        found["days"] = replace(setup, conditions=replace(now, days=now.days + span))
+    if now.days is not None and days and max(days) > min(days):
+        later = now.days + (max(days) - min(days))  # as long again: what drifts is known no further
+        found["days"] = replace(setup, conditions=replace(now, days=later))
     return found
 
 

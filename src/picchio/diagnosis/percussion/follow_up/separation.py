@@ -46,20 +46,6 @@ def _known(problem: Problem, name: str) -> float:
     return problem.noise[name].std if name in problem.noise else 0.0
 
 
-@dataclass(frozen=True)
-class Separation:
-    """By how much chi-square would tell the best model from each of its rivals.
-
-    Attributes:
-        if_best: (rivals,) should the best be the true one, and the rival be refitted.
-        if_rival: (rivals,) the other way round. The two differ where what one claims is within
-            the tolerance of something that the other may refit.
-    """
-
-    if_best: FloatArray
-    if_rival: FloatArray
-
-
 @dataclass(frozen=True, eq=False)
 class Contest:
     """The best model and its rivals, which a further record is to tell apart.
@@ -76,14 +62,19 @@ class Contest:
     rivals: Sequence[Fit]
     fresh: Mapping[str, float]
 
-    def separations(self, setup: PercussionSetup) -> dict[str, Separation]:
-        """Sensor -> by how much a record would tell each rival, whichever is refitted.
+    def separations(self, setup: PercussionSetup) -> dict[str, FloatArray]:
+        """Sensor -> by how much chi-square of a record would tell the best from each rival.
 
         By slopes: the unknowns of the one that is wrong move as far as what is known of them lets
         them.
 
         Args:
             setup: the record that might be taken.
+
+        Returns:
+            (2, rivals): should the best be the true one, and the rival be refitted; and the other
+            way round. The two differ where what one claims is within the tolerance of something
+            that the other may refit.
         """
         problem, rivals = self.problem, self.rivals
         fits = (self.best, *rivals)
@@ -101,7 +92,7 @@ class Contest:
             for k in range(1, len(fits)):
                 left = np.concatenate([(read[k][n] - read[0][n]) / noise[n] for n in rows])
                 told[:, k - 1] = [_left(left, slopes[m], moves[m][1]) for m in (k, 0)]
-            found[kind.name] = Separation(told[0], told[1])
+            found[kind.name] = told
         return found
 
     def expected_rise(self, setup: PercussionSetup, sensor: str, true: Fit, other: Fit) -> float:

@@ -336,10 +336,8 @@ def _judged(
     kept = [t for t, a in zip(kept, alive, strict=True) if a]
     # the residual falls by the part of it that the change (of either size) can undo
     alone = (moves.T @ -left) / size**2
-    gains = np.where(alone > 0.0, (alone * size) ** 2, 0.0)
     linear = acts_either_way(type(kept[0]), faint)
-    if linear:
-        gains = (alone * size) ** 2
+    gains = np.where(linear | (alone > 0.0), (alone * size) ** 2, 0.0)
     numbers = len(kept[0].parameters)
     if kept[0].discrete:
         # nothing lies between its sizes: the residual as it would be
@@ -348,22 +346,16 @@ def _judged(
         order = np.argsort(-gains)
         starts = tuple(kept[i] for i in order[:2])
         return Suspect(starts[0], float(gains[order[0]]), 4, starts)
+    weights = np.linalg.lstsq(moves, -left, rcond=None)[0]
+    span = float(left @ left - ((left + moves @ weights) ** 2).sum())
     if moves_one_each(kept):
-        weights = np.linalg.lstsq(moves, -left, rcond=None)[0]
-        total = float(left @ left - ((left + moves @ weights) ** 2).sum())
         values: dict[str, float] = {}
         for trial, weight in zip(kept, weights, strict=True):
             for p in trial.parameters:
                 if trial.values[p.name] != p.neutral:
                     values[p.name] = float(np.clip(weight, -6.0, 6.0)) * trial.values[p.name]
         start = kept[0].bounded(**values)
-        return Suspect(start, total, numbers, (start,))
+        return Suspect(start, span, numbers, (start,))
     order = np.argsort(-gains)
     starts = tuple(scaled(kept[i], float(alone[i]), linear) for i in order[:2])
-    span = float(left @ left - _leave(moves, left))
     return Suspect(starts[0], max(float(gains[order[0]]), 0.7 * span), numbers, starts)
-
-
-def _leave(moves: FloatArray, left: FloatArray) -> float:
-    weights = np.linalg.lstsq(moves, -left, rcond=None)[0]
-    return float(((left + moves @ weights) ** 2).sum())
