@@ -11,7 +11,6 @@ import inspect
 import json
 import re
 import tomllib
-import types
 import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
@@ -27,6 +26,7 @@ from picchio.campaign.importing import mapping
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
+from picchio.core.toml import leaf_types
 from picchio.excitation.table import ExcitationTable, catalogue
 from picchio.fatigue import reducer
 from picchio.fatigue.sn import library as sn_library
@@ -247,7 +247,7 @@ def _keys(table: type[BaseModel], before: str = "") -> Iterator[Key]:
         if issubclass(table, ExcitationTable) and name == "kind":
             kind = " | ".join(f'"{known}"' for known in catalogue())
         yield Key(path, kind, unit, _default(node), field.is_required(), meaning)
-        for tail, inner in (found for arm in _arms(field.annotation) for found in _inner(arm)):
+        for tail, inner in (found for arm in leaf_types(field.annotation) for found in _inner(arm)):
             yield from _keys(inner, f"{path}{tail}.")
     if issubclass(table, ExcitationTable):
         yield from _declared(before)
@@ -290,16 +290,6 @@ def _split_unit(text: str) -> tuple[str, str]:
     return (match[1], match[2]) if match else ("", text.removesuffix("."))
 
 
-def _arms(kind: Any) -> list[Any]:
-    """The types that an annotation allows, without None and without metadata."""
-    origin = typing.get_origin(kind)
-    if origin is typing.Annotated:
-        return _arms(typing.get_args(kind)[0])
-    if origin in (typing.Union, types.UnionType):
-        return [leaf for arm in typing.get_args(kind) for leaf in _arms(arm)]
-    return [] if kind is types.NoneType else [kind]
-
-
 def _inner(kind: Any) -> Iterator[tuple[str, type[BaseModel]]]:
     """Tables reached from a type, with what the path to them adds."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
@@ -307,7 +297,7 @@ def _inner(kind: Any) -> Iterator[tuple[str, type[BaseModel]]]:
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
     tail = "[]" if origin in (list, tuple) else ".<name>" if origin is dict else ""
     if tail:
-        for leaf in _arms(arguments[-1 if origin is dict else 0]):
+        for leaf in leaf_types(arguments[-1 if origin is dict else 0]):
             for more, table in _inner(leaf):
                 yield tail + more, table
 
