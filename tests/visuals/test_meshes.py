@@ -24,8 +24,9 @@ BLOWS = PulseTrain(300.0, 0.040, 0.004)
 @pytest.mark.parametrize("name", ["ur10", "panda"])
 def test_scene_is_small_and_no_mesh_is_in_it_twice(name: str) -> None:
     robot = picchio.load_robot(name)
-    tree = frames(robot, robot.pose([0.3] * len(robot.joint_names)))
-    body = build_body(robot, tree, world(tree))
+    pose = robot.pose([0.3] * len(robot.joint_names))
+    tree = frames(robot, pose)
+    body = build_body(robot, pose, tree, world(tree))
     assert sum(len(body.shapes[k].faces) for _, k, _ in body.parts) <= MOST_FACES
     distinct = {shape.vertices.tobytes() for shape in body.shapes}
     assert len(distinct) == len(body.shapes)

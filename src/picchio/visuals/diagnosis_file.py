@@ -90,6 +90,5 @@ def read_diagnosis(path: str | Path, robot: FlexibleRobot) -> Diagnosis:
         try:
             check_place(robot, pair.effect, pair.target)
         except InputError as error:
-            raise InputError(error.problem, file=path, key=error.key, value=error.value,
-                             choices=error.choices) from None  # fmt: skip
+            raise error.placed(file=path) from None
     return found

@@ -505,10 +505,9 @@ def _ask(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         rows.append(("pose [rad, m]", pose))
     if ask.get("direction") is not None:
         rows.append(("force along", direction_label(ask["direction"])))
-    if ask.get("force") is not None:
-        rows.append(("force", f"{number(float(ask['force']))} N"))
-    if ask.get("temperature") is not None:
-        rows.append(("temperature", f"{number(float(ask['temperature']))} deg C"))
+    for key, unit in (("force", "N"), ("temperature", "deg C")):
+        if ask.get(key) is not None:
+            rows.append((key, f"{number(float(ask[key]))} {unit}"))
     if ask.get("days") is not None:
         rows.append(("when", when(float(ask["days"]))))
     for rival in ask.get("rivals", ()):

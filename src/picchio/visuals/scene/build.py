@@ -83,7 +83,7 @@ def build_scene(
     envelope = envelope_of(model, checked, excitation, hits=hits)
     tree = frames(robot, checked)
     places = world(tree)
-    body = build_body(robot, tree, places)
+    body = build_body(robot, checked, tree, places)
     where = ", ".join(f"{q:.3g}" for q in checked)
     how = "steady state" if hits is None else f"{hits} hits from rest"
     scene = Scene(robot.name, f"pose ({where}); {excitation.describe()}; {how}", envelope, tree)

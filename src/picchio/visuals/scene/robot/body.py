@@ -79,17 +79,20 @@ class Body:
     reach: float
 
 
-def build_body(robot: FlexibleRobot, frames: list[Frame], places: dict[str, FloatArray]) -> Body:
+def build_body(
+    robot: FlexibleRobot, pose: FloatArray, frames: list[Frame], places: dict[str, FloatArray]
+) -> Body:
     """Meshes and primitives of the URDF; bones for links whose mesh is missing or broken.
 
     Args:
         robot: the robot.
+        pose: (nv,) rad or m.
         frames: its links' frames.
         places: (4, 4) world placement of every link.
     """
     visuals, broken = read_visuals(robot)
     points = np.array([place[:3, 3] for place in places.values()])
-    points = np.vstack([points, [robot.state(_pose(robot, frames)).tool_position]])
+    points = np.vstack([points, [robot.state(pose).tool_position]])
     reach = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
     shapes: list[Mesh] = []
     parts: list[tuple[str, int, FloatArray]] = []
@@ -123,11 +126,6 @@ def build_body(robot: FlexibleRobot, frames: list[Frame], places: dict[str, Floa
         parts.append((link, len(shapes), np.eye(4)))
         shapes.append(bones)
     return Body(shapes, parts, reach)
-
-
-def _pose(robot: FlexibleRobot, frames: list[Frame]) -> FloatArray:
-    at = {frame.joint: frame.position for frame in frames if frame.joint}
-    return np.array([at.get(name, 0.0) for name in robot.joint_names])
 
 
 def _shape(visual: Visual) -> Mesh:
