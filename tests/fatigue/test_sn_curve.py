@@ -72,7 +72,8 @@ def test_every_shipped_curve_says_where_it_comes_from(name: str) -> None:
         assert curve.allowable < curve.yield_shear < curve.ultimate_shear
 
 
-@given(curves(), st.lists(st.just(0.0) | st.floats(1e-6, 10.0), min_size=1, max_size=20))
+# Below a ten-thousandth of the strength the steepest slopes give more cycles than a float holds.
+@given(curves(), st.lists(st.just(0.0) | st.floats(1e-4, 10.0), min_size=1, max_size=20))
 def test_scalar_array_and_inverse_give_one_life(curve: SNCurve, factors: list[float]) -> None:
     stress = curve.strength * np.array(factors)
     life = curve.cycles_to_failure(stress)

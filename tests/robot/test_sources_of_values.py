@@ -88,6 +88,9 @@ def test_a_folders_own_sidecar(arm_text, sidecar_text, write):
     with pytest.raises(InputError, match="no joint of this robot has a stiffness"):
         load_robot(lone)
     assert load_robot(lone, allow_rigid=True).flexible_joints == ()
+    saved = lone.with_name("saved.toml")
+    saved.write_text(f'format = "picchio-model/1"\nrobot = "{lone}"\n')
+    assert load_robot(saved, allow_rigid=True).flexible_joints == ()
     # An annotation in the URDF keeps the folder's sidecar out.
     urdf.write_text(
         arm_text.replace("<robot ", '<robot xmlns:picchio="urn:picchio:1" ').replace(

@@ -63,7 +63,9 @@ def load_robot(
     if is_saved_model(robot):
         saved = read_saved_model(Path(robot))
         flex, tool = flex or saved.flex, tool or saved.tool
-        loaded = load_robot(saved.robot, flex=flex, tool=tool, values=values)
+        loaded = load_robot(
+            saved.robot, flex=flex, tool=tool, values=values, allow_rigid=allow_rigid
+        )
         tables = tuple(table.model_dump() for table in saved.effect)
         return replace(loaded, effect_tables=tables, files=(*loaded.files, Path(robot)))
     found = find_robot(robot)
