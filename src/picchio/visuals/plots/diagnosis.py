@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -171,8 +171,7 @@ def _points(
     if kind == "robot" or target == "deflection":
         return joints
     if kind == "channel group":
-        frame_name = target.partition(".")[2]
-        return [at[frame_name]] if frame_name in at else [tip]
+        return [at.get(target.partition(".")[2], tip)]
     return [tip]
 
 
@@ -293,7 +292,8 @@ def plot_scores(
     left = [math.sqrt(max(row["chi_square_per_sample"], 1e-6)) for row in rows]
     start = math.sqrt(max(without[1], 1e-6))
     low, high = 0.6 * min(1.0, *left), max(start, *left, 1.3)
-    for place, (row, value) in enumerate(zip(rows, left, strict=True)):
+    stand = _candidates(ax, rows, chosen, [value - low for value in left], low)
+    for place, (row, value, stands) in enumerate(zip(rows, left, stand, strict=True)):
         fall = without[0] - row["bic"]
         if not math.isfinite(fall):
             note = "far behind early on: dropped"
@@ -301,7 +301,6 @@ def plot_scores(
             note = "does not pay for its numbers"
         else:
             note = f"evidence {fall:,.0f}"
-        stands = _candidate_bar(ax, place, row, chosen, value - low, low)
         ax.text(value * 1.04, place, f"{value:.3g}", va="center", fontsize=8)
         ax.text(1.01, place, note, va="center", fontsize=8, transform=ax.get_yaxis_transform(),
                 color=INK if stands else MUTED)  # fmt: skip
@@ -312,7 +311,6 @@ def plot_scores(
                 transform=ax.get_xaxis_transform())  # fmt: skip
     ax.set_xscale("log")
     ax.set_xlim(low, high * (high / low) ** 0.12)
-    _name_candidates(ax, rows, chosen)
     plain_numbers(ax.xaxis, low, high)
     ax.set(xlabel="residual that is left once fitted [× noise, RMS]")
     return ax
@@ -333,48 +331,40 @@ def plot_motion_scores(
         chosen: (effect, target) of those that were added.
     """
     ax = axes_or_new(ax)
-    for place, row in enumerate(scores):
-        share = 100.0 * max(row["share"], 0.0)
-        stands = _candidate_bar(ax, place, row, chosen, share)
+    shares = [100.0 * max(row["share"], 0.0) for row in scores]
+    stand = _candidates(ax, scores, chosen, shares)
+    for place, (row, share, stands) in enumerate(zip(scores, shares, stand, strict=True)):
         note = f"{share:.3g} %; evidence {row['rank']:,.0f}".replace("-", "\N{MINUS SIGN}")
         ax.text(share + 1.2, place, note, va="center", fontsize=8, color=INK if stands else MUTED)
     ax.set_xlim(0.0, 128.0)
     ax.set_xticks(range(0, 101, 20))
-    _name_candidates(ax, scores, chosen)
     ax.set(xlabel="share of what is left in its channels that it takes, on stretches held out [%]")
     return ax
 
 
-def _candidate_bar(
+def _candidates(
     ax: Axes,
-    place: int,
-    row: Mapping[str, Any],
+    rows: Sequence[Mapping[str, Any]],
     chosen: Collection[tuple[str, str]],
-    length: float,
+    lengths: Sequence[float],
     start: float = 0.0,
-) -> bool:
-    """A candidate's bar; whether it is one of those chosen."""
-    stands = (row["effect"], row["target"]) in chosen
-    ax.barh(place, length, left=start, height=0.62, color=BLUE if stands else GREY,
-            alpha=1.0 if stands else 0.6)  # fmt: skip
-    return stands
-
-
-def _name_candidates(
-    ax: Axes, rows: Sequence[Mapping[str, Any]], chosen: Collection[tuple[str, str]]
-) -> None:
-    """Candidates down the vertical axis, those chosen in bold."""
-    ax.set_ylim(len(rows) - 0.4, -0.6)
-    ax.grid(False, axis="y")
+) -> list[bool]:
+    """A bar for each candidate, down the vertical axis, those chosen in bold; which these are."""
+    stand = [(row["effect"], row["target"]) in chosen for row in rows]
     names = []
-    for row in rows:
+    for place, (row, length, stands) in enumerate(zip(rows, lengths, stand, strict=True)):
+        ax.barh(place, length, left=start, height=0.62, color=BLUE if stands else GREY,
+                alpha=1.0 if stands else 0.6)  # fmt: skip
         order = row.get("parameters", {}).get("order")
         name = f"{row['effect'].replace('_', ' ')}, {row['target']}"
         names.append(plain(name if order is None else f"{name}, order {order:.4g}", 44))
+    ax.set_ylim(len(rows) - 0.4, -0.6)
+    ax.grid(False, axis="y")
     ax.set_yticks(range(len(rows)), names)
-    for label, row in zip(ax.get_yticklabels(), rows, strict=True):
-        if (row["effect"], row["target"]) in chosen:
+    for label, stands in zip(ax.get_yticklabels(), stand, strict=True):
+        if stands:
             label.set_fontweight("bold")
+    return stand
 
 
 def plain_numbers(axis: Axis, low: float, high: float) -> None:
@@ -388,19 +378,13 @@ def plain_numbers(axis: Axis, low: float, high: float) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def band_edges(level: Level) -> tuple[float, float]:
-    """From and to, Hz, of a level by frequency."""
-    low, _, high = level.part.removesuffix(" Hz").partition("-")
-    return float(low), float(high)
-
-
 @styled
 def plot_bands(
     before: Sequence[Level],
     after: Sequence[Level],
     ax: Axes | None = None,
     *,
-    natural_frequencies: Sequence[float] = (),
+    natural_frequencies: Iterable[float] = (),
 ) -> Axes:
     """The residual's power over the noise's by frequency; 1 is noise.
 
@@ -417,8 +401,8 @@ def plot_bands(
     ):
         if not levels:
             continue
-        edges = [band_edges(level) for level in levels]
-        x = np.array([[max(low, _LOWEST), high] for low, high in edges]).ravel()
+        edges = [level.part.removesuffix(" Hz").split("-") for level in levels]
+        x = np.array([[max(float(low), _LOWEST), float(high)] for low, high in edges]).ravel()
         y = np.repeat([max(level.power, 1e-3) for level in levels], 2)
         ax.plot(x, y, label=label, linewidth=1.8, **style)
     ax.axhline(1.0, color=MUTED, linewidth=1.2, label="noise")

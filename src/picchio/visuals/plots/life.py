@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 
@@ -37,18 +39,8 @@ def plot_utilisation(assessment: Assessment, ax: Axes | None = None) -> Axes:
     if not np.isfinite(parts).any():
         return plot_peak_torque(assessment, ax)
     values = np.array([100 * operation.utilisation.max(axis=0) for operation in operations])
-    _bars(ax, [j.name for j in joints], [op.name for op in operations], values, "no shaft given")
-    for row, joint in enumerate(joints):
-        if joint.reducer and np.isfinite(joint.reducer_utilisation):
-            name = None if "reducer" in ax.get_legend_handles_labels()[1] else "reducer"
-            ax.plot(100 * joint.reducer_utilisation, row, "D", color=INK, markersize=6,
-                    zorder=4, label=name)  # fmt: skip
-            values = np.append(values, 100 * joint.reducer_utilisation)
-    top = float(np.nanmax(values))
-    ax.set_xlim(0.0, 1.12 * top or 1.0)
-    if len(operations) > 1 or any(joint.reducer for joint in joints):
-        ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    if top > 40.0:
+    used = [100 * j.reducer_utilisation if j.reducer else np.nan for j in joints]
+    if _bars(ax, assessment, values, "no shaft given", used) > 40.0:
         ax.axvline(100.0, color=VERMILION, linewidth=1.2, linestyle=(0, (5, 2)))
     ax.set(xlabel="largest load over the allowable [%]",
            title="Utilisation by joint and operation")  # fmt: skip
@@ -58,10 +50,10 @@ def plot_utilisation(assessment: Assessment, ax: Axes | None = None) -> Axes:
 @styled
 def plot_peak_torque(assessment: Assessment, ax: Axes | None = None) -> Axes:
     """Largest torque of the vibration (N m) by joint and operation; needs no shaft."""
-    joints, operations = assessment.joints, assessment.operations
-    ax = axes_or_new(ax, height=_height(len(joints), len(operations)))
+    operations = assessment.operations
+    ax = axes_or_new(ax, height=_height(len(assessment.joints), len(operations)))
     values = np.array([operation.peak_torque.max(axis=0) for operation in operations])
-    _bars(ax, [j.name for j in joints], [op.name for op in operations], values, "not computed")
+    _bars(ax, assessment, values, "not computed")
     ax.set(xlabel="peak torque of the vibration [N m]", title="Torque by joint and operation")
     return ax
 
@@ -114,11 +106,12 @@ def _rows(ax: Axes, names: list[str]) -> np.ndarray:
 
 
 def _bars(
-    ax: Axes, joints: list[str], operations: list[str], values: np.ndarray, missing: str
-) -> None:
-    """Grouped horizontal bars of values (operation, joint); NaN becomes a word."""
+    ax: Axes, assessment: Assessment, values: np.ndarray, missing: str, marks: Sequence[float] = ()
+) -> float:
+    """Grouped bars of values (operation, joint), a mark a joint; NaN becomes a word."""
+    operations = [operation.name for operation in assessment.operations]
     height = 0.8 / len(operations)
-    rows = _rows(ax, joints)
+    rows = _rows(ax, [joint.name for joint in assessment.joints])
     for k, (name, row) in enumerate(zip(operations, values, strict=True)):
         y = rows + (k - (len(operations) - 1) / 2) * height
         known = np.isfinite(row)
@@ -130,10 +123,16 @@ def _bars(
     for row in rows[~np.isfinite(values).any(axis=0)]:
         ax.annotate(missing, (0.0, row), xytext=(5, 0), textcoords="offset points", va="center",
                     fontsize=8.5, color=MUTED, style="italic")  # fmt: skip
-    top = float(np.nanmax(values)) if np.isfinite(values).any() else 1.0
+    for row, mark in zip(rows, marks, strict=False):
+        if np.isfinite(mark):
+            label = None if "reducer" in ax.get_legend_handles_labels()[1] else "reducer"
+            ax.plot(mark, row, "D", color=INK, markersize=6, zorder=4, label=label)
+    every = [*values.ravel(), *marks]
+    top = float(np.nanmax(every)) if np.isfinite(every).any() else 1.0
     ax.set_xlim(0.0, 1.12 * top or 1.0)
-    if len(operations) > 1:
+    if len(operations) > 1 or (marks and any(joint.reducer for joint in assessment.joints)):
         ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return top
 
 
 @styled

@@ -68,9 +68,7 @@ def plot_residual_map(
                   [plain(r) for r in records[::step]], fontsize=8)  # fmt: skip
     ax.invert_yaxis()
     ax.grid(False)
-    figure = ax.get_figure(root=True)
-    assert figure is not None
-    bar = figure.colorbar(shown, ax=ax, pad=0.01, aspect=30)
+    bar = ax.figure.colorbar(shown, ax=ax, pad=0.01, aspect=30)
     bar.set_label("residual / noise, RMS")
     plain_numbers(bar.ax.yaxis, 1.0, top)
     return ax
@@ -141,10 +139,9 @@ def plot_over_time(
     ax = axes_or_new(ax)
     middle = 0.5 * (edges[:-1] + edges[1:])
     for i, group in enumerate(residual):
-        style = {**look(i), "linestyle": "-"}
-        ax.plot(middle, residual[group], "o-", markersize=3, label=plain(group),
-                color=style["color"])  # fmt: skip
-        ax.plot(middle, signal[group], linestyle=":", linewidth=1.2, color=style["color"],
+        colour = look(i)["color"]
+        ax.plot(middle, residual[group], "o-", markersize=3, label=plain(group), color=colour)
+        ax.plot(middle, signal[group], linestyle=":", linewidth=1.2, color=colour,
                 label="the signal" if i == 0 else None)  # fmt: skip
     if last_blow is not None:
         ax.axvspan(0.0, last_blow, color=MUTED, alpha=0.09, linewidth=0)
@@ -169,7 +166,7 @@ def plot_by_condition(
     """The residual's share of the signal, a dot a record, by one thing that differs among them.
 
     Args:
-        values: of each record; numbers, dates or names.
+        values: of each record; numbers or names.
         shares: group -> residual over signal of each record.
         floors: the same of noise alone; drawn as small dashes.
         what: the axis's label.
@@ -179,8 +176,7 @@ def plot_by_condition(
     names = [v for v in dict.fromkeys(values) if isinstance(v, str)]
     x = np.array([names.index(v) if isinstance(v, str) else v for v in values])
     for i, group in enumerate(shares):
-        spread = 0.12 * (i - 0.5 * (len(shares) - 1)) if names else 0.0
-        at = x + spread if names else x
+        at = x + (0.12 * (i - 0.5 * (len(shares) - 1)) if names else 0.0)
         style: dict[str, Any] = {"color": COLOURS[i % len(COLOURS)], "linestyle": ""}
         ax.plot(at, 100.0 * np.asarray(shares[group]), marker="osD^v"[i % 5], markersize=4.5,
                 label=plain(group), **style)  # fmt: skip
@@ -189,14 +185,12 @@ def plot_by_condition(
     if names:
         ax.set_xticks(range(len(names)), [plain(n, 22) for n in names],
                       rotation=30 if len(names) > 5 else 0,
-                      ha="right" if len(names) > 5 else "center", fontsize=8)  # fmt: skip
+                      ha="right" if len(names) > 5 else "center")  # fmt: skip
     ax.set_yscale("log")
-    low, high = ax.get_ylim()
-    plain_numbers(ax.yaxis, low, high)
+    plain_numbers(ax.yaxis, *ax.get_ylim())
     ax.set(xlabel=what, ylabel="residual / signal [%]")
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4)
-    for text in ax.get_xticklabels():
-        text.set_fontsize(8)
+    ax.tick_params(axis="x", labelsize=8)
     return ax
 
 

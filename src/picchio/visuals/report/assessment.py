@@ -34,11 +34,7 @@ from picchio.visuals.worst_rivet import WorstRivet, worst_rivet
 
 
 def _figures(
-    assessment: Assessment,
-    worst: WorstRivet,
-    curve: SNCurve | None,
-    *,
-    spread: UncertainLife | None = None,
+    assessment: Assessment, worst: WorstRivet, curve: SNCurve | None, spread: UncertainLife | None
 ) -> dict[str, list[Picture]]:
     """All plots of an assessment report: "main" ones open it, "more" are folded away."""
     made: dict[str, list[Picture]] = {"main": [], "more": []}
@@ -94,18 +90,16 @@ def _figures(
             f"S-N curve {curve.name} with the largest amplitude of every pose, a symbol a joint",
             "Each symbol is one pose of the task at its largest equivalent amplitude; at the "
             "right edge it could go on for ever.", main=True)  # fmt: skip
-        at, stress = worst.stress_turning_points()
         response = worst.response
-        last = float(response.force.start[-1])
-        time = response_times(
-            response, last * 2.6 if not response.periodic else 2 * response.force.end
-        )
+        force = response.force
+        end = 2 * force.end if response.periodic else 2.6 * float(force.start[-1])
+        time = response_times(response, end)
         history = shear_stress(
             worst.stiffness * response.deflection(time, operation.direction)[worst.index],
             joint.shaft,
         )
         add(plot_stress_history(time, history, blank_figure(height=2.7),
-                                turning_points=(at, stress), joint=joint.name,
+                                turning_points=worst.stress_turning_points(), joint=joint.name,
                                 static=float(shear_stress(worst.static_torque, joint.shaft)),
                                 allowable=curve.allowable),
             f"Shear stress in the shaft of {joint.name} over its worst rivet",
@@ -198,7 +192,7 @@ def assessment_report(
         task=task,
         life=life,
         curve=curve,
-        figures=_figures(assessment, worst, curve, spread=spread),
+        figures=_figures(assessment, worst, curve, spread),
         headline=verdict(assessment),
         tone="bad" if bad else "good" if assessment.limiting_joint else "",
         reducers=any(joint.reducer for joint in assessment.joints),

@@ -67,6 +67,7 @@ def diagnosis_page(
             robot=robot.name,
             d=of,
             headline=headline(of),
+            changed=content["figures"].changed,
             tone=_TONE.get(of.verdict, ""),
             claimed=bool(of.causes),
             held_out=gain is not None and gain.held_out_records not in ((), gain.train_records),
@@ -107,7 +108,6 @@ def _percussion(found: PercussionDiagnosis, also_motion: bool) -> dict[str, Any]
     others = " and of motion records" if also_motion else ""
     return {
         "figures": figures,
-        "changed": figures.changed,
         "taken": f"{len(problem.records)} percussion records at {poses}{others}",
         "cards": [_card(problem.robot, cause) for cause in diagnosis.causes],
         "before": found.before,
@@ -134,7 +134,6 @@ def _motion(
     logs = {log.file for each in details["systems"].values() for log in each.logs}
     return {
         "figures": figures,
-        "changed": figures.changed,
         "taken": f"{len(logs)} motion record{'s' if len(logs) != 1 else ''}",
         "cards": _cards(diagnosis, system.robot),
         "stiffness": [
@@ -229,10 +228,8 @@ def _phrase(kind: str, causes: Sequence[Cause]) -> str:
 
 def _shown(cause: Cause) -> dict[str, Value]:
     """Without the two parts of a wave, whose amplitude is given."""
-    parts = dict(cause.parameters)
-    if "amplitude" in parts:
-        parts = {k: v for k, v in parts.items() if k not in ("cosine", "sine")}
-    return parts
+    left_out = ("cosine", "sine") if "amplitude" in cause.parameters else ()
+    return {name: v for name, v in cause.parameters.items() if name not in left_out}
 
 
 def _value_text(v: Value) -> str:
@@ -323,11 +320,14 @@ _LIFE = {
 }
 
 
+def _sides(life: Mapping[str, Any] | None) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    """Before and after."""
+    return (life or {}).get("baseline") or {}, (life or {}).get("extended") or {}
+
+
 def _life_rows(life: Mapping[str, Any] | None) -> list[tuple[str, str, str]]:
     """Quantity, before, after."""
-    if not life:
-        return []
-    before, after = life.get("baseline") or {}, life.get("extended") or {}
+    before, after = _sides(life)
     rows = []
     for key in dict.fromkeys([*before, *after]):
         if isinstance(before.get(key, after.get(key)), Mapping):
@@ -369,9 +369,7 @@ def _life_by_set(diagnosis: Diagnosis) -> list[tuple[str, str, str, str]]:
 
 def _life_by_joint(life: Mapping[str, Any] | None) -> list[tuple[str, ...]]:
     """Joint; peak deflection, utilisation, rivets, each before and after, with its interval."""
-    before, after = (
-        ((life or {}).get(side) or {}).get("joints") or {} for side in ("baseline", "extended")
-    )
+    before, after = (side.get("joints") or {} for side in _sides(life))
     rows = []
     for joint in before:
         cells: list[str] = []
@@ -496,9 +494,7 @@ _TOLD = {"one way": "may tell it from", "no": "does not tell it from"}
 
 def _ask(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     """The next measurement, a line each."""
-    ask = diagnosis.next_measurement
-    if not ask:
-        return []
+    ask = diagnosis.next_measurement or {}
     rows = []
     if ask.get("pose"):
         pose = ", ".join(f"{name} {number(float(q))}" for name, q in ask["pose"].items())

@@ -65,8 +65,7 @@ class View:
     @property
     def time(self) -> FloatArray:
         """(m,) s."""
-        found: FloatArray = self.segment.samples / self.system.logs[self.segment.record].rate
-        return found
+        return self.segment.samples / self.system.logs[self.segment.record].rate
 
     @property
     def measured(self) -> FloatArray:
@@ -98,8 +97,7 @@ class View:
     def motion(self, name: str) -> FloatArray:
         """(m,) a series of the nominal motion: angle, velocity, acceleration, body."""
         nominal = self.system.predictors[self.segment.record].nominal
-        found: FloatArray = getattr(nominal, name)[self.group[1]][self.segment.samples]
-        return found
+        return getattr(nominal, name)[self.group[1]][self.segment.samples]
 
 
 def _telling(found: Sequence[View], view: View) -> tuple[str, FloatArray, list[View]]:
@@ -168,7 +166,6 @@ class MotionFigures(Pictures):
     PREFIX = "k"
 
     def __init__(self, diagnosis: Diagnosis) -> None:
-        super().__init__()
         self.diagnosis = diagnosis
         self.changed = bool(diagnosis.details["extended"].effects)
         self.train = _views(diagnosis, "train")
@@ -328,6 +325,7 @@ class MotionFigures(Pictures):
         return self.picture(ax, f"The robot from the side, with {', '.join(drawn)} marked", caption)
 
 
+@dataclass(eq=False)
 class MotionResidualFigures(Pictures):
     """Draws what a baseline leaves.
 
@@ -336,10 +334,7 @@ class MotionResidualFigures(Pictures):
     """
 
     PREFIX = "m"
-
-    def __init__(self, left: MotionResidual) -> None:
-        super().__init__()
-        self.left = left
+    left: MotionResidual
 
     def section(self, group: GroupResidual) -> tuple[str, Picture, list[Picture]]:
         """A heading, a torque or twist over time, and what is left of it over the motion."""

@@ -124,9 +124,7 @@ class Pictures:
     """
 
     PREFIX = "p"
-
-    def __init__(self) -> None:
-        self._made = 0
+    _made = 0
 
     def picture(self, ax: Axes, alt: str, caption: str) -> Picture:
         """The figure of some Axes with its alt text and caption."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -115,14 +114,9 @@ def worst_view(fit: Fit, names: tuple[str, ...] = ()) -> View:
 
 
 class _Percussion(Pictures):
-    """Pictures of the channel that is furthest from its simulation.
-
-    Args:
-        baseline: fit of the nominal model.
-    """
+    """Pictures of the channel that a baseline leaves most of."""
 
     def __init__(self, baseline: Fit) -> None:
-        super().__init__()
         self.baseline = baseline
         self.worst = worst_view(baseline)
 
@@ -223,7 +217,7 @@ class PercussionFigures(_Percussion):
 
     def bands(self) -> list[Picture]:
         """Power by frequency against the noise, a picture a channel group."""
-        modes = self._natural_frequencies()
+        modes = self.found.problem.natural_frequencies[self.worst.record.pose]
         made = []
         groups = list(dict.fromkeys(level.group for level in self.found.before.bands))
         width = 5.2 if len(groups) > 1 else 9.4
@@ -250,13 +244,6 @@ class PercussionFigures(_Percussion):
     def _predict(self, hypothesis: Hypothesis, view: View) -> FloatArray:
         """The channel as the hypothesis has it."""
         return view.aligned(self.found.problem.predictions(hypothesis.effects, [view.record])[0])
-
-    def _natural_frequencies(self) -> list[float]:
-        """Hz, of the nominal robot at the first picture's pose."""
-        setup = self.worst.record.setup
-        system = self.found.problem.model.plant(setup.geometry).build(setup.blows.direction)
-        squared = np.linalg.eigvals(np.linalg.solve(system.mass, system.stiffness)).real
-        return sorted(np.sqrt(squared[squared > 0.0]) / (2.0 * np.pi))
 
 
 class PercussionResidualFigures(_Percussion):
@@ -322,8 +309,15 @@ class PercussionResidualFigures(_Percussion):
 
     def by_condition(self) -> list[Picture]:
         """By pose, direction, level, temperature, date."""
-        both = {g: [self._share(r, g) for r in self.records] for g in self.groups}
-        shares, floors = ({g: [one[k] for one in v] for g, v in both.items()} for k in (0, 1))
+        both = {
+            g: [
+                together(p for p in self.left.parts if (p.record, p.group) == (r, g))
+                for r in self.records
+            ]
+            for g in self.groups
+        }
+        shares = {g: [one.nrmse for one in every] for g, every in both.items()}
+        floors = {g: [one.floor for one in every] for g, every in both.items()}
         made = []
         for what, values in self._conditions().items():
             if len(set(values)) > 1:
@@ -355,11 +349,6 @@ class PercussionResidualFigures(_Percussion):
             ax = plot_transfer(one, channel, blank_figure(5.2, 3.2), highest=highest)
             made.append(self.picture(ax, f"Frequency response of {name}", f"{name} over force."))
         return ", ".join(r.name for r in records), made
-
-    def _share(self, record: str, group: str) -> tuple[float, float]:
-        rows = [p for p in self.left.parts if p.record == record and p.group == group]
-        whole = together(rows)
-        return (whole.nrmse, whole.floor) if rows else (math.nan, math.nan)
 
     def _conditions(self) -> dict[str, list[object]]:
         first = {p.record: p for p in reversed(self.left.parts)}
