@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from picchio.core.errors import InputError
+from picchio.core.files import write_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -44,6 +45,13 @@ def console() -> Console:
 
     plain = not sys.stdout.isatty()
     return Console(width=120 if plain else None, highlight=False, soft_wrap=False)
+
+
+def escape(text: str) -> str:
+    """Text in which rich sees no markup."""
+    from rich.markup import escape
+
+    return escape(text)
 
 
 def definitions(rows: Iterable[tuple[str, str]]) -> Table:
@@ -123,14 +131,6 @@ def check_targets(
             raise InputError("cannot write here: the folder is read-only", file=path)
         if path.exists() and any(path.samefile(source) for source in read):
             raise InputError("would overwrite an input of this command", file=path)
-
-
-def write_text(target: str | Path, text: str) -> None:
-    """Write a text file, whole or not at all."""
-    from picchio.core.files import atomic_write
-
-    with atomic_write(target) as stream:
-        stream.write(text)
 
 
 def write_report(result: Result, target: Path | None, **options: Any) -> None:

@@ -50,6 +50,17 @@ def atomic_write(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
         raise
 
 
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text file, whole or not at all; errors as of `atomic_write`.
+
+    Args:
+        path: where the file shall stand.
+        text: its content.
+    """
+    with atomic_write(path) as stream:
+        stream.write(text)
+
+
 def umask() -> int:
     """The user's default permissions, which `tempfile` does not give its files."""
     mask = os.umask(0)

@@ -93,10 +93,9 @@ class Page:
         Raises:
             InputError: it cannot be written there.
         """
-        from picchio.core.files import atomic_write
+        from picchio.core.files import write_text
 
-        with atomic_write(path) as stream:
-            stream.write(self.html())
+        write_text(path, self.html())
         return Path(path)
 
     def _repr_html_(self) -> str:

@@ -10,7 +10,7 @@ from picchio.campaign.importing.importer import read_raw
 from picchio.campaign.importing.mapping import FORMAT
 from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.core.errors import InputError
-from picchio.core.files import atomic_write
+from picchio.core.files import write_text
 
 _TIMES = ("t", "time", "time [s]", "time_s", "timestamp", "zeit")
 
@@ -27,9 +27,7 @@ def write_mapping(file: str | Path, out: str | Path) -> None:
     """
     if Path(out).exists():
         raise InputError("exists already and is left alone", file=out)
-    template = mapping_template(read_raw(file))
-    with atomic_write(out) as stream:
-        stream.write(template)
+    write_text(out, mapping_template(read_raw(file)))
 
 
 def mapping_template(raw: RawFile) -> str:

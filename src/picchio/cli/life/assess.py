@@ -120,9 +120,24 @@ def assess(
     import picchio
     from picchio.studies.assessment.method_comparison import method_terms
 
-    _check_options(
-        method, residue, mean_stress, for_life, survival, uncertainty=uncertainty, seed=seed
-    )
+    # Refuse options that would be ignored, and numbers out of range.
+    rainflow_only = {
+        "--for-life": for_life,
+        "--residue": None if residue == "half-cycles" else residue,
+        "--mean-stress": None if mean_stress == "none" else mean_stress,
+        "--uncertainty": uncertainty or None,
+    }
+    for key, given in rainflow_only.items():
+        if method == "paper" and given is not None:
+            raise InputError("belongs to the method rainflow", key=key, value=given)
+    if survival is not None and for_life is None:
+        raise InputError("belongs to --for-life", key="--survival", value=survival)
+    if survival is not None and not 0.0 < survival < 1.0:
+        raise InputError("must lie between 0 and 1", key="--survival", value=survival)
+    if for_life is not None and not (math.isfinite(for_life) and for_life > 0):
+        raise InputError("must be a positive number of rivets", key="--for-life", value=for_life)
+    if seed is not None and not uncertainty:
+        raise InputError("belongs to --uncertainty", key="--seed", value=seed)
     loaded = picchio.load_robot(robot, flex=flex, tool=tool)
     path = task_file(loaded, task)
     work = picchio.load_task(path, loaded)
@@ -175,36 +190,6 @@ def assess(
             _show_spread(spread)
 
     deliver(content, json, show_all)
-
-
-def _check_options(
-    method: str,
-    residue: str,
-    mean_stress: str,
-    for_life: float | None,
-    survival: float | None,
-    *,
-    uncertainty: bool,
-    seed: int | None,
-) -> None:
-    """Refuse options that would be ignored, and numbers out of range."""
-    rainflow_only = {
-        "--for-life": for_life,
-        "--residue": None if residue == "half-cycles" else residue,
-        "--mean-stress": None if mean_stress == "none" else mean_stress,
-        "--uncertainty": uncertainty or None,
-    }
-    for key, given in rainflow_only.items():
-        if method == "paper" and given is not None:
-            raise InputError("belongs to the method rainflow", key=key, value=given)
-    if survival is not None and for_life is None:
-        raise InputError("belongs to --for-life", key="--survival", value=survival)
-    if survival is not None and not 0.0 < survival < 1.0:
-        raise InputError("must lie between 0 and 1", key="--survival", value=survival)
-    if for_life is not None and not (math.isfinite(for_life) and for_life > 0):
-        raise InputError("must be a positive number of rivets", key="--for-life", value=for_life)
-    if seed is not None and not uncertainty:
-        raise InputError("belongs to --uncertainty", key="--seed", value=seed)
 
 
 # Below this a torque in N m or an angle in mrad is rounding, and is printed as 0.

@@ -22,6 +22,7 @@ from picchio.cli.output import (
     console,
     count_of,
     deliver,
+    escape,
     progress,
     say_warning,
     table,
@@ -131,8 +132,6 @@ def _show(report: QualityReport, verbose: bool) -> None:
 
 
 def _show_contents(report: QualityReport) -> None:
-    from rich.markup import escape
-
     out = console()
     campaign, records = report.campaign, report.records
     name = str(campaign.folder) if campaign.folder is not None else "campaign in memory"
@@ -170,8 +169,6 @@ def _show_contents(report: QualityReport) -> None:
 
 
 def _record_table(records: Sequence[RecordSummary]) -> Table:
-    from rich.markup import escape
-
     rows = []
     for record in records:
         numbers = list(record.pose.values() if isinstance(record.pose, dict) else record.pose or [])
@@ -199,8 +196,6 @@ def _done(record: RecordSummary) -> str:
 
 
 def _channel_table(report: QualityReport) -> Table:
-    from rich.markup import escape
-
     sizes: dict[str, list[float]] = {}
     units = {}
     for record in report.records:
@@ -224,8 +219,6 @@ def _channel_table(report: QualityReport) -> Table:
 
 
 def _finding_table(report: QualityReport, verbose: bool) -> Table:
-    from rich.markup import escape
-
     rows = []
     for group in [[finding] for finding in report.findings] if verbose else report.groups():
         worst = group[0]

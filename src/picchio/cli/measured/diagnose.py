@@ -27,8 +27,8 @@ from picchio.cli.output import (
     table,
     telling,
     write_report,
-    write_text,
 )
+from picchio.core.files import write_text
 from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
@@ -103,15 +103,7 @@ def diagnose(
     write_report(found, report, folder=None if model is None else model.parent)
     if plan is not None and found.plan is not None:
         write_text(plan, found.plan)
-    deliver(found.to_dict(), json, lambda: _show(found, plan))
-
-
-def _show(found: Diagnosis, plan: Path | None) -> None:
-    show_diagnosis(found)
-    if found.life_note:
-        console().print(f"Life: {found.life_note}.")
-    if plan is not None and found.plan is None:
-        console().print(f"Nothing to measure next that a plan could say: {plan} not written.")
+    deliver(found.to_dict(), json, lambda: show_diagnosis(found, plan))
 
 
 # What is said of a cause that percussion and motion records could both show.
@@ -123,8 +115,8 @@ _STATUS = {
 }
 
 
-def show_diagnosis(found: Diagnosis) -> None:
-    """Print verdict, causes, gain, life and what to measure next."""
+def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
+    """Print verdict, causes, gain, life and what to measure next, for which a plan was asked."""
     from picchio.diagnosis.result import VERDICTS, differences, in_words
     from picchio.model.effects.registry import effect_class
 
@@ -175,6 +167,10 @@ def show_diagnosis(found: Diagnosis) -> None:
         out.print(f"Measure next: {ask['why']}", highlight=False)
         if pose:
             out.print(f"  pose {pose}; force along ({direction}), {ask.get('force', 0):g} N")
+    if found.life_note:
+        out.print(f"Life: {found.life_note}.")
+    if plan is not None and found.plan is None:
+        out.print(f"Nothing to measure next that a plan could say: {plan} not written.")
 
 
 def _show_life(life: Mapping[str, Any]) -> None:

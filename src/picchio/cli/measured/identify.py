@@ -16,9 +16,9 @@ from picchio.cli.output import (
     deliver,
     say_warning,
     telling,
-    write_text,
 )
 from picchio.core.errors import InputError
+from picchio.core.files import write_text
 
 
 @app.command(

@@ -63,6 +63,5 @@ def import_(
     check_targets([json], [file, mapping])
     made = picchio.import_record(file, to, mapping, name=name, append=append)
     deliver(made.to_dict(), json)
-    record = made.record
-    text = f"{to}: {record.file}, {record.clock.samples} samples at {record.clock.rate:.6g} Hz, "
-    typer.echo(text + ", ".join(record.channels), err=json == "-")
+    channels = ", ".join(made.record.channels)
+    typer.echo(f"{to}: {made._headline()}, {channels}", err=json == "-")

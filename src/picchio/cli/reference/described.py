@@ -9,7 +9,7 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import JsonOption
-from picchio.cli.output import console, definitions, deliver
+from picchio.cli.output import console, definitions, deliver, escape
 
 if TYPE_CHECKING:
     from picchio.reference.effects import EffectDescription
@@ -58,8 +58,6 @@ def _list_effects(entries: tuple[EffectDescription, ...]) -> None:
 
 
 def _show_effect(entry: EffectDescription) -> None:
-    from rich.markup import escape
-
     from picchio.reference.effects import shown_bounds, shown_unit, target_meaning
 
     screen = console()
@@ -86,8 +84,6 @@ def _show_effect(entry: EffectDescription) -> None:
 
 
 def _list_formats(entries: tuple[FileFormat, ...]) -> None:
-    from rich.markup import escape
-
     screen = console()
     for role, title in (("input", "What you write"), ("output", "What picchio writes")):
         screen.print(f"[bold]{title}[/bold]")
@@ -101,8 +97,6 @@ def _list_formats(entries: tuple[FileFormat, ...]) -> None:
 
 
 def _show_format(entry: FileFormat) -> None:
-    from rich.markup import escape
-
     from picchio.reference.formats import sections
 
     screen = console()

@@ -65,8 +65,7 @@ def _show(found: Reproduction, report: Path | None) -> None:
         rows.append((str(tried.sentence.page), escape(tried.sentence.quote),
                      f"[{colour[mark]}]{mark}[/] {condition}"))  # fmt: skip
     screen.print(table((">p.", "claim", "verdict"), rows, box=None))
-    counts = ", ".join(f"{n} {verdict}" for verdict, n in found.counts.items())
-    screen.print(f"\n{len(found.claims)} claims: {counts}.")
+    screen.print(f"\n{found._headline()}.")
     lives = found.answer.table
     values, longer = lives.other.values, lives.over_printed
     screen.print(

@@ -41,7 +41,7 @@ def annotate(
     check_targets((out, json), [made.urdf, made.sidecar])
     made.save(out)
     deliver(made.to_dict(), json)
-    typer.echo(f"{out}: {made.urdf.name} with the values of {made.sidecar.name}", err=True)
+    typer.echo(f"{out}: {made._headline()}", err=True)
 
 
 def _show(found: RobotList) -> None:

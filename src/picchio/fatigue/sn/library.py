@@ -100,13 +100,12 @@ def write_sn_curve(curve: SNCurve, path: str | Path) -> None:
     """
     import tomlkit
 
-    from picchio.core.files import atomic_write
+    from picchio.core.files import write_text
 
     values = {name: getattr(curve, name) for name in SNCurveFile.model_fields}
     known = {name: value for name, value in values.items() if value not in (None, "")}
     content = {"format": SN_FORMAT, **plain(known)}
-    with atomic_write(path) as stream:
-        stream.write(tomlkit.dumps(content))
+    write_text(path, tomlkit.dumps(content))
 
 
 @cache

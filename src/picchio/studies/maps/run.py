@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from picchio.core.errors import InputError
-from picchio.core.files import atomic_write
+from picchio.core.files import atomic_write, write_text
 from picchio.core.provenance import provenance
 from picchio.excitation.excitation import Excitation
 from picchio.model.model import Model
@@ -184,8 +184,7 @@ def _open_folder(target: Path, job: MapJob, chunk: int) -> Path:
         )
     folder.mkdir(exist_ok=True)
     if not label.exists():
-        with atomic_write(label) as stream:
-            stream.write(text)
+        write_text(label, text)
     return folder
 
 

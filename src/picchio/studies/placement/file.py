@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from picchio.core.files import atomic_write, read_text
+from picchio.core.files import read_text, write_text
 from picchio.studies.placement.result import Placement
 from picchio.studies.placement.work import Work
 from picchio.studies.tasks import Task
@@ -62,8 +62,7 @@ def write_task(found: Placement, work: Work, task: Task, source: Path, out: Path
         common: Any = document.setdefault("excitation", tomlkit.table())
         _set_period(common, spot.period, own=False)
         _relocate(common, source, out)
-    with atomic_write(out) as stream:
-        stream.write(head + tomlkit.dumps(document))
+    write_text(out, head + tomlkit.dumps(document))
 
 
 def _numbers(values: Any) -> list[float]:

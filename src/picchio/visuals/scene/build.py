@@ -26,13 +26,7 @@ from picchio.visuals.plots.workspace import best_branch, dataset_of, spacing
 from picchio.visuals.scene.causes.causes import add_causes
 from picchio.visuals.scene.causes.site import Site
 from picchio.visuals.scene.motion import vibration
-from picchio.visuals.scene.overlay import (
-    Scale,
-    envelope_meshes,
-    joint_values,
-    ring_radius,
-    rivet_values,
-)
+from picchio.visuals.scene.overlay import Scale, joint_values, ring_radius, rivet_values
 from picchio.visuals.scene.robot.body import Body, build_body
 from picchio.visuals.scene.robot.mesh import Mesh, arrow, ring, sphere, turned_to
 from picchio.visuals.scene.scene import Item, Scene
@@ -99,7 +93,11 @@ def build_scene(
     if workspace is not None:
         _add_workspace(scene, dataset_of(workspace), units)
     if diagnosis is not None:
-        along = blow if blow is not None else _against_the_tool(robot, checked)
+        along = blow
+        if along is None:
+            # Of a tool that hits along its own axis.
+            axis = np.array(robot.tool.axis)
+            along = -robot.state(checked).tool_rotation @ axis / np.linalg.norm(axis)
         site = partial(Site, robot, checked, tree, places, body, along)
         add_causes(scene, site, diagnosis)
     scene.motion = vibration(robot, envelope, body.reach, blow, scene.chosen)
@@ -135,12 +133,6 @@ def diagnosis_scene(found: PercussionDiagnosis, **options: Any) -> Scene:
         gravity_stiffness=found.problem.model.gravity_stiffness,
         **options,
     )
-
-
-def _against_the_tool(robot: FlexibleRobot, pose: FloatArray) -> FloatArray:
-    """(3,) the force on a tool that hits along its own axis."""
-    axis = np.array(robot.tool.axis)
-    return -robot.state(pose).tool_rotation @ axis / np.linalg.norm(axis)
 
 
 def _first(envelope: DirectionEnvelope, assessment: Assessment | None, joint: str | None) -> int:
@@ -195,11 +187,17 @@ def _add_envelopes(scene: Scene, body: Body, units: list[str], subdivisions: int
     envelope = scene.envelope
     scene.layers.append(("envelope", "direction envelope at the tool", True))
     scene.layers.append(("worst", "worst direction", True))
-    meshes, scales = envelope_meshes(envelope, units, subdivisions)
+    # A translucent double ball a joint, in rad (m for a prismatic joint).
+    surfaces, faces = envelope.surfaces(subdivisions)
     size = 0.26 * body.reach
     pointer = scene.add(arrow(1.18 * size, 0.011 * body.reach, "#c2410c", head=0.075 * body.reach))
-    for k, (mesh, scale) in enumerate(zip(meshes, scales, strict=True)):
+    for k, (name, unit, surface) in enumerate(
+        zip(envelope.joint_names, units, surfaces, strict=True)
+    ):
         peak = float(envelope.peak_deflection[k])
+        scale = Scale(f"peak deflection of {name}", unit, peak * 1e3)
+        colours = scale.colours(np.linalg.norm(surface, axis=1) * 1e3)
+        mesh = Mesh(surface, faces, colours, opacity=0.5, exact=True, crease=180.0)
         factor = size / peak if peak > 0 else 1.0
         place = np.diag([factor, factor, factor, 1.0])
         place[:3, 3] = envelope.tool_position
@@ -208,13 +206,10 @@ def _add_envelopes(scene: Scene, body: Body, units: list[str], subdivisions: int
         scene.items.append(
             Item(pointer, "worst", "", turned_to(along, envelope.tool_position), joint=k)
         )
-        text = f"{envelope.joint_names[k]}: {peak * 1e3:.3g} {scale.unit} "
-        text += f"along {direction_label(along)}"
+        text = f"{name}: {peak * 1e3:.3g} {unit} along {direction_label(along)}"
         tip = envelope.tool_position + 1.2 * size * along
         scene.labels.append({"text": text, "layer": "worst", "at": tip.tolist(), "joint": k})
-        scene.joints.append(
-            {"name": envelope.joint_names[k], "scale": scale.to_dict(), "peak": peak, "text": text}
-        )
+        scene.joints.append({"name": name, "scale": scale.to_dict(), "peak": peak, "text": text})
 
 
 def _add_tool(scene: Scene, body: Body, direction: FloatArray | None) -> None:

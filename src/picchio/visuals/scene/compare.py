@@ -49,10 +49,8 @@ def compare_scene(
     moments = np.asarray(time, dtype=float)
     if moments.ndim != 1 or len(moments) < 2 or not (np.diff(moments) > 0.0).all():
         raise InputError("must be at least two ascending numbers", key="time")
-    both = {
-        "simulated": _table(robot, simulated, len(moments), "simulated"),
-        "measured": _table(robot, measured, len(moments), "measured"),
-    }
+    given = {"simulated": simulated, "measured": measured}
+    both = {name: _table(robot, each, len(moments), name) for name, each in given.items()}
     scene = build_scene(robot, pose, excitation, **options)
     count = min(len(moments), _MOST_SAMPLES)
     grid = np.linspace(moments[0], moments[-1], count)

@@ -67,8 +67,13 @@ def send(scene: Scene, viewer: Any) -> None:
     for side, colour in (("top", [0.98, 0.985, 0.99]), ("bottom", [0.87, 0.9, 0.93])):
         viewer["/Background"].set_property(f"{side}_color", colour)
     if hasattr(getattr(viewer, "window", None), "zmq_socket"):
+        import umsgpack  # type: ignore[import-untyped]
+
         for control in controls(scene):
-            _send_control(viewer.window, control)
+            viewer.window.zmq_socket.send_multipart(
+                [b"set_property", b"/meshcat/picchio", umsgpack.packb(control)]
+            )
+            viewer.window.zmq_socket.recv()
 
 
 def controls(scene: Scene) -> list[dict[str, Any]]:
@@ -128,15 +133,6 @@ def _turned(point: FloatArray) -> list[float]:
     """A point (3,) as meshcat's camera has it, whose y axis is up."""
     x, y, z = (float(c) for c in point)
     return [x, z, -y]
-
-
-def _send_control(window: Any, control: dict[str, Any]) -> None:
-    import umsgpack  # type: ignore[import-untyped]
-
-    window.zmq_socket.send_multipart(
-        [b"set_property", b"/meshcat/picchio", umsgpack.packb(control)]
-    )
-    window.zmq_socket.recv()
 
 
 def _path(item: Item, number: int) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,6 @@ from picchio.studies.envelopes import DirectionEnvelope
 from picchio.visuals.kinematics import Frame
 from picchio.visuals.plots.style import CMAP
 from picchio.visuals.scene.robot.body import Body
-from picchio.visuals.scene.robot.mesh import Mesh
 
 
 @dataclass(frozen=True)
@@ -52,25 +50,6 @@ class Scale:
                 "colours": [self.colour(value) for value in steps]}  # fmt: skip
 
 
-def envelope_meshes(
-    envelope: DirectionEnvelope, units: Sequence[str], subdivisions: int = 4
-) -> tuple[list[Mesh], list[Scale]]:
-    """A translucent double ball a joint, coloured by magnitude, and what its colours mean.
-
-    Vertices are in rad (m for a prismatic joint); `units` are "mrad" or "mm".
-    """
-    vertices, faces = envelope.surfaces(subdivisions)
-    meshes, scales = [], []
-    for name, unit, surface, peak in zip(
-        envelope.joint_names, units, vertices, envelope.peak_deflection, strict=True
-    ):
-        scale = Scale(f"peak deflection of {name}", unit, float(peak) * 1e3)
-        colours = scale.colours(np.linalg.norm(surface, axis=1) * 1e3)
-        meshes.append(Mesh(surface, faces, colours, opacity=0.5, exact=True, crease=180.0))
-        scales.append(scale)
-    return meshes, scales
-
-
 def joint_values(
     assessment: Assessment | None, envelope: DirectionEnvelope, slides: BoolArray
 ) -> tuple[FloatArray, Scale]:
@@ -106,18 +85,16 @@ def rivet_values(assessment: Assessment) -> tuple[list[FloatArray], Scale]:
     shafts = any(joint.sn_curve for joint in assessment.joints)
     if shafts:
         damage = [np.nanmax(op.damage_per_rivet, axis=1) for op in operations]
-        if max(d.max() for d in damage) > 0.0:
-            top = max(float(d.max()) for d in damage)
-            return [d / top * 100 for d in damage], Scale(
-                "damage of a rivet, worst = 100", "%", 100.0
-            )
+        top = max(float(d.max()) for d in damage)
+        if top > 0.0:
+            scale = Scale("damage of a rivet, worst = 100", "%", 100.0)
+            return [d / top * 100 for d in damage], scale
         use = [100 * np.nanmax(op.utilisation, axis=1) for op in operations]
         return use, Scale("utilisation by a rivet", "%", max(float(u.max()) for u in use))
     turning = [joint.kind != "prismatic" for joint in assessment.joints]
     torque = [op.peak_torque[:, turning].max(axis=1, initial=0.0) for op in operations]
-    return torque, Scale(
-        "largest joint torque in a rivet", "N m", max(float(t.max()) for t in torque)
-    )
+    top = max(float(t.max()) for t in torque)
+    return torque, Scale("largest joint torque in a rivet", "N m", top)
 
 
 def ring_radius(frame: Frame, body: Body) -> float:

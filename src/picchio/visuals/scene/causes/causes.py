@@ -35,16 +35,12 @@ def add_causes(scene: Scene, site: Callable[..., Site], found: Diagnosis) -> Non
     """
     scene.layers = [(i, text, on and i in ("robot", "tool")) for i, text, on in scene.layers]
     scene.playing = False  # what moves is hard to point at
-    shown: list[tuple[str, str, bool]] = []
     labels: list[dict[str, Any]] = []
     told: list[dict[str, str]] = []
     scene.diagnosis = {"verdict": f"{found.verdict.replace('-', ' ')}: {VERDICTS[found.verdict]}",
                        "lines": told}  # fmt: skip
     for layer, cause in _causes(found):
-        words, colour, on = LAYERS[layer]
-        if layer not in scene.swatches:
-            scene.swatches[layer] = colour
-            shown.append((layer, words, on))
+        colour = scene.swatches[layer] = LAYERS[layer][1]
         values = {name: value.value for name, value in cause.parameters.items()}
         here = site(effect=cause.effect, target=cause.target, values=values, colour=colour)
         told.append({"text": cause_text(cause) + note(here), "layer": layer})
@@ -57,6 +53,7 @@ def add_causes(scene: Scene, site: Callable[..., Site], found: Diagnosis) -> Non
                 at = (back @ [*piece.at, 1.0])[:3].tolist()
                 text = cause.effect.replace("_", " ")
                 labels.append({"text": text, "layer": layer, "node": node, "at": at})
+    shown = [(layer, LAYERS[layer][0], LAYERS[layer][2]) for layer in scene.swatches]
     # First in the panel, and first to find a place in the picture.
     scene.layers, scene.labels = shown + scene.layers, labels + scene.labels
 

@@ -14,17 +14,12 @@ from picchio.model.effects.registry import effect_class
 from picchio.visuals.kinematics import Frame
 from picchio.visuals.plots.style import BLUE
 from picchio.visuals.scene.causes.site import Drawn, Site, check_place
-from picchio.visuals.scene.causes.symbols import (
-    ball,
-    coil,
-    hose,
-    pointing,
-    sliding,
-    steel_radius,
-    turning,
-)
+from picchio.visuals.scene.causes.symbols import ball, coil, hose, pointing, sliding, turning
 from picchio.visuals.scene.overlay import ring_radius
 from picchio.visuals.scene.robot.mesh import Mesh, box, moved, ring, turned_to
+
+_STEEL = 7850.0
+"""kg/m^3."""
 
 
 def draw(site: Site) -> list[Drawn]:
@@ -118,7 +113,8 @@ def _payload(site: Site) -> list[Drawn]:
 
 def _mass(site: Site, at: FloatArray, mass: float) -> Mesh:
     """As large as of steel, within what can be seen; what is missing is a mere shade."""
-    radius = float(np.clip(steel_radius(mass), 0.025 * site.reach, 0.12 * site.reach))
+    steel = (3.0 * abs(mass) / (4.0 * np.pi * _STEEL)) ** (1.0 / 3.0)
+    radius = float(np.clip(steel, 0.025 * site.reach, 0.12 * site.reach))
     return ball(at, radius, site.colour, 0.4 if mass < 0.0 else 0.85)
 
 

@@ -1,4 +1,4 @@
-"""The shapes that mark a cause: spring, turning and sliding arrows, hose, steel ball.
+"""The shapes that mark a cause: spring, turning and sliding arrows, hose, ball.
 
 Each is made where it stands, in world coordinates, m.
 """
@@ -11,9 +11,6 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.visuals.scene.robot.mesh import Mesh, arrow, merged, moved, rod, sphere, turned_to
-
-_STEEL = 7850.0
-"""kg/m^3."""
 
 
 def tube(points: FloatArray, radius: float, colour: str) -> Mesh:
@@ -113,11 +110,5 @@ def hose(start: FloatArray, end: FloatArray, thickness: float, colour: str) -> M
 
 def ball(centre: FloatArray, radius: float, colour: str, opacity: float = 1.0) -> Mesh:
     """A sphere."""
-    place = np.eye(4)
-    place[:3, 3] = centre
-    return replace(moved(sphere(radius, colour), place), opacity=opacity)
-
-
-def steel_radius(mass: float) -> float:
-    """Radius of a steel ball of a mass, kg; m."""
-    return float((3.0 * abs(mass) / (4.0 * np.pi * _STEEL)) ** (1.0 / 3.0))
+    shape = sphere(radius, colour)
+    return replace(shape, vertices=shape.vertices + centre, opacity=opacity)

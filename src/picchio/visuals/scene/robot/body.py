@@ -100,7 +100,7 @@ def build_body(
     for visual in visuals:
         if visual.link not in places:
             continue
-        key: object = (visual.file, visual.colour) if visual.file else id(visual)
+        key = (visual.shape, visual.colour)
         if key not in known:
             try:
                 shape = _shape(visual)
@@ -129,11 +129,10 @@ def build_body(
 
 
 def _shape(visual: Visual) -> Mesh:
-    if visual.primitive is not None:
-        return visual.primitive
-    assert visual.file is not None
-    mesh = load_mesh(visual.file)
-    if visual.colour is not None and visual.file.suffix.lower() == ".stl":
+    if isinstance(visual.shape, Mesh):
+        return visual.shape
+    mesh = load_mesh(visual.shape)
+    if visual.colour is not None and visual.shape.suffix.lower() == ".stl":
         # An STL has no colour of its own; other formats know better than the URDF.
         return Mesh(mesh.vertices, mesh.faces, np.tile(rgb(visual.colour), (len(mesh.vertices), 1)))
     return mesh

@@ -30,15 +30,13 @@ class Visual:
     Attributes:
         link: whose it is.
         matrix: (4, 4) in the link's frame, scale included.
-        file: the mesh file, or None for a primitive.
-        primitive: the shape, or None for a mesh file.
+        shape: the mesh file, or a primitive.
         colour: of the URDF, or None for the mesh's own.
     """
 
     link: str
     matrix: FloatArray
-    file: Path | None
-    primitive: Mesh | None
+    shape: Path | Mesh
     colour: str | None
 
 
@@ -77,13 +75,11 @@ def load_mesh(file: Path) -> Mesh:
     if file.stat().st_size > _MOST_BYTES:
         raise InputError("the mesh is above 64 MiB", file=file)
     try:
-        scene = trimesh.load_scene(file)
-        parts = [
-            part
-            for part in scene.dump()
+        meshes = [
+            _part(part)
+            for part in trimesh.load_scene(file).dump()
             if isinstance(part, trimesh.Trimesh) and len(part.faces)
-        ]  # fmt: skip
-        meshes = [_part(part) for part in parts]
+        ]
     except Exception as error:  # trimesh raises whatever its parsers do
         raise InputError(f"is not a readable mesh: {error}", file=file) from None
     if not meshes or not all(np.isfinite(mesh.vertices).all() for mesh in meshes):
@@ -116,7 +112,7 @@ def _visual(link: str, element: etree._Element, named: dict[str, str], folder: P
     if kind == "mesh":
         scale = _numbers(shape.get("scale", "1 1 1"), 3)
         file = resolve_mesh(shape.get("filename", ""), folder)
-        return Visual(link, matrix @ np.diag([*scale, 1.0]), file, None, colour)
+        return Visual(link, matrix @ np.diag([*scale, 1.0]), file, colour)
     paint = colour or _GREY
     if kind == "box":
         mesh = box(_numbers(shape.get("size", ""), 3), paint)
@@ -128,7 +124,7 @@ def _visual(link: str, element: etree._Element, named: dict[str, str], folder: P
     else:
         raise InputError("unknown shape", key=f"link {link}", value=kind,
                          choices=("box", "cylinder", "sphere", "mesh"))  # fmt: skip
-    return Visual(link, matrix, None, mesh, colour)
+    return Visual(link, matrix, mesh, colour)
 
 
 def resolve_mesh(address: str, folder: Path) -> Path:
