@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from picchio.campaign import campaign as write_module
 from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.record import Record
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, OutputError
 
 finite = st.floats(allow_nan=False, allow_infinity=False, width=64)
 
@@ -91,7 +91,7 @@ def test_a_failure_half_way_leaves_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("failing", ["write_csv", "_toml", "load_campaign", "_put_in_place"])
+@pytest.mark.parametrize("failing", ["write_csv", "_toml", "load_campaign", "swap_in"])
 def test_an_interrupt_anywhere_leaves_the_old_campaign(tmp_path, monkeypatch, failing):
     old = Campaign.from_records([motion("old.csv")]).save(tmp_path / "c")
     before = {p.name: p.read_bytes() for p in old.folder.iterdir()}
@@ -116,7 +116,7 @@ def test_a_rename_that_fails_puts_the_old_one_back(tmp_path, monkeypatch):
         replace(source, target)
 
     monkeypatch.setattr(os, "replace", second_fails)
-    with pytest.raises(InputError, match="No space"):
+    with pytest.raises(OutputError, match="No space"):
         Campaign.from_records([motion("new.csv")]).save(tmp_path / "c", overwrite=True)
     assert [p.name for p in tmp_path.iterdir()] == ["c"]
     assert load_campaign(tmp_path / "c").records[0].file == "old.csv"

@@ -27,7 +27,7 @@ from picchio.campaign.tables import (
     Tolerance,
 )
 from picchio.core.errors import InputError, PicchioWarning
-from picchio.core.files import relative_name, umask
+from picchio.core.files import recover, relative_name, swap_in, umask, writing
 from picchio.core.toml import parse_toml, validate
 
 MAPPING_FILE = "mapping.toml"
@@ -167,27 +167,24 @@ class Campaign:
             the campaign as it was written, read from the folder.
 
         Raises:
-            InputError: the folder exists or can't be written, or a sample is wrong.
+            InputError: the folder exists, or a sample is wrong.
+            OutputError: the disk is full or read-only, or the permission is missing.
         """
         target = Path(folder)
         _check_target(target, overwrite)
         if suffix is not None and suffix not in SUFFIXES:
             raise InputError("unknown kind of file", value=suffix, choices=SUFFIXES)
-        try:
+        with writing(target):
             temporary = Path(
                 tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
             )
-        except OSError as error:
-            raise InputError(f"cannot write here: {error.strerror}", file=target) from None
-        try:
-            os.chmod(temporary, 0o777 & ~umask())
-            _fill(self, temporary, target, suffix, extra_files or {})
-            load_campaign(temporary)
-            _put_in_place(temporary, target)
-        except OSError as error:
-            raise InputError(f"cannot be written: {error.strerror}", file=target) from None
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
+            try:
+                os.chmod(temporary, 0o777 & ~umask())
+                _fill(self, temporary, target, suffix, extra_files or {})
+                load_campaign(temporary)
+                swap_in(temporary, target)
+            finally:
+                shutil.rmtree(temporary, ignore_errors=True)
         return load_campaign(target)
 
     def _check(self) -> None:
@@ -239,7 +236,10 @@ def load_campaign(path: str | Path | Campaign, *, clock_tolerance: float = TOLER
         return path
     given = Path(path)
     if not given.exists():
-        raise InputError("no such campaign", file=given)
+        if not recover(given):
+            raise InputError("no such campaign", file=given)
+        warnings.warn(f"{given}: its replacement was interrupted; the campaign from before it is "
+                      "in its place again", PicchioWarning, stacklevel=2)  # fmt: skip
     folder = given if given.is_dir() else given.parent
     file = given / CAMPAIGN_FILE if given.is_dir() else given
     if not file.is_file():
@@ -273,23 +273,6 @@ def _check_target(target: Path, overwrite: bool) -> None:
     if not overwrite:
         raise InputError("a campaign exists here already", file=target,
                          hint="choose another folder, or say to overwrite it")  # fmt: skip
-
-
-def _put_in_place(temporary: Path, target: Path) -> None:
-    if not target.exists() or not any(target.iterdir()):
-        os.replace(temporary, target)
-        return
-    aside = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".old", dir=target.parent))
-    old = aside / target.name
-    try:
-        os.replace(target, old)
-        try:
-            os.replace(temporary, target)
-        except BaseException:
-            os.replace(old, target)
-            raise
-    finally:
-        shutil.rmtree(aside, ignore_errors=True)
 
 
 def _fill(campaign: Campaign, folder: Path, target: Path, suffix: str | None,

@@ -14,7 +14,7 @@ import numpy as np
 from picchio.campaign.channels import Channel
 from picchio.campaign.source import Block, Column, FileSource, Samples
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import PicchioWarning
 
 _LONGEST_LINE = 1 << 20
 _BYTES_A_VALUE = 20
@@ -34,9 +34,7 @@ class CsvSource(FileSource):
 
     def _open(self) -> BinaryIO:
         try:
-            return open(self.path, "rb")
-        except FileNotFoundError:
-            raise self.error("no such file") from None
+            return open(self.checked_path(), "rb")
         except OSError as error:
             raise self.error(f"cannot be read: {error.strerror}") from None
 
@@ -145,11 +143,8 @@ class CsvSource(FileSource):
 
 def write_csv(path: Path, channels: Sequence[Channel], blocks: Iterable[Samples]) -> None:
     """Write a record; floats are written such that they read back bit for bit."""
-    try:
-        with open(path, "w", encoding="utf-8", newline="") as stream:
-            csv.writer(stream, lineterminator="\n").writerow([c.header for c in channels])
-            for block in blocks:
-                table = np.column_stack([block[channel.name] for channel in channels])
-                stream.writelines(",".join(map(repr, row)) + "\n" for row in table.tolist())
-    except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror}", file=path) from None
+    with open(path, "w", encoding="utf-8", newline="") as stream:
+        csv.writer(stream, lineterminator="\n").writerow([c.header for c in channels])
+        for block in blocks:
+            table = np.column_stack([block[channel.name] for channel in channels])
+            stream.writelines(",".join(map(repr, row)) + "\n" for row in table.tolist())

@@ -47,10 +47,9 @@ class ParquetSource(FileSource):
 
     def _open(self) -> Any:
         arrow, parquet = _pyarrow()
-        if not self.path.exists():
-            raise self.error("no such file")
+        path = self.checked_path()
         try:
-            return parquet.ParquetFile(self.path)
+            return parquet.ParquetFile(path)
         except (arrow.ArrowException, OSError, ValueError) as error:
             reason = str(error).partition("\n")[0]
             raise self.error(f"is not a readable Parquet file: {reason}") from None
@@ -90,10 +89,7 @@ def write_parquet(path: Path, channels: Sequence[Channel], blocks: Iterable[Samp
     """Write a record in float64, bit for bit."""
     arrow, parquet = _pyarrow()
     schema = arrow.schema([(channel.header, arrow.float64()) for channel in channels])
-    try:
-        with parquet.ParquetWriter(path, schema) as writer:
-            for block in blocks:
-                arrays = [arrow.array(block[channel.name]) for channel in channels]
-                writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
-    except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror}", file=path) from None
+    with parquet.ParquetWriter(path, schema) as writer:
+        for block in blocks:
+            arrays = [arrow.array(block[channel.name]) for channel in channels]
+            writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))

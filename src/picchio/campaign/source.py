@@ -13,6 +13,7 @@ from picchio.campaign.channels import TIME, Channel, parse_header
 from picchio.campaign.units import Conversion
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.files import regular_file
 
 Samples = dict[str, FloatArray]
 Block = tuple[int, Samples]
@@ -110,6 +111,17 @@ class FileSource(Source):
         self.key = key
         self.columns = _columns(self, self.names())
         self.channels = {name: c.channel for name, c in self.columns.items() if name != TIME}
+
+    def checked_path(self) -> Path:
+        """The file, once it is sure that it is there and no pipe.
+
+        Raises:
+            InputError: missing, a folder, a pipe or a device.
+        """
+        try:
+            return regular_file(self.path)
+        except InputError as error:
+            raise error.placed(key=self.key) from None
 
     @abstractmethod
     def names(self) -> list[str]:

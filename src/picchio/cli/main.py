@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import signal
 import sys
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import typer
@@ -15,10 +18,11 @@ from picchio.cli.app import app
 # Importing its file adds a command, in the order of `picchio --help`.
 from picchio.cli.life import assess, envelope, fit_sn, map, place, view  # noqa: F401
 from picchio.cli.measured import check, diagnose, identify, import_, simulate  # noqa: F401
-from picchio.cli.output import begin, say_warning
+from picchio.cli.output import begin, printable, say_warning
 from picchio.cli.reference import described, reproduce, robots  # noqa: F401
-from picchio.core.errors import InputError, PicchioError
+from picchio.core.errors import InputError, OutputError, PicchioError
 
+_INTERRUPTED, _TERMINATED = 130, 143
 # Typer carries its own copy of click since 0.20: this is whichever it uses.
 _UsageError: Any = typer.BadParameter.__mro__[1]
 
@@ -27,11 +31,42 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exit 0 on success, else as `run` says, with one line on stderr."""
     warnings.showwarning = lambda message, *_, **__: say_warning(str(message))
     warnings.simplefilter("default")
-    sys.exit(run(arguments))
+    before = signal.signal(signal.SIGTERM, _terminated)
+    try:
+        code = run(arguments)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    if arguments is None and code in (_INTERRUPTED, _TERMINATED):
+        _end_at_once(code)
+    sys.exit(code)
+
+
+class _Terminated(BaseException):
+    """The process is asked to end: whatever is half-written goes, as after Ctrl-C."""
+
+
+def _terminated(*_: object) -> None:
+    raise _Terminated
+
+
+def _end_at_once(code: int) -> None:
+    """End without waiting for threads and workers, which have nothing to say any more."""
+    for process in multiprocessing.active_children():
+        process.kill()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def run(arguments: list[str] | None = None) -> int:
-    """Run the command line: 0, 2 on bad input, 1 without memory, 130 where it was interrupted."""
+    """Run the command line.
+
+    Args:
+        arguments: as typed; those of the process if None.
+
+    Returns:
+        0, 2 on bad input, 1 where the machine failed, 130 interrupted, 143 terminated.
+    """
     given = sys.argv[1:] if arguments is None else arguments
     begin(given)
     if given and given[-1] == "--version":  # of every subcommand, too
@@ -39,20 +74,34 @@ def run(arguments: list[str] | None = None) -> int:
     try:
         code = app(args=given or ["--help"], prog_name="picchio", standalone_mode=False)
         sys.stdout.flush()
+        if code == _INTERRUPTED:  # typer swallows it
+            return _fail("interrupted", _INTERRUPTED)
+    except OutputError as error:
+        return _fail(str(error), 1)
     except PicchioError as error:
         return _fail(str(_as_typed(error, given)))
     except _UsageError as error:
         where = error.ctx.command_path if error.ctx else "picchio"
         return _fail(f"{error.format_message()} See {where} --help")
     except (typer.Abort, KeyboardInterrupt):
-        return _fail("interrupted", 130)
+        return _fail("interrupted", _INTERRUPTED)
+    except _Terminated:
+        return _fail("terminated", _TERMINATED)
     except MemoryError:
         return _fail("there is not enough memory for this: ask for less at a time", 1)
-    except BrokenPipeError:
-        # The reader has gone: keep Python from complaining at exit, too.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # the reader has gone
+        _drop_stdout()
         return 0
+    except OSError as error:  # what is read or written knows its name; a full stdout has none
+        _drop_stdout()
+        return _fail(f"{error.filename or 'stdout'}: {error.strerror or error}", 1)
     return code if isinstance(code, int) else 0
+
+
+def _drop_stdout() -> None:
+    """Keep Python from complaining, at exit, of what it could not write."""
+    with suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _as_typed(error: PicchioError, given: Sequence[str]) -> PicchioError:
@@ -66,5 +115,5 @@ def _as_typed(error: PicchioError, given: Sequence[str]) -> PicchioError:
 
 
 def _fail(problem: str, code: int = 2) -> int:
-    print(f"picchio: error: {' '.join(problem.split())}", file=sys.stderr)
+    print(f"picchio: error: {printable(' '.join(problem.split()))}", file=sys.stderr)
     return code

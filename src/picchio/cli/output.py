@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -11,16 +12,21 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from picchio.core.errors import InputError
-from picchio.core.files import write_text
+from picchio.core.errors import InputError, OutputError
+from picchio.core.files import is_stream, write_text
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     from picchio.core.results import Result
 
 _PATIENCE = 2.0
+# ASCII's and Latin-1's, marks that turn the direction of writing, halves of characters.
+_CONTROL = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
+)
 _typed: list[str] = []
 _said: list[str] = []
 
@@ -36,29 +42,47 @@ def say_warning(message: str) -> None:
     line = " ".join(message.split())
     if line not in _said:
         _said.append(line)
-        print(f"picchio: warning: {line}", file=sys.stderr)
+        print(f"picchio: warning: {printable(line)}", file=sys.stderr)
 
 
 def console() -> Console:
-    """Where tables go: stdout, 120 columns wide where it is no terminal."""
+    """Where tables go: stdout, 120 columns wide where it is no terminal.
+
+    Text is printed as it is: a robot may be called "[/x]", which is no markup.
+    """
     from rich.console import Console
 
-    plain = not sys.stdout.isatty()
-    return Console(width=120 if plain else None, highlight=False, soft_wrap=False)
+    class Plain(Console):
+        def render_str(self, text: str, **options: Any) -> Text:
+            return super().render_str(printable(text), **options)
+
+    width = None if sys.stdout.isatty() else 120
+    return Plain(width=width, markup=False, emoji=False, highlight=False)
 
 
-def escape(text: str) -> str:
-    """Text in which rich sees no markup."""
-    from rich.markup import escape
+def styled(text: str, rest: str = "", *, style: str = "bold") -> Text:
+    """A text, of which the first part stands out, to print.
 
-    return escape(text)
+    Args:
+        text: the first part.
+        rest: the second, as usual.
+        style: of the first.
+    """
+    from rich.text import Text
+
+    return Text.assemble((printable(text), style), printable(rest))
 
 
-def definitions(rows: Iterable[tuple[str, str]]) -> Table:
+def printable(text: str) -> str:
+    """The text with control characters spelled out: a name must not command the terminal."""
+    return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+def definitions(rows: Iterable[tuple[str, str | Text]]) -> Table:
     """Names and what they mean, in two columns; no name is cut, the meaning wraps.
 
     Args:
-        rows: (name, text) with rich's markup.
+        rows: (name, text).
 
     Returns:
         a table to print.
@@ -74,12 +98,12 @@ def definitions(rows: Iterable[tuple[str, str]]) -> Table:
     return table
 
 
-def table(headers: Iterable[str], rows: Iterable[Iterable[str]], **style: Any) -> Table:
+def table(headers: Iterable[str], rows: Iterable[Iterable[str | Text]], **style: Any) -> Table:
     """A table to print; where there is little room, the first column alone is not broken.
 
     Args:
         headers: of the columns; one that begins with ">" is set to the right.
-        rows: cells, with rich's markup.
+        rows: cells: texts, or what `styled` makes.
         **style: of `rich.table.Table`, such as its title.
     """
     from rich import box
@@ -116,19 +140,22 @@ def check_targets(
         inputs: files that the command reads.
 
     Raises:
-        InputError: the folder is missing or read-only, or the file is one of the inputs.
+        InputError: the folder is missing, or the file is one of the inputs.
+        OutputError: the folder is read-only.
     """
     read = [Path(source) for source in inputs if source is not None and Path(source).exists()]
     for target in targets:
         if target is None or str(target) == "-":
             continue
         path = Path(target)
+        if is_stream(path):
+            continue
         if path.is_dir() and path.suffix != ".zarr":
             raise InputError("is a folder, not a file to write", file=path)
         if not path.parent.is_dir():
             raise InputError("cannot write here: the folder does not exist", file=path)
         if not os.access(path.parent, os.W_OK):
-            raise InputError("cannot write here: the folder is read-only", file=path)
+            raise OutputError("cannot be written: the folder is read-only", file=path)
         if path.exists() and any(path.samefile(source) for source in read):
             raise InputError("would overwrite an input of this command", file=path)
 

@@ -23,6 +23,25 @@ class PicchioWarning(UserWarning):
     """Something the user should know, that does not stop the work."""
 
 
+class OutputError(PicchioError):
+    """The machine failed: a full or read-only disk, a missing permission, a lock, memory.
+
+    Args:
+        problem: what went wrong, without a full stop.
+        file: that could not be written.
+        hint: what to do.
+    """
+
+    def __init__(
+        self, problem: str, *, file: str | Path | None = None, hint: str | None = None
+    ) -> None:
+        self.problem, self.hint = problem, hint
+        self.file = str(file) if file is not None else None
+        super().__init__(
+            (f"{self.file}: " if file else "") + problem + (f"; {hint}" if hint else "")
+        )
+
+
 class InputError(PicchioError):
     """Bad input: a file, a key, a value or an argument.
 

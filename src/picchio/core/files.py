@@ -3,51 +3,194 @@
 from __future__ import annotations
 
 import csv
+import ctypes
 import hashlib
 import io
 import math
 import os
+import re
+import shutil
+import stat
+import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, OutputError
 
 LARGEST = 32 << 20
 """Bytes of a file that people write."""
+_OLD = ".old"
+_STANDARD = ("/dev/stdin", "/dev/stdout", "/dev/stderr")
+_RENAME_EXCHANGE = 2  # linux/fs.h
 
 
 @contextmanager
 def atomic_write(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
     """Open a temporary file beside `path` and rename it over `path` when the block ends well.
 
+    A link is followed: what it points to is replaced. A pipe or a device is written to as it is.
+
     Args:
         path: where the file shall stand.
         mode: "w" for UTF-8 text, "wb" for bytes.
 
     Raises:
-        InputError: the folder does not exist or can't be written.
+        InputError: the folder does not exist, or there is a folder of this name.
+        OutputError: the disk is full or read-only, or the permission is missing.
     """
-    target = Path(path)
-    try:
+    encoding = None if "b" in mode else "utf-8"
+    if is_stream(path):
+        with writing(path):
+            sys.stdout.flush()
+            opened = os.dup(open_file) if (open_file := _open_file(path)) is not None else path
+            with open(opened, mode, encoding=encoding) as stream:
+                yield stream
+        return
+    target = Path(os.path.realpath(path))
+    if not target.parent.is_dir():
+        raise InputError("cannot write here: the folder does not exist", file=path)
+    if target.is_dir():
+        raise InputError("cannot write a file over a folder", file=path)
+    with writing(path):
         handle, name = tempfile.mkstemp(
             prefix=f".{target.name}.", suffix=".part", dir=target.parent
         )
-    except OSError as error:
-        raise InputError(f"cannot write here: {error.strerror}", file=target) from None
-    temporary = Path(name)
+        temporary = Path(name)
+        try:
+            os.chmod(temporary, 0o666 & ~umask())
+            with os.fdopen(handle, mode, encoding=encoding) as stream:
+                yield stream
+            os.replace(temporary, target)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+
+
+@contextmanager
+def writing(path: str | Path) -> Iterator[None]:
+    """Within the block, an error of the operating system is one line that names the output.
+
+    Args:
+        path: what is being written.
+
+    Raises:
+        OutputError: the disk is full or read-only, or the permission is missing.
+    """
     try:
-        os.chmod(temporary, 0o666 & ~umask())
-        with os.fdopen(handle, mode, encoding=None if "b" in mode else "utf-8") as stream:
-            yield stream
-        if target.is_dir():
-            raise InputError("cannot write a file over a folder", file=target)
-        os.replace(temporary, target)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
+        yield
+    except BrokenPipeError:  # the reader has gone, which is no failure
         raise
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"cannot be written: {reason}", file=path) from None
+
+
+def is_stream(path: str | Path) -> bool:
+    """Whether this is a pipe, a device or an open file's number: not to be replaced by a file."""
+    if _open_file(path) is not None:
+        return True
+    try:
+        mode = os.stat(path).st_mode
+    except OSError:
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+def _open_file(path: str | Path) -> int | None:
+    """The number of the open file that a name such as /dev/stdout stands for."""
+    name = os.path.abspath(path)
+    if name in _STANDARD:
+        return _STANDARD.index(name)
+    found = re.fullmatch(r"/(?:dev|proc/self)/fd/(\d+)", name)
+    return int(found[1]) if found else None
+
+
+def swap_in(new: Path, target: Path) -> None:
+    """Put a finished file or folder in the place of an old one, which is deleted.
+
+    At every moment there is the old one or the new one, whole: the two names are exchanged in one
+    step where the system can do that (Linux). Elsewhere a folder is moved aside first;
+    `recover` brings it back where that was interrupted.
+
+    Args:
+        new: beside the target, on the same disk.
+        target: need not exist.
+    """
+    if not target.is_dir() or not any(target.iterdir()):
+        if new.is_dir() and target.is_file():
+            target.unlink()
+        os.replace(new, target)
+        return
+    aside = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=_OLD, dir=target.parent))
+    old = aside / target.name
+    try:
+        os.replace(new, old)
+        if not _exchange(old, target):
+            os.replace(old, new)
+            os.replace(target, old)
+            try:
+                os.replace(new, target)
+            except BaseException:
+                os.replace(old, target)
+                raise
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def recover(target: Path) -> bool:
+    """Bring back a folder whose replacement was interrupted; whether there was one.
+
+    Args:
+        target: where it stood.
+    """
+    if target.exists():
+        return False
+    for old in sorted(target.parent.glob(f".{target.name}.*{_OLD}/{target.name}")):
+        os.replace(old, target)
+        shutil.rmtree(old.parent, ignore_errors=True)
+        return True
+    return False
+
+
+@contextmanager
+def locked(target: Path, *, patience: float = 0.0) -> Iterator[None]:
+    """Within the block no other process writes this file or folder, if it locks it, too.
+
+    Args:
+        target: which may not exist yet.
+        patience: seconds to wait for another process.
+
+    Raises:
+        OutputError: another process is writing it, or the lock cannot be made.
+    """
+    from filelock import FileLock, Timeout
+
+    file = target.with_name(f".{target.name}.lock")
+    lock = FileLock(file, timeout=patience)
+    with writing(target):
+        try:
+            lock.acquire()
+        except Timeout:
+            raise OutputError("another process is writing it", file=target) from None
+    try:
+        yield
+    finally:
+        # While it is held: who waits for it sees that the name is gone, and takes a new one.
+        file.unlink(missing_ok=True)
+        lock.release()
+
+
+def _exchange(one: Path, other: Path) -> bool:
+    """Exchange two names in one step; False where the system or the disk cannot."""
+    try:
+        call = ctypes.CDLL(None, use_errno=True).renameat2
+    except (AttributeError, OSError):
+        return False
+    names = os.fsencode(one.absolute()), os.fsencode(other.absolute())
+    return call(-1, names[0], -1, names[1], _RENAME_EXCHANGE) == 0
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -110,17 +253,38 @@ def read_bytes(path: str | Path, *, limit: int = LARGEST) -> bytes:
     Raises:
         InputError: missing, a folder, unreadable or too large.
     """
-    source = Path(path)
     try:
-        if source.is_dir():
-            raise InputError("is a folder, not a file", file=source)
-        if (size := source.stat().st_size) > limit:
-            raise InputError(f"is too large ({size} bytes; at most {limit})", file=source)
-        return source.read_bytes()
-    except FileNotFoundError:
-        raise InputError("no such file", file=source) from None
+        return regular_file(path, limit=limit).read_bytes()
     except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=source) from None
+        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
+
+
+def regular_file(path: str | Path, *, limit: float = math.inf) -> Path:
+    """The path, once it is sure that a file of bounded size is there.
+
+    A pipe would be waited for, a device read without end.
+
+    Args:
+        path: the file.
+        limit: refuse files above this size, in bytes.
+
+    Raises:
+        InputError: missing, a folder, a pipe or a device, unreadable or too large.
+    """
+    try:
+        found = os.stat(path)
+    except FileNotFoundError:
+        raise InputError("no such file", file=path) from None
+    except (OSError, ValueError) as error:  # a name with a zero byte is a ValueError
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"cannot be read: {reason}", file=path) from None
+    if stat.S_ISDIR(found.st_mode):
+        raise InputError("is a folder, not a file", file=path)
+    if not stat.S_ISREG(found.st_mode):
+        raise InputError("is a pipe or a device, not a file", file=path)
+    if found.st_size > limit:
+        raise InputError(f"is too large ({found.st_size} bytes; at most {limit:.0f})", file=path)
+    return Path(path)
 
 
 def read_columns(

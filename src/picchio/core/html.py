@@ -91,7 +91,7 @@ class Page:
             the same path.
 
         Raises:
-            InputError: it cannot be written there.
+            OutputError: it cannot be written there.
         """
         from picchio.core.files import write_text
 

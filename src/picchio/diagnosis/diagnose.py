@@ -10,6 +10,7 @@ from typing import Any
 
 from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.diagnosis.life import NO_SHAFT, has_strength
 from picchio.diagnosis.mixed import diagnose_mixed
@@ -35,6 +36,7 @@ from picchio.studies.tasks import Task, load_task
 _FOUND = "found by picchio diagnose"
 
 
+@one_thread()
 def diagnose(
     robot: str | Path | FlexibleRobot,
     campaign: str | Path | Campaign,

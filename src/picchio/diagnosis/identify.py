@@ -12,6 +12,7 @@ import numpy as np
 from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.tables import Tolerance
 from picchio.core.errors import InputError
+from picchio.core.processes import one_thread
 from picchio.core.results import TableResult
 from picchio.core.toml import StrictModel
 from picchio.diagnosis.diagnose import diagnose
@@ -143,6 +144,7 @@ class Identification(TableResult):
         ]
 
 
+@one_thread()
 def identify(
     robot: str | Path | FlexibleRobot,
     campaign: str | Path | Campaign,

@@ -9,6 +9,7 @@ from typing import Any
 
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
+from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
 from picchio.paper.assumptions import INPUTS, Assumptions, parse_assumptions
@@ -111,7 +112,7 @@ class Reproduction(TableResult):
 
 
 @contextmanager
-def one_thread() -> Iterator[None]:
+def compiled_on_one_thread() -> Iterator[None]:
     """Compiled code on one thread: the batches are small, and threads would wait for each other."""
     import numba
 
@@ -123,6 +124,7 @@ def one_thread() -> Iterator[None]:
         numba.set_num_threads(before)
 
 
+@one_thread()
 def reproduce(
     assume: Assumptions | Mapping[str, float | str] | None = None,
     *,
@@ -149,7 +151,7 @@ def reproduce(
     if not isinstance(assume, Assumptions):
         assume = parse_assumptions(f"{name}={value}" for name, value in (assume or {}).items())
     study = Study(assume, worlds, seed, progress)
-    with one_thread():
+    with compiled_on_one_thread():
         _ = study.base.rivet_poses, study.base.path_poses  # what is out of reach is said at once
         steps = waterfall(study.base)
         claims = try_claims(study)

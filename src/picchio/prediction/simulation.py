@@ -14,6 +14,7 @@ from picchio.campaign.channels import Channel
 from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.core.results import Result
 from picchio.core.toml import parse_toml
@@ -68,6 +69,7 @@ class Simulation(Result):
         }
 
 
+@one_thread()
 def simulate(
     robot: str | Path | FlexibleRobot,
     plan: str | Path | Plan,

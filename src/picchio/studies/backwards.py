@@ -13,6 +13,7 @@ import numpy as np
 
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
+from picchio.core.processes import one_thread
 from picchio.core.results import TableResult
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.counting.cycles import Cycles
@@ -98,6 +99,7 @@ class AllowableLoads(TableResult):
         return sheet("Allowable loads", facts, columns, rows)
 
 
+@one_thread()
 def allowable(
     robot: FlexibleRobot | Model,
     task: Task,

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
+from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
 from picchio.excitation.excitation import Excitation
@@ -186,6 +187,7 @@ class DirectionEnvelope(TableResult):
         }
 
 
+@one_thread()
 def envelope(
     robot: FlexibleRobot | Model,
     pose: ArrayLike,

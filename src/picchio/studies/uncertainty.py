@@ -12,6 +12,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
+from picchio.core.processes import one_thread
 from picchio.core.results import TableResult
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.counting.cycles import Cycles
@@ -77,6 +78,7 @@ class UncertainLife(TableResult):
         return vars(self)
 
 
+@one_thread()
 def uncertain_life(
     robot: FlexibleRobot | Model,
     task: Task,

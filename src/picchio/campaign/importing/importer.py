@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from picchio.campaign.importing.resample import common_clock
 from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.files import locked, regular_file
 from picchio.core.provenance import provenance
 from picchio.core.results import Result
 
@@ -24,6 +26,9 @@ READERS = {
 _ENDINGS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".uff": "uff", ".unv": "uff",
             ".mcap": "mcap", ".mat": "matlab"}  # fmt: skip
 
+# s that an import waits for another one into the same campaign.
+_PATIENCE = 60.0
+
 
 def read_raw(path: str | Path, mapping: Mapping | None = None) -> RawFile:
     """The series of a foreign file.
@@ -31,9 +36,7 @@ def read_raw(path: str | Path, mapping: Mapping | None = None) -> RawFile:
     Raises:
         InputError: missing, of an unknown kind, or not readable.
     """
-    source = Path(path)
-    if not source.is_file():
-        raise InputError("no such file", file=source)
+    source = regular_file(path)
     kind = (mapping.source.kind if mapping else None) or _ENDINGS.get(source.suffix.lower())
     if kind is None:
         raise InputError("the kind of file is not known by its ending", file=source,
@@ -168,11 +171,10 @@ def import_record(
     Raises:
         InputError: the file or the mapping cannot be read, they do not fit each other, or the
             campaign at `to` says otherwise than the mapping.
+        OutputError: the campaign cannot be written, or another process has been at it for a minute.
     """
-    source = Path(file)
+    source = regular_file(file)
     if mapping is None:
-        if not source.is_file():
-            raise InputError("no such file", file=source)
         raise InputError(
             "needs a mapping from its series to the campaign's channels",
             file=source,
@@ -185,9 +187,11 @@ def import_record(
     if to is None:
         return ImportedRecord(_noted(new, origin), origin)
     extra = {"mapping.toml": rules.read_bytes()}
-    if append:
-        new, extra = _appended(new, Path(to), extra["mapping.toml"])
-    made = _noted(new, origin).save(to, overwrite=append, extra_files=extra)
+    # Two that append at once would each add to the campaign as it was before.
+    with locked(Path(to), patience=_PATIENCE) if Path(to).parent.is_dir() else nullcontext():
+        if append:
+            new, extra = _appended(new, Path(to), extra["mapping.toml"])
+        made = _noted(new, origin).save(to, overwrite=append, extra_files=extra)
     return ImportedRecord(made, origin)
 
 

@@ -7,10 +7,10 @@ process of its own.
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from subprocess import TimeoutExpired
 from typing import Any
 
 import numpy as np
@@ -19,12 +19,15 @@ from picchio.campaign.importing.mapping import Mapping
 from picchio.campaign.importing.raw import RawChannel, RawFile, reason
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.files import regular_file
+from picchio.core.processes import run_python
 
 _DEEPEST = 6
 _REFUSED = 3
-_CHILD = (
-    "import sys; from picchio.campaign.importing.read_matlab import child; child(*sys.argv[1:])"
-)
+_CHILD = "from picchio.campaign.importing.read_matlab import child; child(*sys.argv[1:])"
+# What the reader may take: of a file of 1 GiB some 5 min and 12 GiB, compressed as it may be.
+_SECONDS, _SECONDS_A_BYTE = 60.0, 2.5e-7
+_MEMORY, _MEMORY_A_BYTE = 4 << 30, 8
 
 
 def read(path: Path, mapping: Mapping | None) -> RawFile:
@@ -38,12 +41,12 @@ def read(path: Path, mapping: Mapping | None) -> RawFile:
     """
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "series.npz"
-        done = subprocess.run(
-            [sys.executable, "-c", _CHILD, str(path), str(out)],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        size = regular_file(path).stat().st_size
+        seconds, memory = _SECONDS + size * _SECONDS_A_BYTE, _MEMORY + size * _MEMORY_A_BYTE
+        try:
+            done = run_python(_CHILD, [str(path), str(out)], seconds=seconds, memory=memory)
+        except TimeoutExpired:
+            raise InputError(f"could not be read within {seconds:.0f} s", file=path) from None
         if done.returncode == _REFUSED:
             raise InputError(file=path, **json.loads(done.stdout))
         if done.returncode != 0:
@@ -73,6 +76,8 @@ def _load(path: Path) -> dict[str, FloatArray]:
     except NotImplementedError:
         raise InputError("is a version 7.3 file (HDF5), which is not read",
                          hint="save it in MATLAB with '-v7'") from None  # fmt: skip
+    except MemoryError:
+        raise InputError("needs more memory than its size allows for") from None
     except Exception as error:  # a damaged file may raise anything
         raise InputError(f"is not a readable .mat file: {reason(error)}") from None
     series: dict[str, FloatArray] = {}

@@ -27,6 +27,7 @@ from picchio.cli.output import (
     count_of,
     deliver,
     progress,
+    styled,
     table,
     write_report,
 )
@@ -200,7 +201,7 @@ def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
     """Print an assessment."""
     out = console()
     passes = sum(len(op.poses) * op.rivets for op in found.operations)
-    out.print(f"[bold]{found.robot}[/bold] on {task.name}: {count_of(passes, 'rivet')} a pass")
+    out.print(styled(found.robot, f" on {task.name}: {count_of(passes, 'rivet')} a pass"))
     for blows in dict.fromkeys(_blows(operation) for operation in found.operations):
         out.print(f"  {blows}")
         for operation in found.operations:
@@ -221,18 +222,18 @@ def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
         heads = ("joint", "reducer", ">used, %", "the limit that binds")
         out.print(table(heads, reducers, title="The reducers"))
         for line in found.reducer_warnings:
-            out.print(f"  {line}", markup=False)
+            out.print(f"  {line}")
         out.print()
-    out.print(f"[bold]{verdict(found)}[/bold]\n")
+    out.print(f"{verdict(found)}\n", style="bold")
     if len(found.operations) > 1 and any(joint.damage_share for joint in found.joints):
         out.print(_share_table(found))
     if found.steady_state:
         out.print(_steady_table(found))
     if terms:
         out.print(_terms_table(terms))
-    out.print("[dim]How this was computed[/dim]")
+    out.print("How this was computed", style="dim")
     for line in found.assumptions:
-        out.print(f"[dim]  - {line}[/dim]")
+        out.print(f"  - {line}", style="dim")
 
 
 def _life_table(found: Assessment) -> Table:
@@ -350,7 +351,7 @@ def _show_spread(found: UncertainLife) -> None:
         "from, %",
     ))  # fmt: skip
     for line in found.assumptions:
-        out.print(f"[dim]  - {line}[/dim]")
+        out.print(f"  - {line}", style="dim")
 
 
 def _number(value: float) -> str:

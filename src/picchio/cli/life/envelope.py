@@ -20,7 +20,7 @@ from picchio.cli.options import (
     WidthOption,
     numbers,
 )
-from picchio.cli.output import check_targets, console, deliver, table
+from picchio.cli.output import check_targets, console, deliver, styled, table
 
 if TYPE_CHECKING:
     from picchio.studies.envelopes import DirectionEnvelope
@@ -60,7 +60,7 @@ def _show(found: DirectionEnvelope) -> None:
     out = console()
     pose = ", ".join(f"{q:g}" for q in found.pose)
     how = "steady state" if found.hits is None else f"{found.hits} hits from rest"
-    out.print(f"[bold]{found.robot}[/bold] at ({pose}), {how}")
+    out.print(styled(found.robot, f" at ({pose}), {how}"))
     out.print(f"  {found.excitation.describe()}")
     frequencies = ", ".join(f"{f:.4f}" for f in found.natural_frequencies)
     out.print(f"  natural frequencies {frequencies} Hz\n")

@@ -9,7 +9,7 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import JsonOption
-from picchio.cli.output import check_targets, console, deliver, table
+from picchio.cli.output import check_targets, console, deliver, styled, table
 
 if TYPE_CHECKING:
     from picchio.fatigue.sn.fit import Estimate, SNFit
@@ -75,7 +75,7 @@ def fit_sn(
 
 def _show(found: SNFit, tests: Path) -> None:
     screen = console()
-    screen.print(f"[bold]{tests.name}[/bold]: {found.failures} failures, {found.run_outs} run-outs")
+    screen.print(styled(tests.name, f": {found.failures} failures, {found.run_outs} run-outs"))
     limit = (
         "endurance limit in shear, median, MPa"
         if found.knee
@@ -94,4 +94,4 @@ def _show(found: SNFit, tests: Path) -> None:
         rows.append((name, format(value.value * factor, spec), f"{low} to {high}"))
     screen.print(table(("", ">value", f">{100 * found.level:g} % interval"), rows))
     for line in found.assumptions:
-        screen.print(f"[dim]  - {line}[/dim]")
+        screen.print(f"  - {line}", style="dim")

@@ -19,7 +19,7 @@ from picchio.cli.options import (
     WidthOption,
     numbers,
 )
-from picchio.cli.output import check_targets, console, deliver, progress, table
+from picchio.cli.output import check_targets, console, deliver, progress, styled, table
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -187,7 +187,7 @@ def _places(
 
 def _show(summary: dict[str, Any]) -> None:
     out = console()
-    out.print(f"[bold]{summary['robot']}[/bold]: {summary['poses']} poses in {summary['file']}")
+    out.print(styled(summary["robot"], f": {summary['poses']} poses in {summary['file']}"))
     hits, counted = summary["hits"], summary["hits_of_damage"]
     when = "steady state" if hits is None else f"{hits} hits from rest"
     along = {"worst": "each joint's worst direction", "normal": "along the surface's normal"}

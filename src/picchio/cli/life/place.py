@@ -19,7 +19,7 @@ from picchio.cli.options import (
     numbers,
     task_file,
 )
-from picchio.cli.output import check_targets, console, deliver, progress, table
+from picchio.cli.output import check_targets, console, deliver, progress, styled, table
 from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
@@ -118,8 +118,11 @@ def _show(found: Placement, off: float, moved: Path | None) -> None:
     x, y, z = found.best.spot.move[:3].round(3) + 0.0
     heading = round(math.degrees(found.best.spot.move[3]), 2) + 0.0
     out.print(
-        f"[bold]{found.robot}[/bold]: {found.placements} placements tried all over, "
-        f"{found.reached} of them within reach; {found.nearby} more near the best"
+        styled(
+            found.robot,
+            f": {found.placements} placements tried all over, {found.reached} of them within "
+            f"reach; {found.nearby} more near the best",
+        )
     )
     if found.moved:
         out.print(

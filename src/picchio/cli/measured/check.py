@@ -22,9 +22,9 @@ from picchio.cli.output import (
     console,
     count_of,
     deliver,
-    escape,
     progress,
     say_warning,
+    styled,
     table,
     write_report,
 )
@@ -136,7 +136,7 @@ def _show_contents(report: QualityReport) -> None:
     campaign, records = report.campaign, report.records
     name = str(campaign.folder) if campaign.folder is not None else "campaign in memory"
     robot = report.robot.name if report.robot else "no robot: limits and axes are not checked"
-    out.print(f"[bold]{escape(name)}[/bold]: {count_of(len(records), 'record')}; {escape(robot)}")
+    out.print(styled(name, f": {count_of(len(records), 'record')}; {robot}"))
     hits = [r for r in records if r.kind == "percussion"]
     motions = [r for r in records if r.kind == "motion"]
     if hits:
@@ -176,7 +176,7 @@ def _record_table(records: Sequence[RecordSummary]) -> Table:
             f"{c + 0.0:.2g}" for c in np.round(record.direction, 6)
         )  # fmt: skip
         rows.append((
-            escape(record.file), _done(record), ", ".join(f"{q:.3g}" for q in numbers) or "-",
+            record.file, _done(record), ", ".join(f"{q:.3g}" for q in numbers) or "-",
             along, f"{record.start:.4g}", f"{record.end:.4g}", str(record.samples),
             f"{record.rate:.6g}", str(len(record.channels)),
         ))  # fmt: skip
@@ -211,7 +211,7 @@ def _channel_table(report: QualityReport) -> Table:
             colour = "a rough floor" if noise.rough else "white" if noise.white else "coloured"
             cells = [f"{noise.std:.3g}", f"{100 * noise.error:.2g} %",
                      "-" if np.isnan(ratio) else f"{ratio:.0f}", hum or "-", colour]  # fmt: skip
-        rows.append((escape(name), units[name], str(len(rms)), f"{min(rms):.3g}",
+        rows.append((name, units[name], str(len(rms)), f"{min(rms):.3g}",
                      f"{max(rms):.3g}", *cells))  # fmt: skip
     heads = ("channel", "unit", ">in records", ">RMS,\nleast", ">RMS,\nmost", ">noise\n(std)",
              ">known\nto", ">signal over\nnoise, dB", ">hum", "colour")  # fmt: skip
@@ -228,7 +228,6 @@ def _finding_table(report: QualityReport, verbose: bool) -> Table:
         if files:
             count = f"{len(files)} of {len(report.records)} records, worst {worst.record}"
             where += (": " if where else "") + (files[0] if len(files) == 1 else count)
-        style = _STYLES[worst.severity]
-        rows.append((f"[{style}]{worst.severity}[/{style}]", escape(where or "campaign"),
-                     escape(worst.message), escape(worst.advice)))  # fmt: skip
+        mark = styled(worst.severity, style=_STYLES[worst.severity])
+        rows.append((mark, where or "campaign", worst.message, worst.advice))
     return table(("", "where", "what was seen", "what to do"), rows, title="What was found")

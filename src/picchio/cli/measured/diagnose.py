@@ -24,6 +24,7 @@ from picchio.cli.output import (
     console,
     count_of,
     deliver,
+    styled,
     table,
     telling,
     write_report,
@@ -32,6 +33,8 @@ from picchio.core.files import write_text
 from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
+    from rich.text import Text
+
     from picchio.diagnosis.result import Diagnosis
 
 
@@ -121,7 +124,7 @@ def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
     from picchio.model.effects.registry import effect_class
 
     out = console()
-    out.print(f"[bold]{found.verdict}[/bold]: {found.note or VERDICTS[found.verdict]}.")
+    out.print(styled(found.verdict, f": {found.note or VERDICTS[found.verdict]}."))
     if found.causes:
         rows = []
         for cause in found.causes:
@@ -177,10 +180,10 @@ def _show_life(life: Mapping[str, Any]) -> None:
     def used(share: float) -> str:
         return f"{100 * share:.4g}"
 
-    def between(joint: Mapping[str, Any], key: str, show: Callable[[float], str]) -> str:
+    def between(joint: Mapping[str, Any], key: str, show: Callable[[float], str]) -> Text | str:
         """The interval, where it says more than the value."""
         low, high = (show(end) for end in joint.get(key, (math.nan, math.nan)))
-        return "" if low == high else f"[dim]{low} to {high}[/dim]"
+        return "" if low == high else styled(f"{low} to {high}", style="dim")
 
     rows = []
     for name, before in life["baseline"]["joints"].items():
@@ -196,9 +199,10 @@ def _show_life(life: Mapping[str, Any]) -> None:
     out.print(table(columns, rows, box=None, header_style="dim", title="Life"))
     if "interval_level" in life:
         out.print(
-            f"  [dim]{100 * life['interval_level']:g} % intervals: before, of the stated "
+            f"  {100 * life['interval_level']:g} % intervals: before, of the stated "
             "tolerance; after, of what was fitted. The material's scatter is not in them (picchio "
-            "assess --uncertainty)[/dim]"
+            "assess --uncertainty)",
+            style="dim",
         )
 
 

@@ -9,7 +9,7 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import JsonOption
-from picchio.cli.output import console, definitions, deliver, escape
+from picchio.cli.output import console, definitions, deliver, styled
 
 if TYPE_CHECKING:
     from picchio.reference.effects import EffectDescription
@@ -47,12 +47,17 @@ def formats(
 
 
 def _list_effects(entries: tuple[EffectDescription, ...]) -> None:
+    from rich.text import Text
+
     from picchio.reference.effects import by_place
 
     screen = console()
     for heading, group in by_place(entries).items():
-        screen.print(f"[bold]{heading}[/bold]")
-        rows = [(entry.name, f"{entry.meaning} [dim]({entry.target})[/dim]") for entry in group]
+        screen.print(heading, style="bold")
+        rows = [
+            (entry.name, Text.assemble(f"{entry.meaning} ", (f"({entry.target})", "dim")))
+            for entry in group
+        ]
         screen.print(definitions(rows))
     screen.print("In brackets: what the effect acts on. `picchio effects NAME` shows one in full.")
 
@@ -61,15 +66,15 @@ def _show_effect(entry: EffectDescription) -> None:
     from picchio.reference.effects import shown_bounds, shown_unit, target_meaning
 
     screen = console()
-    screen.print(f"[bold]{entry.name}[/bold]: {entry.meaning}")
-    screen.print(escape(entry.detail))
+    screen.print(styled(entry.name, f": {entry.meaning}"))
+    screen.print(entry.detail)
     facts = [("where", entry.where), ("target", target_meaning(entry.target))]
     if entry.drawn:
         facts.append(("drawn", f"{entry.drawn}; another in every record"))
     if entry.source:
         facts.append(("source", entry.source))
     screen.print(definitions(facts))
-    screen.print("[bold]Parameters[/bold]")
+    screen.print("Parameters", style="bold")
     screen.print(
         definitions(
             (
@@ -79,19 +84,19 @@ def _show_effect(entry: EffectDescription) -> None:
             for p in entry.parameters
         )
     )
-    screen.print("[bold]Example[/bold], in a picchio-model/1 or picchio-plan/1 file")
-    screen.print("\n" + escape(entry.example), soft_wrap=True)
+    screen.print(styled("Example", ", in a picchio-model/1 or picchio-plan/1 file"))
+    screen.print("\n" + entry.example, soft_wrap=True)
 
 
 def _list_formats(entries: tuple[FileFormat, ...]) -> None:
     screen = console()
     for role, title in (("input", "What you write"), ("output", "What picchio writes")):
-        screen.print(f"[bold]{title}[/bold]")
+        screen.print(title, style="bold")
         rows = []
         for e in entries:
             if e.role == role:
                 facts = "; ".join(fact for fact in (e.kind, e.format, e.command) if fact)
-                rows.append((e.name, escape(f"{e.meaning}\n{facts}")))
+                rows.append((e.name, f"{e.meaning}\n{facts}"))
         screen.print(definitions(rows))
     screen.print("`picchio formats NAME` prints every key of one.")
 
@@ -100,16 +105,16 @@ def _show_format(entry: FileFormat) -> None:
     from picchio.reference.formats import sections
 
     screen = console()
-    screen.print(f"[bold]{entry.name}[/bold]: {escape(entry.meaning)}")
-    screen.print(escape("; ".join(x for x in (entry.kind, entry.format, entry.command) if x)))
+    screen.print(styled(entry.name, f": {entry.meaning}"))
+    screen.print("; ".join(x for x in (entry.kind, entry.format, entry.command) if x))
     for section, keys in sections(entry).items():
         if section:
-            screen.print(f"[bold]{escape(_heading(section, entry.kind))}[/bold]")
+            screen.print(_heading(section, entry.kind), style="bold")
         rows = [
             (key.path.rpartition(".")[2] if section else key.path, _text(key, entry.role))
             for key in keys
         ]
-        screen.print(definitions((escape(name), escape(text)) for name, text in rows))
+        screen.print(definitions(rows))
 
 
 def _heading(section: str, kind: str) -> str:

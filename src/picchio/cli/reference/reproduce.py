@@ -9,7 +9,15 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import JsonOption, ReportOption
-from picchio.cli.output import check_targets, console, deliver, progress, table, write_report
+from picchio.cli.output import (
+    check_targets,
+    console,
+    deliver,
+    progress,
+    styled,
+    table,
+    write_report,
+)
 
 if TYPE_CHECKING:
     from picchio.paper.run import Reproduction
@@ -52,18 +60,16 @@ def reproduce(
 
 
 def _show(found: Reproduction, report: Path | None) -> None:
-    from rich.markup import escape
-
     screen = console()
     printed = found.study.printed
-    screen.print(f"[bold]{printed.title}[/bold]\n{printed.journal}\n", highlight=False)
+    screen.print(styled(printed.title, f"\n{printed.journal}\n"))
     colour = {"holds": "green", "holds only if": "yellow", "does not hold": "red",
               "cannot be known": "dim"}  # fmt: skip
     rows = []
     for tried in found.claims:
-        mark, condition = str(tried.finding.verdict), escape(tried.finding.condition)
-        rows.append((str(tried.sentence.page), escape(tried.sentence.quote),
-                     f"[{colour[mark]}]{mark}[/] {condition}"))  # fmt: skip
+        mark = str(tried.finding.verdict)
+        told = styled(mark, f" {tried.finding.condition}", style=colour[mark])
+        rows.append((str(tried.sentence.page), tried.sentence.quote, told))
     screen.print(table((">p.", "claim", "verdict"), rows, box=None))
     screen.print(f"\n{found._headline()}.")
     lives = found.answer.table

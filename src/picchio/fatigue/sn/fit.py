@@ -15,6 +15,7 @@ import numpy.typing as npt
 from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError, PicchioWarning
 from picchio.core.html import sheet
+from picchio.core.processes import one_thread
 from picchio.core.results import TableResult
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import write_sn_curve
@@ -142,7 +143,7 @@ class SNFit(TableResult):
             path: the file; `load_sn_curve` and `--sn-curve` read it.
 
         Raises:
-            InputError: it cannot be written there.
+            OutputError: it cannot be written there.
         """
         write_sn_curve(self.curve(self.design_survival, name=Path(path).stem), path)
 
@@ -182,6 +183,7 @@ class SNFit(TableResult):
         }
 
 
+@one_thread()
 def fit_sn(
     tests: str | Path | SNTests,
     *,

@@ -96,7 +96,7 @@ def write_sn_curve(curve: SNCurve, path: str | Path) -> None:
         path: the file; its folder must exist.
 
     Raises:
-        InputError: it cannot be written there.
+        OutputError: it cannot be written there.
     """
     import tomlkit
 

@@ -15,6 +15,7 @@ from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.record import Record
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
+from picchio.core.processes import one_thread
 from picchio.core.results import TableResult
 from picchio.measurement.noise.estimate import NoiseCollector
 from picchio.measurement.noise.level import Noise
@@ -198,6 +199,7 @@ class QualityReport(TableResult):
         }
 
 
+@one_thread()
 def check(
     campaign: str | Path | Campaign,
     robot: str | Path | FlexibleRobot | None = None,

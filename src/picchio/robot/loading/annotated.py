@@ -41,7 +41,7 @@ class AnnotatedUrdf(Result):
             the path.
 
         Raises:
-            InputError: it cannot be written there.
+            OutputError: it cannot be written there.
         """
         with atomic_write(path, "wb") as stream:
             stream.write(self.content)

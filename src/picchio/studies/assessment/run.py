@@ -11,6 +11,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.mean_stress import Rule
@@ -43,6 +44,7 @@ _LARGEST = (
 )  # fmt: skip
 
 
+@one_thread()
 def assess(
     robot: FlexibleRobot | Model,
     task: Task,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import io
 import shutil
 import warnings
 from collections.abc import Iterable, Iterator
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from picchio.core.errors import InputError
+from picchio.core.files import swap_in, writing
 from picchio.studies.maps.chunk import Columns
 
 # Rows written at a time, and of a piece of a Zarr store: a piece is then written once, not again
@@ -50,20 +51,20 @@ def join_chunks(target: Path, chunks: Iterable[Columns], attributes: dict[str, A
     rows = 0
     names = {name: attributes[name] for name in ("joint", "coordinate")} | {"xyz": list("xyz")}
     labels = {name: np.array(values, dtype=object) for name, values in names.items()}
-    out = writer(part, labels, {k: v for k, v in attributes.items() if k not in names})
-    try:
-        for columns in _in_blocks(chunks):
-            out.append(columns)
-            rows += len(columns["place"])
-        out.close()
-    except BaseException:
-        _remove(part)
-        raise
-    if not rows:
-        _remove(part)
-        raise InputError("no point of the map can be reached within the joint limits", key="places")
-    _remove(target)
-    os.replace(part, target)
+    with writing(target):
+        try:
+            out = writer(part, labels, {k: v for k, v in attributes.items() if k not in names})
+            for columns in _in_blocks(chunks):
+                out.append(columns)
+                rows += len(columns["place"])
+            out.close()
+            if not rows:
+                raise InputError(
+                    "no point of the map can be reached within the joint limits", key="places"
+                )
+            swap_in(part, target)
+        finally:
+            _remove(part)
 
 
 def _in_blocks(chunks: Iterable[Columns]) -> Iterator[Columns]:
@@ -95,7 +96,8 @@ class _NetcdfWriter:
 
         self._labels, self._attributes = labels, attributes
         self._rows = 0
-        self._file = h5netcdf.File(path, "w")
+        self._stream = _KeptError(path)
+        self._file = h5netcdf.File(self._stream, "w")
         self._ready = False
 
     def _prepare(self, columns: Columns) -> None:
@@ -123,9 +125,43 @@ class _NetcdfWriter:
         self._file.resize_dimension("point", self._rows)
         for name, values in columns.items():
             self._file.variables[name][first : self._rows] = values
+        self._stream.check()
 
     def close(self) -> None:
         self._file.close()
+        self._stream.close()
+        self._stream.check()
+
+
+class _KeptError(io.FileIO):
+    """A file whose errors are kept for us: HDF5 crashes where one reaches it in its close."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "w+")
+        self._error: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        count = memoryview(data).nbytes
+        if self._error is None:
+            try:
+                written = 0
+                while written < count:
+                    written += super().write(memoryview(data).cast("B")[written:]) or 0
+            except OSError as error:
+                self._error = error
+        return count
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self._error = self._error or error
+            return size or 0
+
+    def check(self) -> None:
+        """Raise what a write met."""
+        if self._error is not None:
+            raise self._error
 
 
 class _ZarrWriter:

@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.core.files import read_columns
+from picchio.core.files import read_columns, regular_file
 from picchio.robot.flexible_robot import FlexibleRobot
 
 PLANES = ("xy", "xz", "yz")
 _AXES = "xyz"
 _MOST_STEPS = 10**6
+_MOST_BYTES = 256 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,10 +184,9 @@ def surface(path: str | Path, *, spacing: float) -> Listed:
 
     if not (math.isfinite(spacing) and spacing > 0.0):
         raise InputError("must be positive", key="spacing", value=spacing)
-    if not Path(path).is_file():
-        raise InputError("no such file", file=path)
+    file = regular_file(path, limit=_MOST_BYTES)
     try:
-        mesh = trimesh.load_mesh(path)
+        mesh = trimesh.load_mesh(file)
     except Exception as error:  # each format's reader raises what it likes
         raise InputError(f"cannot be read as a mesh: {error}", file=path) from None
     if not len(getattr(mesh, "faces", ())):

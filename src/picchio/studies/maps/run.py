@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,7 +18,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from picchio.core.errors import InputError
-from picchio.core.files import atomic_write, write_text
+from picchio.core.files import atomic_write, locked, regular_file, write_text
+from picchio.core.processes import one_thread, safe_start
 from picchio.core.provenance import provenance
 from picchio.excitation.excitation import Excitation
 from picchio.model.model import Model
@@ -39,6 +41,7 @@ ENDINGS = (".nc", ".zarr")
 _WORTH_WORKERS = 50_000
 
 
+@one_thread()
 def workspace_map(
     robot: FlexibleRobot | Model,
     places: Places,
@@ -124,18 +127,19 @@ def workspace_map(
             hint="give shafts in a sidecar",
         )
     job = MapJob(model, excitation, places, direction, branch, hits, damage)
-    if restart:
-        shutil.rmtree(_folder_of(target), ignore_errors=True)
-    folder = _open_folder(target, job, chunk)
-    spans = [(k, min(k + chunk, len(places))) for k in range(0, len(places), chunk)]
-    missing = [span for span in spans if not _file(folder, span).exists()]
-    done = len(places) - sum(last - first for first, last in missing)
-    for span in _run(job, folder, missing, workers, scheduler):
-        done += span[1] - span[0]
-        if progress is not None:
-            progress(done, len(places))
-    join_chunks(target, (_read(_file(folder, span)) for span in spans), _attributes(job))
-    shutil.rmtree(folder)
+    with locked(target):
+        if restart:
+            shutil.rmtree(_folder_of(target), ignore_errors=True)
+        folder = _open_folder(target, job, chunk)
+        spans = [(k, min(k + chunk, len(places))) for k in range(0, len(places), chunk)]
+        missing = [span for span in spans if not _file(folder, span).exists()]
+        done = len(places) - sum(last - first for first, last in missing)
+        for span in _run(job, folder, missing, workers, scheduler):
+            done += span[1] - span[0]
+            if progress is not None:
+                progress(done, len(places))
+        join_chunks(target, (_read(_file(folder, span)) for span in spans), _attributes(job))
+        shutil.rmtree(folder)
     return WorkspaceMap(open_map(target), target)
 
 
@@ -148,13 +152,15 @@ def open_map(path: str | Path) -> xarray.Dataset:
     import xarray
 
     target = Path(path)
-    if not target.exists():
+    if target.suffix != ".zarr":
+        regular_file(target)
+    elif not target.exists():
         raise InputError("no such file", file=target)
     try:
         if target.suffix == ".zarr":
             return xarray.open_zarr(target, consolidated=False)
         return xarray.open_dataset(target, engine="h5netcdf")
-    except (OSError, ValueError, KeyError) as error:
+    except Exception as error:  # h5py raises whatever a damaged file makes it
         raise InputError(f"cannot be read as a map: {error}", file=target) from None
 
 
@@ -220,23 +226,29 @@ def _run(
         return
     from distributed import Client, LocalCluster, as_completed
 
-    cluster = None
-    if scheduler is None:
-        cluster = LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None
-        )
+    cluster = client = None
     try:
-        with Client(cluster or scheduler) as client:
-            shared = client.scatter(job, broadcast=True)
-            futures = client.map(
-                compute_chunk, [shared] * len(missing), [folder] * len(missing), missing,
-                pure=False, retries=3,
-            )  # fmt: skip
-            for future in as_completed(futures):
-                yield future.result()
+        if scheduler is None:
+            with safe_start():
+                cluster = LocalCluster(
+                    n_workers=workers, threads_per_worker=1, processes=True,
+                    dashboard_address=None, silence_logs=logging.CRITICAL,
+                )  # fmt: skip
+        client = Client(cluster or scheduler)
+        shared = client.scatter(job, broadcast=True)
+        futures = client.map(
+            compute_chunk, [shared] * len(missing), [folder] * len(missing), missing,
+            pure=False, retries=3,
+        )  # fmt: skip
+        for future in as_completed(futures):
+            yield future.result()
     finally:
-        if cluster is not None:
-            cluster.close()
+        # What its tasks say of being stopped in the middle is of no use to anybody.
+        logging.disable()
+        for part in (client, cluster):
+            if part is not None:
+                part.close()
+        logging.disable(logging.NOTSET)
 
 
 def _attributes(job: MapJob) -> dict[str, Any]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.fatigue.miner import life
 from picchio.fatigue.sn.curve import SNCurve
@@ -39,6 +40,7 @@ _DESCENTS = 3
 _PERIODS = 7
 
 
+@one_thread()
 def place(
     robot: FlexibleRobot | Model,
     task: Task,

@@ -106,7 +106,7 @@ class Scene(Page, Result):
         """Write the page to a file, whole or not at all, and return the path.
 
         Raises:
-            InputError: it cannot be written there.
+            OutputError: it cannot be written there.
         """
         self.file = super().save(path)
         return self.file

@@ -19,6 +19,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from picchio.core.arrays import FloatArray
+from picchio.core.processes import end_with
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Pin, Problem
 from picchio.model.effects.effect import Effect
 
@@ -57,7 +58,9 @@ def worker_pool(
     pool: ProcessPoolExecutor | None = None
     if count > 1:
         _shared[number] = functions
-        pool = ProcessPoolExecutor(count, multiprocessing.get_context("fork"))
+        pool = ProcessPoolExecutor(
+            count, multiprocessing.get_context("fork"), _start, (os.getpid(),)
+        )
 
     def mapped(name: str, items: Iterable[Any]) -> list[Any]:
         todo = list(items)
@@ -65,14 +68,24 @@ def worker_pool(
             return [functions[name](item) for item in todo]
         return list(pool.map(_run, [(number, name, item) for item in todo]))
 
-    finished = False
+    others = set(multiprocessing.active_children())
     try:
         yield mapped
-        finished = True
+    except BaseException:
+        # Interrupted: what they are at is of no use any more.
+        for process in set(multiprocessing.active_children()) - others:
+            process.kill()
+        raise
     finally:
         _shared.pop(number, None)
         if pool is not None:
-            pool.shutdown(wait=finished, cancel_futures=True)
+            pool.shutdown(cancel_futures=True)
+
+
+def _start(parent: int) -> None:
+    """In a forked process: Ctrl-C is for the parent, which ends this one; so does its death."""
+    end_with(parent)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _run(task: tuple[int, str, Any]) -> Any:
@@ -118,7 +131,9 @@ class _Helpers:
             self._ends.append(mine)
             # Were our ends open in it, it would not notice that we are gone.
             process = context.Process(
-                target=_serve, args=(problem, its, list(self._ends)), daemon=True
+                target=_serve,
+                args=(problem, its, list(self._ends), self._owner),
+                daemon=True,
             )
             process.start()
             its.close()
@@ -171,9 +186,11 @@ class _Helpers:
         self._ends, self._processes = [], []
 
 
-def _serve(problem: Problem, connection: Connection, others: Sequence[Connection]) -> None:
+def _serve(
+    problem: Problem, connection: Connection, others: Sequence[Connection], parent: int
+) -> None:
     """Answer until the other end is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _start(parent)
     for other in others:
         other.close()
     warnings.simplefilter("ignore")

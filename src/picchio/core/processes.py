@@ -1,0 +1,101 @@
+"""Processes of our own: what they import, how long they live, how many threads they use."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+_PR_SET_PDEATHSIG = 1  # linux/prctl.h
+_PACKAGES = str(Path(__file__).resolve().parents[2])
+# What a child does first: its search path is ours, not one that begins with the current folder,
+# where a `numpy.py` beside the data would be taken for the package.
+_BEGIN = "import sys; sys.path[:] = sys.argv.pop(1).split({sep!r}); "
+_LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_AS, ({memory}, {memory})); "
+
+
+def search_path() -> list[str]:
+    """The folders that a child process imports from: ours, without the current folder."""
+    here = os.path.realpath(os.curdir)
+    kept = [folder for folder in sys.path if folder and os.path.realpath(folder) != here]
+    return kept if _PACKAGES in kept else [*kept, _PACKAGES]
+
+
+def run_python(
+    code: str, arguments: Sequence[str], *, seconds: float, memory: int
+) -> subprocess.CompletedProcess[str]:
+    """Run some lines of Python in a process of their own, with bounded time and memory.
+
+    Args:
+        code: the lines; `sys.argv[1:]` holds the arguments.
+        arguments: of the process.
+        seconds: after which it is ended.
+        memory: bytes of its address space; no bound where the system knows none.
+
+    Returns:
+        its exit status and what it printed.
+
+    Raises:
+        subprocess.TimeoutExpired: it took longer.
+    """
+    begin = _BEGIN.format(sep=os.pathsep)
+    if sys.platform != "win32":
+        begin += _LIMIT.format(memory=memory)
+    begin += f"from picchio.core.processes import end_with; end_with({os.getpid()}); "
+    return subprocess.run(
+        # -I: neither the current folder nor the environment's folders are searched (implies -P)
+        [sys.executable, "-I", "-c", begin + code, os.pathsep.join(search_path()), *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=seconds,
+        # Each thread of the linear algebra takes address space; a reader needs one.
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+    )
+
+
+def end_with(parent: int) -> None:
+    """Have this process end when its parent does, however that ends (Linux).
+
+    Args:
+        parent: process number, as `os.getpid()` in the parent.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:  # it ended before we asked
+            os._exit(1)
+
+
+@contextmanager
+def safe_start() -> Iterator[None]:
+    """Within the block, Python processes that others start search no current folder either."""
+    path, before = list(sys.path), dict(os.environ)
+    sys.path[:] = search_path()
+    os.environ["PYTHONSAFEPATH"] = "1"
+    # Of a command that was interrupted multiprocessing says that it left something behind.
+    os.environ["PYTHONWARNINGS"] = "ignore:resource_tracker"
+    try:
+        yield
+    finally:
+        sys.path[:] = path
+        os.environ.clear()
+        os.environ.update(before)
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Within the block, linear algebra uses one thread a process; forked processes do as well.
+
+    The matrices of a robot are small, and several threads only wait for each other: a diagnosis on
+    an idle machine of two cores takes a quarter longer with them, on a busy one several times.
+    """
+    import scipy.linalg  # noqa: F401  # a library that is not loaded yet cannot be limited
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, user_api="blas"):
+        yield

@@ -1,0 +1,72 @@
+"""Commands as processes of their own, in a folder of their own."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import pytest
+
+from picchio.cli.main import main
+
+HERE = str(Path(__file__).resolve().parent)
+if HERE not in sys.path:
+    sys.path.insert(0, HERE)
+COMMAND = [sys.executable, "-c", "from picchio.cli.main import main; main()"]
+
+
+@pytest.fixture
+def start(tmp_path):
+    """`start(*arguments)`: a `picchio` process whose current folder is `tmp_path`."""
+    started = []
+
+    def begin(*arguments, **options):
+        options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options
+        process = subprocess.Popen(
+            [COMMAND[0], "-P", *COMMAND[1:], *map(str, arguments)], cwd=tmp_path, **options
+        )
+        started.append(process)
+        return process
+
+    yield begin
+    for process in started:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+@pytest.fixture
+def picchio_process(start):
+    """`picchio_process(*arguments)`: exit status, stdout and stderr of a process that has ended."""
+
+    def call(*arguments, timeout=120, **options):
+        process = start(*arguments, **options)
+        out, err = process.communicate(timeout=timeout)
+        return subprocess.CompletedProcess(arguments, process.returncode, out, err)
+
+    return call
+
+
+@pytest.fixture
+def in_process():
+    """`in_process(*arguments, cwd=...)`: the same in this process, which is many times faster."""
+
+    def call(*arguments, cwd="."):
+        out, err = io.StringIO(), io.StringIO()
+        with (
+            contextlib.chdir(cwd),
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(err),
+            warnings.catch_warnings(),
+            pytest.raises(SystemExit) as ended,
+        ):
+            main([str(argument) for argument in arguments])
+        return subprocess.CompletedProcess(
+            arguments, ended.value.code, out.getvalue(), err.getvalue()
+        )
+
+    return call

@@ -1,0 +1,103 @@
+"""A command that is ended ends whole: no worker outlives it, and it says one line at most."""
+
+import os
+import signal
+import sys
+import time
+
+import pytest
+from held import alive, children
+
+from picchio.prediction.plan import Plan
+from picchio.prediction.simulation import simulate
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform != "linux", reason="looks at processes in Linux's /proc"),
+]
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """Enough records that a diagnosis has something to share among workers, for a while."""
+    folder = tmp_path_factory.mktemp("data") / "campaign"
+    blows = {"kind": "pulse_train", "force": 300.0, "period": 0.04, "width": 0.004, "hits": 10}
+    plan = Plan(
+        poses=[[0.3, 0.5, -0.8], [-0.4, 0.9, -1.2], [0.0, 0.2, -0.5]],
+        directions=[[0.6, 0.0, 0.8], [0.0, 1.0, 0.0]], sample_rate=2000.0, quiet=0.5, length=2.0,
+        excitation=blows,
+        effect=[{"effect": "joint_stiffness", "target": "joint_2", "parameters": {"scale": 0.8}}],
+        sensor=[{"channels": "accelerometer.tool", "noise": 0.1}],
+    )  # fmt: skip
+    simulate("fanuc_like_3dof", plan, folder)
+    return folder
+
+
+def begun(start, campaign, command):
+    """A process with workers, and they."""
+    process = start(*command(campaign))
+    until = time.monotonic() + 60.0
+    while time.monotonic() < until and process.poll() is None:
+        found = children(process.pid)
+        if found:
+            time.sleep(0.5)  # in the midst of their work
+            return process, children(process.pid) | found
+        time.sleep(0.05)
+    raise AssertionError(process.communicate()[1])
+
+
+def gone(pids, within):
+    until = time.monotonic() + within
+    while time.monotonic() < until:
+        if not any(map(alive, pids)):
+            return True
+        time.sleep(0.05)
+    return False
+
+
+COMMANDS = {
+    "diagnose": lambda data: ("diagnose", "fanuc_like_3dof", "--data", data),
+    "map": lambda data: (
+        "map", "fanuc_like_3dof", "--joint-grid", "60", "--workers", "2", "--out", "m.nc",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_killed(name, start, campaign):
+    process, workers = begun(start, campaign, COMMANDS[name])
+    process.kill()
+    process.wait()
+    assert gone(workers, 3.0)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize(
+    ("number", "status", "line"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+)
+def test_asked_to_end(name, number, status, line, start, campaign):
+    process, workers = begun(start, campaign, COMMANDS[name])
+    asked = time.monotonic()
+    os.kill(process.pid, number)
+    _, err = process.communicate(timeout=30)
+    assert time.monotonic() - asked < 3.0
+    assert process.returncode == status
+    assert err.splitlines()[-1] == f"picchio: error: {line}"
+    assert len([text for text in err.splitlines() if "warning" not in text]) == 1, err
+    assert gone(workers, 1.0)
+
+
+def test_ctrl_c_reaches_the_workers_too(start, campaign):
+    """A terminal sends it to all processes of the command at once."""
+    process = start(*COMMANDS["diagnose"](campaign), start_new_session=True)
+    until = time.monotonic() + 60.0
+    while not (workers := children(process.pid)) and time.monotonic() < until:
+        time.sleep(0.05)
+    time.sleep(0.5)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert err.splitlines()[-1] == "picchio: error: interrupted"
+    assert "Traceback" not in err
+    assert gone(workers, 1.0)

@@ -1,0 +1,52 @@
+"""Linear algebra uses one thread a process in what picchio computes, whatever is set outside."""
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
+
+import picchio
+from picchio.core.processes import one_thread
+from picchio.diagnosis.percussion.fit.parallel import worker_pool
+
+
+def blas_threads(_=None):
+    return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
+
+
+@pytest.fixture
+def two():
+    np.linalg.inv(np.eye(3))
+    with threadpool_limits(2, user_api="blas"):
+        if set(blas_threads()) != {2}:
+            pytest.fail("a BLAS that cannot be set")
+        yield
+
+
+def test_parent_and_workers_use_one(two):
+    with one_thread():
+        assert set(blas_threads()) == {1}
+        with worker_pool(2, {"look": blas_threads}) as mapped:
+            assert {n for found in mapped("look", range(4)) for n in found} == {1}
+    assert set(blas_threads()) == {2}  # as the user had it
+
+
+def test_every_study_does(two, monkeypatch):
+    """A function that computes is marked by `one_thread`; it is the outermost of its frames."""
+    found = {}
+    for name in ("assess", "allowable", "uncertain_life", "envelope", "workspace_map", "place",
+                 "check", "diagnose", "identify", "simulate", "fit_sn", "reproduce"):  # fmt: skip
+        function = getattr(picchio, name)
+        found[name] = function.__wrapped__.__name__ if hasattr(function, "__wrapped__") else None
+    assert found == {name: name for name in found}
+    seen = []
+    robot = picchio.load_robot("fanuc_like_3dof")
+    task = picchio.load_task(robot.task_path, robot)
+    first = type(robot).state
+
+    def look(self, *arguments, **options):
+        seen.append(set(blas_threads()))
+        return first(self, *arguments, **options)
+
+    monkeypatch.setattr(type(robot), "state", look)
+    picchio.assess(robot, task)
+    assert seen and all(threads == {1} for threads in seen)
