@@ -26,8 +26,6 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
 ROOT = Path(__file__).resolve().parent.parent
 # Not the folder of benchmarks, which has a rainflow.py of its own.
 sys.path[0] = str(ROOT / "tests" / "diagnosis")

@@ -20,8 +20,6 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
 ROOT = Path(__file__).resolve().parent.parent
 # Not this folder, which has a rainflow.py of its own.
 sys.path[0] = str(ROOT / "tests" / "diagnosis")

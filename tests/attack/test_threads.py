@@ -50,3 +50,11 @@ def test_every_study_does(two, monkeypatch):
     monkeypatch.setattr(type(robot), "state", look)
     picchio.assess(robot, task)
     assert seen and all(threads == {1} for threads in seen)
+
+
+def test_nothing_sets_the_users_variables(repository):
+    """A benchmark, or a test in CI, runs under what a user gets."""
+    files = [repository / ".ci" / "run", *(repository / "benchmarks").glob("*.py")]
+    assert len(files) > 5
+    for file in files:
+        assert "_NUM_THREADS" not in file.read_text(), file

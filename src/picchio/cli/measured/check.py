@@ -80,6 +80,7 @@ def check(
     Clipping, dropouts, spikes, drift, uneven clocks, swapped or flipped axes, hum, high-passes,
     delays, records that are too short, aliasing, repeats, and the noise of every channel. --report
     shows how a simulation of the nominal robot, with gravity's stiffness or without, differs.
+    Everything is written; then the exit status is 2 where an error was found, 0 otherwise.
     """
     import math
 
@@ -103,6 +104,11 @@ def check(
             if group[0].severity != "note":
                 more = f" (and {len(group) - 1} more like it)" if len(group) > 1 else ""
                 say_warning(f"{group[0]}{more}")
+    errors = [finding for finding in found.findings if finding.severity == "error"]
+    if errors:
+        raise InputError(
+            f"{count_of(len(errors), 'error')} found, first: {errors[0]}", file=campaign
+        )
 
 
 def _show(report: QualityReport, verbose: bool) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from picchio.campaign.campaign import Campaign
 from picchio.core.errors import InputError
+from picchio.core.processes import one_thread
 from picchio.diagnosis.motion.conclude.holdout import judge, judged_groups, table
 from picchio.diagnosis.motion.conclude.values import nuisances, parameters
 from picchio.diagnosis.motion.criteria.holdout import validate
@@ -53,6 +54,7 @@ class _Search:
     dropped: list[tuple[Effect, dict[str, float]]]
 
 
+@one_thread()
 def diagnose_motion(
     robot: FlexibleRobot,
     campaign: Campaign,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from picchio.campaign.campaign import Campaign
+from picchio.core.processes import one_thread
 from picchio.diagnosis.life import life_before_and_after
 from picchio.diagnosis.percussion.conclude.causes import (
     fitted_causes,
@@ -91,6 +92,7 @@ class PercussionDiagnosis:
         )
 
 
+@one_thread()
 def diagnose_percussion(
     robot: FlexibleRobot,
     campaign: Campaign,
