@@ -59,3 +59,11 @@ def test_nothing_sets_the_users_variables(repository):
     for file in files:
         text = file.read_text()
         assert not any(f"{name}_NUM_THREADS" in text for name in ("OMP", "OPENBLAS", "MKL")), file
+
+
+def test_a_warning_still_points_at_the_users_line():
+    robot = picchio.load_robot("ur10")
+    task = picchio.load_task(robot.task_path, robot)
+    with pytest.warns(picchio.PicchioWarning, match="no shaft is given") as told:
+        picchio.assess(robot, task)
+    assert {warning.filename for warning in told} == {__file__}

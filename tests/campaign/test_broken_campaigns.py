@@ -244,7 +244,7 @@ def test_a_record_that_is_a_folder_or_leads_out(campaign_folder, tmp_path):
         load_campaign(campaign_folder)
     file.unlink()
     file.mkdir()
-    with pytest.raises(InputError, match=r"r01\.csv.*cannot be read"):
+    with pytest.raises(InputError, match=r"r01\.csv.*is a folder"):
         load_campaign(campaign_folder)
 
 

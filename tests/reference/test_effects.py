@@ -44,7 +44,9 @@ def printed(*arguments, width, monkeypatch):
     from rich.console import Console
 
     module = "picchio.cli.reference.described"
-    monkeypatch.setattr(f"{module}.console", lambda: Console(width=width, highlight=False))
+    monkeypatch.setattr(
+        f"{module}.console", lambda: Console(width=width, highlight=False, markup=False)
+    )
     out = io.StringIO()
     with contextlib.redirect_stdout(out):
         assert run(list(arguments)) == 0

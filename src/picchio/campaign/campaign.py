@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
@@ -26,7 +25,7 @@ from picchio.campaign.tables import (
     RecordTable,
     Tolerance,
 )
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 from picchio.core.files import recover, relative_name, swap_in, umask, writing
 from picchio.core.toml import parse_toml, validate
 
@@ -204,7 +203,7 @@ def _check_record(record: Record, key: str, file: Path | None) -> None:
     if record.kind == "motion":
         if useless := record.table.percussion_keys():
             text = f"{file}: {key} ({record.file}): a motion record has no use for "
-            warnings.warn(text + ", ".join(useless), PicchioWarning, stacklevel=4)
+            warn_user(text + ", ".join(useless))
         return
     for name in ("pose", "direction"):
         if getattr(record.table, name) is None:
@@ -238,8 +237,10 @@ def load_campaign(path: str | Path | Campaign, *, clock_tolerance: float = TOLER
     if not given.exists():
         if not recover(given):
             raise InputError("no such campaign", file=given)
-        warnings.warn(f"{given}: its replacement was interrupted; the campaign from before it is "
-                      "in its place again", PicchioWarning, stacklevel=2)  # fmt: skip
+        warn_user(
+            f"{given}: its replacement was interrupted; the campaign from before it is "
+            "in its place again"
+        )
     folder = given if given.is_dir() else given.parent
     file = given / CAMPAIGN_FILE if given.is_dir() else given
     if not file.is_file():

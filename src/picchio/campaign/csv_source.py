@@ -14,7 +14,7 @@ import numpy as np
 from picchio.campaign.channels import Channel
 from picchio.campaign.source import Block, Column, FileSource, Samples
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import PicchioWarning
+from picchio.core.errors import warn_user
 
 _LONGEST_LINE = 1 << 20
 _BYTES_A_VALUE = 20
@@ -75,7 +75,7 @@ class CsvSource(FileSource):
                 if lines[-1][-1:] not in (b"\n", b"\r"):
                     place = self.error("has no line end: the file may have been cut short",
                                        sample=first - 1)  # fmt: skip
-                    warnings.warn(str(place), PicchioWarning, stacklevel=3)
+                    warn_user(str(place))
 
     def _converted(
         self, columns: list[Column], table: FloatArray, first: int

@@ -7,12 +7,16 @@ valid choices, so that a user can mend the input without reading a traceback.
 from __future__ import annotations
 
 import difflib
+import sys
+import warnings
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 _NOT_GIVEN = object()
 _MOST_CHOICES = 12
+# Modules whose lines are none of the user's; contextlib's are between decorated functions.
+_OURS = ("picchio", "contextlib")
 
 
 class PicchioError(Exception):
@@ -21,6 +25,18 @@ class PicchioError(Exception):
 
 class PicchioWarning(UserWarning):
     """Something the user should know, that does not stop the work."""
+
+
+def warn_user(message: str) -> None:
+    """A PicchioWarning at the line, outside picchio, that led to it.
+
+    Args:
+        message: a sentence without a full stop.
+    """
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and frame.f_globals["__name__"].split(".")[0] in _OURS:
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, PicchioWarning, stacklevel=level)
 
 
 class OutputError(PicchioError):

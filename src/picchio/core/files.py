@@ -37,6 +37,9 @@ def atomic_write(path: str | Path, mode: str = "w") -> Iterator[IO[Any]]:
         path: where the file shall stand.
         mode: "w" for UTF-8 text, "wb" for bytes.
 
+    Returns:
+        a context manager whose value is the open file.
+
     Raises:
         InputError: the folder does not exist, or there is a folder of this name.
         OutputError: the disk is full or read-only, or the permission is missing.
@@ -76,6 +79,9 @@ def writing(path: str | Path) -> Iterator[None]:
     Args:
         path: what is being written.
 
+    Returns:
+        a context manager.
+
     Raises:
         OutputError: the disk is full or read-only, or the permission is missing.
     """
@@ -89,7 +95,11 @@ def writing(path: str | Path) -> Iterator[None]:
 
 
 def is_stream(path: str | Path) -> bool:
-    """Whether this is a pipe, a device or an open file's number: not to be replaced by a file."""
+    """Whether this is a pipe, a device or an open file's number: not to be replaced by a file.
+
+    Args:
+        path: of an output, which may not exist yet.
+    """
     if _open_file(path) is not None:
         return True
     try:
@@ -141,10 +151,13 @@ def swap_in(new: Path, target: Path) -> None:
 
 
 def recover(target: Path) -> bool:
-    """Bring back a folder whose replacement was interrupted; whether there was one.
+    """Bring back a folder whose replacement was interrupted.
 
     Args:
         target: where it stood.
+
+    Returns:
+        whether there was one.
     """
     if target.exists():
         return False
@@ -162,6 +175,9 @@ def locked(target: Path, *, patience: float = 0.0) -> Iterator[None]:
     Args:
         target: which may not exist yet.
         patience: seconds to wait for another process.
+
+    Returns:
+        a context manager.
 
     Raises:
         OutputError: another process is writing it, or the lock cannot be made.
@@ -212,7 +228,14 @@ def umask() -> int:
 
 
 def sha256(path: str | Path) -> str:
-    """SHA-256 of a file's bytes, as 64 hex digits."""
+    """SHA-256 of a file's bytes.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        64 hex digits.
+    """
     with open(path, "rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 

@@ -73,7 +73,11 @@ def end_with(parent: int) -> None:
 
 @contextmanager
 def safe_start() -> Iterator[None]:
-    """Within the block, Python processes that others start search no current folder either."""
+    """Within the block, Python processes that others start search no current folder either.
+
+    Returns:
+        a context manager.
+    """
     path, before = list(sys.path), dict(os.environ)
     sys.path[:] = search_path()
     os.environ["PYTHONSAFEPATH"] = "1"
@@ -93,6 +97,9 @@ def one_thread() -> Iterator[None]:
 
     The matrices of a robot are small, and several threads only wait for each other: a diagnosis on
     an idle machine of two cores takes a quarter longer with them, on a busy one several times.
+
+    Returns:
+        a context manager, or a decorator of a function that computes.
     """
     import scipy.linalg  # noqa: F401  # a library that is not loaded yet cannot be limited
     from threadpoolctl import threadpool_limits

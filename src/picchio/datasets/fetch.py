@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 
 VARIABLE = "PICCHIO_DATA"
 
@@ -102,7 +102,7 @@ def _local(dataset: Dataset, folder: Path) -> dict[str, Path]:
                              value=name)  # fmt: skip
         if hashlib.sha256(content(path)).hexdigest() != remote.sha256:
             text = f"{path}: is not the file that {dataset.name} was made for (SHA-256 differs)"
-            warnings.warn(text, PicchioWarning, stacklevel=4)
+            warn_user(text)
         found[name] = path
     return found
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from picchio.campaign.campaign import Campaign, load_campaign
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.diagnosis.life import NO_SHAFT, has_strength
@@ -167,7 +166,7 @@ def _percussion_life(
     robot = hit.problem.robot
     if not has_strength(robot):
         if task is not None:
-            warnings.warn(NO_SHAFT, PicchioWarning, stacklevel=3)
+            warn_user(NO_SHAFT)
         return None
     if answer.verdict in ("nothing-wrong", "unexplained"):
         return None
@@ -175,7 +174,7 @@ def _percussion_life(
         work = _task_of(robot, task)
         return None if work is None else hit.life(work)
     except InputError as error:  # what took minutes to find is told all the same
-        warnings.warn(f"the life could not be computed: {error}", PicchioWarning, stacklevel=3)
+        warn_user(f"the life could not be computed: {error}")
         return None
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
@@ -15,7 +14,7 @@ from picchio.campaign.readers import Reading
 from picchio.campaign.record import Record
 from picchio.campaign.tables import CAMPAIGN_FILE
 from picchio.core.arrays import BoolArray, FloatArray
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 from picchio.core.recent import Recent
 from picchio.excitation.piecewise import PiecewiseForce
 from picchio.model.blows import Blows
@@ -312,11 +311,9 @@ def _warn_of_blows_beyond(record: Record) -> None:
     end = record.clock.start + record.clock.step * (record.clock.samples - 1)
     if period is None or hits is None or (hits - 1) * period <= end:
         return
-    warnings.warn(
+    warn_user(
         f"{record.file} ends at {end:.3g} s, before the last of {hits} blows at "
-        f"{(hits - 1) * period:.3g} s: is the period of {period:g} s right?",
-        PicchioWarning,
-        stacklevel=3,
+        f"{(hits - 1) * period:.3g} s: is the period of {period:g} s right?"
     )
 
 
@@ -340,11 +337,9 @@ def _channels(record: Record, robot: FlexibleRobot) -> tuple[Channel, ...]:
         channel = record.channel(name)
         if channel.kind.reader is None:
             if not channel.kind.unused:
-                warnings.warn(
+                warn_user(
                     f"{record.file}: {name} is not used: nothing predicts a {channel.kind.name} "
-                    "while the tool hits",
-                    PicchioWarning,
-                    stacklevel=3,
+                    "while the tool hits"
                 )
             continue
         if channel.kind.of == "joint" and channel.subject not in robot.flexible_names:

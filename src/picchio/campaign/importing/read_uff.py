@@ -12,7 +12,7 @@ import numpy as np
 
 from picchio.campaign.importing.mapping import Mapping
 from picchio.campaign.importing.raw import Names, RawChannel, RawFile, reason
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 
 # Function types of data set 58 that are histories in time: general, and time response.
 _TIME_HISTORIES = (0, 1)
@@ -57,7 +57,7 @@ def read(path: Path, mapping: Mapping | None) -> RawFile:
         channels[channel.name] = channel
     if skipped:
         text = f"{path}: {skipped} data sets are no time histories and were left out"
-        warnings.warn(text, PicchioWarning, stacklevel=2)
+        warn_user(text)
     if not channels:
         raise InputError("holds no time history in a data set 58", file=path)
     return RawFile(path, "uff", channels)

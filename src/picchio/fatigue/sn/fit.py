@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import NormalDist
@@ -13,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from picchio.core.arrays import FloatArray, as_floats
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 from picchio.core.html import sheet
 from picchio.core.processes import one_thread
 from picchio.core.results import TableResult
@@ -260,11 +259,7 @@ def fit_sn(
     if with_knee and run_outs == 0:
         raise InputError("a knee needs run-outs", key="knee", value=knee)
     if knee is None and not with_knee:
-        warnings.warn(
-            "no test is a run-out, so the fit has no knee and no endurance limit",
-            PicchioWarning,
-            stacklevel=2,
-        )
+        warn_user("no test is a run-out, so the fit has no knee and no endurance limit")
     free = [0, 1, 2, 3, 4] if with_knee else [0, 2, 3]
     known = dataclasses.replace(known, limited=with_knee)
     theta = _best(known, free)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 from picchio.core.results import plain
 from picchio.core.toml import Positive, StrictModel, parse_toml
 from picchio.fatigue.sn.curve import MinerRule, SNCurve
@@ -84,7 +83,7 @@ def load_sn_curve(name_or_path: str | Path, *, quiet: bool = False) -> SNCurve:
     except InputError as error:
         raise InputError(str(error), file=path) from None
     if curve.warning and not quiet:
-        warnings.warn(f"S-N curve {curve.name}: {curve.warning}", PicchioWarning, stacklevel=2)
+        warn_user(f"S-N curve {curve.name}: {curve.warning}")
     return curve
 
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import csv
 import math
 import re
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 from picchio.core.files import read_text
 
 _UNITS = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "n/mm^2": 1e6, "n/mm2": 1e6, "gpa": 1e9,
@@ -131,5 +130,5 @@ def _by_cycles(
     limit = longest if run_out_cycles is None else float(run_out_cycles)
     note = f"no outcome column: tests that reached {limit:g} cycles are run-outs"
     if run_out_cycles is None:
-        warnings.warn(note, PicchioWarning, stacklevel=3)
+        warn_user(note)
     return cycles < limit, (note,)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -11,7 +10,7 @@ import numpy as np
 from picchio.campaign.campaign import Campaign
 from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 from picchio.robot.flexible_robot import FlexibleRobot
 
 _STANDS = 0.01
@@ -66,11 +65,9 @@ def read_log(robot: FlexibleRobot, record: Record) -> MotionLog:
         if channel.kind.motion:
             wanted[name] = channel
         elif not channel.kind.unused:
-            warnings.warn(
+            warn_user(
                 f"{record.file}: {name} is not used: nothing predicts a {channel.kind.name} "
-                "while the robot moves",
-                PicchioWarning,
-                stacklevel=3,
+                "while the robot moves"
             )
     read = record.read(wanted)
     for name, channel in wanted.items():

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 
 if TYPE_CHECKING:
     from picchio.robot.flexible_robot import FlexibleRobot
@@ -94,6 +93,4 @@ def warn_beyond_limits(robot: FlexibleRobot, poses: Iterable[FloatArray], what: 
     hint = "; angles are in radians" if far > 2.0 * np.pi * _TURNS else ""
     for name, count in beyond.items():
         of = "" if len(every) == 1 else f" in {count} of {len(every)} poses"
-        warnings.warn(
-            f"{what}: {name} is beyond its limits{of}{hint}", PicchioWarning, stacklevel=3
-        )
+        warn_user(f"{what}: {name} is beyond its limits{of}{hint}")

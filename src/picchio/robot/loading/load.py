@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from lxml import etree
 
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 from picchio.core.toml import validate
 from picchio.robot.annotations.flexibility import Source, flexible_joints
 from picchio.robot.annotations.inline import read_annotations
@@ -76,7 +75,7 @@ def load_robot(
     joints, origins = flexible_joints(tree, sources)
     _check_balancers(sources, joints)
     for remark in _remarks(tree, joints, origins):
-        warnings.warn(remark, PicchioWarning, stacklevel=2)
+        warn_user(remark)
     chosen_tool, tool_origins = choose_tool(tree, tool, sources, srdf)
     gun, gun_origins = choose_gun(sources)
     mounting, base_origins = choose_mounting(sources)
@@ -151,11 +150,7 @@ def _check_owner(sidecar: Sidecar, file: Path, found: FoundRobot, name: str) -> 
     """Warn of a sidecar that names another robot: arms of one maker share their joints' names."""
     known = {text.removesuffix("_robot") for text in (found.name, name, found.urdf.stem) if text}
     if sidecar.robot is not None and sidecar.robot.removesuffix("_robot") not in known:
-        warnings.warn(
-            f"{file}: says that it belongs to robot {sidecar.robot!r}, not to {found.urdf}",
-            PicchioWarning,
-            stacklevel=4,
-        )
+        warn_user(f"{file}: says that it belongs to robot {sidecar.robot!r}, not to {found.urdf}")
 
 
 def _remarks(

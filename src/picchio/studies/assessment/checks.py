@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import warnings
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 from picchio.fatigue.miner import life
 from picchio.fatigue.reducer import Reducer, load_reducer
 from picchio.fatigue.shaft_stress import check_shaft
@@ -31,7 +30,7 @@ def reducer_of(joint: Joint) -> Reducer | None:
     try:
         return load_reducer(joint.reducer)
     except InputError as error:
-        warnings.warn(f"{joint.name}: {error}; it is left unchecked", PicchioWarning, stacklevel=3)
+        warn_user(f"{joint.name}: {error}; it is left unchecked")
         return None
 
 
@@ -39,11 +38,9 @@ def warn_about_shafts(robot: FlexibleRobot) -> None:
     """Warn of joints without a shaft, and of shafts that do not fit their joint."""
     bare = [joint.name for joint in robot.flexible_joints if joint.shaft is None]
     if bare:
-        warnings.warn(
+        warn_user(
             f"no shaft is given for {', '.join(bare)}: deflection and torque are given, stress "
-            "and life are not",
-            PicchioWarning,
-            stacklevel=3,
+            "and life are not"
         )
     for joint in robot.flexible_joints:
         if joint.shaft is None:
@@ -61,9 +58,7 @@ def warn_about_shafts(robot: FlexibleRobot) -> None:
             )
         else:
             continue
-        warnings.warn(
-            f"{joint.name}: the shaft, by G Jp / l, {problem}", PicchioWarning, stacklevel=3
-        )
+        warn_user(f"{joint.name}: the shaft, by G Jp / l, {problem}")
 
 
 def warn_about_yield(joints: tuple[JointLife, ...], curves: tuple[SNCurve | None, ...]) -> None:
@@ -73,12 +68,10 @@ def warn_about_yield(joints: tuple[JointLife, ...], curves: tuple[SNCurve | None
             continue
         strength = curve.yield_shear or curve.ultimate_shear
         if strength is not None and joint.peak_total_stress >= strength:
-            warnings.warn(
+            warn_user(
                 f"{joint.name}: gravity and blows together reach "
                 f"{joint.peak_total_stress / 1e6:.4g} MPa in shear, and {curve.name} yields at "
-                f"{strength / 1e6:.4g} MPa: no fatigue life holds there",
-                PicchioWarning,
-                stacklevel=3,
+                f"{strength / 1e6:.4g} MPa: no fatigue life holds there"
             )
 
 

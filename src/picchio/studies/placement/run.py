@@ -9,14 +9,13 @@ placements spread over what is allowed, then a pattern search from the best few 
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.fatigue.miner import life
@@ -114,11 +113,9 @@ def place(
     beyond = any(robot.limit_violations(pose) for pose in work.pose)
     valid = not beyond and not search.colliding(work.pose)
     if not valid:
-        warnings.warn(
+        warn_user(
             "the work now stands where joints are beyond their limits or links collide: it is "
-            "no candidate for the best place",
-            PicchioWarning,
-            stacklevel=2,
+            "no candidate for the best place"
         )
     best = _search(search, start if valid else None, half, periods, placements, seed, progress)
     now = _standing(search, start)

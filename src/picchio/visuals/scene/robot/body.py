@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.visuals.kinematics import Frame
 from picchio.visuals.scene.robot.mesh import Mesh, merged, rgb, rod, sphere, turned_to
@@ -106,8 +105,7 @@ def build_body(
                 shape = _shape(visual)
             except (InputError, OSError) as error:
                 broken.append(visual.link)
-                warnings.warn(f"link {visual.link!r} is drawn as a primitive: {error}",
-                              PicchioWarning, stacklevel=2)  # fmt: skip
+                warn_user(f"link {visual.link!r} is drawn as a primitive: {error}")
                 continue
             known[key] = len(shapes)
             shapes.append(shape)

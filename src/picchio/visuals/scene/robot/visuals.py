@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 from lxml import etree
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError, PicchioWarning
+from picchio.core.errors import InputError, warn_user
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.find import resolve_package
 from picchio.robot.urdf.xml import children, parse_urdf, read_urdf_bytes
@@ -57,8 +56,7 @@ def read_visuals(robot: FlexibleRobot) -> tuple[list[Visual], list[str]]:
                 found.append(_visual(name, element, named, robot.source.parent))
             except (InputError, ValueError, OSError) as error:
                 broken.append(name)
-                warnings.warn(f"link {name!r} is drawn as a primitive: {error}", PicchioWarning,
-                              stacklevel=2)  # fmt: skip
+                warn_user(f"link {name!r} is drawn as a primitive: {error}")
     return found, broken
 
 
