@@ -12,6 +12,7 @@ import json
 import logging
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -226,15 +227,19 @@ def _run(
         return
     from distributed import Client, LocalCluster, as_completed
 
-    cluster = client = None
-    try:
+    with ExitStack() as open_things:
+        open_things.callback(logging.disable, logging.NOTSET)
+        cluster = None
         if scheduler is None:
             with safe_start():
                 cluster = LocalCluster(
                     n_workers=workers, threads_per_worker=1, processes=True,
                     dashboard_address=None, silence_logs=logging.CRITICAL,
                 )  # fmt: skip
-        client = Client(cluster or scheduler)
+            open_things.enter_context(cluster)
+        client = open_things.enter_context(Client(cluster or scheduler))
+        # First of all at the end: what its tasks say of being stopped is of no use to anybody.
+        open_things.callback(logging.disable)
         shared = client.scatter(job, broadcast=True)
         futures = client.map(
             compute_chunk, [shared] * len(missing), [folder] * len(missing), missing,
@@ -242,13 +247,6 @@ def _run(
         )  # fmt: skip
         for future in as_completed(futures):
             yield future.result()
-    finally:
-        # What its tasks say of being stopped in the middle is of no use to anybody.
-        logging.disable()
-        for part in (client, cluster):
-            if part is not None:
-                part.close()
-        logging.disable(logging.NOTSET)
 
 
 def _attributes(job: MapJob) -> dict[str, Any]:
