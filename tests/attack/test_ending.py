@@ -8,6 +8,7 @@ import time
 import pytest
 from held import alive, children
 
+from picchio.cli.main import _not_lost
 from picchio.prediction.plan import Plan
 from picchio.prediction.simulation import simulate
 
@@ -101,3 +102,18 @@ def test_ctrl_c_reaches_the_workers_too(start, campaign):
     assert err.splitlines()[-1] == "picchio: error: interrupted"
     assert "Traceback" not in err
     assert gone(workers, 5.0)
+
+
+def test_an_interrupt_in_a_destructor_is_not_lost(monkeypatch):
+    class Last:
+        def __del__(self):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys, "unraisablehook", _not_lost)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            Last()
+            time.sleep(1.0)
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import _thread
 import multiprocessing
 import os
 import signal
 import sys
+import threading
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
@@ -31,6 +33,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exit 0 on success, else as `run` says, with one line on stderr."""
     warnings.showwarning = lambda message, *_, **__: say_warning(str(message))
     warnings.simplefilter("default")
+    sys.unraisablehook = _not_lost
     before = signal.signal(signal.SIGTERM, _terminated)
     try:
         code = run(arguments)
@@ -47,6 +50,18 @@ class _Terminated(BaseException):
 
 def _terminated(*_: object) -> None:
     raise _Terminated
+
+
+def _not_lost(met: Any) -> None:
+    """Python drops an exception in a destructor; one that asks this to end is raised again."""
+    if met.exc_type in (KeyboardInterrupt, _Terminated):
+        number = signal.SIGTERM if met.exc_type is _Terminated else signal.SIGINT
+        # A moment later: raised in here it would be dropped again.
+        later = threading.Timer(0.05, _thread.interrupt_main, [number])
+        later.daemon = True
+        later.start()
+    else:
+        sys.__unraisablehook__(met)
 
 
 def _end_at_once(code: int) -> None:

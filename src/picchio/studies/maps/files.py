@@ -7,7 +7,7 @@ import shutil
 import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -51,20 +51,20 @@ def join_chunks(target: Path, chunks: Iterable[Columns], attributes: dict[str, A
     rows = 0
     names = {name: attributes[name] for name in ("joint", "coordinate")} | {"xyz": list("xyz")}
     labels = {name: np.array(values, dtype=object) for name, values in names.items()}
-    with writing(target):
-        try:
-            out = writer(part, labels, {k: v for k, v in attributes.items() if k not in names})
-            for columns in _in_blocks(chunks):
-                out.append(columns)
-                rows += len(columns["place"])
-            out.close()
+    others = {k: v for k, v in attributes.items() if k not in names}
+    try:
+        with writing(target):
+            with writer(part, labels, others) as out:
+                for columns in _in_blocks(chunks):
+                    out.append(columns)
+                    rows += len(columns["place"])
             if not rows:
                 raise InputError(
                     "no point of the map can be reached within the joint limits", key="places"
                 )
             swap_in(part, target)
-        finally:
-            _remove(part)
+    finally:
+        _remove(part)
 
 
 def _in_blocks(chunks: Iterable[Columns]) -> Iterator[Columns]:
@@ -127,10 +127,14 @@ class _NetcdfWriter:
             self._file.variables[name][first : self._rows] = values
         self._stream.check()
 
-    def close(self) -> None:
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._file.close()
         self._stream.close()
-        self._stream.check()
+        if kind is None:
+            self._stream.check()
 
 
 class _KeptError(io.FileIO):
@@ -186,8 +190,11 @@ class _ZarrWriter:
                 self._path, mode="a", append_dim="point", consolidated=False
             )
 
-    def close(self) -> None:
-        if self._mode == "a":
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None and self._mode == "a":
             import zarr
 
             with warnings.catch_warnings():
