@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
+import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import pytest
@@ -26,6 +30,31 @@ def measured_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"{NO_DATA}{folder} is missing; set PICCHIO_DATA")
     return folder
+
+
+@pytest.fixture(scope="session")
+def in_process():
+    """`in_process(*arguments, cwd=...)`: a command in this process, many times faster than as one.
+
+    Its exit status and what went to stdout and stderr.
+    """
+    from picchio.cli.main import main
+
+    def call(*arguments, cwd="."):
+        out, err = io.StringIO(), io.StringIO()
+        with (
+            contextlib.chdir(cwd),
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(err),
+            warnings.catch_warnings(),
+            pytest.raises(SystemExit) as ended,
+        ):
+            main([str(argument) for argument in arguments])
+        return subprocess.CompletedProcess(
+            arguments, ended.value.code, out.getvalue(), err.getvalue()
+        )
+
+    return call
 
 
 @pytest.fixture(scope="session")

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import subprocess
 import sys
-import warnings
 from pathlib import Path
 
 import pytest
-
-from picchio.cli.main import main
 
 HERE = str(Path(__file__).resolve().parent)
 if HERE not in sys.path:
@@ -47,26 +42,5 @@ def picchio_process(start):
         process = start(*arguments, **options)
         out, err = process.communicate(timeout=timeout)
         return subprocess.CompletedProcess(arguments, process.returncode, out, err)
-
-    return call
-
-
-@pytest.fixture
-def in_process():
-    """`in_process(*arguments, cwd=...)`: the same in this process, which is many times faster."""
-
-    def call(*arguments, cwd="."):
-        out, err = io.StringIO(), io.StringIO()
-        with (
-            contextlib.chdir(cwd),
-            contextlib.redirect_stdout(out),
-            contextlib.redirect_stderr(err),
-            warnings.catch_warnings(),
-            pytest.raises(SystemExit) as ended,
-        ):
-            main([str(argument) for argument in arguments])
-        return subprocess.CompletedProcess(
-            arguments, ended.value.code, out.getvalue(), err.getvalue()
-        )
 
     return call

@@ -1,8 +1,25 @@
-"""What the tests of this folder hold of processes."""
+"""What the tests of this folder share: an import, and what they hold of processes."""
 
 from __future__ import annotations
 
 from pathlib import Path
+
+MAPPING = """format = "picchio-mapping/1"
+[time]
+series = "t"
+unit = "ms"
+[[channel]]
+from = "F"
+to = "force"
+unit = "kN"
+[record]
+kind = "percussion"
+pose = { joint_1 = 0.3 }
+direction = [0.0, 0.0, 1.0]
+[campaign]
+robot = "fanuc_like_3dof"
+tool = "tool"
+"""
 
 
 def one_line(done, status, *words):

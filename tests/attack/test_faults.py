@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from held import one_line
+from held import MAPPING, one_line
 
 from picchio.prediction.plan import Plan, plan_toml
 from picchio.prediction.simulation import simulate
@@ -54,22 +54,6 @@ OUTPUTS = [
     Output("d.html", f"diagnose {ARM} --data campaign --report OUT", slow=True),
     Output("rep.html", "reproduce --report OUT", slow=True),
 ]
-MAPPING = """format = "picchio-mapping/1"
-[time]
-series = "t"
-unit = "ms"
-[[channel]]
-from = "F"
-to = "force"
-unit = "kN"
-[record]
-kind = "percussion"
-pose = { joint_1 = 0.3 }
-direction = [0.0, 0.0, 1.0]
-[campaign]
-robot = "fanuc_like_3dof"
-tool = "tool"
-"""
 
 
 @contextlib.contextmanager

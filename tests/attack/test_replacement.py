@@ -102,6 +102,10 @@ def test_a_map_is_replaced_whole(tmp_path):
     file.write_text("new")
     files.swap_in(file, old)  # a file where a folder was
     assert old.read_text() == "new" and os.listdir(tmp_path) == ["m.zarr"]
+    new.mkdir()
+    (new / "zarr.json").write_text("newest")
+    files.swap_in(new, old)  # and a folder where a file was
+    assert (old / "zarr.json").read_text() == "newest" and os.listdir(tmp_path) == ["m.zarr"]
 
 
 def test_a_campaign_that_is_gone_is_said_to_be(tmp_path):

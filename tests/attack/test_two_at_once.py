@@ -1,24 +1,9 @@
 """Two processes at the same output: both are honoured, or one is told."""
 
+from held import MAPPING
+
 from picchio.campaign.campaign import load_campaign
 from picchio.core.files import locked
-
-MAPPING = """format = "picchio-mapping/1"
-[time]
-series = "t"
-unit = "ms"
-[[channel]]
-from = "F"
-to = "force"
-unit = "kN"
-[record]
-kind = "percussion"
-pose = { joint_1 = 0.3 }
-direction = [0.0, 0.0, 1.0]
-[campaign]
-robot = "fanuc_like_3dof"
-tool = "tool"
-"""
 
 
 def test_appending_twice_at_once_adds_two_records(tmp_path, start, picchio_process):

@@ -45,17 +45,11 @@ class OutputError(PicchioError):
     Args:
         problem: what went wrong, without a full stop.
         file: that could not be written.
-        hint: what to do.
     """
 
-    def __init__(
-        self, problem: str, *, file: str | Path | None = None, hint: str | None = None
-    ) -> None:
-        self.problem, self.hint = problem, hint
-        self.file = str(file) if file is not None else None
-        super().__init__(
-            (f"{self.file}: " if file else "") + problem + (f"; {hint}" if hint else "")
-        )
+    def __init__(self, problem: str, *, file: str | Path) -> None:
+        self.problem, self.file = problem, str(file)
+        super().__init__(f"{self.file}: {problem}")
 
 
 class InputError(PicchioError):

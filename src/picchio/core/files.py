@@ -129,9 +129,8 @@ def swap_in(new: Path, target: Path) -> None:
         new: beside the target, on the same disk.
         target: need not exist.
     """
-    if not target.is_dir() or not any(target.iterdir()):
-        if new.is_dir() and target.is_file():
-            target.unlink()
+    empty = target.is_dir() and not any(target.iterdir())
+    if not target.exists() or (empty if new.is_dir() else target.is_file()):
         os.replace(new, target)
         return
     aside = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=_OLD, dir=target.parent))
