@@ -95,7 +95,7 @@ def test_the_robot_is_assessed_with_the_curve_and_the_blows(package):
 
 
 def test_the_reducer_can_be_loaded(package):
-    from picchio.fatigue.reducer import load_reducer
+    from picchio.robot.drives.reducer import load_reducer
 
     found = load_reducer("EX-40", catalogues=[package / "my-reducers.toml"])
     assert found.repeated_peak_torque == 1029.0

@@ -65,9 +65,11 @@ def test_shipped_files_have_no_key_that_is_not_described(name, repository):
         assert_described(tomllib.loads(path.read_text()), name)
 
 
-@pytest.mark.parametrize(("name", "folder"), [("sn-curve", "sn"), ("reducers", "reducers")])
+@pytest.mark.parametrize(
+    ("name", "folder"), [("sn-curve", "fatigue/data/sn"), ("reducers", "robot/drives/reducers")]
+)
 def test_shipped_data_have_no_key_that_is_not_described(name, folder, repository):
-    for path in (repository / "src/picchio/fatigue/data" / folder).glob("*.toml"):
+    for path in (repository / "src/picchio" / folder).glob("*.toml"):
         assert_described(tomllib.loads(path.read_text()), name)
 
 

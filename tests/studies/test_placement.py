@@ -9,7 +9,7 @@ import pytest
 
 import picchio
 from picchio.core.errors import InputError, PicchioWarning
-from picchio.fatigue.reducer import load_reducer
+from picchio.robot.drives.reducer import load_reducer
 from picchio.studies.placement.run import place
 from picchio.studies.placement.work import Work
 from picchio.studies.rivet.life_rules import curves_of
@@ -177,7 +177,7 @@ def test_reducers_as_the_catalogue_check_has_them():
     for name in ("RV-80E-121",):
         reducer = load_reducer(name)
         peak, held = rng.uniform(0, 3000, (2, 20))
-        told = [reducer.check_blows(p, h).utilisation for p, h in zip(peak, held, strict=True)]
+        told = [reducer.check_blows(p, h).governing.share for p, h in zip(peak, held, strict=True)]
         many = np.max(list(reducer.shares(peak, held).values()), axis=0)
         np.testing.assert_allclose(many, told)
 

@@ -6,7 +6,7 @@ import pytest
 import picchio
 from picchio.cli.life.assess import show
 from picchio.core.errors import PicchioWarning
-from picchio.fatigue.reducer import load_reducer
+from picchio.robot.drives.reducer import load_reducer
 
 TASK = {
     "hits_per_rivet": 12,
@@ -40,7 +40,6 @@ def test_peak_torque_of_gravity_and_blows_against_the_limits(tmp_path):
     expected = max(
         largest / rated.repeated_peak_torque,
         largest / rated.momentary_peak_torque,
-        abs(state.gravity_torque[1]) / rated.rated_torque,
     )
     joint = found.joint("joint_2")
     assert joint.reducer_utilisation == pytest.approx(expected, rel=1e-6)
@@ -55,14 +54,14 @@ def test_peak_torque_of_gravity_and_blows_against_the_limits(tmp_path):
     [
         # RV-40E by the catalogue: rated 412, repeated peaks 1029, momentary peaks 2058 N m.
         (900.0, 300.0, "repeated peak torque", 900.0 / 1029.0, 0),
-        (500.0, 453.2, "rated torque, held", 1.1, 1),
-        (2469.6, 453.2, "repeated peak torque", 2.4, 3),
+        (500.0, 453.2, "repeated peak torque", 500.0 / 1029.0, 0),
+        (2469.6, 453.2, "repeated peak torque", 2.4, 2),
     ],
 )
 def test_the_limit_that_binds(peak, held, binds, share, exceeded):
     check = load_reducer("RV-40E-121").check_blows(peak, held)
-    assert check.governed_by == binds
-    assert check.utilisation == pytest.approx(share)
+    assert check.governing.name == binds
+    assert check.governing.share == pytest.approx(share)
     assert len(check.warnings) == 1 + exceeded
 
 
@@ -78,20 +77,29 @@ def test_the_task_s_largest_torques_count(tmp_path, capsys):
     joint = found.joint("joint_2")
     per_pose = [op.reducer_utilisation[:, 1].max() for op in found.operations]
     assert joint.reducer_utilisation == max(per_pose)
-    held = max(op.gravity_torque[:, 1].max() for op in found.operations)
-    # Gravity on the outstretched arm: over three times what the catalogue rates, 167 N m.
-    assert joint.reducer_governed_by == "rated torque, held"
-    assert joint.reducer_utilisation == pytest.approx(held / 167.0)
+    # The outstretched arm: gravity and blows are beyond what repeated peaks may be, 412 N m.
+    torque = max(op.reducer_torque[:, 1].max() for op in found.operations)
+    assert joint.reducer_governed_by == "repeated peak torque"
+    assert joint.reducer_utilisation == pytest.approx(torque / 412.0)
     text = "\n".join(joint.reducer_warnings)
-    assert "false brinelling" in text and f"({held / 167.0:.2f} times)" in text
-    told = {j["name"]: j for j in found.to_dict()["joints"]}
-    assert told["joint_2"]["reducer_governed_by"] == "rated torque, held"
+    assert "false brinelling" in text and f"({torque / 412.0:.2f} times)" in text
+    content = found.to_dict()
+    told = {j["name"]: j for j in content["joints"]}
+    assert told["joint_2"]["reducer_governed_by"] == "repeated peak torque"
+    governing = told["joint_2"]["reducer_limits"][0]
+    assert governing["limit"] == 412.0 and governing["torque"] == torque
+    for name, op in zip(("up", "out"), content["operations"], strict=True):
+        assert op["name"] == name
+        for k, share in enumerate(op["reducer_utilisation"]):
+            assert op["reducer_governed_by"][k] == ["", "repeated peak torque", ""]
+            assert op["reducer_limit"][k][1] == 412.0
+            assert share[1] == pytest.approx(op["reducer_torque"][k][1] / 412.0)
     assert tuple(told["joint_2"]["reducer_warnings"]) == joint.reducer_warnings
     without = found.joint("joint_1")
     assert (without.reducer_governed_by, without.reducer_warnings) == ("", ())
     show(found, tmp_path / "task.toml")
     said = " ".join(capsys.readouterr().out.split())
-    assert "RV-20E-121" in said and "rated torque, held" in said
+    assert "RV-20E-121" in said and "repeated peak torque" in said
     for line in joint.reducer_warnings:
         assert f"joint_2: {line.removeprefix('RV-20E-121: ')}" in said
 

@@ -28,10 +28,10 @@ from picchio.core.html import sheet
 from picchio.core.results import TableResult
 from picchio.core.toml import leaf_types
 from picchio.excitation.table import ExcitationTable, catalogue
-from picchio.fatigue import reducer
 from picchio.fatigue.sn import library as sn_library
 from picchio.prediction import plan
 from picchio.robot.annotations import sidecar
+from picchio.robot.drives import reducer
 from picchio.robot.loading import saved_model
 from picchio.studies import tasks
 from picchio.studies.maps.files import EXTRA, VARIABLES

@@ -9,10 +9,10 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, warn_user
 from picchio.fatigue.miner import life
-from picchio.fatigue.reducer import Reducer, load_reducer
 from picchio.fatigue.shaft_stress import check_shaft
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.model import Model
+from picchio.robot.drives.reducer import Reducer, load_reducer
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
 from picchio.studies.assessment.result import JointLife, OperationResult, SteadyStateCheck
@@ -130,8 +130,10 @@ def assumptions_of(
     if named:
         lines += [
             "reducers: the peak torque of gravity and blows against the catalogue's limits for "
-            "repeated and momentary peaks, gravity's torque against the rated torque; a joint that "
-            "stands still under blows risks false brinelling, which no catalogue covers",
+            "repeated and momentary peaks, what is held against that for the average torque where "
+            "the catalogue has one (the rated torque is for the rated life at the rated speed, no "
+            "limit at standstill); a joint that stands still under blows risks false brinelling, "
+            "which no catalogue covers",
             *(f"reducer {r.name}: {r.manufacturer}, {r.kind}; {r.source}" for r in named),
         ]
     if unchecked:

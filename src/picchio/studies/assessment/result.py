@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from picchio.core.arrays import FloatArray
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
+from picchio.robot.drives.reducer import TorqueLimit
 
 # What an assessment found: the life of every joint, and where it goes.
 
@@ -43,6 +45,10 @@ class OperationResult:
         utilisation: (n_poses, n) of the shafts.
         reducer_utilisation: (n_poses, n) of the reducers, torque over the limit that binds; NaN
             where a joint names none.
+        reducer_torque: (n_poses, n) N m, that which the limit that binds is about: the peak, or
+            what is held; NaN likewise.
+        reducer_limit: (n_poses, n) N m, of the catalogue; NaN likewise.
+        reducer_governed_by: (n_poses, n) the limit that binds; "" likewise.
         damage_per_rivet: (n_poses, n).
     """
 
@@ -64,6 +70,9 @@ class OperationResult:
     peak_total_stress: FloatArray
     utilisation: FloatArray
     reducer_utilisation: FloatArray
+    reducer_torque: FloatArray
+    reducer_limit: FloatArray
+    reducer_governed_by: NDArray[np.str_]
     damage_per_rivet: FloatArray
 
 
@@ -91,6 +100,8 @@ class JointLife:
         worst_pose: index of the pose there.
         damage_share: of each operation in this joint's damage; empty without damage.
         reducer_governed_by: the limit that binds, such as "repeated peak torque"; empty without.
+        reducer_limits: every limit that applies, largest share over the task first: which torque
+            acts, which is allowed.
         reducer_warnings: what the catalogue does not promise, and which limits are exceeded.
     """
 
@@ -112,6 +123,7 @@ class JointLife:
     worst_pose: int
     damage_share: Mapping[str, float] = field(default_factory=dict)
     reducer_governed_by: str = ""
+    reducer_limits: tuple[TorqueLimit, ...] = ()
     reducer_warnings: tuple[str, ...] = ()
 
     @property
@@ -224,7 +236,7 @@ class Assessment(TableResult):
         return f"{self.robot!r}, method={self.method!r}: {verdict(self)}"
 
     def _rows(self) -> list[dict[str, Any]]:
-        left_out = ("damage_share", "reducer_warnings")
+        left_out = ("damage_share", "reducer_limits", "reducer_warnings")
         return [
             {key: value for key, value in vars(joint).items() if key not in left_out}
             for joint in self.joints

@@ -16,11 +16,11 @@ from picchio.core.provenance import provenance
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.miner import life, peak_damage
-from picchio.fatigue.reducer import Reducer
 from picchio.fatigue.shaft_stress import shear_stress
 from picchio.fatigue.sn.curve import MinerRule, SNCurve
 from picchio.fatigue.sn.library import PAPER_SN_CURVE, load_sn_curve
 from picchio.model.model import Model
+from picchio.robot.drives.reducer import Reducer
 from picchio.robot.dynamics.pose import warn_beyond_limits
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.checks import (
@@ -168,11 +168,13 @@ class _Job:
         loads = rivet.loads(self.rule.needs, both=self.both)
         n = len(loads)
         columns = ("peak_deflection", "peak_shear_stress", "utilisation", "damage_per_rivet")
-        others = ("gravity_shear_stress", "reducer_utilisation", "peak_total_stress")
+        others = ("gravity_shear_stress", "peak_total_stress", "reducer_utilisation",
+                  "reducer_torque", "reducer_limit")  # fmt: skip
         out = {key: np.full(n, np.nan) for key in (*columns, *others)}
         out["steady_peak_deflection"] = np.array([peak(load.steady) for load in loads])
         out["rest_peak_deflection"] = np.array([peak(load.rest) for load in loads])
         out["check"], out["reducer_torques"] = np.full((2, n, 2), np.nan)
+        governs = [""] * n
         own = out[f"{self.rule.needs}_peak_deflection"]
         out["peak_deflection"] = own.copy()
         out["peak_torque"] = rivet.stiffness * own
@@ -183,7 +185,9 @@ class _Job:
             if reducer is not None and load.rest is not None:
                 torques = load.peak_torque_with_gravity, abs(load.stiffness * load.static)
                 out["reducer_torques"][j] = torques
-                out["reducer_utilisation"][j] = reducer.check_blows(*torques).utilisation
+                limit = reducer.check_blows(*torques).governing
+                governs[j], out["reducer_utilisation"][j] = limit.name, limit.share
+                out["reducer_torque"][j], out["reducer_limit"][j] = limit.torque, limit.limit
             curve = self.curves[j]
             if joint.shaft is None or curve is None:
                 continue
@@ -200,6 +204,7 @@ class _Job:
                     PaperRule()(joint, load, hits, self.paper_curve).damage,
                     RainflowRule()(joint, load, hits, self.paper_curve).damage,
                 )
+        out["reducer_governed_by"] = np.array(governs)
         out["natural_frequencies"] = rivet.natural_frequencies
         out["tool_position"] = rivet.state.tool_position
         return out
@@ -251,7 +256,8 @@ def _joint_life(
         worst_operation=results[k].name,
         worst_pose=int(ranked[k][:, j].argmax()),
         damage_share=shares,
-        reducer_governed_by=check.governed_by if check is not None else "",
+        reducer_governed_by=check.governing.name if check is not None else "",
+        reducer_limits=check.limits if check is not None else (),
         reducer_warnings=check.warnings if check is not None else (),
     )
 

@@ -9,10 +9,10 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.excitation.excitation import Excitation
-from picchio.fatigue.reducer import Reducer
 from picchio.fatigue.shaft_stress import stress_per_torque
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.model import Model
+from picchio.robot.drives.reducer import Reducer
 from picchio.robot.joint import Joint
 from picchio.studies.rivet.poses import BatchDamage, damage_at
 from picchio.studies.tasks import Task

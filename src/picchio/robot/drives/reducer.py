@@ -6,6 +6,12 @@ blows turns nothing: its contacts fret in one spot (false brinelling), which no 
 for percussive work the check that decides is the peak torque, gravity and vibration together,
 against the limit for repeated peaks. A blow is part of the duty, not an accident: the limit for
 momentary peaks is for emergencies only.
+
+The rated torque is no limit at standstill: it is that at which the rated life holds at the rated
+speed (Nabtesco, *RV reduction gear, technical document*, glossary: "rated service life"; Harmonic
+Drive, *CSF and CSG catalogue*, "technical terms": continuous load at rated input speed). What is
+held is judged by the limit for the average torque where the catalogue has one, and by no limit of
+its own where it has none: the peak contains it.
 """
 
 from __future__ import annotations
@@ -14,6 +20,7 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from difflib import SequenceMatcher
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -32,8 +39,36 @@ _EXCEEDED = {
     "repeated peak torque": "the blows' peak torque exceeds the limit for repeated peaks",
     "momentary peak torque": "the peak torque exceeds even the limit for emergencies",
     "ratcheting torque": "the peak torque exceeds that at which teeth skip",
-    "rated torque, held": "gravity's torque exceeds the rated torque, for which the life is stated",
+    "average torque, held": "gravity's torque exceeds the limit for the average torque",
 }
+
+
+@dataclass(frozen=True)
+class TorqueLimit:
+    """A torque beside the limit that applies to it.
+
+    Attributes:
+        name: of the limit, such as "repeated peak torque".
+        torque: N m, largest magnitude that acts.
+        limit: N m, of the catalogue.
+    """
+
+    name: str
+    torque: float
+    limit: float
+
+    @property
+    def share(self) -> float:
+        """Torque over limit; above 1 is too much."""
+        return self.torque / self.limit
+
+    def to_dict(self) -> dict[str, str | float]:
+        """As JSON has it.
+
+        Returns:
+            name, torque [N m], limit [N m] and share.
+        """
+        return vars(self) | {"share": self.share}
 
 
 class ReducerEntry(StrictModel):
@@ -76,6 +111,17 @@ class Reducer(ReducerEntry):
     rated_speed: Positive
     rated_life: Positive
 
+    @property
+    def limits(self) -> dict[str, tuple[str, float]]:
+        """The limits that bind at standstill and are known: {name: ("peak" or "held", N m)}."""
+        known = {
+            "repeated peak torque": ("peak", self.repeated_peak_torque),
+            "momentary peak torque": ("peak", self.momentary_peak_torque),
+            "ratcheting torque": ("peak", self.ratcheting_torque),
+            "average torque, held": ("held", self.average_torque),
+        }
+        return {name: (which, limit) for name, (which, limit) in known.items() if limit is not None}
+
     def shares(self, peak: Torque, held: Torque) -> dict[str, Torque]:
         """Torque over limit, by limit.
 
@@ -86,13 +132,8 @@ class Reducer(ReducerEntry):
         Returns:
             {limit: share}, of the limits that are known.
         """
-        limits = {
-            "repeated peak torque": (peak, self.repeated_peak_torque),
-            "momentary peak torque": (peak, self.momentary_peak_torque),
-            "ratcheting torque": (peak, self.ratcheting_torque),
-            "rated torque, held": (held, self.rated_torque),
-        }
-        return {k: torque / limit for k, (torque, limit) in limits.items() if limit is not None}
+        torque = {"peak": peak, "held": held}
+        return {name: torque[which] / limit for name, (which, limit) in self.limits.items()}
 
     def check_blows(self, peak_torque: float, holding_torque: float = 0.0) -> ReducerCheck:
         """Check a joint that stands still under blows.
@@ -103,22 +144,26 @@ class Reducer(ReducerEntry):
             holding_torque: N m, gravity's alone.
 
         Returns:
-            utilisations and what is beyond its limit.
+            torques beside their limits, and what is beyond its limit.
 
         Raises:
             InputError: torques that are not finite.
         """
-        peak = abs(float(as_floats(peak_torque, "peak_torque")))
-        hold = abs(float(as_floats(holding_torque, "holding_torque")))
-        shares = self.shares(peak, hold)
+        torque = {
+            "peak": abs(float(as_floats(peak_torque, "peak_torque"))),
+            "held": abs(float(as_floats(holding_torque, "holding_torque"))),
+        }
+        found = [TorqueLimit(name, torque[which], limit)
+                 for name, (which, limit) in self.limits.items()]  # fmt: skip
         warnings = [
             f"{self.name}: the catalogue life presumes turning; a joint that stands still under "
-            "blows risks false brinelling, which no catalogue covers"
-        ]
-        for limit, text in _EXCEEDED.items():
-            if shares.get(limit, 0.0) > 1.0:
-                warnings.append(f"{self.name}: {text} ({shares[limit]:.2f} times)")
-        return ReducerCheck(shares, tuple(warnings))
+            "blows risks false brinelling, which no catalogue covers",
+            *(f"{self.name}: {_EXCEEDED[one.name]} ({one.share:.2f} times)"
+              for one in found if one.share > 1.0),
+        ]  # fmt: skip
+        # Of equal shares the first stands first: the sort is stable.
+        ranked = sorted(found, key=lambda one: -one.share)
+        return ReducerCheck(tuple(ranked), tuple(warnings))
 
 
 @dataclass(frozen=True)
@@ -126,22 +171,17 @@ class ReducerCheck:
     """Torques of a joint that stands still under blows, against its reducer's limits.
 
     Attributes:
-        utilisations: torque over limit, by limit; above 1 is too much.
+        limits: every limit that applies, the one that governs first.
         warnings: what the catalogue does not promise, and which limits are exceeded.
     """
 
-    utilisations: dict[str, float]
+    limits: tuple[TorqueLimit, ...]
     warnings: tuple[str, ...]
 
     @property
-    def governed_by(self) -> str:
+    def governing(self) -> TorqueLimit:
         """The limit that binds."""
-        return max(self.utilisations, key=lambda limit: self.utilisations[limit])
-
-    @property
-    def utilisation(self) -> float:
-        """Torque over that limit."""
-        return self.utilisations[self.governed_by]
+        return self.limits[0]
 
 
 class ReducerFile(StrictModel):
@@ -165,6 +205,24 @@ class ReducerFile(StrictModel):
     reducer: tuple[ReducerEntry, ...]
 
 
+def all_reducers(catalogues: Iterable[str | Path] = ()) -> dict[str, Reducer]:
+    """The reducers of the shipped catalogues and of others, by name.
+
+    Args:
+        catalogues: further files (`picchio-reducers/1`); they take precedence over those shipped.
+
+    Returns:
+        the reducers, the shipped ones first.
+
+    Raises:
+        InputError: a catalogue file that is missing or wrong.
+    """
+    known = dict(_shipped())
+    for path in catalogues:
+        known |= read_reducers(path)
+    return known
+
+
 def load_reducer(name: str, *, catalogues: Iterable[str | Path] = ()) -> Reducer:
     """A reducer by its catalogue name.
 
@@ -177,20 +235,23 @@ def load_reducer(name: str, *, catalogues: Iterable[str | Path] = ()) -> Reducer
     Raises:
         InputError: an unknown name, or a catalogue file that is missing or wrong.
     """
-    known = dict(_shipped())
-    for path in catalogues:
-        known |= read_reducers(path)
+    known = all_reducers(catalogues)
     if name in known:
         return known[name]
     found = re.fullmatch(r"(.+?)-(\d+(?:\.\d+)?)", name)
     if found and found.group(1) in known and known[found.group(1)].ratio is None:
         own = known[found.group(1)].model_dump()
         return Reducer(**own | {"name": name, "ratio": float(found.group(2))})
-    raise InputError("no such reducer", key="reducer", value=name, choices=known)
+    close = sorted(known, key=lambda other: -SequenceMatcher(None, name, other).ratio())
+    raise InputError("no such reducer", key="reducer", value=name, choices=close,
+                     hint="a catalogue of your own: --reducers FILE")  # fmt: skip
 
 
 def read_reducers(path: str | Path) -> dict[str, Reducer]:
     """The reducers of a catalogue file, by name.
+
+    Args:
+        path: the file, `picchio-reducers/1`.
 
     Raises:
         InputError: missing, not TOML, an unknown format, misspelt keys, wrong values, or a
@@ -214,7 +275,7 @@ def read_reducers(path: str | Path) -> dict[str, Reducer]:
 
 @cache
 def _shipped() -> dict[str, Reducer]:
-    folder = Path(str(files("picchio.fatigue"))) / "data" / "reducers"
+    folder = Path(str(files("picchio.robot.drives"))) / "reducers"
     found: dict[str, Reducer] = {}
     for path in sorted(folder.glob("*.toml")):
         found |= read_reducers(path)

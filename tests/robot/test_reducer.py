@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from picchio.core.errors import InputError
-from picchio.fatigue.reducer import Reducer, load_reducer, read_reducers
+from picchio.robot.drives.reducer import Reducer, load_reducer, read_reducers
 
 RPM = 2.0 * math.pi / 60.0
 
@@ -31,20 +31,42 @@ def test_standstill_promises_nothing() -> None:
 
 def test_blows_are_duty_not_an_emergency() -> None:
     check = strain_wave().check_blows(-900.0, 150.0)
-    assert check.governed_by == "repeated peak torque"
-    assert check.utilisation == pytest.approx(900.0 / 617.0)
+    governing = check.governing
+    assert (governing.name, governing.torque, governing.limit) == (
+        "repeated peak torque", 900.0, 617.0,
+    )  # fmt: skip
+    assert governing.share == pytest.approx(900.0 / 617.0)
     assert any("repeated peaks (1.46 times)" in line for line in check.warnings)
     assert not any("emergencies" in line for line in check.warnings)
     assert any("emergencies" in line for line in strain_wave().check_blows(1200.0).warnings)
-    assert strain_wave().check_blows(617.0).utilisation == 1.0
-    held = strain_wave().check_blows(300.0, 299.0)
-    assert held.governed_by == "rated torque, held"
+    assert strain_wave().check_blows(617.0).governing.share == 1.0
     ratchet = strain_wave(ratcheting_torque=500.0).check_blows(550.0)
-    assert ratchet.governed_by == "ratcheting torque"
-    assert ratchet.utilisation > 1.0
+    assert ratchet.governing.name == "ratcheting torque"
+    assert ratchet.governing.share > 1.0
     assert any("teeth skip (1.10 times)" in line for line in ratchet.warnings)
-    loaded = strain_wave().check_blows(310.0, -300.0)
-    assert any("gravity's torque exceeds the rated" in line for line in loaded.warnings)
+
+
+def test_held_torque_is_judged_by_the_average_limit_and_never_by_the_rated_one() -> None:
+    # CSG-25-100: rated 87, average 140, repeated peaks 204 N m.
+    held = load_reducer("CSG-25-100-2UH").check_blows(176.0, -112.0)
+    assert (held.governing.name, held.governing.share) == ("repeated peak torque", 176.0 / 204.0)
+    told = {limit.name: limit for limit in held.limits}
+    assert told["average torque, held"].to_dict() == {
+        "name": "average torque, held", "torque": 112.0, "limit": 140.0, "share": 0.8,
+    }  # fmt: skip
+    assert len(held.warnings) == 1
+    above = load_reducer("CSG-25-100-2UH").check_blows(150.0, 145.0)
+    assert above.governing.name == "average torque, held"
+    assert any("limit for the average torque (1.04 times)" in line for line in above.warnings)
+    # A catalogue without a limit for the average torque gives none for what is held.
+    assert not any(
+        "held" in one.name for one in load_reducer("RV-20E").check_blows(400, 390).limits
+    )
+
+
+def test_an_unknown_reducer_is_told_with_the_closest_names() -> None:
+    with pytest.raises(InputError, match=r"valid: CSG-25-100-2UH,.*--reducers FILE"):
+        load_reducer("CSG-25-101-2UH")
 
 
 def test_catalogue_agrees_with_the_makers_product_pages() -> None:
@@ -60,7 +82,7 @@ def test_catalogue_agrees_with_the_makers_product_pages() -> None:
 
 SHIPPED = [
     entry
-    for path in files("picchio.fatigue").joinpath("data/reducers").iterdir()
+    for path in files("picchio.robot.drives").joinpath("reducers").iterdir()
     for entry in read_reducers(str(path))
 ]
 

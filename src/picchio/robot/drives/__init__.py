@@ -1,0 +1,1 @@
+"""Drives: what a reducer's catalogue says of it."""
