@@ -255,6 +255,7 @@ def test_two_runs_write_the_same_bytes():
 def test_a_report_that_opens_offline(picchio, tmp_path):
     out = tmp_path / "report.html"
     done = picchio("assess", "fanuc_like_3dof", "--report", out)
+    assert f"picchio: wrote {out}" in done.stderr
     assert done.returncode == 0, done.stderr
     page = out.read_text()
     assert page.lower().startswith("<!doctype html>")

@@ -1,5 +1,6 @@
 """The help of every command, on a terminal of 80 columns."""
 
+import re
 from typing import Any
 
 import pytest
@@ -24,6 +25,11 @@ def test_every_option_is_told_whole_and_nothing_is_cut(picchio, name):
         for word in (*parameter.opts, *parameter.secondary_opts):
             if word.startswith("--"):
                 assert word in text, word
+    # What the help says in brackets is no markup.
+    told = " ".join(
+        [GROUP.commands[name].help or "", *(p.help or "" for p in GROUP.commands[name].params)]
+    )
+    assert set(re.findall(r"\[+[\w/^]+\]+", told)) <= set(re.findall(r"\[+[\w/^]+\]+", text))
 
 
 def test_what_each_command_does_fits_its_line(picchio):

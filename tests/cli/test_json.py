@@ -131,7 +131,9 @@ COMMANDS: dict[str, tuple[str, Any]] = {
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in COMMANDS]
 )
-def test_json_is_to_dict(name: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_is_to_dict(
+    name: str, folder: Path, capsys: pytest.CaptureFixture[str], tables: list[Any]
+) -> None:
     words, function = COMMANDS[name]
     assert run([*words.split(), "--json", "out.json"]) == 0
     capsys.readouterr()

@@ -20,8 +20,9 @@ from picchio.cli.app import app
 # Importing its file adds a command, in the order of `picchio --help`.
 from picchio.cli.life import assess, envelope, fit_sn, map, place, view  # noqa: F401
 from picchio.cli.measured import check, diagnose, identify, import_, simulate  # noqa: F401
-from picchio.cli.output import begin, printable, say_warning
+from picchio.cli.output import begin, printable, say_warning, say_written
 from picchio.cli.reference import described, reproduce, robots  # noqa: F401
+from picchio.cli.waiting import waiting
 from picchio.core.errors import InputError, OutputError, PicchioError
 
 _INTERRUPTED, _TERMINATED = 130, 143
@@ -87,7 +88,7 @@ def run(arguments: list[str] | None = None) -> int:
     if given and given[-1] == "--version":  # of every subcommand, too
         given = ["--version"]
     try:
-        code = app(args=given or ["--help"], prog_name="picchio", standalone_mode=False)
+        code = _watched(given or ["--help"])
         sys.stdout.flush()
         if code == _INTERRUPTED:  # typer swallows it
             return _fail("interrupted", _INTERRUPTED)
@@ -111,6 +112,15 @@ def run(arguments: list[str] | None = None) -> int:
         _drop_stdout()
         return _fail(f"{error.filename or 'stdout'}: {error.strerror or error}", 1)
     return code if isinstance(code, int) else 0
+
+
+def _watched(arguments: Sequence[str]) -> Any:
+    """Run a command with a bar for long work; say what it wrote, even if it then failed."""
+    try:
+        with waiting.watched():
+            return app(args=arguments, prog_name="picchio", standalone_mode=False)
+    finally:
+        say_written()
 
 
 def _drop_stdout() -> None:

@@ -7,11 +7,14 @@ import os
 import re
 import shlex
 import sys
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
+from picchio.cli.layout import FittedTable, Row
+from picchio.cli.waiting import waiting
 from picchio.core.errors import InputError, OutputError
 from picchio.core.files import is_stream, write_text
 
@@ -22,19 +25,22 @@ if TYPE_CHECKING:
 
     from picchio.core.results import Result
 
-_PATIENCE = 2.0
+_NO_END = 10_000  # characters
 # ASCII's and Latin-1's, marks that turn the direction of writing, halves of characters.
 _CONTROL = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
 )
+_INDENT = re.compile(r" +(- )?")
 _typed: list[str] = []
 _said: list[str] = []
+_awaited: dict[Path, tuple[int, ...] | None] = {}
 
 
 def begin(arguments: Sequence[str]) -> None:
-    """Start a command: keep what was typed for a report, forget an earlier command's warnings."""
+    """Start a command: keep what was typed for a report, forget what an earlier one said."""
     _typed[:] = arguments
     _said.clear()
+    _awaited.clear()
 
 
 def say_warning(message: str) -> None:
@@ -46,7 +52,7 @@ def say_warning(message: str) -> None:
 
 
 def console() -> Console:
-    """Where tables go: stdout, 120 columns wide where it is no terminal.
+    """Where tables go: stdout, as wide as the terminal (or COLUMNS); into a pipe nothing wraps.
 
     Text is printed as it is: a robot may be called "[/x]", which is no markup.
     """
@@ -56,8 +62,24 @@ def console() -> Console:
         def render_str(self, text: str, **options: Any) -> Text:
             return super().render_str(printable(text), **options)
 
-    width = None if sys.stdout.isatty() else 120
+        def print(self, *objects: Any, **options: Any) -> None:
+            """What wraps of an indented line is indented, too."""
+            super().print(*(_hanging(o, self.width) for o in objects), **options)
+
+    known = sys.stdout.isatty() or os.environ.get("COLUMNS", "").isdigit()
+    width = None if known else _NO_END
     return Plain(width=width, markup=False, emoji=False, highlight=False)
+
+
+def _hanging(content: Any, width: int) -> Any:
+    """An indented line in lines of this width, all indented; anything else as it is."""
+    indent = _INDENT.match(content) if isinstance(content, str) else None
+    if indent is None or len(content) <= width:
+        return content
+    return textwrap.fill(
+        content, width, subsequent_indent=" " * indent.end(), break_long_words=False,
+        break_on_hyphens=False, drop_whitespace=True,
+    )  # fmt: skip
 
 
 def styled(text: str, rest: str = "", *, style: str = "bold") -> Text:
@@ -98,31 +120,20 @@ def definitions(rows: Iterable[tuple[str, str | Text]]) -> Table:
     return table
 
 
-def table(headers: Iterable[str], rows: Iterable[Iterable[str | Text]], **style: Any) -> Table:
-    """A table to print; where there is little room, the first column alone is not broken.
+def table(headers: Iterable[str], rows: Iterable[Iterable[str | Text]], **look: Any) -> FittedTable:
+    """A table to print; no width breaks a number or a name of it.
 
     Args:
         headers: of the columns; one that begins with ">" is set to the right.
-        rows: cells: texts, or what `styled` makes.
-        **style: of `rich.table.Table`, such as its title.
+        rows: cells: texts, or what `styled` makes; the first names its row.
+        **look: of `picchio.cli.layout.FittedTable`, such as its title.
     """
-    from rich import box
-    from rich.table import Table
+    from rich.text import Text
 
-    look: dict[str, Any] = {"box": box.SIMPLE_HEAD, "pad_edge": False, "title_justify": "left"}
-    made = Table(title_style="bold", caption_justify="left", **look | style)
-    for header in headers:
-        side: Literal["left", "right"] = "right" if header.startswith(">") else "left"
-        first = not made.columns
-        made.add_column(
-            header.removeprefix(">"),
-            justify=side,
-            no_wrap=first,
-            overflow="ellipsis" if first else "fold",
-        )
-    for row in rows:
-        made.add_row(*row)
-    return made
+    def cell(content: str | Text) -> Text:
+        return content if isinstance(content, Text) else Text(printable(content))
+
+    return FittedTable(list(headers), [Row([cell(c) for c in row]) for row in rows], **look)
 
 
 def count_of(count: float, noun: str) -> str:
@@ -131,19 +142,26 @@ def count_of(count: float, noun: str) -> str:
 
 
 def check_targets(
-    targets: Iterable[str | Path | None], inputs: Iterable[str | Path | None]
+    targets: Iterable[str | Path | None],
+    inputs: Iterable[str | Path | None],
+    folder: Path | None = None,
 ) -> None:
     """Refuse, before any work, outputs that cannot be written or would destroy an input.
+
+    What has been written of them is told at the end, by `say_written`.
 
     Args:
         targets: where results shall go; None or "-" for nowhere.
         inputs: files that the command reads.
+        folder: a campaign to write; it is checked where it is written.
 
     Raises:
         InputError: the folder is missing, or the file is one of the inputs.
         OutputError: the folder is read-only.
     """
     read = [Path(source) for source in inputs if source is not None and Path(source).exists()]
+    if folder is not None:
+        _awaited.setdefault(folder, _stamp(folder))
     for target in targets:
         if target is None or str(target) == "-":
             continue
@@ -158,6 +176,23 @@ def check_targets(
             raise OutputError("cannot be written: the folder is read-only", file=path)
         if path.exists() and any(path.samefile(source) for source in read):
             raise InputError("would overwrite an input of this command", file=path)
+        _awaited.setdefault(path, _stamp(path))
+
+
+def _stamp(path: Path) -> tuple[int, ...] | None:
+    """What changes when a file or folder is written anew; None where there is none."""
+    with suppress(OSError):
+        found = path.stat()
+        return found.st_ino, found.st_mtime_ns, found.st_size
+    return None
+
+
+def say_written() -> None:
+    """Say, on stderr, which of the command's targets it has written."""
+    for path, before in _awaited.items():
+        if _stamp(path) not in (None, before):
+            print(f"picchio: wrote {printable(str(path))}", file=sys.stderr)
+    _awaited.clear()
 
 
 def write_report(result: Result, target: Path | None, **options: Any) -> None:
@@ -171,6 +206,7 @@ def write_report(result: Result, target: Path | None, **options: Any) -> None:
     if target is not None:
         import picchio
 
+        waiting.say("drawing the page")
         typed = shlex.join(["picchio", *_typed])
         picchio.report(result, command=typed, warnings=_said, **options).save(target)
 
@@ -185,6 +221,7 @@ def deliver(
         target: the file of `--json`; "-" for stdout, None where there is none.
         show: prints the result for people.
     """
+    waiting.end()
     if target is not None:
         text = json.dumps(content, indent=2, allow_nan=False) + "\n"
         if target == "-":
@@ -196,49 +233,28 @@ def deliver(
 
 @contextmanager
 def progress(description: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on stderr, once work takes over two seconds and stderr is a terminal.
+    """Tell how much of a step is done, in the command's bar.
+
+    Args:
+        description: what is counted.
 
     Yields:
         a function to call with (done, total).
     """
-    if not sys.stderr.isatty():
-        yield lambda done, total: None
-        return
-    import threading
-
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.completed}/{task.total}"),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    )
-    # Before the first report there may be a minute of compiling, which should not look like death.
-    task = bar.add_task(f"{description} (a first run compiles for a minute)", total=None)
-    patience = threading.Timer(_PATIENCE, bar.start)
-    patience.daemon = True
-    patience.start()
-    try:
-        yield lambda done, total: bar.update(
-            task, description=description, completed=done, total=total
-        )
-    finally:
-        patience.cancel()
-        patience.join()
-        bar.stop()
+    yield lambda done, total: waiting.say(description, done, total)
+    waiting.say("working")
 
 
 @contextmanager
-def telling() -> Iterator[Callable[[str], None]]:
-    """What is being done, on stderr, where that is a terminal."""
-    if not sys.stderr.isatty():
-        yield lambda text: None
-        return
-    from rich.console import Console
+def telling(what: str = "working") -> Iterator[Callable[[str], None]]:
+    """Tell what is being done, in the command's bar.
 
-    with Console(stderr=True).status("") as status:
-        yield status.update
+    Args:
+        what: at first.
+
+    Yields:
+        a function to call with what is done now.
+    """
+    waiting.say(what)
+    yield waiting.say
+    waiting.say("working")

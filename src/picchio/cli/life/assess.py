@@ -36,8 +36,7 @@ from picchio.core.results import plain
 from picchio.studies.assessment.result import format_count, verdict
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
+    from picchio.cli.layout import FittedTable
     from picchio.studies.assessment.method_comparison import Term
     from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
     from picchio.studies.backwards import AllowableLoads
@@ -236,7 +235,7 @@ def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
         out.print(f"  - {line}", style="dim")
 
 
-def _life_table(found: Assessment) -> Table:
+def _life_table(found: Assessment) -> FittedTable:
     shafts = [joint for joint in found.joints if joint.sn_curve]
     columns: dict[str, Callable[[JointLife], str]] = {
         "joint": lambda j: j.name,
@@ -269,7 +268,7 @@ def _life_table(found: Assessment) -> Table:
     return made
 
 
-def _share_table(found: Assessment) -> Table:
+def _share_table(found: Assessment) -> FittedTable:
     names = [operation.name for operation in found.operations]
     rows = []
     for joint in found.joints:
@@ -279,7 +278,7 @@ def _share_table(found: Assessment) -> Table:
     return table(heads, rows, title="Share of each joint's damage, %")
 
 
-def _steady_table(found: Assessment) -> Table:
+def _steady_table(found: Assessment) -> FittedTable:
     title = "The paper's steady state against a rivet as it happens\n(largest over the task"
     heads = ["joint", ">steady\npeak\nmrad", ">rivet's\npeak\nmrad", ">\nratio\n"]
     rows = [
@@ -299,7 +298,7 @@ def _steady_table(found: Assessment) -> Table:
     return table(heads, rows, title=f"{title})")
 
 
-def _terms_table(terms: tuple[Term, ...]) -> Table:
+def _terms_table(terms: tuple[Term, ...]) -> FittedTable:
     rows = []
     for term in terms:
         known = math.isfinite(term.factor)

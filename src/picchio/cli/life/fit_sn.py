@@ -9,7 +9,7 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import JsonOption
-from picchio.cli.output import check_targets, console, deliver, styled, table
+from picchio.cli.output import check_targets, console, deliver, styled, table, telling
 
 if TYPE_CHECKING:
     from picchio.fatigue.sn.fit import Estimate, SNFit
@@ -60,9 +60,10 @@ def fit_sn(
     import picchio
 
     check_targets((out, plot, json), [tests])
-    found = picchio.fit_sn(
-        tests, kind=kind, survival=survival, level=level, run_out_cycles=run_out_cycles
-    )
+    with telling("fitting"):
+        found = picchio.fit_sn(
+            tests, kind=kind, survival=survival, level=level, run_out_cycles=run_out_cycles
+        )
     if plot is not None:
         from picchio.visuals.plots.sn import plot_sn_fit
         from picchio.visuals.plots.style import blank_figure, save_figure

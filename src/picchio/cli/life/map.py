@@ -94,8 +94,13 @@ def map_(
     flex: FlexOption = None,
     tool: ToolOption = None,
     chunk: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Places computed and kept at a time.")
-    ] = 4096,
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=1,
+            help="Places computed and kept at a time; 4096 if not given, 64 with --damage.",
+        ),
+    ] = None,
     restart: Annotated[
         bool,
         typer.Option("--restart", help="Start afresh, though an interrupted map could be resumed."),

@@ -109,10 +109,10 @@ def place(
         )
     if out is not None:
         write_task(found, Work.of(loaded, work), work, path, out)
-    deliver(found.to_dict(), json, lambda: _show(found, off, out))
+    deliver(found.to_dict(), json, lambda: _show(found, off))
 
 
-def _show(found: Placement, off: float, moved: Path | None) -> None:
+def _show(found: Placement, off: float) -> None:
     out = console()
     # Zeros are added for the sake of their sign.
     x, y, z = found.best.spot.move[:3].round(3) + 0.0
@@ -154,8 +154,6 @@ def _show(found: Placement, off: float, moved: Path | None) -> None:
     if found.by_effort:
         out.print("Utilisation: torque over the URDF's effort limit; no shaft or reducer is known.")
     out.print(f"Self-collisions: {found.self_collision}.")
-    if moved is not None:
-        print(f"The task with the work moved: {moved}")
 
 
 def _gain(found: Placement) -> str:

@@ -20,7 +20,7 @@ from picchio.cli.options import (
     WidthOption,
     numbers,
 )
-from picchio.cli.output import check_targets, deliver, progress
+from picchio.cli.output import check_targets, deliver, progress, telling
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -99,8 +99,8 @@ def view(
             progress=tell,
         )
     if out is not None:
-        size = scene.save(out).stat().st_size
-        typer.echo(f"{out}: {scene.title}, {size / 1e6:.1f} MB; open it in a browser", err=True)
+        with telling("writing the scene"):
+            scene.save(out)
     deliver(scene.to_dict(), json)
     if live:
         _show_live(scene)

@@ -31,8 +31,7 @@ from picchio.cli.output import (
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
+    from picchio.cli.layout import FittedTable
     from picchio.measurement.quality.report import QualityReport, RecordSummary
 
 _MOST_RECORDS = 16
@@ -174,7 +173,7 @@ def _show_contents(report: QualityReport) -> None:
     out.print()
 
 
-def _record_table(records: Sequence[RecordSummary]) -> Table:
+def _record_table(records: Sequence[RecordSummary]) -> FittedTable:
     rows = []
     for record in records:
         numbers = list(record.pose.values() if isinstance(record.pose, dict) else record.pose or [])
@@ -201,7 +200,7 @@ def _done(record: RecordSummary) -> str:
     return f"{count}{e['force']:.4g} N / {1e3 * e['period']:.4g} ms"
 
 
-def _channel_table(report: QualityReport) -> Table:
+def _channel_table(report: QualityReport) -> FittedTable:
     sizes: dict[str, list[float]] = {}
     units = {}
     for record in report.records:
@@ -224,7 +223,7 @@ def _channel_table(report: QualityReport) -> Table:
     return table(heads, rows, title="Channels and their noise")
 
 
-def _finding_table(report: QualityReport, verbose: bool) -> Table:
+def _finding_table(report: QualityReport, verbose: bool) -> FittedTable:
     rows = []
     for group in [[finding] for finding in report.findings] if verbose else report.groups():
         worst = group[0]

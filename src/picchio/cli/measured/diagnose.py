@@ -136,7 +136,7 @@ def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
             # The cause is named in its first row alone.
             rows += [heads + (values or [[]])[0], *(["", "", "", *row] for row in values[1:])]
         columns = ("cause", "where", "confidence", ">value", ">std", "unit")
-        out.print(table(columns, rows, box=None, header_style="dim"))
+        out.print(table(columns, rows, ruled=False, head_style="dim"))
         for name in dict.fromkeys(cause.effect for cause in found.causes):
             out.print(f"  {name}: {effect_class(name).meaning}")
     for each in differences(found):
@@ -196,7 +196,7 @@ def _show_life(life: Mapping[str, Any]) -> None:
             rows.append(["", *spans])
     columns = ("joint", ">rivets before", ">after", ">utilisation before %", ">after %")
     out = console()
-    out.print(table(columns, rows, box=None, header_style="dim", title="Life"))
+    out.print(table(columns, rows, ruled=False, head_style="dim", title="Life"))
     if "interval_level" in life:
         out.print(
             f"  {100 * life['interval_level']:g} % intervals: before, of the stated "

@@ -58,5 +58,5 @@ def identify(
     deliver(
         found.to_dict(),
         json,
-        lambda: console().print(f"{count_of(len(causes), 'cause')}; wrote {out}"),
+        lambda: console().print(f"{count_of(len(causes), 'cause')} found."),
     )

@@ -9,7 +9,7 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import JsonOption
-from picchio.cli.output import check_targets, deliver
+from picchio.cli.output import check_targets, console, deliver
 from picchio.core.errors import InputError
 
 
@@ -55,13 +55,12 @@ def import_(
 
         if to is not None or mapping is not None:
             raise InputError("stands alone: edit the mapping, then import", key="--write-mapping")
+        check_targets([write_mapping], [file])
         template.write_mapping(file, write_mapping)
-        typer.echo(f"{write_mapping}: edit it, then give it with --mapping", err=True)
         return
     if to is None:
         raise InputError("say where the campaign goes", key="--to")
-    check_targets([json], [file, mapping])
+    check_targets([json], [file, mapping], folder=to)
     made = picchio.import_record(file, to, mapping, name=name, append=append)
-    deliver(made.to_dict(), json)
     channels = ", ".join(made.record.channels)
-    typer.echo(f"{to}: {made._headline()}, {channels}", err=json == "-")
+    deliver(made.to_dict(), json, lambda: console().print(f"{made._headline()}, {channels}"))

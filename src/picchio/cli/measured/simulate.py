@@ -15,7 +15,7 @@ from picchio.cli.options import (
     RobotArgument,
     ToolOption,
 )
-from picchio.cli.output import check_targets, deliver, progress
+from picchio.cli.output import check_targets, console, deliver, progress
 
 if TYPE_CHECKING:
     from picchio.prediction.simulation import Simulation
@@ -49,7 +49,7 @@ def simulate(
     import picchio
 
     loaded = picchio.load_robot(robot, flex=flex, tool=tool)
-    check_targets([json], [*loaded.files, plan])
+    check_targets([json], [*loaded.files, plan], folder=to)
     with progress("records") as report:
         made = picchio.simulate(
             loaded,
@@ -62,9 +62,10 @@ def simulate(
             overwrite=overwrite,
             progress=report,
         )
-    deliver(made.to_dict(), json, lambda: _show(made, to))
+    deliver(made.to_dict(), json, lambda: _show(made))
 
 
-def _show(made: Simulation, to: Path) -> None:
-    typer.echo(f"{to}: {made._headline()}")
-    typer.echo("  " + ", ".join(made.campaign.records[0].channels))
+def _show(made: Simulation) -> None:
+    out = console()
+    out.print(made._headline())
+    out.print("  " + ", ".join(made.campaign.records[0].channels))

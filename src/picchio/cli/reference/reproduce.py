@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -56,10 +55,10 @@ def reproduce(
     with progress("hypotheses about Table 2") as told:
         found = picchio.reproduce(given, worlds=WORLDS if worlds is None else worlds, progress=told)
     write_report(found, report)
-    deliver(found.to_dict(), json, lambda: _show(found, report))
+    deliver(found.to_dict(), json, lambda: _show(found))
 
 
-def _show(found: Reproduction, report: Path | None) -> None:
+def _show(found: Reproduction) -> None:
     screen = console()
     printed = found.study.printed
     screen.print(styled(printed.title, f"\n{printed.journal}\n"))
@@ -70,7 +69,7 @@ def _show(found: Reproduction, report: Path | None) -> None:
         mark = str(tried.finding.verdict)
         told = styled(mark, f" {tried.finding.condition}", style=colour[mark])
         rows.append((str(tried.sentence.page), tried.sentence.quote, told))
-    screen.print(table((">p.", "claim", "verdict"), rows, box=None))
+    screen.print(table((">p.", "claim", "verdict"), rows, ruled=False))
     screen.print(f"\n{found._headline()}.")
     lives = found.answer.table
     values, longer = lives.other.values, lives.over_printed
@@ -79,5 +78,3 @@ def _show(found: Reproduction, report: Path | None) -> None:
         f"printed curve's; S = {values['a']:,.0f} N^{values['b']:.4f} at the same mean stresses "
         f"gives seven of eight within {100 * lives.within:.2g} %."
     )
-    if report is not None:
-        screen.print(f"The page: {report}")

@@ -40,8 +40,7 @@ def annotate(
     made = picchio.annotate(robot, flex=flex)
     check_targets((out, json), [made.urdf, made.sidecar])
     made.save(out)
-    deliver(made.to_dict(), json)
-    typer.echo(f"{out}: {made._headline()}", err=True)
+    deliver(made.to_dict(), json, lambda: console().print(made._headline()))
 
 
 def _show(found: RobotList) -> None:

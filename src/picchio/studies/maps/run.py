@@ -35,7 +35,7 @@ from picchio.vibration.closed_form.response import unit_vector
 if TYPE_CHECKING:
     import xarray
 
-CHUNK = 4096
+CHUNK, CHUNK_WITH_DAMAGE = 4096, 64
 MOST_PLACES = 10**10
 ENDINGS = (".nc", ".zarr")
 # Fewer places than this are not worth starting workers for.
@@ -53,7 +53,7 @@ def workspace_map(
     branch: str = "all",
     hits: int | None = None,
     damage: int | None = None,
-    chunk: int = CHUNK,
+    chunk: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
     restart: bool = False,
@@ -72,7 +72,7 @@ def workspace_map(
         hits: of a burst from rest; None for the steady state.
         damage: count the damage of a rivet of so many hits, too, from rest with its ring-down; for
             the worst direction it is searched, which takes many times as long.
-        chunk: places at a time.
+        chunk: places at a time; 4096 if not given, 64 where damage is counted, which takes longer.
         workers: processes; up to one, this process does the work itself. As many as cores, and
             none for small maps, if not given.
         scheduler: address of a dask scheduler to use instead.
@@ -101,6 +101,8 @@ def workspace_map(
         from picchio.robot.ik.branch import branch_words
 
         branch_words(robot, branch)
+    if chunk is None:
+        chunk = CHUNK if damage is None else CHUNK_WITH_DAMAGE
     if chunk < 1:
         raise InputError("must be at least 1", key="chunk", value=chunk)
     if len(places) > MOST_PLACES:
@@ -135,10 +137,11 @@ def workspace_map(
         spans = [(k, min(k + chunk, len(places))) for k in range(0, len(places), chunk)]
         missing = [span for span in spans if not _file(folder, span).exists()]
         done = len(places) - sum(last - first for first, last in missing)
+        tell = progress or (lambda done, total: None)
+        tell(done, len(places))
         for span in _run(job, folder, missing, workers, scheduler):
             done += span[1] - span[0]
-            if progress is not None:
-                progress(done, len(places))
+            tell(done, len(places))
         join_chunks(target, (_read(_file(folder, span)) for span in spans), _attributes(job))
         shutil.rmtree(folder)
     return WorkspaceMap(open_map(target), target)

@@ -1,0 +1,116 @@
+"""What people see of a command besides its result: tables of any width, a bar, what was written."""
+
+from __future__ import annotations
+
+import io
+import sys
+import time
+from pathlib import Path
+
+import picchio as library
+from picchio.cli import waiting as waiting_module
+from picchio.cli.output import begin, check_targets, console, say_written, table
+from picchio.cli.waiting import Waiting
+
+ONE_POSE = """format = "picchio-task/1"
+excitation = { kind = "pulse_train", force = 300.0, period = 0.040, width = 0.004 }
+operation = [{ name = "forward", direction = [1.0, 0.0, 0.0], poses = [[0.0, 0.5, -0.8]] }]
+"""
+LONG = "the_second_joint_of_a_large_arm"  # over 30 characters
+
+
+def test_an_assessment_is_whole_at_every_width(picchio, tables, tmp_path, monkeypatch):
+    library.annotate("fanuc_like_3dof").save(tmp_path / "plain.urdf")
+    text = (tmp_path / "plain.urdf").read_text().replace('"joint_2"', f'"{LONG}"')
+    (tmp_path / "arm.urdf").write_text(text)
+    task = tmp_path / "one.toml"
+    task.write_text(ONE_POSE)
+    monkeypatch.setenv("COLUMNS", "60")
+    done = picchio("assess", tmp_path / "arm.urdf", "--task", task, "--for-life", "1e6",
+                   "--compare-methods")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert len(tables) >= 4 and done.stdout.count(LONG) > 4
+    assert max(map(len, done.stdout.splitlines())) <= 60
+    assert "…" not in done.stdout
+
+
+def test_a_pipe_gets_full_lines(picchio, monkeypatch):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    lines = picchio("assess", "fanuc_like_3dof").stdout.splitlines()
+    assert max(map(len, lines)) > 200
+    assert sum(line.startswith("joint_2") for line in lines) == 2  # one a table
+
+
+def test_what_does_not_fit_is_split_and_then_turned(tables):
+    heads = ["joint", *(f">quantity {k}" for k in range(8)), "remark"]
+    rows = [[f"{LONG}_{k}", *["123456.789"] * 8, "a remark of several words"] for k in range(2)]
+    for name, parts in (("joint", 3), (f"{LONG}_on_the_left", 0)):
+        cells = [[f"{name}_{k}", *row[1:]] for k, row in enumerate(rows)]
+        made = table(heads, cells)
+        text = io.StringIO()
+        screen = console()
+        screen.file, screen.width = text, 60
+        screen.print(made)
+        assert text.getvalue().count(f"{name}_1") == (parts or 1)
+
+
+def test_what_was_written_is_said_once(picchio, tmp_path):
+    words = ("envelope", "fanuc_like_3dof", "--pose=0.3,1.1,-1.0", "--json")
+    done = picchio(*words, "worst.json", cwd=tmp_path)
+    assert done.stderr.splitlines() == ["picchio: wrote worst.json"]
+    assert "wrote" not in done.stdout
+    assert "wrote" not in picchio(*words, "-", cwd=tmp_path).stderr
+
+
+def test_every_output_of_every_command_is_awaited():
+    """An option that names an output reaches `check_targets`, which is where it is told."""
+    import typer
+
+    from picchio.cli.main import app
+
+    for name, command in typer.main.get_command(app).commands.items():
+        source = Path(sys.modules[command.callback.__module__].__file__).read_text()
+        outputs = {"json", "report", "out", "plot", "model", "to"} & {
+            p.name for p in command.params
+        }
+        if name not in ("robots", "effects", "formats"):  # they read nothing
+            assert not outputs or "check_targets(" in source, name
+
+
+def test_only_what_changed_was_written(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("old.json").write_text("{}")
+    begin([])
+    check_targets(["old.json", "new\x1b.json", "never.json", "-"], [], folder=Path("campaign"))
+    Path("new\x1b.json").write_text("{}")
+    Path("campaign").mkdir()
+    say_written()
+    said = capsys.readouterr().err.splitlines()
+    assert said == ["picchio: wrote campaign", "picchio: wrote new\\x1b.json"]
+
+
+class _Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def test_long_work_shows_a_bar_and_short_work_none(monkeypatch):
+    screen = _Terminal()
+    monkeypatch.setattr(sys, "stderr", screen)
+    monkeypatch.setenv("TERM", "xterm")
+    with Waiting().watched():
+        pass
+    assert screen.getvalue() == ""
+    monkeypatch.setattr(waiting_module, "PATIENCE", 0.05)
+    bar = Waiting()
+    with bar.watched():
+        bar.say("places", 3, 8)
+        time.sleep(0.6)
+        bar.say("drawing the page")
+        time.sleep(0.4)
+        assert "places" in screen.getvalue() and "3/8" in screen.getvalue()
+    assert "drawing the page" in screen.getvalue() and "None" not in screen.getvalue()
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    with bar.watched():
+        time.sleep(0.2)
+    assert sys.stderr.getvalue() == ""
