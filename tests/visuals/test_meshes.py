@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 import picchio
 from picchio.core.errors import PicchioWarning
 from picchio.excitation.pulse_train import PulseTrain
+from picchio.robot.urdf.addresses import resolve_mesh
 from picchio.visuals.kinematics import frames, world
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.robot.body import MOST_FACES, build_body, decimate
 from picchio.visuals.scene.robot.mesh import sphere
-from picchio.visuals.scene.robot.visuals import load_mesh, resolve_mesh
+from picchio.visuals.scene.robot.visuals import load_mesh
 
 BLOWS = PulseTrain(300.0, 0.040, 0.004)
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.urdf.shapes import placement
 from picchio.robot.urdf.tree import MOVABLE, UrdfJoint
 
 
@@ -36,14 +36,6 @@ class Frame:
     position: float
     follows: FloatArray
     joint: str | None
-
-
-def placement(xyz: ArrayLike, rpy: ArrayLike) -> FloatArray:
-    """(4, 4) of a URDF origin: fixed-axis roll, pitch, yaw."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = pin.rpy.rpyToMatrix(np.asarray(rpy, dtype=float))
-    matrix[:3, 3] = xyz
-    return matrix
 
 
 def frames(robot: FlexibleRobot, pose: FloatArray) -> list[Frame]:

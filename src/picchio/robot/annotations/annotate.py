@@ -18,8 +18,8 @@ from lxml import etree
 
 from picchio.core.errors import InputError
 from picchio.robot.annotations.flexibility import EXCLUDED, Source, check_names
-from picchio.robot.annotations.inline import IN_JOINT, IN_ROBOT, read_annotations
-from picchio.robot.annotations.sidecar import JointEntry, Sidecar, given
+from picchio.robot.annotations.inline import IN, IN_ROBOT, read_annotations
+from picchio.robot.annotations.sidecar import Sidecar, given
 from picchio.robot.urdf.check import read_tree
 from picchio.robot.urdf.xml import NAMESPACE, parse_urdf, read_urdf_bytes
 
@@ -64,7 +64,7 @@ class Places:
 
     Attributes:
         root_name_end: byte after `<robot`.
-        at: by ("joint", its name) or ("robot", the annotation's name).
+        at: by ("joint" or "link", its name) or ("robot", the annotation's name).
 
     Raises:
         ValueError: expat cannot follow the file's encoding.
@@ -80,7 +80,7 @@ class Places:
         # Of each open element whether it is self-closing: expat then reports the end of
         # `<limit/>` at the byte after it, where another element's closing tag may stand.
         self._open: list[bool] = []
-        self._joint: Place | None = None
+        self._holder: Place | None = None
         self._robot = {tag: Place() for tag in IN_ROBOT}
         try:
             self._parser.Parse(content, True)
@@ -98,16 +98,16 @@ class Places:
             name = _NAME.match(self.content, start)
             self.root_name_end = name.end() if name else start
         elif depth == 2:
-            if tag == "joint":
-                self._joint = self.at["joint", attributes["name"]] = Place()
+            if tag in IN:
+                self._holder = self.at[tag, attributes["name"]] = Place()
             for annotation, place in self._robot.items():
                 place.see_child(blank)
                 if tag == f"{NAMESPACE} {annotation}":
                     place.old.append(old)
-        elif depth == 3 and self._joint is not None:
-            self._joint.see_child(blank)
+        elif depth == 3 and self._holder is not None:
+            self._holder.see_child(blank)
             if tag.startswith(f"{NAMESPACE} "):
-                self._joint.old.append(old)
+                self._holder.old.append(old)
 
     def _end(self, tag: str) -> None:
         depth = len(self._open)
@@ -116,7 +116,7 @@ class Places:
             blank = self._blank_before(start)
             self._close(tag, depth, start - len(blank), self._tag_end(start))
         if depth == 2:
-            self._joint = None
+            self._holder = None
 
     def _close(self, tag: str, depth: int, insert: int, end: int) -> None:
         """A closing tag that, with the white space before it, stands at insert..end."""
@@ -124,11 +124,11 @@ class Places:
             for name, place in self._robot.items():
                 place.insert = insert
                 self.at["robot", name] = place
-        elif depth == 2 and self._joint is not None:
-            self._joint.insert = insert
+        elif depth == 2 and self._holder is not None:
+            self._holder.insert = insert
         elif tag.startswith(f"{NAMESPACE} "):
             name = tag.removeprefix(f"{NAMESPACE} ")
-            holder = self._robot.get(name) if depth == 2 else self._joint if depth == 3 else None
+            holder = self._robot.get(name) if depth == 2 else self._holder if depth == 3 else None
             if holder is not None:
                 holder.old[-1] = (holder.old[-1][0], end)
 
@@ -175,13 +175,15 @@ def annotate(urdf: str | Path, sidecar: Sidecar) -> bytes:
     if not prefix:
         prefix = "picchio"
         edits.append((places.root_name_end, places.root_name_end, f' xmlns:{prefix}="{NAMESPACE}"'))
-    for name, entry in sidecar.joint.items():
-        merged = {**given(before.joint.get(name)), **given(entry)}
-        for key in given(entry):
-            merged.pop(EXCLUDED.get(key, ""), None)
-        JointEntry.model_validate(merged)
-        expected["joint", name] = merged
-        edits += _replace(places, ("joint", name), _joint_elements(prefix, merged))
+    for kind, elements in IN.items():
+        old = getattr(before, kind)
+        for name, entry in getattr(sidecar, kind).items():
+            merged = {**given(old.get(name)), **given(entry)}
+            for key in given(entry):
+                merged.pop(EXCLUDED.get(key, ""), None)
+            type(entry).model_validate(merged)
+            expected[kind, name] = merged
+            edits += _replace(places, (kind, name), _elements(prefix, elements, merged))
     for tag in IN_ROBOT:
         values = {**given(getattr(before, tag)), **given(getattr(sidecar, tag))}
         if given(getattr(sidecar, tag)):
@@ -209,7 +211,7 @@ def _read_back(
         raise InputError(f"cannot be annotated, the result would not read back: {error.problem}",
                          file=path, key=error.key) from None  # fmt: skip
     for (kind, name), values in expected.items():
-        entry = found.joint.get(name) if kind == "joint" else getattr(found, name)
+        entry = getattr(found, kind).get(name) if kind in IN else getattr(found, name)
         if given(entry) != values:
             raise InputError("cannot be annotated, the result would not read back as the values "
                              "given", file=path, key=f"{kind}.{name}")  # fmt: skip
@@ -224,9 +226,13 @@ def _outline(root: etree._Element) -> list[tuple[str, dict[str, str]]]:
             if not str(element.tag).startswith(f"{{{NAMESPACE}}}")]  # fmt: skip
 
 
-def _joint_elements(prefix: str, values: Mapping[str, Any]) -> list[str]:
+def _elements(
+    prefix: str,
+    known: Mapping[str, tuple[str | None, dict[str, Any]]],
+    values: Mapping[str, Any],
+) -> list[str]:
     elements = []
-    for tag, (target, attributes) in IN_JOINT.items():
+    for tag, (target, attributes) in known.items():
         if target is None:
             own = {key: value for key, value in values.items() if key in attributes}
         else:

@@ -47,6 +47,23 @@ class Source:
         return f"{self.label}: {source}" if source else self.label
 
 
+def strongest(sources: Sequence[Source], table: str) -> tuple[dict[str, Any], dict[str, str]]:
+    """Of each value of a sidecar's table the strongest source's, and where it is from.
+
+    Args:
+        sources: the strongest first.
+        table: such as "tool".
+    """
+    values: dict[str, Any] = {}
+    origins: dict[str, str] = {}
+    for source in reversed(sources):
+        found = given(getattr(source.content, table))
+        note = found.pop("source", None)
+        values |= found
+        origins |= {f"{table}.{key}": source.origin(note) for key in found}
+    return values, origins
+
+
 def flexible_joints(
     tree: UrdfTree, sources: Sequence[Source]
 ) -> tuple[dict[str, Joint], dict[str, str]]:
@@ -79,12 +96,16 @@ def flexible_joints(
 
 
 def check_names(tree: UrdfTree, source: Source) -> None:
-    """Refuse joints that the robot does not have or that cannot be flexible.
+    """Refuse joints and links that the robot does not have, and joints that cannot have a drive.
 
     Raises:
-        InputError: with the joints that can be.
+        InputError: with those that can be.
     """
-    for name, entry in source.content.joint.items():
+    for name in source.content.link:
+        if name not in tree.links:
+            raise InputError("the robot has no link of this name", file=source.file, key="link",
+                             value=name, choices=tree.links)  # fmt: skip
+    for name in source.content.joint:
         key = f"joint.{name}"
         if name not in tree.joints:
             if source.strict:
@@ -92,12 +113,12 @@ def check_names(tree: UrdfTree, source: Source) -> None:
                                  key="joint", value=name, choices=tree.movable())  # fmt: skip
             continue
         urdf = tree.joints[name]
-        if not entry.flexible:
+        if not source.strict:  # other tools' tags speak of their own matters
             continue
         if urdf.type not in MOVABLE:
-            raise InputError(f"a {urdf.type} joint cannot be flexible", file=source.file, key=key,
-                             hint="flexible joints are revolute, continuous or "
-                             "prismatic")  # fmt: skip
+            raise InputError(f"a {urdf.type} joint cannot be flexible and has no drive",
+                             file=source.file, key=key, hint="flexible joints are revolute, "
+                             "continuous or prismatic")  # fmt: skip
         if urdf.mimic is not None:
             raise InputError(f"mimics {urdf.mimic.joint!r} and has no spring of its own",
                              file=source.file, key=key,

@@ -1,12 +1,14 @@
 """The `picchio:` annotations of a URDF, read into the same records as a sidecar.
 
 In a `<joint>`: `<picchio:flexibility>`, `<picchio:shaft>`, `<picchio:stiffness_curve>`,
-`<picchio:balancer>`. In `<robot>`: `<picchio:tool>`, `<picchio:gun>`, `<picchio:base>`.
+`<picchio:balancer>`. In a `<link>`: `<picchio:inertial>`. In `<robot>`: `<picchio:tool>`,
+`<picchio:gun>`, `<picchio:links>`, `<picchio:base>`.
 The prefix is bound to `urn:picchio:1`; another version is refused by name.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from picchio.core.errors import InputError
 from picchio.core.toml import StrictModel, leaf_types, validate
 from picchio.robot.annotations.sidecar import FORMAT, JointEntry, Sidecar
 from picchio.robot.joint import Balancer, Shaft, StiffnessCurve
+from picchio.robot.link import LinkEntry, LinkMasses
 from picchio.robot.tool import Gun, Mounting, Tool
 from picchio.robot.urdf.tree import to_number
 from picchio.robot.urdf.xml import NAMESPACE, local_name
@@ -35,9 +38,15 @@ IN_JOINT: dict[str, tuple[str | None, dict[str, Any]]] = {
     "stiffness_curve": ("stiffness_curve", _attributes_of(StiffnessCurve)),
     "balancer": ("balancer", _attributes_of(Balancer)),
 }
+IN_LINK: dict[str, tuple[str | None, dict[str, Any]]] = {
+    "inertial": (None, _attributes_of(LinkEntry)),
+}
+# What a <joint> and a <link> may hold.
+IN = {"joint": IN_JOINT, "link": IN_LINK}
 IN_ROBOT = {
     "tool": _attributes_of(Tool),
     "gun": _attributes_of(Gun),
+    "links": _attributes_of(LinkMasses),
     "base": _attributes_of(Mounting),
 }
 
@@ -57,7 +66,7 @@ def read_annotations(root: etree._Element, path: Path) -> Sidecar | None:
         found = _read(root)
     except InputError as error:
         raise error.placed(file=path) from None
-    if found == {"joint": {}}:
+    if not any(found.values()):
         return None
     return validate({"format": FORMAT, **found}, Sidecar, format=FORMAT, file=path)
 
@@ -65,14 +74,16 @@ def read_annotations(root: etree._Element, path: Path) -> Sidecar | None:
 def _read(root: etree._Element) -> dict[str, Any]:
     """The annotations as a sidecar has them."""
     _check_prefix(root)
-    found: dict[str, Any] = {"joint": {}}
+    found: dict[str, Any] = {"joint": {}, "link": {}}
     for element in root.iter(f"{{{NAMESPACE}}}*"):
         parent = element.getparent()
         name = local_name(element)
         # Not the <joint> of a <transmission>, which only refers to one.
-        if parent is not None and parent.tag == "joint" and parent.getparent() is root:
-            joint = parent.get("name")
-            _read_in_joint(element, parent, found["joint"].setdefault(joint, {}), f"joint {joint}")
+        kind = str(parent.tag) if parent is not None else ""
+        if parent is not None and kind in IN and parent.getparent() is root:
+            holder = parent.get("name", "")
+            _read_in(IN[kind], element, parent, found[kind].setdefault(holder, {}),
+                     f"{kind} {holder}")  # fmt: skip
         elif parent is root and name in IN_ROBOT:
             if name in found:
                 raise InputError(f"<picchio:{name}> occurs twice")
@@ -92,15 +103,19 @@ def _check_prefix(root: etree._Element) -> None:
                                  choices=[NAMESPACE])  # fmt: skip
 
 
-def _read_in_joint(
-    element: etree._Element, joint: etree._Element, entry: dict[str, Any], place: str
+def _read_in(
+    known: Mapping[str, tuple[str | None, dict[str, Any]]],
+    element: etree._Element,
+    holder: etree._Element,
+    entry: dict[str, Any],
+    place: str,
 ) -> None:
     name = local_name(element)
-    if name not in IN_JOINT:
+    if name not in known:
         _refuse(element)
-    target, attributes = IN_JOINT[name]
+    target, attributes = known[name]
     values = _attributes(element, attributes, f"{place}: picchio:{name}")
-    if len(joint.findall(str(element.tag))) > 1:
+    if len(holder.findall(str(element.tag))) > 1:
         raise InputError(f"<picchio:{name}> occurs twice", key=place)
     if target is None:
         entry.update(values)
@@ -134,9 +149,10 @@ def _convert(text: str, kind: Any, key: str) -> Any:
 def _refuse(element: etree._Element) -> None:
     name = local_name(element)
     line = f"line {element.sourceline}"
-    if name in IN_JOINT:
-        raise InputError(f"<picchio:{name}> belongs directly in a <joint> of <robot> ({line})")
+    for kind, elements in IN.items():
+        if name in elements:
+            raise InputError(f"<picchio:{name}> belongs directly in a <{kind}> of <robot> ({line})")
     if name in IN_ROBOT:
         raise InputError(f"<picchio:{name}> belongs directly in <robot> ({line})")
     raise InputError(f"unknown picchio element ({line})", value=name,
-                     choices=[*IN_JOINT, *IN_ROBOT])  # fmt: skip
+                     choices=[*IN_JOINT, *IN_LINK, *IN_ROBOT])  # fmt: skip

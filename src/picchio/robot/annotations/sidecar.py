@@ -35,6 +35,15 @@ recoil_stiffness = 3e4       # N/m, optional: the body then slides along the too
 damping_ratio = 0.1
 feed_force = 80.0            # N
 
+[link.forearm_link]          # in place of the URDF's
+mass = 4.2                   # kg
+com = [0.0, 0.0, 0.12]       # m, in the link's frame
+inertia = [0.05, 0, 0, 0.05, 0, 0.01]   # kg m^2 about com, along the link's axes
+
+[links]                      # or: a total, spread over the links by the volume of their shapes
+total_mass = 25.0            # kg, base included
+shapes = "collision"         # or "visual"
+
 [base]
 xyz = [0.0, 0.0, 0.0]        # m
 rpy = [0.0, 0.0, 0.0]        # rad
@@ -51,6 +60,7 @@ from pydantic import Field, model_validator
 
 from picchio.core.toml import Finite, NotNegative, StrictModel, parse_toml
 from picchio.robot.joint import Balancer, Shaft, Stiffness, StiffnessCurve
+from picchio.robot.link import LinkEntry, LinkMasses
 from picchio.robot.tool import Gun, Mounting, Tool
 
 FORMAT = "picchio-sidecar/1"
@@ -108,6 +118,8 @@ class Sidecar(StrictModel):
         joint: drives, by the URDF's joint names.
         tool: the tool, in addition to the URDF.
         gun: the percussive tool's body.
+        link: masses in place of the URDF's, by its links' names.
+        links: a total mass, spread over the links by the volume of their shapes.
         base: how the robot stands.
     """
 
@@ -116,6 +128,8 @@ class Sidecar(StrictModel):
     joint: dict[str, JointEntry] = Field(default_factory=dict)
     tool: Tool | None = None
     gun: Gun | None = None
+    link: dict[str, LinkEntry] = Field(default_factory=dict)
+    links: LinkMasses | None = None
     base: Mounting | None = None
 
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from picchio.core.errors import InputError
-from picchio.robot.annotations.flexibility import Source
+from picchio.robot.annotations.flexibility import Source, strongest
 from picchio.robot.annotations.other_tags import Srdf
 from picchio.robot.annotations.sidecar import given
 from picchio.robot.tool import Gun, Mounting, Tool
@@ -29,7 +28,7 @@ def choose_tool(
     Raises:
         InputError: no such frame, or several links could be it.
     """
-    values, origins = _strongest(sources, "tool")
+    values, origins = strongest(sources, "tool")
     for source in reversed(sources):
         if (stated := given(source.content.tool)) and "frame" in stated:
             values["frame"] = _link(tree, stated["frame"], source.file, "tool.frame")
@@ -40,18 +39,6 @@ def choose_tool(
     if "axis" in values:
         values["axis"] = tuple((np.array(values["axis"]) / np.linalg.norm(values["axis"])).tolist())
     return Tool.model_construct(**values), origins  # each value was checked where it stands
-
-
-def _strongest(sources: Sequence[Source], table: str) -> tuple[dict[str, Any], dict[str, str]]:
-    """Of each value of a sidecar's table the strongest source's, and where it is from."""
-    values: dict[str, Any] = {}
-    origins: dict[str, str] = {}
-    for source in reversed(sources):
-        found = given(getattr(source.content, table))
-        note = found.pop("source", None)
-        values |= found
-        origins |= {f"{table}.{key}": source.origin(note) for key in found}
-    return values, origins
 
 
 def _link(tree: UrdfTree, frame: str, file: str | None, key: str) -> str:
@@ -91,5 +78,5 @@ def choose_gun(sources: Sequence[Source]) -> tuple[Gun | None, dict[str, str]]:
 
 def choose_mounting(sources: Sequence[Source]) -> tuple[Mounting, dict[str, str]]:
     """How the robot stands: of each value the strongest source's."""
-    values, origins = _strongest(sources, "base")
+    values, origins = strongest(sources, "base")
     return Mounting.model_construct(**values), origins

@@ -9,11 +9,11 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 from picchio.core.errors import InputError
 from picchio.robot.annotations.sidecar import read_sidecar
+from picchio.robot.urdf.addresses import example_share, resolve_package
 
 
 @dataclass(frozen=True)
@@ -124,16 +124,6 @@ def shipped_robot(name: str) -> FoundRobot | None:
 
 
 @cache
-def example_share() -> Path | None:
-    """example-robot-data's root, which is also the root of its `package://` addresses."""
-    try:
-        share = Path(str(distribution("example-robot-data").locate_file("cmeel.prefix/share")))
-    except PackageNotFoundError:
-        return None
-    return share if (share / "example-robot-data").is_dir() else None
-
-
-@cache
 def example_robots() -> dict[str, Path]:
     """The URDFs of example-robot-data by name.
 
@@ -156,28 +146,3 @@ def example_robot(name: str) -> Path | None:
     """A URDF of example-robot-data by its name, with or without "_robot" at its end."""
     robots = example_robots()
     return robots.get(name) or robots.get(f"{name}_robot")
-
-
-def package_roots() -> list[Path]:
-    """Folders in which `package://<name>/...` is looked up: ROS_PACKAGE_PATH, then the data's."""
-    listed = os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep)
-    roots = [Path(entry) for entry in listed if entry]
-    share = example_share()
-    return [*roots, share] if share else roots
-
-
-def resolve_package(address: str) -> Path:
-    """The file behind a `package://` address.
-
-    Raises:
-        InputError: in none of the roots.
-    """
-    inside = address.removeprefix("package://")
-    for root in package_roots():
-        # A root may hold the package, or be it.
-        for path in (root / inside, root.parent / inside):
-            if path.is_file():
-                return path
-    raise InputError("no package root has this file", value=address,
-                     choices=[str(root) for root in package_roots()],
-                     hint="set ROS_PACKAGE_PATH")  # fmt: skip

@@ -19,8 +19,9 @@ from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
 from picchio.robot.loading.find import FoundRobot, find_robot
-from picchio.robot.loading.mass_check import check_masses
 from picchio.robot.loading.saved_model import is_saved_model, read_saved_model
+from picchio.robot.masses.check import check_masses
+from picchio.robot.masses.given import give_masses
 from picchio.robot.urdf.check import read_tree
 from picchio.robot.urdf.normalised import normalise
 from picchio.robot.urdf.tree import UrdfTree
@@ -73,6 +74,7 @@ def load_robot(
     srdf = find_srdf(tree)
     sources, flex_file = _sources(root, found, flex, values, srdf)
     joints, origins = flexible_joints(tree, sources)
+    tree, mass_origins = give_masses(tree, sources, root)
     _check_balancers(sources, joints)
     for remark in _remarks(tree, joints, origins):
         warn_user(remark)
@@ -101,7 +103,7 @@ def load_robot(
         gun=gun,
         mounting=mounting,
         flexible_joints=tuple(joints[name] for name in rigid.joint_names if name in joints),
-        origins={**origins, **tool_origins, **gun_origins, **base_origins},
+        origins={**origins, **tool_origins, **gun_origins, **mass_origins, **base_origins},
         named_poses={
             pose: tuple(values.get(name, 0.0) for name in rigid.joint_names)
             for pose, values in (srdf.poses if srdf else {}).items()

@@ -11,7 +11,7 @@ import pinocchio as pin
 from picchio.core.arrays import FloatArray
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.ik.chain import tool_chain
-from picchio.robot.loading.find import package_roots
+from picchio.robot.urdf.addresses import package_roots
 
 _SAMPLES = 100
 # Pairs that touch in nearly all poses are drawn to touch (MoveIt's assistant takes 95 %).

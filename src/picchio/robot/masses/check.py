@@ -20,6 +20,9 @@ _LEAST_EIGENVALUE = 1e-9
 def check_masses(robot: FlexibleRobot) -> None:
     """Refuse a robot whose flexible joints do not all carry inertia.
 
+    Args:
+        robot: as it was loaded.
+
     Raises:
         InputError: a body with an impossible inertia beyond a flexible joint; a flexible joint
             that carries no mass, or none off its axis; a singular mass matrix.
