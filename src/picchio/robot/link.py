@@ -28,7 +28,7 @@ class LinkEntry(StrictModel):
     """One link's mass, in place of the URDF's.
 
     Attributes:
-        mass: kg; alone, the URDF's inertia grows or shrinks with it.
+        mass: kg, and alone, the URDF's inertia grows or shrinks with it.
         com: m, centre of mass in the link's frame.
         inertia: kg m^2, about the centre of mass, along the link's axes: ixx, ixy, ixz, iyy, iyz,
             izz.
