@@ -8,6 +8,7 @@ import pytest
 
 from picchio.core.errors import InputError
 from picchio.robot.drives.reducer import Reducer, load_reducer, read_reducers
+from picchio.robot.joint import StiffnessCurve
 
 RPM = 2.0 * math.pi / 60.0
 
@@ -91,11 +92,27 @@ SHIPPED = [
 def test_every_entry_is_ordered_and_sourced(name: str) -> None:
     reducer = load_reducer(name)
     assert reducer.rated_torque < reducer.repeated_peak_torque < reducer.momentary_peak_torque
+    # Regression over catalogues (K2 against the repeated peak torque): a slip of a digit shows.
+    law = 170.0 * reducer.repeated_peak_torque**1.11
+    for spring in reducer.spring.values():
+        curve = spring if isinstance(spring, StiffnessCurve) else None
+        k2 = curve.k2 if curve else spring
+        assert law / 3.0 < k2 < law * 3.0
+        if curve:
+            assert curve.k1 < curve.k2 < curve.k3
+            assert 2.0 < curve.t2 / curve.t1 < 4.0
+            assert curve.t2 < reducer.momentary_peak_torque
+    if reducer.output_bearing is not None:
+        # Its own moment loads it to a fraction of C0: pi over 4 of the pitch circle at most.
+        bearing = reducer.output_bearing
+        share = 2.0 * bearing.permissible_moment / bearing.pitch_diameter
+        assert 0.1 < share / bearing.static_load_rating < 0.6
     if reducer.average_torque is not None:
         assert reducer.rated_torque <= reducer.average_torque < reducer.repeated_peak_torque
     assert len(reducer.source) > 40
-    expected = {"CSG": 10_000, "SHG": 10_000, "CSF": 7_000, "HFU": 7_000, "RV-": 6_000}[name[:3]]
-    assert reducer.rated_life == expected * 3600.0
+    lives = {"CSG-": 10_000, "SHG-": 10_000, "CSF-": 7_000, "HFUC": 7_000, "RV-2": 6_000}
+    if name[:4] in lives:
+        assert reducer.rated_life == lives[name[:4]] * 3600.0
     if reducer.kind == "strain-wave":
         assert reducer.ratio == float(name.split("-")[2])
 
@@ -114,6 +131,15 @@ def test_a_cycloidal_name_may_carry_its_ratio() -> None:
             assert getattr(ours, key) / ours.rated_torque == pytest.approx(ratio, rel=0.015)
     with pytest.raises(InputError, match="no such reducer"):
         load_reducer("CSG-32-101-2UH")
+
+
+def test_a_component_set_has_its_unit_s_ratings_and_no_bearing() -> None:
+    unit, alone = load_reducer("CSG-25-100-2UH"), load_reducer("CSG-25-100")
+    # CHA manual, table 50.3: K1 to K3 of size 25 at ratios above 50 are 31, 50, 57 kN m/rad.
+    curve = StiffnessCurve(k1=31e3, k2=50e3, k3=57e3, t1=14.0, t2=48.0)
+    assert alone.spring == unit.spring == {"stiffness_curve": curve}
+    assert (alone.rated_torque, alone.output_bearing) == (87.0, None)
+    assert unit.output_bearing is not None
 
 
 def test_a_users_catalogue(tmp_path: Path) -> None:

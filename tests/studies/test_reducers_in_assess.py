@@ -1,11 +1,13 @@
 """Reducers beside shafts: peak torque of gravity and blows against the catalogue."""
 
+import re
+
 import numpy as np
 import pytest
 
 import picchio
 from picchio.cli.life.assess import show
-from picchio.core.errors import PicchioWarning
+from picchio.core.errors import InputError
 from picchio.robot.drives.reducer import load_reducer
 
 TASK = {
@@ -22,6 +24,15 @@ def robot_with(tmp_path, **reducers):
     sidecar = tmp_path / "flex.toml"
     sidecar.write_text("\n".join(lines))
     return picchio.load_robot("fanuc_like_3dof", flex=sidecar)
+
+
+@pytest.fixture
+def plain_urdf(tmp_path, repository):
+    """The example arm without annotations: every joint rigid."""
+    text = (repository / "robots/fanuc_like_3dof/robot.urdf").read_text()
+    path = tmp_path / "plain.urdf"
+    path.write_text(re.sub(r"<picchio:[^>]*/>", "", text))
+    return path
 
 
 def test_peak_torque_of_gravity_and_blows_against_the_limits(tmp_path):
@@ -104,9 +115,59 @@ def test_the_task_s_largest_torques_count(tmp_path, capsys):
         assert f"joint_2: {line.removeprefix('RV-20E-121: ')}" in said
 
 
-def test_a_reducer_no_catalogue_has_is_told_and_left_unchecked(tmp_path):
-    robot = robot_with(tmp_path, joint_1="RV-9999")
-    with pytest.warns(PicchioWarning, match=r"joint_1.*RV-9999.*unchecked"):
-        found = picchio.assess(robot, picchio.task_from_dict(TASK, robot))
-    assert np.isnan(found.joint("joint_1").reducer_utilisation)
-    assert found.joint("joint_1").reducer == ""
+def test_a_reducer_no_catalogue_has_is_an_error_that_names_close_ones(tmp_path):
+    match = r"flex\.toml: joint\.joint_1\.reducer: no such reducer, got 'RV-90E'.*RV-80E"
+    with pytest.raises(InputError, match=match):
+        robot_with(tmp_path, joint_1="RV-90E")
+
+
+def test_a_reducer_s_name_brings_its_stiffness_curve(tmp_path, plain_urdf):
+    sidecar = tmp_path / "alone.toml"
+    head = 'format = "picchio-sidecar/1"\n[joint.joint_2]\nreducer = "CSG-25-100"\n'
+    sidecar.write_text(head)
+    robot = picchio.load_robot(plain_urdf, flex=sidecar, tool="tool")
+    (joint,) = robot.flexible_joints
+    assert joint.stiffness_curve == load_reducer("CSG-25-100").stiffness_curve
+    assert joint.damping_ratio == 0.03
+    assert "CHA" in robot.origins["joint_2.stiffness_curve"]
+    found = picchio.assess(robot, picchio.task_from_dict(TASK, robot))
+    said = "\n".join(found.assumptions)
+    assert "joint_2: stiffness is that of the reducer CSG-25-100 alone" in said
+    assert "damping ratio 0.03 is assumed" in said
+    sidecar.write_text(head + "stiffness = 5e4\n")
+    (joint,) = picchio.load_robot(plain_urdf, flex=sidecar, tool="tool").flexible_joints
+    assert (joint.stiffness, joint.stiffness_curve) == (5e4, None)
+    assert joint.reducer.name == "CSG-25-100"
+    sidecar.write_text(head.replace("CSG-25-100", "RV-20E"))
+    with pytest.raises(InputError, match=r"no stiffness of this reducer.*give the joint a stiff"):
+        picchio.load_robot(plain_urdf, flex=sidecar, tool="tool")
+
+
+def test_a_reducer_turns_and_a_slide_does_not(tmp_path, plain_urdf):
+    slide = tmp_path / "slide.urdf"
+    slide.write_text(plain_urdf.read_text().replace('"revolute"', '"prismatic"'))
+    sidecar = tmp_path / "flex.toml"
+    sidecar.write_text(
+        'format = "picchio-sidecar/1"\n[joint.joint_1]\nstiffness = 1e6\nreducer = "CSG-25-100"\n'
+    )
+    with pytest.raises(InputError, match=r"prismatic joint has no torsion reducer"):
+        picchio.load_robot(slide, flex=sidecar, tool="tool")
+
+
+def test_catalogues_of_one_s_own(tmp_path, in_process):
+    mine = tmp_path / "mine.toml"
+    mine.write_text(
+        'format = "picchio-reducers/1"\nmanufacturer = "Me"\nkind = "cycloidal"\n'
+        'source = "a test"\n[[reducer]]\nname = "X-1"\nrated_torque = 100\n'
+        "repeated_peak_torque = 2500\nmomentary_peak_torque = 5000\nstiffness = 3e5\n"
+    )
+    flex = tmp_path / "flex.toml"
+    flex.write_text('format = "picchio-sidecar/1"\n[joint.joint_2]\nreducer = "X-1"\n')
+    robot = picchio.load_robot("fanuc_like_3dof", flex=flex, reducers=[mine])
+    assert {joint.reducer.name for joint in robot.flexible_joints if joint.reducer} == {"X-1"}
+    assert mine in robot.files
+    command = ["envelope", "fanuc_like_3dof", "--pose=0,0.5,-0.8", "--flex", flex]
+    refused = in_process(*command)
+    assert refused.returncode == 2
+    assert "no such reducer, got 'X-1'" in refused.stderr
+    assert in_process(*command, "--reducers", mine).returncode == 0

@@ -33,6 +33,14 @@ ToolOption = Annotated[
         help="Frame of the URDF on which the tool's force acts; the sidecar's if not given.",
     ),
 ]
+ReducersOption = Annotated[
+    list[Path] | None,
+    typer.Option(
+        metavar="FILE",
+        help="Catalogue of reducers (TOML, see `picchio formats reducers`), stronger than those "
+        "shipped; may be repeated.",
+    ),
+]
 TaskOption = Annotated[
     Path | None,
     typer.Option(

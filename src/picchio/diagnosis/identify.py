@@ -283,10 +283,12 @@ def _joint(robot: FlexibleRobot, joint: Joint) -> dict[str, Any]:
     found: dict[str, Any] = {"stiffness": joint.stiffness, "damping_ratio": joint.damping_ratio}
     if joint.stiffness_curve is not None:
         del found["stiffness"]
-    for key in ("stiffness_curve", "reducer", "rotor_inertia", "gear_ratio", "shaft", "balancer"):
+    for key in ("stiffness_curve", "rotor_inertia", "gear_ratio", "shaft", "balancer"):
         if (value := getattr(joint, key)) is not None:
             model = isinstance(value, StrictModel)
             found[key] = value.model_dump(exclude_none=True) if model else value
+    if joint.reducer is not None:
+        found["reducer"] = joint.reducer.name
     if joint.estimated:
         found["estimated"] = True
     origin = robot.origins.get(f"{joint.name}.stiffness")

@@ -160,7 +160,7 @@ _TABLES: tuple[tuple[str, type[BaseModel], str, str], ...] = (
      "a robot, its sidecar and the effects that a diagnosis found"),
     (sn_library.SN_FORMAT, sn_library.SNCurveFile, "--sn-curve; fit-sn --out",
      "an S-N curve in shear"),
-    (reducer.REDUCER_FORMAT, reducer.ReducerFile, "load_reducer(catalogues=...)",
+    (reducer.REDUCER_FORMAT, reducer.ReducerFile, "--reducers",
      "a maker's catalogue of reducers"),
 )  # fmt: skip
 

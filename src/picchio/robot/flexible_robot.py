@@ -95,7 +95,8 @@ class FlexibleRobot:
         columns = ("joint", "kind", "stiffness [N m/rad, N/m]", "damping ratio", "shaft", "reducer")
         rows = [
             (j.name, j.kind, j.stiffness, j.damping_ratio,
-             f"radius {1e3 * j.shaft.radius:.4g} mm" if j.shaft else None, j.reducer)
+             f"radius {1e3 * j.shaft.radius:.4g} mm" if j.shaft else None,
+             j.reducer.name if j.reducer else None)
             for j in self.flexible_joints
         ]  # fmt: skip
         guess = any(j.estimated for j in self.flexible_joints)

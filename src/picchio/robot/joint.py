@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,9 @@ from pydantic import AfterValidator, model_validator
 
 from picchio.core.arrays import Vector
 from picchio.core.toml import Finite, FiniteVector, NotNegative, Positive, StrictModel
+
+if TYPE_CHECKING:
+    from picchio.robot.drives.reducer import Reducer
 
 LONGEST_SHAFT = 2.0  # m: no arm has a longer one, a number beyond it is in millimetres
 SOFTEST, STIFFEST = 1e-3, 1e12  # N m/rad or N/m: far beyond any drive on either side
@@ -157,7 +160,7 @@ class Joint:
         stiffness: N m/rad, or N/m for a prismatic joint; with a curve, that at no load.
         damping_ratio: modal, dimensionless.
         shaft: the shaft in the drive, where it is known.
-        reducer: a name of the reducer catalogue, where it is known.
+        reducer: its reducer, where it is known.
         effort_limit: N m or N; infinite where there is none.
         lower: position limit, rad or m; -inf where there is none.
         upper: position limit, rad or m; inf where there is none.
@@ -173,7 +176,7 @@ class Joint:
     stiffness: float
     damping_ratio: float
     shaft: Shaft | None = None
-    reducer: str | None = None
+    reducer: Reducer | None = None
     effort_limit: float = math.inf
     lower: float = -math.inf
     upper: float = math.inf

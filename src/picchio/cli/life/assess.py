@@ -14,6 +14,7 @@ from picchio.cli.options import (
     FlexOption,
     GravityStiffnessOption,
     JsonOption,
+    ReducersOption,
     ReportOption,
     RobotArgument,
     SNCurveOption,
@@ -50,6 +51,7 @@ def assess(
     task: TaskOption = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
+    reducers: ReducersOption = None,
     method: Annotated[
         str,
         typer.Option(
@@ -138,7 +140,7 @@ def assess(
         raise InputError("must be a positive number of rivets", key="--for-life", value=for_life)
     if seed is not None and not uncertainty:
         raise InputError("belongs to --uncertainty", key="--seed", value=seed)
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool)
+    loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     path = task_file(loaded, task)
     work = picchio.load_task(path, loaded)
     check_targets((json, report), [*loaded.files, *work.files, sn_curve])

@@ -15,6 +15,7 @@ from picchio.cli.options import (
     HitsOption,
     JsonOption,
     PeriodOption,
+    ReducersOption,
     RobotArgument,
     ToolOption,
     WidthOption,
@@ -36,6 +37,7 @@ def envelope(
     hits: HitsOption = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
+    reducers: ReducersOption = None,
     gravity_stiffness: GravityStiffnessOption = False,
     json: JsonOption = None,
 ) -> None:
@@ -47,7 +49,7 @@ def envelope(
     from picchio.robot.dynamics.pose import warn_beyond_limits
     from picchio.studies.tasks import blows_of
 
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool)
+    loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     check_targets([json], loaded.files)
     blows = blows_of(loaded, force=force, period=period, width=width)
     at = loaded.pose(numbers(pose, "--pose"))

@@ -14,6 +14,7 @@ from picchio.cli.options import (
     HitsOption,
     JsonOption,
     PeriodOption,
+    ReducersOption,
     RobotArgument,
     ToolOption,
     WidthOption,
@@ -93,6 +94,7 @@ def map_(
     width: WidthOption = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
+    reducers: ReducersOption = None,
     chunk: Annotated[
         int | None,
         typer.Option(
@@ -126,7 +128,7 @@ def map_(
     import picchio
     from picchio.studies.tasks import blows_of, hits_of_rivet
 
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool)
+    loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     check_targets((out, json), [*loaded.files, points, surface])
     where = _places(loaded, plane, at, box, points, surface, joint_grid, spacing, bounds)
     if direction is None:

@@ -12,6 +12,7 @@ from picchio.cli.app import app
 from picchio.cli.options import (
     FlexOption,
     JsonOption,
+    ReducersOption,
     RobotArgument,
     SNCurveOption,
     TaskOption,
@@ -63,6 +64,7 @@ def place(
     ] = 400,
     flex: FlexOption = None,
     tool: ToolOption = None,
+    reducers: ReducersOption = None,
     sn_curve: SNCurveOption = None,
     self_collision: Annotated[
         bool,
@@ -89,7 +91,7 @@ def place(
     if far is not None:
         far[3] = math.radians(far[3])
     rates = None if period_range is None else numbers(period_range, "--period-range", 2)
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool)
+    loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     path = task_file(loaded, task)
     work = picchio.load_task(path, loaded)
     check_targets((json, out), [*loaded.files, *work.files, sn_curve])

@@ -14,6 +14,7 @@ from picchio.cli.options import (
     GravityStiffnessOption,
     JsonOption,
     PeriodOption,
+    ReducersOption,
     RobotArgument,
     TaskOption,
     ToolOption,
@@ -64,6 +65,7 @@ def view(
     ] = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
+    reducers: ReducersOption = None,
     gravity_stiffness: GravityStiffnessOption = False,
     json: JsonOption = None,
 ) -> None:
@@ -76,7 +78,7 @@ def view(
 
     if out is None and not live:
         raise InputError("needs a file", key="--out", hint="--out scene.html, or --live")
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool)
+    loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     check_targets((out, json), [*loaded.files, task, map_, diagnosis])
     blows = None
     if pose is not None:

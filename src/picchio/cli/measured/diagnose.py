@@ -15,6 +15,7 @@ from picchio.cli.options import (
     FlexOption,
     GravityStiffnessOption,
     JsonOption,
+    ReducersOption,
     ReportOption,
     RobotArgument,
     ToolOption,
@@ -72,6 +73,7 @@ def diagnose(
     ] = None,
     flex: FlexOption = None,
     tool: ToolOption = None,
+    reducers: ReducersOption = None,
     gravity_stiffness: GravityStiffnessOption = True,
     json: JsonOption = None,
 ) -> None:
@@ -88,7 +90,9 @@ def diagnose(
         effect_class(name)
     campaign = picchio.load_campaign(data)
     moves = {record.kind for record in campaign} == {"motion"}
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool, allow_rigid=moves)
+    loaded = picchio.load_robot(
+        robot, flex=flex, tool=tool, reducers=reducers or (), allow_rigid=moves
+    )
     check_targets((json, report, model, plan), [*loaded.files, *campaign.files, task])
     with telling() as say:
         found = picchio.diagnose(

@@ -8,7 +8,14 @@ from typing import Annotated
 import typer
 
 from picchio.cli.app import app
-from picchio.cli.options import DataOption, FlexOption, JsonOption, RobotArgument, ToolOption
+from picchio.cli.options import (
+    DataOption,
+    FlexOption,
+    JsonOption,
+    ReducersOption,
+    RobotArgument,
+    ToolOption,
+)
 from picchio.cli.output import (
     check_targets,
     console,
@@ -31,6 +38,7 @@ def identify(
     out: Annotated[Path, typer.Option(metavar="SIDECAR.toml", help="Where the sidecar goes.")],
     flex: FlexOption = None,
     tool: ToolOption = None,
+    reducers: ReducersOption = None,
     json: JsonOption = None,
 ) -> None:
     """Stiffness and damping from measured data, as a sidecar.
@@ -45,7 +53,9 @@ def identify(
     check_targets((out, json), [flex])
     campaign = picchio.load_campaign(data)
     moves = any(record.kind == "motion" for record in campaign)
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool, allow_rigid=moves)
+    loaded = picchio.load_robot(
+        robot, flex=flex, tool=tool, reducers=reducers or (), allow_rigid=moves
+    )
     files = [*loaded.files, *campaign.files]
     check_targets([out], files)
     check_targets([json], [*files, out])

@@ -12,6 +12,7 @@ from picchio.cli.options import (
     FlexOption,
     GravityStiffnessOption,
     JsonOption,
+    ReducersOption,
     RobotArgument,
     ToolOption,
 )
@@ -28,6 +29,7 @@ def simulate(
     to: Annotated[Path, typer.Option(metavar="CAMPAIGN", help="The folder of the campaign.")],
     flex: FlexOption = None,
     tool: ToolOption = None,
+    reducers: ReducersOption = None,
     gravity_stiffness: GravityStiffnessOption = True,
     seed: Annotated[
         int | None,
@@ -48,7 +50,7 @@ def simulate(
     """
     import picchio
 
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool)
+    loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     check_targets([json], [*loaded.files, plan], folder=to)
     with progress("records") as report:
         made = picchio.simulate(

@@ -8,17 +8,20 @@ is kept. Tags that mean a spring beside the drive (Gazebo `springStiffness`, SDF
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from picchio.core.errors import InputError
 from picchio.robot.annotations.sidecar import Sidecar, given
+from picchio.robot.drives.reducer import Reducer, find_reducer
 from picchio.robot.joint import Joint
 from picchio.robot.urdf.tree import MOVABLE, UrdfJoint, UrdfTree
 
 DEFAULT_DAMPING_RATIO = 0.03
 # One of these excludes the other, wherever they stand.
+# The origin of a stiffness that a reducer's catalogue gives begins so.
+ITS_REDUCER = "the catalogue of its reducer"
 EXCLUDED = {"stiffness": "stiffness_curve", "stiffness_curve": "stiffness"}
 
 
@@ -65,13 +68,14 @@ def strongest(sources: Sequence[Source], table: str) -> tuple[dict[str, Any], di
 
 
 def flexible_joints(
-    tree: UrdfTree, sources: Sequence[Source]
+    tree: UrdfTree, sources: Sequence[Source], reducers: Mapping[str, Reducer] | None = None
 ) -> tuple[dict[str, Joint], dict[str, str]]:
     """Merge the sources.
 
     Args:
         tree: the robot.
         sources: the strongest first.
+        reducers: those that can be named; the shipped ones if None.
 
     Returns:
         Flexible joints by name in the URDF's order, and origins such as
@@ -86,6 +90,8 @@ def flexible_joints(
     origins: dict[str, str] = {}
     for name, urdf in tree.joints.items():
         values, where = _merge(name, sources)
+        if "reducer" in values:
+            _resolve(name, values, where, sources, reducers)
         if "stiffness" not in values and "stiffness_curve" not in values:
             continue
         joints[name] = _joint(urdf, values, where, tree)
@@ -125,6 +131,31 @@ def check_names(tree: UrdfTree, source: Source) -> None:
                              hint=f"give {urdf.mimic.joint!r} the stiffness")  # fmt: skip
 
 
+def _resolve(
+    name: str,
+    values: dict[str, Any],
+    where: dict[str, str],
+    sources: Sequence[Source],
+    reducers: Mapping[str, Reducer] | None,
+) -> None:
+    """Put the catalogue's reducer in place of its name, and its stiffness where none is given."""
+    said = next(s for s in sources if "reducer" in given(s.content.joint.get(name)))
+    place = {"file": said.file, "key": f"joint.{name}.reducer"}
+    try:
+        reducer = find_reducer(values["reducer"], reducers)
+    except InputError as error:
+        raise error.placed(**place) from None
+    values["reducer"] = reducer
+    if "stiffness" in values or "stiffness_curve" in values:
+        return
+    if not reducer.spring:
+        raise InputError("the catalogue has no stiffness of this reducer", value=reducer.name,
+                         hint="give the joint a stiffness", **place)  # fmt: skip
+    values.update(reducer.spring)
+    for key in reducer.spring:
+        where[key] = f"{ITS_REDUCER} {reducer.name} ({reducer.source})"
+
+
 def _merge(name: str, sources: Sequence[Source]) -> tuple[dict[str, Any], dict[str, str]]:
     values: dict[str, Any] = {}
     where: dict[str, str] = {}
@@ -146,7 +177,7 @@ def _merge(name: str, sources: Sequence[Source]) -> tuple[dict[str, Any], dict[s
 def _joint(urdf: UrdfJoint, values: dict[str, Any], where: dict[str, str], tree: UrdfTree) -> Joint:
     kind = "prismatic" if urdf.type == "prismatic" else "revolute"
     if kind == "prismatic":
-        for key in ("shaft", "balancer"):
+        for key in ("shaft", "balancer", "reducer"):
             if key in values:
                 raise InputError(f"a prismatic joint has no torsion {key}; its spring is in N/m "
                                  "and its load a force", key=f"joint.{urdf.name}.{key}",

@@ -14,7 +14,7 @@ damping_ratio = 0.03
 source = "..."
 estimated = true             # not measured
 shaft = { radius = 0.01765, length = 0.0504, shear_modulus = 79.3e9, sn_curve = "..." }
-reducer = "RV-80E-121"
+reducer = "RV-80E-121"       # alone, it brings its catalogue's stiffness
 rotor_inertia = 1e-4         # kg m^2, on the motor's side
 gear_ratio = 121.0
 # a spring [N/m] between two points [m] in the joint's frame at position zero; it may also have
@@ -70,13 +70,14 @@ class JointEntry(StrictModel):
     """One joint's drive.
 
     Attributes:
-        stiffness: N m/rad (N/m for a prismatic joint), 1e-3 to 1e12. Without it, or a curve, the
-            joint is rigid.
+        stiffness: N m/rad (N/m for a prismatic joint), 1e-3 to 1e12. Without it, a curve or a
+            reducer, the joint is rigid.
         stiffness_curve: in place of `stiffness`: a strain-wave gear's curve, whose slope at the
             gravity torque is used.
         damping_ratio: 1, modal damping ratio.
         shaft: the part whose fatigue is assessed.
-        reducer: a catalogue name, such as "RV-80E-121"; its torque limits are checked.
+        reducer: a catalogue name, such as "RV-80E-121"; its torque limits are checked, and its
+            stiffness is the joint's where none is given.
         rotor_inertia: kg m^2, at the motor, before the gear.
         gear_ratio: 1, motor turns for one turn of the joint.
         balancer: a spring that carries part of the gravity torque.
@@ -97,8 +98,8 @@ class JointEntry(StrictModel):
 
     @property
     def flexible(self) -> bool:
-        """Whether it gives the joint a spring."""
-        return self.stiffness is not None or self.stiffness_curve is not None
+        """Whether it gives the joint a spring; a reducer's is in its catalogue."""
+        return any(x is not None for x in (self.stiffness, self.stiffness_curve, self.reducer))
 
     @model_validator(mode="after")
     def _one_stiffness(self) -> Self:

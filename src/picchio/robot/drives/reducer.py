@@ -18,17 +18,20 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Literal, Self, TypeVar
+
+from pydantic import model_validator
 
 from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError
 from picchio.core.toml import Positive, StrictModel, parse_toml
+from picchio.robot.joint import Stiffness, StiffnessCurve
 
 Kind = Literal["strain-wave", "cycloidal"]
 Torque = TypeVar("Torque", float, FloatArray)
@@ -71,6 +74,20 @@ class TorqueLimit:
         return vars(self) | {"share": self.share}
 
 
+class OutputBearing(StrictModel):
+    """The bearing between a reducer's output and its housing.
+
+    Attributes:
+        pitch_diameter: m, of the circle on which the rollers' centres lie.
+        static_load_rating: N, C0 by ISO 76.
+        permissible_moment: N m, tilting moment that the catalogue allows.
+    """
+
+    pitch_diameter: Positive
+    static_load_rating: Positive
+    permissible_moment: Positive
+
+
 class ReducerEntry(StrictModel):
     """One reducer of a catalogue file; every torque is at the output.
 
@@ -82,6 +99,10 @@ class ReducerEntry(StrictModel):
         momentary_peak_torque: N m, limit for emergencies.
         average_torque: N m, limit of the mean torque.
         ratcheting_torque: N m, at which teeth skip.
+        stiffness_curve: of a strain-wave gear, with its input held.
+        stiffness: N m/rad, torsional rigidity, of a gear without a curve (most cycloidal ones).
+        lost_motion: rad, both ways together, at 3 % of the rated torque.
+        output_bearing: the bearing at the output, where the reducer has one of its own.
         source: where the ratings come from, if not as for the whole file.
     """
 
@@ -92,7 +113,19 @@ class ReducerEntry(StrictModel):
     momentary_peak_torque: Positive
     average_torque: Positive | None = None
     ratcheting_torque: Positive | None = None
+    stiffness_curve: StiffnessCurve | None = None
+    stiffness: Stiffness | None = None
+    lost_motion: Positive | None = None
+    output_bearing: OutputBearing | None = None
     source: str | None = None
+
+    @model_validator(mode="after")
+    def _limits_ascend(self) -> Self:
+        if self.stiffness is not None and self.stiffness_curve is not None:
+            raise ValueError("give stiffness or stiffness_curve, not both")
+        if not self.repeated_peak_torque <= self.momentary_peak_torque:
+            raise ValueError("momentary_peak_torque must not be below repeated_peak_torque")
+        return self
 
 
 class Reducer(ReducerEntry):
@@ -108,8 +141,14 @@ class Reducer(ReducerEntry):
 
     kind: Kind
     manufacturer: str
-    rated_speed: Positive
-    rated_life: Positive
+    rated_speed: Positive | None = None
+    rated_life: Positive | None = None
+
+    @property
+    def spring(self) -> dict[str, Stiffness | StiffnessCurve]:
+        """What of a joint's stiffness its catalogue gives, by the sidecar's key; may be empty."""
+        own = {"stiffness_curve": self.stiffness_curve, "stiffness": self.stiffness}
+        return {key: value for key, value in own.items() if value is not None}
 
     @property
     def limits(self) -> dict[str, tuple[str, float]]:
@@ -194,15 +233,26 @@ class ReducerFile(StrictModel):
             output (cycloidal).
         rated_life_hours: h, life L10 at rated torque and speed.
         source: where the ratings come from.
+        unit: what the names of housed units end with.
+        component_sets: what stands in its place in the names of component sets, which have the
+            same ratings and no output bearing of their own; "" for names without an ending.
         reducer: the reducers, one table for each.
     """
 
     manufacturer: str
     kind: Kind
-    rated_speed_rpm: Positive
-    rated_life_hours: Positive
+    rated_speed_rpm: Positive | None = None
+    rated_life_hours: Positive | None = None
     source: str
+    unit: str | None = None
+    component_sets: tuple[str, ...] = ()
     reducer: tuple[ReducerEntry, ...]
+
+    @model_validator(mode="after")
+    def _sets_of_units(self) -> Self:
+        if self.component_sets and not self.unit:
+            raise ValueError("component_sets needs unit, the ending that they replace")
+        return self
 
 
 def all_reducers(catalogues: Iterable[str | Path] = ()) -> dict[str, Reducer]:
@@ -232,10 +282,29 @@ def load_reducer(name: str, *, catalogues: Iterable[str | Path] = ()) -> Reducer
         name: as in the catalogue.
         catalogues: further files (`picchio-reducers/1`); they take precedence over those shipped.
 
+    Returns:
+        the reducer.
+
     Raises:
         InputError: an unknown name, or a catalogue file that is missing or wrong.
     """
-    known = all_reducers(catalogues)
+    return find_reducer(name, all_reducers(catalogues))
+
+
+def find_reducer(name: str, known: Mapping[str, Reducer] | None = None) -> Reducer:
+    """A reducer by its catalogue name, among those already read.
+
+    Args:
+        name: as in the catalogue; a cycloidal one's may carry the ratio.
+        known: by name; the shipped ones if None.
+
+    Returns:
+        the reducer.
+
+    Raises:
+        InputError: an unknown name, with the closest known ones.
+    """
+    known = _shipped() if known is None else known
     if name in known:
         return known[name]
     found = re.fullmatch(r"(.+?)-(\d+(?:\.\d+)?)", name)
@@ -258,19 +327,26 @@ def read_reducers(path: str | Path) -> dict[str, Reducer]:
             duplicate name.
     """
     content = parse_toml(path, ReducerFile, format=REDUCER_FORMAT)
+    life, speed = content.rated_life_hours, content.rated_speed_rpm
     found: dict[str, Reducer] = {}
+    sets: dict[str, Reducer] = {}
     for entry in content.reducer:
         if entry.name in found:
             raise InputError("duplicate name", file=path, key="reducer.name", value=entry.name)
-        found[entry.name] = Reducer(
+        whole = Reducer(
             **entry.model_dump(exclude={"source"}),
             kind=content.kind,
             manufacturer=content.manufacturer,
-            rated_speed=content.rated_speed_rpm * _RPM,
-            rated_life=content.rated_life_hours * 3600.0,
+            rated_speed=None if speed is None else speed * _RPM,
+            rated_life=None if life is None else life * 3600.0,
             source=entry.source or content.source,
         )
-    return found
+        found[entry.name] = whole
+        if content.unit and entry.name.endswith(content.unit):
+            for ending in content.component_sets:
+                name = entry.name.removesuffix(content.unit) + ending
+                sets[name] = whole.model_copy(update={"name": name, "output_bearing": None})
+    return found | {name: one for name, one in sets.items() if name not in found}
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from picchio.robot.annotations.inline import read_annotations
 from picchio.robot.annotations.other_tags import Srdf, find_srdf, read_drake
 from picchio.robot.annotations.sidecar import FORMAT, Sidecar, read_sidecar
 from picchio.robot.annotations.tool_choice import choose_gun, choose_mounting, choose_tool
+from picchio.robot.drives.reducer import all_reducers
 from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
@@ -34,6 +35,7 @@ def load_robot(
     flex: str | Path | None = None,
     tool: str | None = None,
     values: Mapping[str, Mapping[str, object]] | None = None,
+    reducers: Sequence[str | Path] = (),
     allow_rigid: bool = False,
 ) -> FlexibleRobot:
     """Load a robot by name or path.
@@ -46,6 +48,7 @@ def load_robot(
         tool: the frame that carries the tool.
         values: values that win over every file, by joint and key, as in a sidecar:
             `{"joint_1": {"stiffness": 1e5}}`.
+        reducers: catalogues of reducers `picchio-reducers/1`, stronger than the shipped ones.
         allow_rigid: accept a robot none of whose joints is flexible.
 
     Returns:
@@ -55,7 +58,8 @@ def load_robot(
         InputError: with the file, the key, the value and the valid choices.
     """
     if isinstance(robot, FlexibleRobot):
-        for key, given in (("flex", flex), ("tool", tool), ("values", values)):
+        for key, given in (("flex", flex), ("tool", tool), ("values", values),
+                           ("reducers", reducers or None)):  # fmt: skip
             if given is not None:
                 raise InputError("comes too late for a robot that is loaded", key=key,
                                  hint="give the robot's name or file with it")  # fmt: skip
@@ -64,7 +68,12 @@ def load_robot(
         saved = read_saved_model(Path(robot))
         flex, tool = flex or saved.flex, tool or saved.tool
         loaded = load_robot(
-            saved.robot, flex=flex, tool=tool, values=values, allow_rigid=allow_rigid
+            saved.robot,
+            flex=flex,
+            tool=tool,
+            values=values,
+            reducers=reducers,
+            allow_rigid=allow_rigid,
         )
         tables = tuple(table.model_dump() for table in saved.effect)
         return replace(loaded, effect_tables=tables, files=(*loaded.files, Path(robot)))
@@ -73,7 +82,7 @@ def load_robot(
     tree = read_tree(root, found.urdf)
     srdf = find_srdf(tree)
     sources, flex_file = _sources(root, found, flex, values, srdf)
-    joints, origins = flexible_joints(tree, sources)
+    joints, origins = flexible_joints(tree, sources, all_reducers(reducers))
     tree, mass_origins = give_masses(tree, sources, root)
     _check_balancers(sources, joints)
     for remark in _remarks(tree, joints, origins):
@@ -97,7 +106,10 @@ def load_robot(
         name=found.name or tree.name,
         source=found.urdf,
         task_path=found.task,
-        files=tuple(file for file in (found.urdf, flex_file, srdf and srdf.path) if file),
+        files=(
+            *(file for file in (found.urdf, flex_file, srdf and srdf.path) if file),
+            *map(Path, reducers),
+        ),
         tree=tree,
         tool=chosen_tool,
         gun=gun,

@@ -7,31 +7,20 @@ import math
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError, warn_user
+from picchio.core.errors import warn_user
 from picchio.fatigue.miner import life
 from picchio.fatigue.shaft_stress import check_shaft
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.model import Model
-from picchio.robot.drives.reducer import Reducer, load_reducer
+from picchio.robot.annotations.flexibility import ITS_REDUCER
+from picchio.robot.drives.reducer import Reducer
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.robot.joint import Joint
 from picchio.studies.assessment.result import JointLife, OperationResult, SteadyStateCheck
 from picchio.studies.rivet.life_rules import LifeRule
 from picchio.studies.tasks import Task
 
 # A shaft that disagrees with its joint's stiffness by more than this is worth a warning.
 _SHAFT_TOLERANCE = 0.05
-
-
-def reducer_of(joint: Joint) -> Reducer | None:
-    """The joint's reducer; a warning if no catalogue has it: it is then left unchecked."""
-    if joint.reducer is None:
-        return None
-    try:
-        return load_reducer(joint.reducer)
-    except InputError as error:
-        warn_user(f"{joint.name}: {error}; it is left unchecked")
-        return None
 
 
 def warn_about_shafts(robot: FlexibleRobot) -> None:
@@ -148,6 +137,13 @@ def _estimates(robot: FlexibleRobot) -> list[str]:
         if joint.estimated:
             source = robot.origins.get(f"{joint.name}.stiffness", "marked as an estimate")
             said.setdefault(f"stiffness is an estimate ({source})", []).append(joint.name)
+        keys = (f"{joint.name}.stiffness", f"{joint.name}.stiffness_curve")
+        if joint.reducer and any(robot.origins.get(k, "").startswith(ITS_REDUCER) for k in keys):
+            text = (
+                f"stiffness is that of the reducer {joint.reducer.name} alone, from its catalogue; "
+                "bearings, links and shafts in series make the joint softer and are not in it"
+            )
+            said.setdefault(text, []).append(joint.name)
         damping = robot.origins.get(f"{joint.name}.damping_ratio", "")
         if "default" in damping:
             text = f"damping ratio {joint.damping_ratio:g} is assumed ({damping})"

@@ -25,7 +25,6 @@ from picchio.robot.dynamics.pose import warn_beyond_limits
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.checks import (
     assumptions_of,
-    reducer_of,
     steady_state_checks,
     warn_about_shafts,
     warn_about_yield,
@@ -99,7 +98,7 @@ def assess(
     warn_about_shafts(robot)
     for operation in task.operations:
         warn_beyond_limits(robot, operation.poses, f"operation {operation.name!r}")
-    reducers = tuple(reducer_of(joint) for joint in robot.flexible_joints)
+    reducers = tuple(joint.reducer for joint in robot.flexible_joints)
     paper_curve = load_sn_curve(PAPER_SN_CURVE, quiet=True)
     job = _Job(model, rule, curves, reducers, paper_curve, steady_check)
     total = sum(len(operation.poses) for operation in task.operations)

@@ -23,7 +23,6 @@ from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.ik.chain import tool_chain
-from picchio.studies.assessment.checks import reducer_of
 from picchio.studies.placement.loads import Loads
 from picchio.studies.placement.reach import Candidates
 from picchio.studies.placement.result import JointUse, Off, Placement, Standing
@@ -100,7 +99,7 @@ def place(
     if not (math.isfinite(margin) and margin >= 0.0):
         raise InputError("must not be negative", key="margin", value=margin)
     curves = curves_of(robot, sn_curve)
-    loads = Loads(model, task, curves, tuple(reducer_of(j) for j in robot.flexible_joints))
+    loads = Loads(model, task, curves, tuple(j.reducer for j in robot.flexible_joints))
     work = Work.of(robot, task)
     half = _half(robot, move)
     periods = _periods(task, period_range)
