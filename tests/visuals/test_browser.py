@@ -67,6 +67,24 @@ def arm_scene(arm: SimpleNamespace, tmp_path_factory: pytest.TempPathFactory) ->
     return path
 
 
+LABELS = """() => {
+  const pane = document.getElementById("labels").getBoundingClientRect(), bad = [];
+  const shown = [...document.querySelectorAll("#labels span")].filter((e) => !e.hidden);
+  const boxes = shown.map((e) => [e.textContent, e.getBoundingClientRect()]);
+  for (const [one, a] of boxes) {
+    if (a.left < pane.left || a.right > pane.right || a.top < pane.top || a.bottom > pane.bottom)
+      bad.push(one);
+    for (const [other, b] of boxes)
+      if (one < other && a.left < b.right && b.left < a.right
+          && a.top < b.bottom && b.top < a.bottom)
+        bad.push(`${one} / ${other}`);
+  }
+  const lines = [...document.querySelectorAll("#leaders line")];
+  if (lines.filter((e) => e.style.display !== "none").length !== shown.length) bad.push("leaders");
+  return [shown.length, bad];
+}"""
+
+
 def hide_labels(page: Any) -> None:
     page.add_style_tag(content="#labels { display: none; }")
 
@@ -185,6 +203,13 @@ def test_scenes_of_other_robots(open_page, tmp_path, pictures, name: str) -> Non
     path = tmp_path / f"{name}.html"
     path.write_text(build_scene(robot, task.operations[0].poses[0], BLOWS).html())
     page = opened(open_page, path)
+    # On a telephone, too, no label covers another or leaves the picture, and each has its line.
+    for width, height in ((390, 844), (1100, 700)):
+        page.set_viewport_size({"width": width, "height": height})
+        page.wait_for_timeout(300)
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        labels, bad = page.evaluate(LABELS)
+        assert labels > len(robot.flexible_names) and bad == []
     shown = picture(page, pictures / f"scene-{name}.png")
     page.locator("#layer-robot").set_checked(False)
     assert changed(shown, picture(page)) > 20_000

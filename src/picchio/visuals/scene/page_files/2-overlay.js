@@ -35,18 +35,54 @@ function fillBar(element, scale) {
 
 // --- labels -----------------------------------------------------------------------------
 const spot = new THREE.Vector3(), centre = new THREE.Vector3();
+const leaders = byId("leaders");
 const labels = data.labels.map((label) => {
   const element = document.createElement("span");
   element.textContent = label.text;
   element.className = label.layer;
+  const leader = document.createElementNS(leaders.namespaceURI, "line");
+  leaders.append(leader);
   byId("labels").append(element);
-  return { label, element };
+  return { label, element, leader, way: 0 };
 });
 
+// Where a label may stand: round what it names, ever further away. The first that is free is taken.
+const WAYS = [];
+for (const far of [14, 30, 50, 75, 105, 140, 180, 230])
+  for (const [dx, dy] of [[1, 0], [1, -1], [1, 1], [-1, 0], [-1, -1], [-1, 1], [0, -1], [0, 1]])
+    WAYS.push([dx * far, dy * far, dx, dy]);
+
+const covers = (a, b) => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h;
+
+// The place of a label beside (x, y) that covers no other and is within the picture; or null.
+function placed(entry, x, y, box, room, taken) {
+  const fits = (at) => !taken.some((other) => covers(at, other)) && at;
+  const tried = (way) => {
+    const [far, down, dx, dy] = WAYS[way];
+    const at = { x: x + far + (dx - 1) * box.w / 2, y: y + down + (dy - 1) * box.h / 2, ...box };
+    at.x = Math.min(Math.max(at.x, 4), room.w - box.w - 4);
+    at.y = Math.min(Math.max(at.y, 4), room.h - box.h - 4);
+    return fits(at);
+  };
+  // As before where that is still free: a label must not hop about while the arm vibrates.
+  for (const way of [entry.way, ...WAYS.keys()]) {
+    const at = tried(way);
+    if (at) {
+      entry.way = way;
+      return at;
+    }
+  }
+  for (let row = 4; row + box.h + 4 < room.h; row += box.h + 1) {
+    const at = fits({ x: 4, y: row, ...box }) || fits({ x: room.w - box.w - 4, y: row, ...box });
+    if (at) return at;
+  }
+  return null;
+}
+
 function drawLabels() {
-  const { offsetWidth: width, offsetHeight: height } = byId("labels"), taken = [];
-  const tool = new THREE.Vector3();
-  for (const { label, element } of labels) {
+  const { offsetWidth: w, offsetHeight: h } = byId("labels"), taken = [];
+  for (const entry of labels) {
+    const { label, element, leader } = entry;
     let visible = shown(label.layer, label.joint);
     if (visible) {
       if (label.node) {
@@ -56,34 +92,25 @@ function drawLabels() {
       } else {
         spot.fromArray(label.at);
         if (label.layer === "worst") {
-          tool.fromArray(data.tool);
-          spot.sub(tool).multiplyScalar(state.size).add(tool);
+          centre.fromArray(data.tool);
+          spot.sub(centre).multiplyScalar(state.size).add(centre);
         }
         spot.applyMatrix4(viewer.scene.matrixWorld);
       }
       spot.project(viewer.camera);
-      visible = spot.z < 1 && Math.abs(spot.x) < 1.05 && Math.abs(spot.y) < 1.05;
+      visible = spot.z < 1 && Math.abs(spot.x) < 1 && Math.abs(spot.y) < 1;
     }
     element.hidden = !visible;
-    if (!visible) continue;
-    const box = { w: element.offsetWidth, h: element.offsetHeight };
-    let x = ((spot.x + 1) / 2) * width + 14, y = ((1 - spot.y) / 2) * height - box.h / 2;
-    if (label.layer === "worst") {
-      // Beyond the arrow's tip, away from the tool.
-      tool.fromArray(data.tool).applyMatrix4(viewer.scene.matrixWorld).project(viewer.camera);
-      x -= 14 + box.w / 2;
-      y += (tool.y > spot.y ? 1 : -1) * (box.h / 2 + 10);
-    }
-    // Above what is pointed at, which may be as large as the label.
-    if (label.layer in data.swatches) y -= 0.9 * box.h;
-    x = Math.min(Math.max(x, 4), width - box.w - 4);
-    // Joints lie close together: a label that would cover another moves below it.
-    for (let tries = 0; tries < 24; tries++) {
-      const hit = taken.find((t) => x < t.x + t.w && t.x < x + box.w && y < t.y + t.h && t.y < y + box.h);
-      if (!hit) break;
-      y = hit.y + hit.h + 1;
-    }
-    taken.push({ x, y, ...box });
-    element.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+    const x = ((spot.x + 1) / 2) * w, y = ((1 - spot.y) / 2) * h;
+    const box = visible && { w: element.offsetWidth, h: element.offsetHeight };
+    const at = visible && placed(entry, x, y, box, { w, h }, taken);
+    element.hidden = !at;
+    leader.style.display = at ? "" : "none";
+    if (!at) continue;
+    taken.push(at);
+    element.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px)`;
+    const ends = { x1: x, y1: y, x2: Math.min(Math.max(x, at.x), at.x + box.w),
+      y2: Math.min(Math.max(y, at.y), at.y + box.h) };
+    for (const [name, value] of Object.entries(ends)) leader.setAttribute(name, value.toFixed(1));
   }
 }
