@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from picchio.campaign.importing import read_matlab
+from picchio.campaign.importing import isolated
 from picchio.campaign.importing.importer import read_mapped, read_raw
 from picchio.campaign.importing.mapping import read_mapping
 from picchio.campaign.importing.template import mapping_template
@@ -159,7 +159,7 @@ def test_a_mat_file_that_kills_its_reader(tmp_path, signals, monkeypatch):
         read_raw(path)
     path.write_bytes(whole)
     die = "import os, signal; os.kill(os.getpid(), signal.SIGBUS)"
-    monkeypatch.setattr(read_matlab, "_CHILD", die)
+    monkeypatch.setattr(isolated, "_CHILD", die)
     with pytest.raises(InputError, match=r"run\.mat.*reader crashed"):
         read_raw(path)
 

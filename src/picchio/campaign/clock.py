@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,33 @@ TOLERANCE = 0.05
 # An even clock is checked at every sample against its neighbour, and at these strides against
 # the straight line through its ends, so that memory does not grow with the record.
 _STRIDE = 1024
+SLOWEST, FASTEST = 1e-3, 1e9
+"""Hz: sample rates that a record may have."""
+_LATEST = 4_102_444_800.0  # s from 1970 to 2100: no record begins later
+_UNITS = ("s", "ms", "us", "ns")
+
+
+def not_seconds(start: float, step: float, scale: float = 1.0) -> str | None:
+    """Why stamps cannot be in the unit they are said to be in, in words; None where they can.
+
+    A logger's nanoseconds that are read as seconds make a record of centuries.
+
+    Args:
+        start: s, the first stamp, as converted from that unit.
+        step: s, from one sample to the next.
+        scale: s, that unit.
+
+    Returns:
+        a clause that names the unit they probably are in.
+    """
+    if abs(start) <= _LATEST and step <= 1.0 / SLOWEST:
+        return None
+    problem = f"the first stamp is at {start:.6g} s and the next {step:.3g} s later"
+    said = round(-math.log10(scale) / 3.0)
+    for finer in range(1, len(_UNITS) - max(said, 0)):
+        if abs(start) * 1e-3**finer <= _LATEST and step * 1e-3**finer <= 0.1:
+            return f"{problem}: the time is probably in {_UNITS[said + finer]}, not {_UNITS[said]}"
+    return f"{problem}: is the unit of the time right?"
 
 
 @dataclass(frozen=True)
@@ -72,6 +100,9 @@ class ClockCheck:
         if self._samples == 0:
             self._first = float(time[0])
             steps = np.diff(time)
+            usual = float(np.median(steps)) if steps.size else 0.0
+            if problem := not_seconds(self._first, usual, self.source.time_scale):
+                raise self.source.error(problem, channel=TIME)
         else:
             steps = np.diff(time, prepend=self._last)
         offset = first + (1 if self._samples == 0 else 0)

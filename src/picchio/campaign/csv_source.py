@@ -92,6 +92,8 @@ class CsvSource(FileSource):
         if not data.endswith(b"\n"):
             data += b"\n"
         data = data.replace(b"\r\n", b"\n")
+        if b"\r" in data:  # numpy would take it for a space
+            return None
         letters = np.frombuffer(data, np.uint8)
         ends = np.flatnonzero(letters == ord("\n"))
         commas = np.searchsorted(np.flatnonzero(letters == ord(",")), ends)

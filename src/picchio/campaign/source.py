@@ -36,6 +36,7 @@ class Source(ABC):
         path: its file; None in memory.
         channels: by name, without the time, in the file's order.
         row_word: what messages call a sample: "line", "row" or "sample".
+        time_scale: s, the unit that the time is stored in.
     """
 
     key: str
@@ -43,6 +44,7 @@ class Source(ABC):
     channels: Mapping[str, Channel]
     row_word: str = "sample"
     first_row: int = 1
+    time_scale: float = 1.0
 
     @abstractmethod
     def blocks(self, names: Sequence[str], size: int) -> Iterator[Block]:
@@ -110,6 +112,7 @@ class FileSource(Source):
         self.path: Path = path
         self.key = key
         self.columns = _columns(self, self.names())
+        self.time_scale = self.columns[TIME].convert.scale
         self.channels = {name: c.channel for name, c in self.columns.items() if name != TIME}
 
     def checked_path(self) -> Path:

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator
 
+from picchio.campaign.clock import FASTEST, SLOWEST
 from picchio.core.toml import Finite, NotNegative, Positive, StrictModel
 from picchio.excitation.table import ExcitationTable
 
@@ -51,6 +52,8 @@ def _pose(value: Any) -> Any:
     named = isinstance(value, dict)
     if not named and not isinstance(value, list):
         raise ValueError("must be a table of joint names and values, or a list of values")
+    if not value:
+        raise ValueError("names no joint")
     for name, number in value.items() if named else enumerate(value):
         if isinstance(number, bool) or not isinstance(number, (int, float)):
             raise ValueError(f"joint {name!r} must be a number")
@@ -77,8 +80,9 @@ DataFile = Annotated[str, AfterValidator(_inside), AfterValidator(_data_file)]
 Direction = Annotated[list[Finite], Field(min_length=3, max_length=3), AfterValidator(_direction)]
 _AnyPose = dict[str, float] | list[float]
 Pose = Annotated[_AnyPose, PlainValidator(_pose, json_schema_input_type=_AnyPose)]
+SampleRate = Annotated[Positive, Field(ge=SLOWEST, le=FASTEST)]
 FreeTable = Annotated[dict[str, Any], AfterValidator(_finite_leaves)]
-Hits = Annotated[int, Field(gt=0, strict=True)]
+Hits = Annotated[int, Field(gt=0, le=1_000_000, strict=True)]
 
 
 class CampaignExcitation(ExcitationTable):

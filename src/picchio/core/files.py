@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import ctypes
 import hashlib
-import io
 import math
 import os
 import re
@@ -13,7 +12,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -309,6 +308,33 @@ def regular_file(path: str | Path, *, limit: float = math.inf) -> Path:
     return Path(path)
 
 
+def csv_rows(
+    lines: Iterable[str], path: str | Path, *, delimiter: str = ",", first: int = 1
+) -> list[list[str]]:
+    """The cells of a table, a list a line.
+
+    Args:
+        lines: of the table, split as `str.splitlines` does: at a lone carriage return, too.
+        path: of its file, for messages.
+        delimiter: one letter between cells.
+        first: number of the first line in the file.
+
+    Returns:
+        a list of text a row.
+
+    Raises:
+        InputError: a cell too long to be one, with its line.
+    """
+    reader = csv.reader(lines, delimiter=delimiter)
+    rows: list[list[str]] = []
+    try:
+        rows.extend(reader)
+    except csv.Error as error:
+        where = f"line {first + reader.line_num - 1}"
+        raise InputError(f"is no CSV: {error}", file=path, key=where) from None
+    return rows
+
+
 def read_columns(
     path: str | Path, needed: Sequence[str], optional: Sequence[str] = ()
 ) -> list[list[float]]:
@@ -326,7 +352,7 @@ def read_columns(
         InputError: no such file, a column that is missing or there twice, or a cell that is no
             finite number, with its line.
     """
-    rows = list(csv.reader(io.StringIO(read_text(path))))
+    rows = csv_rows(read_text(path).splitlines(), path)
     header = [cell.strip() for cell in rows[0]] if rows else []
     names = [*needed, *(optional if set(optional) <= set(header) else ())]
     for name in names:

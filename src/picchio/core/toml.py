@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 import types
 import typing
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -55,11 +56,26 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     """
     text = read_text(path)
     try:
-        return tomllib.loads(text)
-    except ValueError as error:  # syntax, or an integer of thousands of digits
+        content = tomllib.loads(text)
+        beyond = next(_beyond(content, ()), None)
+    except tomllib.TOMLDecodeError as error:
         raise InputError(f"is not valid TOML: {error}", file=path) from None
+    except ValueError:  # an integer of thousands of digits
+        raise InputError("is not valid TOML: an integer of more than 64 bits", file=path) from None
     except RecursionError:
         raise InputError("is nested too deeply", file=path) from None
+    if beyond is not None:
+        raise InputError("is an integer of more than 64 bits", file=path, key=_dotted(beyond))
+    return content
+
+
+def _beyond(value: Any, place: tuple[int | str, ...]) -> Iterator[tuple[int | str, ...]]:
+    """Where integers stand that TOML does not have; as a float they would overflow."""
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        yield place
+    if isinstance(value, dict | list):
+        for name, part in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _beyond(part, (*place, name))
 
 
 def parse_toml(path: str | Path, model: type[T], *, format: str) -> T:

@@ -261,17 +261,27 @@ def superposed(
     Raises:
         InputError: two sines of different frequencies at one time, which no piece can hold.
     """
+    order = np.argsort(start, kind="stable")
+    start = start[order]
     ends = [(start[:, None] + (*force.start, force.end)).ravel() for _, force in parts]
     edges = np.concatenate([(0.0,), *ends])
     edges = np.unique(np.round(edges[(edges >= 0.0) & (edges < end)], 12))
-    since = edges[:, None] - start
+    # At an edge only the blows that began lately enough are felt, however many there are.
+    longest = max(force.end for _, force in parts)
+    first = np.searchsorted(start, edges - longest - _AFTER)
+    felt = np.searchsorted(start, edges + _AFTER, side="right") - first
+    blow = first[:, None] + np.arange(int(felt.max(initial=1)))
+    known = blow < (first + felt)[:, None]
+    blow = np.minimum(blow, start.size - 1)
+    since = edges[:, None] - start[blow]
     # Just after an edge it is clear which piece holds, whatever the rounding did.
     late = since + _AFTER
     constant, slope, highest = np.zeros((3, edges.size))
     lowest = np.full(edges.size, np.inf)  # rad/s, as `highest`: of the sines of one moment
     amplitude = np.zeros(edges.size, dtype=np.complex128)
     for factor, force in parts:
-        on = np.where((late >= 0.0) & (late < force.end), factor, 0.0)
+        height = np.broadcast_to(factor, start.shape)[order][blow]
+        on = np.where(known & (late >= 0.0) & (late < force.end), height, 0.0)
         piece = np.searchsorted(force.start, late, side="right") - 1
         u = since - force.start[piece]
         if force.constant.any():

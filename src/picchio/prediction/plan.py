@@ -10,7 +10,14 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from picchio.campaign.channels import AXES, Channel, ChannelKind, kinds, parse_channel
-from picchio.campaign.tables import CampaignExcitation, Direction, Hits, Pose, Tolerance
+from picchio.campaign.tables import (
+    CampaignExcitation,
+    Direction,
+    Hits,
+    Pose,
+    SampleRate,
+    Tolerance,
+)
 from picchio.core.errors import InputError
 from picchio.core.toml import Finite, NotNegative, Positive, StrictModel
 from picchio.excitation.table import catalogue, excitation_class
@@ -152,7 +159,7 @@ class Plan(StrictModel):
     combine: Literal["all", "in-turn"] = "all"
     repeats: Annotated[int, Field(gt=0, strict=True)] = 1
     hits: Hits | None = None
-    sample_rate: Positive
+    sample_rate: SampleRate
     quiet: NotNegative = 0.15
     length: Positive
     times: list[datetime] | None = None
@@ -218,10 +225,12 @@ class Plan(StrictModel):
             if given is not None and len(given) != self.count:
                 raise InputError(f"must be as many as records ({self.count})", key=key,
                                  value=len(given))  # fmt: skip
-        total = self.count * sum(self.samples)
-        if total > MOST_SAMPLES:
-            raise InputError(f"that is {total} samples a channel; at most {MOST_SAMPLES}",
-                             key="sample_rate", value=self.sample_rate)  # fmt: skip
+        for key in ("quiet", "length"):
+            total = self.count * getattr(self, key) * self.sample_rate
+            if total > MOST_SAMPLES:
+                raise InputError(f"that is {total:.3g} samples a channel at {self.sample_rate:g} "
+                                 f"Hz; at most {MOST_SAMPLES:.0e}", key=key,
+                                 value=getattr(self, key))  # fmt: skip
         first = next(self.records())
         self.excitation.overridden_by(CampaignExcitation(force=first.get("force"))).blows.build()
 

@@ -9,7 +9,8 @@ from typing import Any
 
 from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.channels import TIME, parse_channel
-from picchio.campaign.importing import read_csv, read_matlab, read_mcap, read_uff
+from picchio.campaign.importing import read_csv
+from picchio.campaign.importing.isolated import read_isolated
 from picchio.campaign.importing.mapping import ChannelTable, Mapping, read_mapping
 from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.campaign.importing.resample import common_clock
@@ -20,9 +21,7 @@ from picchio.core.files import locked, regular_file
 from picchio.core.provenance import provenance
 from picchio.core.results import Result
 
-READERS = {
-    "csv": read_csv.read, "uff": read_uff.read, "mcap": read_mcap.read, "matlab": read_matlab.read
-}  # fmt: skip
+_ISOLATED = {kind: f"picchio.campaign.importing.read_{kind}" for kind in ("uff", "mcap", "matlab")}
 _ENDINGS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".uff": "uff", ".unv": "uff",
             ".mcap": "mcap", ".mat": "matlab"}  # fmt: skip
 
@@ -42,7 +41,10 @@ def read_raw(path: str | Path, mapping: Mapping | None = None) -> RawFile:
         raise InputError("the kind of file is not known by its ending", file=source,
                          value=source.suffix, choices=_ENDINGS,
                          hint="or say [source] kind in the mapping")  # fmt: skip
-    return READERS[kind](source, mapping)
+    if kind not in _ISOLATED:
+        return read_csv.read(source, mapping)
+    clock = mapping.time.model_dump() if mapping else {}
+    return read_isolated(_ISOLATED[kind], source, clock)
 
 
 def read_mapped(

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from picchio.campaign.tables import FreeTable
-from picchio.core.toml import Finite, Positive, StrictModel, parse_toml
+from picchio.campaign.tables import FreeTable, SampleRate
+from picchio.core.toml import Finite, StrictModel, parse_toml
 
 FORMAT = "picchio-mapping/1"
 FileKind = Literal["csv", "uff", "mcap", "matlab"]
@@ -53,7 +53,7 @@ class TimeTable(StrictModel):
 
     series: str | None = None
     unit: str = "s"
-    rate: Positive | None = None
+    rate: SampleRate | None = None
     zero: Finite = 0.0
     resample: Literal["linear"] | None = None
     stamp: Literal["header", "log"] = "header"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from picchio.campaign.importing.mapping import Mapping, SourceTable
 from picchio.campaign.importing.raw import Names, RawChannel, RawFile
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.core.files import read_text
+from picchio.core.files import csv_rows, read_text
 
 _LARGEST = 4 << 30
 
@@ -28,7 +27,7 @@ def read(path: Path, mapping: Mapping | None) -> RawFile:
         lines.pop()
     if not lines:
         raise InputError("is empty", file=path)
-    rows = list(csv.reader(lines, delimiter=layout.delimiter))
+    rows = csv_rows(lines, path, delimiter=layout.delimiter, first=layout.skip_lines + 1)
     cells = [cell.strip() for cell in rows[0]]
     unique = Names()
     names = [unique(cell or str(i + 1)) for i, cell in enumerate(cells)]

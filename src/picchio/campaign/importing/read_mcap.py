@@ -5,17 +5,20 @@ from __future__ import annotations
 import contextlib
 import io
 import math
-from collections.abc import Iterator
+from array import array
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from picchio.campaign.importing.mapping import Mapping
+from picchio.campaign.importing.isolated import Limits
 from picchio.campaign.importing.raw import RawChannel, RawFile, reason
 from picchio.core.errors import InputError
 
+# Decoded message by message, and often compressed.
+LIMITS = Limits(seconds_a_byte=1e-5, memory_a_byte=32.0)
 _NANO = 1_000_000_000
 _JOINT_FIELDS = {"position": ("position", "rad"), "velocity": ("velocity", "rad/s"),
                  "effort": ("torque", "N*m")}  # fmt: skip
@@ -26,7 +29,7 @@ _VECTORS: dict[str, dict[str, tuple[str | None, str]]] = {
 Sample = tuple[str, float, str | None, str | None]
 
 
-def read(path: Path, mapping: Mapping | None) -> RawFile:
+def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
     """Every number of the messages of these three kinds, named "<topic>:<field>".
 
     `/joint_states:position.joint_1`, `/imu:linear_acceleration.x`, `/wrench:force.z`. Times are
@@ -42,9 +45,9 @@ def read(path: Path, mapping: Mapping | None) -> RawFile:
     except ImportError:
         raise InputError("MCAP files need mcap and mcap-ros2-support",
                          hint="pip install 'picchio[import]'") from None  # fmt: skip
-    stamp = mapping.time.stamp if mapping else "header"
-    stamps: dict[str, list[int]] = {}
-    values: dict[str, list[float]] = {}
+    stamp = clock.get("stamp", "header")
+    stamps: dict[str, array[int]] = {}
+    values: dict[str, array[float]] = {}
     about: dict[str, tuple[str | None, str | None]] = {}
     try:
         # The decoder prints what it does not like about a message's definition.
@@ -56,9 +59,11 @@ def read(path: Path, mapping: Mapping | None) -> RawFile:
                 when = message.log_time if stamp == "log" else _stamp(ros)
                 for field, number, unit, suggestion in _samples(schema, ros):
                     name = f"{channel.topic}:{field}"
-                    stamps.setdefault(name, []).append(when)
-                    values.setdefault(name, []).append(number)
+                    stamps.setdefault(name, array("q")).append(when)
+                    values.setdefault(name, array("d")).append(number)
                     about[name] = (unit, suggestion)
+    except MemoryError:
+        raise
     except Exception as error:  # mcap's, zstandard's, lz4's and the decoder's own kinds
         raise InputError(f"is not a readable MCAP file: {reason(error)}", file=path) from None
     if not values:

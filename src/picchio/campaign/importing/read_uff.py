@@ -5,15 +5,17 @@ from __future__ import annotations
 import contextlib
 import io
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from picchio.campaign.importing.mapping import Mapping
+from picchio.campaign.importing.isolated import Limits
 from picchio.campaign.importing.raw import Names, RawChannel, RawFile, reason
 from picchio.core.errors import InputError, warn_user
 
+LIMITS = Limits(memory_a_byte=32.0)
 # Function types of data set 58 that are histories in time: general, and time response.
 _TIME_HISTORIES = (0, 1)
 _TIME_ABSCISSA = (0, 17)
@@ -22,7 +24,7 @@ _DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ",
 _NO_UNIT = ("", "none", "unknown")
 
 
-def read(path: Path, mapping: Mapping | None) -> RawFile:
+def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
     """Every time history of the file, named by its response node and direction, as "12+X".
 
     Spectra and FRFs are left out, with a warning.
@@ -39,6 +41,8 @@ def read(path: Path, mapping: Mapping | None) -> RawFile:
         with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             found = pyuff.UFF(str(path)).read_sets()
+    except MemoryError:
+        raise
     except Exception as error:  # pyuff raises bare Exceptions
         raise InputError(f"is not a readable universal file: {reason(error)}", file=path) from None
     sets = [found] if isinstance(found, dict) else list(found)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from picchio.campaign.clock import TOLERANCE
+from picchio.campaign.clock import TOLERANCE, not_seconds
 from picchio.campaign.importing.mapping import TimeTable
 from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.campaign.units import conversion
@@ -15,6 +15,8 @@ from picchio.core.errors import InputError
 
 # A hole of more usual steps than this is a dropout, over which nothing may be drawn.
 _LARGEST_GAP = 5.0
+# Straight lines between stamps hold nothing that is this many times as fast.
+_FASTER = 20.0
 
 
 def common_clock(
@@ -38,7 +40,7 @@ def common_clock(
             for; no stamps, or a rate that is missing; a dropout; no time in common.
     """
     file, rate = raw.path, asked.rate
-    stamps = _stamps(raw, asked, series, mapping)
+    stamps, scale = _stamps(raw, asked, series, mapping)
     for stamp, entry in zip(stamps, series, strict=True):
         if stamp.size < 2:
             raise InputError("holds fewer than two samples", file=file, key=entry.name)
@@ -46,6 +48,8 @@ def common_clock(
             bad = int(np.flatnonzero(~(np.diff(stamp) > 0.0))[0]) + 1
             raise InputError(f"the stamps do not ascend (sample {bad + 1})", file=file,
                              key=entry.name)  # fmt: skip
+        if problem := not_seconds(stamp[0] - asked.zero, float(np.median(np.diff(stamp))), scale):
+            raise InputError(problem, file=file, key=asked.series or entry.name)
     first = stamps[0]
     same = all(stamp is first or np.array_equal(stamp, first) for stamp in stamps)
     if asked.resample is None:
@@ -66,6 +70,10 @@ def common_clock(
                 f"is missing for {steps.max():.3g} s from {stamp[int(steps.argmax())]:.6g} s on",
                 file=file, key=entry.name,
             )  # fmt: skip
+    usual = _usual(stamps)
+    if rate > _FASTER * usual:
+        raise InputError(f"is more than {_FASTER:g} times the stamps' own {usual:.6g} Hz",
+                         file=mapping, key="time.rate", value=rate)  # fmt: skip
     begin, end = max(s[0] for s in stamps), min(s[-1] for s in stamps)
     samples = int(np.floor((end - begin) * rate * (1.0 + 1e-12))) + 1
     if end <= begin or samples < 2:
@@ -77,8 +85,9 @@ def common_clock(
 
 def _stamps(
     raw: RawFile, asked: TimeTable, series: list[RawChannel], mapping: Path | None
-) -> list[FloatArray]:
-    """The time of every sample of each series, s."""
+) -> tuple[list[FloatArray], float]:
+    """The time of every sample of each series, s; and the unit it is stored in, s."""
+    scale = 1.0
     own: list[FloatArray | None] = [s.time for s in series]
     if asked.series is not None:
         clock = raw.channel(asked.series, mapping=mapping, key="time.series").values
@@ -86,6 +95,7 @@ def _stamps(
             _, convert = conversion(asked.unit, ("s",))
         except InputError as error:
             raise error.placed(file=mapping, key="time.unit") from None
+        scale = convert.scale
         own = [convert(clock)] * len(series)
     elif asked.rate is not None and any(s.time is None for s in series):
         own = [np.arange(s.values.size) / asked.rate for s in series]
@@ -98,7 +108,7 @@ def _stamps(
             raise InputError(f"has {entry.values.size} samples and its clock {stamp.size}",
                              file=raw.path, key=entry.name)  # fmt: skip
         stamps.append(stamp)
-    return stamps
+    return stamps, scale
 
 
 def _jitter(time: FloatArray) -> float:
@@ -107,6 +117,11 @@ def _jitter(time: FloatArray) -> float:
     return float(np.abs((time - time[0]) / step - np.arange(time.size)).max())
 
 
+def _usual(stamps: list[FloatArray]) -> float:
+    """Hz, at which the fastest of the series come."""
+    return max(1.0 / float(np.median(np.diff(stamp))) for stamp in stamps)
+
+
 def _advice(stamps: list[FloatArray]) -> str:
-    usual = max(1.0 / float(np.median(np.diff(stamp))) for stamp in stamps)
+    usual = _usual(stamps)
     return f'say [time] resample = "linear" and a rate (the stamps come at about {usual:.6g} Hz)'

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, warn_user
-from picchio.core.files import read_text
+from picchio.core.files import csv_rows, read_text
 
 _UNITS = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "n/mm^2": 1e6, "n/mm2": 1e6, "gpa": 1e9,
           "psi": 6894.757293168361, "ksi": 6894757.293168361}  # fmt: skip
@@ -93,7 +92,7 @@ def _rows(path: str | Path) -> list[list[str]]:
     if len(lines) < 2:
         raise InputError("has no tests: needs a header and at least one row", file=path)
     delimiter = max("\t;,", key=lines[0].count)
-    return list(csv.reader(lines, delimiter=delimiter))
+    return csv_rows(lines, path, delimiter=delimiter)
 
 
 def _find(header: list[str], *words: str) -> int | None:

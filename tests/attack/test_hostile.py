@@ -1,0 +1,168 @@
+"""Hostile values: each is refused in one line that names the file or option, the key and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import pytest
+from held import MAPPING, one_line
+
+ARM = "fanuc_like_3dof"
+LONG = "1" * 200_000  # Python's reader of CSV gives up at 131,072
+HUGE = "9" * 400  # no float is that large
+SIDECAR = """format = "picchio-sidecar/1"
+[joint.joint_1]
+stiffness = 2.4e5
+damping_ratio = 0.03
+[tool]
+frame = "tool"
+"""
+PLAN = """format = "picchio-plan/1"
+poses = [[0.3, 0.5, -0.8]]
+directions = [[0.6, 0.0, 0.8]]
+hits = 2
+sample_rate = 1000.0
+quiet = 0.1
+length = 0.2
+seed = 1
+[excitation]
+kind = "pulse_train"
+force = 300.0
+period = 0.04
+width = 0.004
+[[sensor]]
+channels = "accelerometer.tool"
+"""
+CAMPAIGN = """format = "picchio-campaign/1"
+robot = "fanuc_like_3dof"
+[[record]]
+file = "r.csv"
+kind = "motion"
+"""
+MODEL = """format = "picchio-model/1"
+robot = "fanuc_like_3dof"
+[[effect]]
+effect = "payload"
+target = "tool"
+"""
+TESTS = "stress [MPa],cycles,failed\n" + "".join(
+    f"{500 * n**-0.08:.2f},{n:.0f},1\n" for n in (2e4, 5e4, 1e5, 3e5, 1e6, 2e6)
+)
+POINTS = "x [m],y [m],z [m]\n1.0,0.0,1.0\n"
+
+
+def rows(step=1, start=0, count=50, header="t,F"):
+    """A table of a time and a channel."""
+    return f"{header}\n" + "".join(f"{start + i * step},{i * 0.25}\n" for i in range(count))
+
+
+@dataclass(frozen=True)
+class Case:
+    """A file with a passage replaced, what is typed, and what the line must name."""
+
+    typed: str
+    words: tuple[str, ...]
+    files: dict[str, str] = field(default_factory=dict)
+
+
+def sidecar(value, *words):
+    text = SIDECAR.replace("0.03", value)
+    return Case(
+        f"assess {ARM} --flex s.toml", ("s.toml", "joint.joint_1.damping_ratio", *words),
+        {"s.toml": text},
+    )  # fmt: skip
+
+
+def plan(key, value, *words):
+    line = next(line for line in PLAN.splitlines() if line.startswith(f"{key} ="))
+    text = PLAN.replace(line, f"{key} = {value}")
+    return Case(f"simulate {ARM} --plan p.toml --to c", ("p.toml", key, *words), {"p.toml": text})
+
+
+def imported(table, *words, mapping=MAPPING):
+    return Case("import r.csv --mapping m.toml --to c", words, {"r.csv": table, "m.toml": mapping})
+
+
+def timed(unit, extra=""):
+    return MAPPING.replace('unit = "ms"', f'unit = "{unit}"\n{extra}')
+
+
+def recorded(table, *words):
+    return Case("check c", ("r.csv", *words), {"c/campaign.toml": CAMPAIGN, "c/r.csv": table})
+
+
+RESAMPLED = 'rate = 1000.0\nresample = "linear"'
+DAY = 1_772_352_000  # 2026-03-01, s
+CASES = {
+    # tables
+    "tests-cell": Case("fit-sn t.csv", ("t.csv", "line 8"), {"t.csv": TESTS + f"{LONG},1,1\n"}),
+    "points-cell": Case(
+        f"map {ARM} --points p.csv --out m.nc", ("p.csv", "line 3"),
+        {"p.csv": POINTS + f"{LONG},1,1\n"},
+    ),
+    "points-cr": Case(
+        f"map {ARM} --points p.csv --out m.nc", ("p.csv", "line 2"),
+        {"p.csv": POINTS.replace("1.0,0.0", "1.0,0\r.0")},
+    ),
+    "import-cell": imported(rows() + f"{LONG},1\n", "r.csv", "line 52"),
+    "import-cr": imported(rows().replace("7,", "7\r,"), "r.csv", "line 9"),
+    "record-cell": recorded(rows(header="time [s],position.joint_1 [rad]") + f"{LONG},1\n",
+                            "record[0]", "line 52"),
+    "record-cr": recorded(rows(header="time [s],position.joint_1 [rad]").replace("7,", "7\r,"),
+                          "record[0]", "line 9"),
+    # stamps
+    "ns-as-s": imported(rows(10**6, DAY * 10**9), "r.csv: t:", "probably in ns, not s",
+                        mapping=timed("s", RESAMPLED)),
+    "ns-as-ms": imported(rows(10**6, DAY * 10**9), "r.csv: t:", "probably in ns, not ms",
+                         mapping=timed("ms")),
+    "us-as-s": imported(rows(10**3, DAY * 10**6), "r.csv: t:", "probably in us, not s",
+                        mapping=timed("s", RESAMPLED)),
+    "ms-as-s": imported(rows(1, DAY * 10**3), "r.csv: t:", "probably in ms, not s",
+                        mapping=timed("s")),
+    "ns-from-zero": imported(rows(10**6), "r.csv: t:", "probably in ns, not s",
+                             mapping=timed("s", RESAMPLED)),
+    "ns-as-ms-from-zero": imported(rows(5 * 10**6), "r.csv: t:", "probably in ns, not ms",
+                                   mapping=timed("ms", RESAMPLED)),
+    "record-in-ns": recorded(rows(10**6, header="time [s],position.joint_1 [rad]"),
+                             "channel time", "probably in ns, not s"),
+    "record-in-us": recorded(
+        rows(10**3, DAY * 10**6, header="time [ms],position.joint_1 [rad]"),
+        "channel time", "probably in us, not ms",
+    ),
+    "zero": imported(rows(), "r.csv: t:", "first stamp", mapping=timed("ms", "zero = 1e308")),
+    # rates, durations and counts
+    "rate-high": imported(rows(), "m.toml", "time.rate", "20 times",
+                          mapping=timed("ms", 'rate = 1e8\nresample = "linear"')),
+    "rate-highest": imported(rows(), "m.toml", "time.rate", mapping=timed("ms", "rate = 1e300")),
+    "rate-low": imported(rows(), "m.toml", "time.rate", mapping=timed("ms", "rate = 1e-300")),
+    "quiet": plan("quiet", "1e308", "inf samples"),
+    "length": plan("length", "1e308", "inf samples"),
+    "sample_rate-low": plan("sample_rate", "1e-300"),
+    "sample_rate-high": plan("sample_rate", "1e300"),
+    "hits": plan("hits", "1000000000", "1000000"),
+    "hits-digits": plan("hits", HUGE, "64 bits"),
+    "hits-thousands": Case(f"simulate {ARM} --plan p.toml --to c", ("p.toml", "64 bits"),
+                           {"p.toml": PLAN.replace("hits = 2", f"hits = {'9' * 5000}")}),
+    "quiet-digits": plan("quiet", HUGE, "64 bits"),
+    "seed-digits": plan("seed", HUGE, "64 bits"),
+    "pose-digits": plan("poses", f"[[{HUGE}, 0, 0]]", "poses[0][0]", "64 bits"),
+    "damping-digits": sidecar(HUGE, "64 bits"),
+    # poses
+    "pose-empty": plan("poses", "[{}]", "names no joint"),
+    "pose-list": plan("poses", "[[]]", "names no joint"),
+    "import-pose": imported(rows(), "m.toml", "pose", "names no joint",
+                            mapping=MAPPING.replace("{ joint_1 = 0.3 }", "{}")),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_refused_in_one_line(name, tmp_path, in_process):
+    case = CASES[name]
+    for file, text in case.files.items():
+        (tmp_path / file).parent.mkdir(exist_ok=True)
+        (tmp_path / file).write_text(text, newline="")
+    before = sorted(tmp_path.rglob("*"))
+    done = in_process(*case.typed.split(" "), cwd=tmp_path)
+    one_line(done, 2, *case.words)
+    assert len(done.stderr) < 400, done.stderr
+    assert sorted(tmp_path.rglob("*")) == before
