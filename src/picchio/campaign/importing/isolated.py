@@ -80,7 +80,14 @@ def read_isolated(module: str, path: Path, clock: Mapping[str, Any]) -> RawFile:
 
 
 def child(module: str, path: str, out: str, clock: str) -> None:
-    """Read the file and leave its series as .npz; the other process runs this."""
+    """Read the file and leave its series as .npz; the other process runs this.
+
+    Args:
+        module: dotted name of the reader.
+        path: the file.
+        out: where the series go.
+        clock: `[time]`, as JSON.
+    """
     with warnings.catch_warnings(record=True) as met:
         warnings.simplefilter("always")
         try:
