@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
+
+import numpy as np
 
 from picchio.campaign.campaign import Campaign
 from picchio.core.processes import one_thread
+from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.life import life_before_and_after
 from picchio.diagnosis.percussion.conclude.causes import (
     fitted_causes,
@@ -92,6 +96,8 @@ class PercussionDiagnosis:
         )
 
 
+# Numbers far off overflow in trials that are dropped for it: no warning to a user.
+@np.errstate(over="ignore", invalid="ignore")
 @one_thread()
 def diagnose_percussion(
     robot: FlexibleRobot,
@@ -202,7 +208,8 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
     ask = None
     if verdict in ("ambiguous", "unexplained", "partial") and not common:
         search.say("looking for the measurement that would tell most")
-        ask = next_measurement(problem, whole, rivals, same)
+        looked = partial(next_measurement, problem, whole, rivals, same)
+        ask = attempt("next measurement", looked)
     claimed = verdict in ("named", "ambiguous", "partial")
     diagnosis = Diagnosis(
         verdict=verdict,
@@ -246,7 +253,9 @@ def _on_all_records(
     kept: list[Trial] = []
     refuted: list[Trial] = []
     for trial in same:
-        there = refit(problem, trial.fit.hypothesis, problem.records)
+        there = attempt(trial.label, partial(refit, problem, trial.fit.hypothesis, problem.records))
+        if there is None:
+            continue
         alike = bic_difference(problem, whole, there) < SAME
         (kept if alike else refuted).append(replace(trial, fit=there, score=bic(there)))
     return kept, refuted

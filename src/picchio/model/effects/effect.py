@@ -327,6 +327,16 @@ class Effect(ABC):
         """
         return self.trials(scales)
 
+    def tried_at(self, scales: Scales, early: bool = False) -> list[Self]:
+        """The effect at the values of its trials, each brought within its bounds.
+
+        Args:
+            scales: sizes of deflections, torques and readings in the campaign.
+            early: those for the first few cycles.
+        """
+        sizes = self.early_trials(scales) if early else self.trials(scales)
+        return [self.bounded(**values) for values in sizes]
+
     # Where it may be at work -----------------------------------------------------------------
 
     @classmethod

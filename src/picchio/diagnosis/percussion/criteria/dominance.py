@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from picchio.diagnosis.percussion.data.problem import Problem
-from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fits_without
 
 # Nine tenths: what imitates something unknown takes away that much of it where the two are
 # correlated by 0.95.
@@ -23,12 +23,11 @@ def dominant_causes(problem: Problem, found: Fit) -> Fit:
     """
     best = found
     while len(best.hypothesis.labels) > 1:
-        fits = [
-            fit(problem, best.hypothesis.minus(label), found.records, None, iterations=5)
-            for label in sorted(best.hypothesis.labels)
-        ]
-        without = min(fits, key=lambda other: other.cost)
-        if explained_share(best, without) >= _FAR_ABOVE:
+        fits = fits_without(
+            best, lambda rest: fit(problem, rest, found.records, None, iterations=5)
+        )
+        without = min(fits, key=lambda other: other.cost, default=best)
+        if without is best or explained_share(best, without) >= _FAR_ABOVE:
             break
         best = without
     return best

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -240,12 +241,20 @@ class Problem:
             effects: of the model.
             records: to predict.
             end: s, look no further; None for all.
+
+        Raises:
+            InputError: no model there, or one whose motion diverges: it is no explanation.
         """
         model = self.model.with_effects(effects)
-        # A trial far off may diverge; its residual is then no number, and it is dropped.
         # One after the other: threads would wait for the interpreter most of the time.
-        with np.errstate(all="ignore"):
-            return [residual(record, model, end) for record in records]
+        try:
+            with np.errstate(all="ignore"):
+                found = [residual(record, model, end) for record in records]
+        except (ArithmeticError, np.linalg.LinAlgError) as error:
+            raise InputError(f"no model that can be computed: {error}") from error
+        if not all(math.isfinite(each.sum()) for each in found):
+            raise InputError("no model that can be computed: the motion diverges")
+        return found
 
     @contextmanager
     def pinned(self, effects: Iterable[Effect]) -> Iterator[None]:

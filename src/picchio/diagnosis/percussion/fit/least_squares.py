@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.active_set import bounded_solution
+from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis, Unknown
 
@@ -140,7 +142,7 @@ def fit(
         normal = sum(j.T @ j for j in slopes) + np.diag(weights**2)
         gradient = sum(j.T @ r.ravel() for j, r in zip(slopes, residuals, strict=True))
         gradient = gradient + weights**2 * from_prior(here)
-        if not np.isfinite(normal).all():
+        if not (np.isfinite(normal).all() and np.isfinite(gradient).all()):
             break
         improved = False
         for _ in range(7 if fresh else 2):
@@ -245,6 +247,21 @@ def fit_growing(
     for end in first:
         hypothesis = fit(problem, hypothesis, records, end, iterations=3, near=near).hypothesis
     return fit(problem, hypothesis, records, last, iterations=iterations, near=near)
+
+
+def fits_without(best: Fit, refit: Callable[[Hypothesis], Fit]) -> list[Fit]:
+    """A fit without one of its causes, each in turn, as far as there is a model without it.
+
+    Args:
+        best: the fit with all of them.
+        refit: fits what is left.
+    """
+    labels = [cause.label for cause in best.hypothesis.causes]
+    fits = [
+        attempt(f"without {label}", partial(refit, best.hypothesis.minus(label)))
+        for label in labels
+    ]
+    return [each for each in fits if each is not None]
 
 
 # Jacobians of residuals: by differences, from a fit nearby, or updated from step to step.

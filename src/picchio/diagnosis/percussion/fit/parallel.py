@@ -15,11 +15,13 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from multiprocessing.connection import Connection
 from typing import Any
 
 from picchio.core.arrays import FloatArray
 from picchio.core.processes import end_with
+from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Pin, Problem
 from picchio.model.effects.effect import Effect
 
@@ -50,6 +52,8 @@ def worker_pool(
     of that is copied or sent. Items and results are. Where a process can't be forked safely (not
     on Linux, or within such a process), or one core is all there is, this one does the work itself.
 
+    A function that fails gives None, see `attempt`.
+
     Args:
         workers: processes; as many as cores where None, eight at most.
         functions: name -> function of one item.
@@ -65,7 +69,7 @@ def worker_pool(
     def mapped(name: str, items: Iterable[Any]) -> list[Any]:
         todo = list(items)
         if pool is None or len(todo) < 2:
-            return [functions[name](item) for item in todo]
+            return [attempt(name, partial(functions[name], item)) for item in todo]
         return list(pool.map(_run, [(number, name, item) for item in todo]))
 
     others = set(multiprocessing.active_children())
@@ -93,7 +97,7 @@ def _run(task: tuple[int, str, Any]) -> Any:
     # Whatever shows warnings may have been in the middle of something when this was forked.
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        return _shared[number][name](item)
+        return attempt(name, partial(_shared[number][name], item))
 
 
 @contextmanager

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError
+from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.parallel import worker_count
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
@@ -159,9 +160,9 @@ def warm_up(problem: Problem, candidates: Sequence[tuple[type[Effect], str]]) ->
     scales = measure_scales(problem, nominal.effects, problem.predictions(nominal.effects))
     first = dict(reversed(candidates))
     for kind, target in first.items():
-        values = next(iter(kind(target).trials(scales)), {})
-        try:
-            effects = nominal.plus(kind(target, **values)).effects
-            problem.own_residuals(effects, problem.records[:1], _MOMENT)
-        except InputError:  # no model at this size
-            continue
+        effect = next(iter(kind(target).tried_at(scales)), kind(target))
+        attempt(effect.label, partial(_predict_a_moment, problem, nominal, effect))
+
+
+def _predict_a_moment(problem: Problem, nominal: Hypothesis, effect: Effect) -> None:
+    problem.own_residuals(nominal.plus(effect).effects, problem.records[:1], _MOMENT)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Set
 from dataclasses import replace
+from functools import partial
 
+from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.criteria.equivalence import bic
 from picchio.diagnosis.percussion.fit.drawn import fit_latent, with_hidden
-from picchio.diagnosis.percussion.fit.least_squares import HOPELESS, Fit, fit
+from picchio.diagnosis.percussion.fit.least_squares import HOPELESS, Fit, fit, fits_without
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.diagnosis.percussion.search.trials import (
@@ -27,12 +29,9 @@ def prune(search: Search, found: Fit, *, alone: bool = True) -> Fit:
     best = found
     while len(best.hypothesis.causes) > (0 if alone else 1):
         # To the end, however far behind at first: the cause may have moved a stuck fit on.
-        fits = [
-            search.fit(best.hypothesis.minus(cause.label), iterations=5)
-            for cause in best.hypothesis.causes
-        ]
-        idlest = min(fits, key=bic)
-        if bic(idlest) >= bic(best) + search.least:
+        fits = fits_without(best, partial(search.fit, iterations=5))
+        idlest = min(fits, key=bic, default=best)
+        if idlest is best or bic(idlest) >= bic(best) + search.least:
             break
         best = idlest
     return best
@@ -44,8 +43,8 @@ def refit_latent(search: Search, best: Fit, newest: str) -> Fit:
         if cause.label != newest and cause.latent is not None and not cause.latent.linear:
             # From the start: without the newest cause some numbers may have been far off.
             start = replace(best, hypothesis=with_hidden(best.hypothesis, cause, {}))
-            again = fit_latent(search.problem, start, cause)
-            best = again if again.cost < best.cost else best
+            again = attempt(cause.label, partial(fit_latent, search.problem, start, cause))
+            best = again if again is not None and again.cost < best.cost else best
     return best
 
 
@@ -66,21 +65,20 @@ def exchange(search: Search) -> Fit:
             for cause in best.hypothesis.causes:
                 if cause.label not in (chosen, *joined.labels):
                     joined = joined.joined(cause)
-            begun = _come_near(search, joined, best)
-            if begun is None:
-                continue
-            other = search.fit(begun, iterations=6, rival=best.cost)
-            if bic(other) < bic(best) - search.least:
+            other = attempt(rival.label, partial(_exchanged, search, joined, best))
+            if other is not None and bic(other) < bic(best) - search.least:
                 best = other
     return best
 
 
-def _come_near(search: Search, hypothesis: Hypothesis, best: Fit) -> Hypothesis | None:
-    """A hypothesis fitted to the first part of some records; None where that is hopeless."""
+def _exchanged(search: Search, hypothesis: Hypothesis, best: Fit) -> Fit | None:
+    """A hypothesis fitted; None where it is hopeless on the first part of some records."""
     problem, some = search.problem, records_of_every_pose(search.records)
     own = fit(problem, best.hypothesis, some, SCREEN_WINDOW, iterations=2)
     begun = fit(problem, hypothesis, some, SCREEN_WINDOW, iterations=4, rival=own.cost)
-    return begun.hypothesis if begun.cost < HOPELESS * own.cost else None
+    if begun.cost >= HOPELESS * own.cost:
+        return None
+    return search.fit(begun.hypothesis, iterations=6, rival=best.cost)
 
 
 def rivals_of(search: Search, best: Fit, label: str, short_list: int = SHORT_LIST) -> list[Trial]:
@@ -95,8 +93,10 @@ def rivals_of(search: Search, best: Fit, label: str, short_list: int = SHORT_LIS
     known = search.replacements.get(label)
     if known is None or known[0] is not best:
         others = best.hypothesis.minus(label)
-        trials = try_candidates(search, others, cause=label, best=best, short_list=short_list)
-        known = search.replacements[label] = (best, trials)
+        looked = partial(
+            try_candidates, search, others, cause=label, best=best, short_list=short_list
+        )
+        known = search.replacements[label] = (best, attempt(f"rivals of {label}", looked) or [])
     return known[1]
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from picchio.core.errors import InputError
+from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing, is_nonsmooth
 from picchio.diagnosis.percussion.search.state import Search
@@ -45,8 +47,9 @@ def restarted(search: Search, best: Fit) -> Fit:
                 )
                 start = replace(found.hypothesis, effects=effects)
                 windows = _GROWING if is_nonsmooth(start) else (None,)
-                again = fit_growing(problem, start, search.records, windows=windows, iterations=8)
-                found = again if again.cost < found.cost else found
+                grow = partial(fit_growing, windows=windows, iterations=8)
+                again = attempt(effect.label, partial(grow, problem, start, search.records))
+                found = again if again is not None and again.cost < found.cost else found
     return found
 
 
@@ -56,7 +59,8 @@ def _usual(effect: Effect, scales: Scales) -> dict[str, list[float]]:
     if effect.latent is not None or effect.discrete:
         return sizes
     for trial in effect.trials(scales):
-        for name, value in trial.items():
+        for name, wanted in trial.items():
+            value = effect.bounded(**{name: wanted}).values[name]
             if value > 0.0 and value not in sizes.get(name, []):
                 sizes.setdefault(name, []).append(value)
     return sizes

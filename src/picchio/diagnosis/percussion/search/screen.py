@@ -191,7 +191,7 @@ class Screen:
         if f"{kind.name}:{target}" in self.fit.hypothesis.labels:
             return None
         if kind.latent is not None:
-            starts = [kind(target, **values) for values in kind(target).trials(self.scales)]
+            starts = kind(target).tried_at(self.scales)
             return self._latent(starts)
         if kind.discrete and self.faint:
             return None  # what has no small size would have been seen before
@@ -200,8 +200,7 @@ class Screen:
             if glance is None or glance.gain < _FIRST * self.enough / _EVERY:
                 return glance
         bare = kind(target)
-        sizes = bare.early_trials(self.scales) if self.early else bare.trials(self.scales)
-        trials = [kind(target, **values) for values in sizes]
+        trials = bare.tried_at(self.scales, early=self.early)
         if self.faint:
             if acts_either_way(kind, faint=True) and len(kind.parameters) == 1:
                 trials = [smallest(trials)]  # the others would become the same

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from functools import partial
 
+from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic, bic_difference, confidence
 from picchio.diagnosis.percussion.data.problem import Problem, Split
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
@@ -64,8 +66,8 @@ def start_from(search: Search, known: Sequence[Estimate]) -> None:
     for cause in known:
         if cause.effect.label in search.considered:
             informed = search.best.hypothesis.informed(cause.effect, cause.std)
-            there = search.fit(informed, iterations=6)
-            if there.cost < search.best.cost - search.least:
+            there = attempt(cause.effect.label, partial(search.fit, informed, iterations=6))
+            if there is not None and there.cost < search.best.cost - search.least:
                 search.best = there
 
 
@@ -105,7 +107,8 @@ def _grow(search: Search, stack: ExitStack) -> None:
         if quiet and not search.pinned:
             stack.enter_context(problem.pinned(here.hypothesis.effects))
             search.pinned = True
-        trials = try_candidates(search, here.hypothesis, whole=quiet)
+        looked = partial(try_candidates, search, here.hypothesis, whole=quiet)
+        trials = attempt("candidates", looked)
         if not trials:
             break
         if not search.pinned:
@@ -141,7 +144,8 @@ def _chosen(search: Search, trials: list[Trial], wider: bool) -> Trial | None:
     best = holdout_choice([(t, search.held_out_gain(here, t.fit)) for t in tied])
     if best is None and wider:
         # What looked best is none; the right one may not have been among those fitted.
-        trials[:] = try_candidates(search, here.hypothesis, wide=True) or trials
+        looked = partial(try_candidates, search, here.hypothesis, wide=True)
+        trials[:] = attempt("more candidates", looked) or trials
         held = (t for t in trials if t.finished(search.records) and search.confirmed(t.fit))
         best = next(held, None)
     return best
@@ -170,8 +174,9 @@ def _without_newest(search: Search, newest: str) -> Fit:
     best = search.best
     if newest not in search.labels or len(search.labels) < 2:
         return best
-    without = search.fit(best.hypothesis.minus(newest), iterations=5)
-    return without if search.leaves_noise(without) else best
+    rest = best.hypothesis.minus(newest)
+    without = attempt(f"without {newest}", partial(search.fit, rest, iterations=5))
+    return without if without is not None and search.leaves_noise(without) else best
 
 
 def alternatives(search: Search) -> tuple[list[Trial], list[Trial]]:
@@ -192,7 +197,9 @@ def alternatives(search: Search) -> tuple[list[Trial], list[Trial]]:
         for trial in finished:
             if trial.fit.hypothesis.labels == best.hypothesis.labels:
                 continue
-            if bic_difference(search.problem, best, trial.fit) < SAME:
+            compared = partial(bic_difference, search.problem, best, trial.fit)
+            rise = attempt(trial.label, compared)
+            if rise is not None and rise < SAME:
                 same.append(trial)
     return same, tried
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.criteria.equivalence import bic
 from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, signal_power
@@ -126,7 +128,9 @@ class Search:
             left = self.problem.residuals(found.hypothesis.effects, self.kept)
             return float(sum((r * r).sum() for r in left))
 
-        return chi_square(before) - chi_square(after)
+        after_it = attempt("records held out", lambda: chi_square(after))
+        # What is no model at a pose that was held out is refuted by it.
+        return -math.inf if after_it is None else chi_square(before) - after_it
 
     def confirmed(self, other: Fit) -> bool:
         """Whether the records held out do not speak against a fit in place of the best.

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
-from picchio.core.errors import InputError
+from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
@@ -31,22 +32,19 @@ def fit_short(
     start: Effect,
     records: Sequence[MeasuredRecord],
     window: float | None,
-) -> Fit | None:
+) -> Fit:
     """A candidate fitted to the first part of the records."""
     # What has no small size turns all slopes: those that are known say nothing beside it.
     near = None if start.discrete else known
-    try:
-        hypothesis = known.hypothesis.plus(start)
-        if start.latent is not None:
-            turns = 0 if start.latent.times else 1
-            first = fit(problem, hypothesis, records, window, iterations=turns)
-            return fit_latent(problem, first, start)
-        if window is None:
-            return fit(problem, hypothesis, records, None, iterations=3, near=near)
-        windows = (0.06, 0.16, window)
-        return fit_growing(problem, hypothesis, records, windows=windows, iterations=4, near=near)
-    except InputError:
-        return None
+    hypothesis = known.hypothesis.plus(start)
+    if start.latent is not None:
+        turns = 0 if start.latent.times else 1
+        first = fit(problem, hypothesis, records, window, iterations=turns)
+        return fit_latent(problem, first, start)
+    if window is None:
+        return fit(problem, hypothesis, records, None, iterations=3, near=near)
+    windows = (0.06, 0.16, window)
+    return fit_growing(problem, hypothesis, records, windows=windows, iterations=4, near=near)
 
 
 def fit_long(
@@ -121,10 +119,10 @@ def try_candidates(
         begun = fit(problem, known, some, _EARLY, iterations=4, with_jacobian=True)
         early = Screen(problem, begun, scales, early=True)
 
-    def short_fit(effect: Effect) -> Fit | None:
+    def short_fit(effect: Effect) -> Fit:
         return _light(fit_short(problem, start, effect, some, window))
 
-    def long_fit(task: tuple[Hypothesis, Effect, float]) -> Fit | None:
+    def long_fit(task: tuple[Hypothesis, Effect, float]) -> Fit:
         return _light(fit_long(problem, *task, records))
 
     # What takes long begins first, or all others would wait for it at the end.
@@ -184,9 +182,9 @@ def _rivals(suspects: Sequence[Suspect], cause: str) -> list[Suspect]:
     return chosen
 
 
-def _light(found: Fit | None) -> Fit | None:
+def _light(found: Fit) -> Fit:
     """A fit without its records, which whoever asked for it has."""
-    return None if found is None else replace(found, records=())
+    return replace(found, records=())
 
 
 def _best_of_each(
@@ -236,7 +234,10 @@ def _long_trials(
     others = sorted(wanted[1:], key=lambda each: each[0].effect.latent is None)
     for some in (wanted[:1], others):
         tasks = [(found.hypothesis, suspect.effect, rival) for suspect, found in some]
-        for (suspect, _), light in zip(some, mapped("long", tasks), strict=True):
+        for (suspect, found), light in zip(some, mapped("long", tasks), strict=True):
+            if light is None:  # it failed: it was not fitted to the end
+                trials.append(Trial(suspect.label, found, math.inf, suspect.gain))
+                continue
             long = replace(light, records=tuple(records))
             rival = min(rival, long.cost)
             trials.append(Trial(suspect.label, long, bic(long), suspect.gain))
@@ -316,7 +317,8 @@ def over_the_same_samples(search: Search, trials: Sequence[Trial]) -> list[Trial
     with search.problem.pinned(best.fit.hypothesis.effects):
         again = []
         for t in close:
-            there = search.fit(t.fit.hypothesis, iterations=6)
-            again.append(replace(t, fit=there, score=bic(there)))
+            there = attempt(t.label, partial(search.fit, t.fit.hypothesis, iterations=6))
+            if there is not None:
+                again.append(replace(t, fit=there, score=bic(there)))
     others = [t for t in trials if t not in close]
     return sorted([*again, *others], key=lambda t: t.score)
