@@ -81,7 +81,8 @@ def run(arguments: list[str] | None = None) -> int:
         arguments: as typed; those of the process if None.
 
     Returns:
-        0, 2 on bad input, 1 where the machine failed, 130 interrupted, 143 terminated.
+        0, 3 by --strict, 2 on bad input, 1 where the machine failed, 130 interrupted, 143
+        terminated.
     """
     given = sys.argv[1:] if arguments is None else arguments
     begin(given)

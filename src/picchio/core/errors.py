@@ -9,7 +9,9 @@ from __future__ import annotations
 import difflib
 import sys
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ _NOT_GIVEN = object()
 _MOST_CHOICES = 12
 # Modules whose lines are none of the user's; contextlib's are between decorated functions.
 _OURS = ("picchio", "contextlib")
+_listening: ContextVar[tuple[list[str], ...]] = ContextVar("_listening", default=())
 
 
 class PicchioError(Exception):
@@ -33,10 +36,36 @@ def warn_user(message: str) -> None:
     Args:
         message: a sentence without a full stop.
     """
+    for said in _listening.get():
+        if message not in said:
+            said.append(message)
     level, frame = 1, sys._getframe()
     while frame.f_back is not None and frame.f_globals["__name__"].split(".")[0] in _OURS:
         level, frame = level + 1, frame.f_back
     warnings.warn(message, PicchioWarning, stacklevel=level)
+
+
+@contextmanager
+def gathered() -> Iterator[list[str]]:
+    """Every warning of picchio meanwhile, each once; they are raised all the same."""
+    said: list[str] = []
+    token = _listening.set((*_listening.get(), said))
+    try:
+        yield said
+    finally:
+        _listening.reset(token)
+
+
+@contextmanager
+def unheard() -> Iterator[None]:
+    """No warning of picchio meanwhile: what there is to say is said elsewhere."""
+    token = _listening.set(())
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PicchioWarning)
+            yield
+    finally:
+        _listening.reset(token)
 
 
 class OutputError(PicchioError):

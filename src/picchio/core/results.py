@@ -17,12 +17,15 @@ def plain(value: Any) -> Any:
     """The same structure as `json.dumps` takes it.
 
     Arrays and tuples become lists, paths become text, keys become text, records what their
-    `to_dict` gives or else their fields; numbers that JSON cannot hold (NaN, infinity) become None.
+    `to_dict` or `model_dump` gives or else their fields; numbers that JSON cannot hold (NaN,
+    infinity) become None.
     """
     if hasattr(value, "tolist"):
         value = value.tolist()
     elif hasattr(value, "to_dict"):
         value = value.to_dict()
+    elif hasattr(value, "model_dump"):
+        value = value.model_dump()
     elif dataclasses.is_dataclass(value):
         value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
     if isinstance(value, Mapping):

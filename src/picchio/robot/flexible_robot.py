@@ -44,6 +44,7 @@ class FlexibleRobot:
         tool_point: the link at whose origin the force acts.
         effect_tables: of a saved model: how the world departs from the robot's files, as
             `picchio.model.effects.from_dict` reads it.
+        warnings: what was warned of while it was loaded.
     """
 
     name: str
@@ -60,6 +61,7 @@ class FlexibleRobot:
     rigid: RigidModel
     tool_point: str
     effect_tables: tuple[Mapping[str, Any], ...] = ()
+    warnings: tuple[str, ...] = ()
     lower: Array = field(init=False)
     upper: Array = field(init=False)
     stiffness: Array = field(init=False)

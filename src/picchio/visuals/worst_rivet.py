@@ -1,4 +1,4 @@
-"""The one rivet that a report and a scene show: the limiting joint's worst pose, in full."""
+"""The one rivet that a report and a scene show: where the verdict's part fares worst, in full."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class WorstRivet:
 
     Attributes:
         rivet: the model at the pose, under the operation's blows.
-        joint: the limiting joint, or without shafts the one that deflects most.
+        joint: the one that governs the verdict.
         index: its row among the flexible joints.
         pose_number: counted from 1.
         rest: response to the burst; None where its ring-down has no end.
@@ -104,19 +104,16 @@ def worst_rivet(
         gravity_stiffness: as in the assessment.
 
     Returns:
-        the rivet's response at the joint that limits the life.
+        the rivet's response at the joint that governs the verdict.
 
     Raises:
         InputError: as `assess`.
     """
     model = Model.of(robot, gravity_stiffness=gravity_stiffness)
-    name = assessment.limiting_joint
-    if name is None:
-        name = max(assessment.joints, key=lambda joint: joint.peak_deflection).name
-    life = assessment.joint(name)
-    operation = next(op for op in task.operations if op.name == life.worst_operation)
-    rivet = Rivet(model, operation, operation.poses[life.worst_pose])
-    index = model.robot.flexible_names.index(name)
+    told = assessment.verdict
+    operation = next(op for op in task.operations if op.name == told.operation)
+    rivet = Rivet(model, operation, operation.poses[told.pose])
+    index = model.robot.flexible_names.index(told.joint)
     found: list[Response | SampledResponse | None] = []
     for hits in (operation.hits_per_rivet, None):
         try:
@@ -128,7 +125,7 @@ def worst_rivet(
         rivet=rivet,
         joint=model.robot.flexible_joints[index],
         index=index,
-        pose_number=life.worst_pose + 1,
+        pose_number=told.pose + 1,
         rest=found[0],
         steady=found[1],
     )

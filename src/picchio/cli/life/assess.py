@@ -34,7 +34,7 @@ from picchio.cli.output import (
 )
 from picchio.core.errors import InputError
 from picchio.core.results import plain
-from picchio.studies.assessment.result import format_count, verdict
+from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
     from picchio.cli.layout import FittedTable
@@ -115,6 +115,13 @@ def assess(
         bool,
         typer.Option("--gravity-balanced", help="The arm is balanced: no gravity in its joints."),
     ] = False,
+    strict: Annotated[
+        bool,
+        typer.Option(
+            "--strict",
+            help="Exit with 3 unless the verdict is safe or, with --for-life, the answer is yes.",
+        ),
+    ] = False,
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -192,8 +199,11 @@ def assess(
             _show_spread(spread)
 
     deliver(content, json, show_all)
+    if strict and found.verdict.status != "safe":
+        raise typer.Exit(_NOT_SAFE)
 
 
+_NOT_SAFE = 3
 # Below this a torque in N m or an angle in mrad is rounding, and is printed as 0.
 _ROUNDING = 1e-9
 
@@ -222,10 +232,11 @@ def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
     if reducers:
         heads = ("joint", "reducer", ">used, %", "the limit that binds")
         out.print(table(heads, reducers, title="The reducers"))
-        for line in found.reducer_warnings:
-            out.print(f"  {line}")
-        out.print()
-    out.print(f"{verdict(found)}\n", style="bold")
+    told = found.verdict
+    out.print(told.headline, style="bold")
+    for line in told.reasons:
+        out.print(f"  - {line}")
+    out.print()
     if len(found.operations) > 1 and any(joint.damage_share for joint in found.joints):
         out.print(_share_table(found))
     if found.steady_state:
@@ -266,7 +277,7 @@ def _life_table(found: Assessment) -> FittedTable:
         caption=f"{', '.join(slides)} slides: mm and N, not mrad and N m" if slides else None,
     )
     for row, joint in zip(made.rows, found.joints, strict=True):
-        row.style = "bold" if joint.name == found.limiting_joint else None
+        row.style = "bold" if joint.name == found.verdict.joint else None
     return made
 
 

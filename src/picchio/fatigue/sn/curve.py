@@ -50,6 +50,7 @@ class SNCurve:
         tensile_strength: Pa, R_m, for the FKM mean stress sensitivity and surface factor.
         source: where the numbers come from.
         warning: why not to use it for real work, if there is a reason.
+        unverified: which of its numbers nobody has held against a source, if any.
         assumptions: what was changed since, in words, to print with a result.
         kind: always "shear".
 
@@ -70,6 +71,7 @@ class SNCurve:
     tensile_strength: float | None = None
     source: str = ""
     warning: str = ""
+    unverified: str = ""
     assumptions: tuple[str, ...] = ()
     kind: Literal["shear"] = "shear"
     _knots: FloatArray = field(init=False, repr=False, compare=False)

@@ -37,6 +37,7 @@ class SNCurveFile(StrictModel):
         tensile_strength: Pa, R_m, for FKM's mean stress sensitivity and surface factor.
         source: where the numbers come from.
         warning: why not to use the curve for real work, if there is a reason.
+        unverified: which of its numbers nobody has held against a source, if any; a verdict tells.
         assumptions: sentences to print with every result.
     """
 
@@ -54,6 +55,7 @@ class SNCurveFile(StrictModel):
     tensile_strength: Positive | None = None
     source: str
     warning: str = ""
+    unverified: str = ""
     assumptions: tuple[str, ...] = ()
 
 

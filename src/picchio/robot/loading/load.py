@@ -8,7 +8,7 @@ from pathlib import Path
 
 from lxml import etree
 
-from picchio.core.errors import InputError, warn_user
+from picchio.core.errors import InputError, gathered, warn_user
 from picchio.core.toml import validate
 from picchio.robot.annotations.flexibility import Source, flexible_joints
 from picchio.robot.annotations.inline import read_annotations
@@ -64,17 +64,23 @@ def load_robot(
                 raise InputError("comes too late for a robot that is loaded", key=key,
                                  hint="give the robot's name or file with it")  # fmt: skip
         return robot
+    with gathered() as said:
+        loaded = _load(robot, flex, tool, values, reducers, allow_rigid)
+    return replace(loaded, warnings=tuple(said))
+
+
+def _load(
+    robot: str | Path,
+    flex: str | Path | None,
+    tool: str | None,
+    values: Mapping[str, Mapping[str, object]] | None,
+    reducers: Sequence[str | Path],
+    allow_rigid: bool,
+) -> FlexibleRobot:
     if is_saved_model(robot):
         saved = read_saved_model(Path(robot))
         flex, tool = flex or saved.flex, tool or saved.tool
-        loaded = load_robot(
-            saved.robot,
-            flex=flex,
-            tool=tool,
-            values=values,
-            reducers=reducers,
-            allow_rigid=allow_rigid,
-        )
+        loaded = _load(saved.robot, flex, tool, values, reducers, allow_rigid)
         tables = tuple(table.model_dump() for table in saved.effect)
         return replace(loaded, effect_tables=tables, files=(*loaded.files, Path(robot)))
     found = find_robot(robot)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,11 +17,13 @@ from picchio.robot.annotations.flexibility import ITS_REDUCER
 from picchio.robot.drives.reducer import Reducer
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import JointLife, OperationResult, SteadyStateCheck
-from picchio.studies.rivet.life_rules import LifeRule
+from picchio.studies.assessment.verdict import MUCH_GROWTH, RATE_STEP, SHAFT_TOLERANCE, softer
+from picchio.studies.rivet.life_rules import LifeRule, peak
+from picchio.studies.rivet.pose import Rivet
 from picchio.studies.tasks import Task
 
-# A shaft that disagrees with its joint's stiffness by more than this is worth a warning.
-_SHAFT_TOLERANCE = 0.05
+# Below this, in rad or m, a peak is rounding.
+_ROUNDING = 1e-12
 
 
 def warn_about_shafts(robot: FlexibleRobot) -> None:
@@ -35,12 +38,9 @@ def warn_about_shafts(robot: FlexibleRobot) -> None:
         if joint.shaft is None:
             continue
         ratio = 1.0 + check_shaft(joint.stiffness, joint.shaft)
-        if ratio < 1.0 - _SHAFT_TOLERANCE:
-            problem = (
-                f"is {1.0 / ratio:.3g} times softer than the joint it is a part of, which cannot "
-                "be: radius, length or stiffness is wrong"
-            )
-        elif ratio > 1.0 + _SHAFT_TOLERANCE:
+        if ratio < 1.0 - SHAFT_TOLERANCE:
+            problem = softer(ratio)
+        elif ratio > 1.0 + SHAFT_TOLERANCE:
             problem = (
                 f"is {ratio:.3g} times stiffer than the joint: something else yields as well, and "
                 "the stress by the paper's formula (from the deflection) is too high by as much"
@@ -50,17 +50,15 @@ def warn_about_shafts(robot: FlexibleRobot) -> None:
         warn_user(f"{joint.name}: the shaft, by G Jp / l, {problem}")
 
 
-def warn_about_yield(joints: tuple[JointLife, ...], curves: tuple[SNCurve | None, ...]) -> None:
+def warn_about_yield(joints: tuple[JointLife, ...]) -> None:
     """Warn where gravity and blows together reach the static strength."""
-    for joint, curve in zip(joints, curves, strict=True):
-        if curve is None:
-            continue
-        strength = curve.yield_shear or curve.ultimate_shear
-        if strength is not None and joint.peak_total_stress >= strength:
+    for joint in joints:
+        if joint.yield_utilisation >= 1.0:
+            stress = joint.peak_total_stress / 1e6
+            strength = stress / joint.yield_utilisation
             warn_user(
-                f"{joint.name}: gravity and blows together reach "
-                f"{joint.peak_total_stress / 1e6:.4g} MPa in shear, and {curve.name} yields at "
-                f"{strength / 1e6:.4g} MPa: no fatigue life holds there"
+                f"{joint.name}: gravity and blows together reach {stress:.4g} MPa in shear, and "
+                f"{joint.sn_curve} yields at {strength:.4g} MPa: no fatigue life holds there"
             )
 
 
@@ -130,13 +128,102 @@ def assumptions_of(
     return tuple(lines)
 
 
+def rate_sensitivity(
+    model: Model,
+    task: Task,
+    joints: tuple[JointLife, ...],
+    results: list[OperationResult],
+    needs: str,
+) -> dict[str, tuple[float, str]]:
+    """How the peaks answer to the rate of the blows, each joint at its worst rivet.
+
+    Args:
+        model: the robot and its effects.
+        task: what it does.
+        joints: as they fare.
+        results: of the operations, in the task's order.
+        needs: the response that is meant, "rest" or "steady".
+
+    Returns:
+        by joint the larger of the two peaks with the blows 5 % faster and slower over the peak as
+        stated, and what to say of it, "" where that is not much.
+    """
+    solved: dict[tuple[str, int], tuple[Rivet, FloatArray, list[list[float]]]] = {}
+    told = {}
+    for k, joint in enumerate(joints):
+        place = joint.worst_operation, joint.worst_pose
+        if place not in solved:
+            at = [op.name for op in task.operations].index(place[0])
+            operation, as_stated = task.operations[at], results[at].peak_deflection[place[1]]
+            stated = Rivet(model, operation, operation.poses[place[1]])
+            periods = (1.0 + RATE_STEP, 1.0 - RATE_STEP)
+            solved[place] = stated, as_stated, [_peaks(stated, f, needs) for f in periods]
+        rivet, before, found = solved[place]
+        peaks = [column[k] for column in found if column]
+        moves = peaks and before[k] > _ROUNDING
+        growth = max(peaks) / float(before[k]) if moves else math.nan
+        text = ""
+        if growth > MUCH_GROWTH:
+            way = "slower" if found[0] and found[0][k] == max(peaks) else "faster"
+            own = ", ".join(f"{f:.3g}" for f in rivet.natural_frequencies)
+            text = (
+                f"a resonance is near: blows {100 * RATE_STEP:g} % {way} raise the peak of "
+                f"{joint.name} {growth:.3g} times ({place[0]}, pose {place[1] + 1}; "
+                f"{1.0 / rivet.operation.excitation.period:.3g} Hz and its multiples, natural "
+                f"frequencies {own} Hz)"
+            )
+        told[joint.name] = growth, text
+    return told
+
+
+def _peaks(stated: Rivet, factor: float, needs: str) -> list[float]:
+    """Every joint's peak with the period times a factor, rad; none where the blows do not fit."""
+    blows = stated.operation.excitation
+    try:
+        changed = replace(stated.operation, excitation=blows.with_period(factor * blows.period))
+        loads = Rivet(stated.model, changed, stated.pose).loads(needs, both=False)
+    except InputError:
+        return []
+    return [peak(getattr(load, needs)) for load in loads]
+
+
+def doubts_of(
+    model: Model,
+    curves: tuple[SNCurve | None, ...],
+    steady: tuple[SteadyStateCheck, ...],
+    needs: str,
+) -> tuple[str, ...]:
+    """What lowers trust beside warnings: estimates, unverified curves, effects left out.
+
+    Args:
+        model: the robot and its effects.
+        curves: of the joints.
+        steady: what the steady state misjudges.
+        needs: the response that the method takes, "rest" or "steady".
+    """
+    lines = [*_estimates(model.robot), *model.without_load()]
+    for curve in dict.fromkeys(c for c in curves if c is not None):
+        if curve.unverified:
+            lines.append(f"S-N curve {curve.name} is unverified: {curve.unverified}")
+    ratios = [(check.peak_ratio, check.joint) for check in steady if check.peak_ratio > 1.0]
+    if needs == "steady" and ratios:
+        ratio, name = max(ratios)
+        lines.append(
+            f"the method takes the steady state: from rest the peak of {name} is {ratio:.3g} times "
+            "as high"
+        )
+    return tuple(lines)
+
+
 def _estimates(robot: FlexibleRobot) -> list[str]:
     """What of the robot is an estimate or a default, one line a source."""
     said: dict[str, list[str]] = {}
     for joint in robot.flexible_joints:
         if joint.estimated:
             source = robot.origins.get(f"{joint.name}.stiffness", "marked as an estimate")
-            said.setdefault(f"stiffness is an estimate ({source})", []).append(joint.name)
+            said.setdefault(
+                f"stiffness and damping are estimates, not measurements ({source})", []
+            ).append(joint.name)
         keys = (f"{joint.name}.stiffness", f"{joint.name}.stiffness_curve")
         if joint.reducer and any(robot.origins.get(k, "").startswith(ITS_REDUCER) for k in keys):
             text = (

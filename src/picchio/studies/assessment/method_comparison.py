@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import PicchioWarning
+from picchio.core.errors import unheard
 from picchio.fatigue.miner import life
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, PAPER_SN_CURVE, load_sn_curve
@@ -59,9 +58,7 @@ def compare_methods(
         InputError: as `assess`.
     """
     paper_curve = load_sn_curve(PAPER_SN_CURVE, quiet=True)
-    with warnings.catch_warnings():
-        # What assess has to say, it says to whoever asked for the assessment itself.
-        warnings.simplefilter("ignore", PicchioWarning)
+    with unheard():  # what assess has to say, it says to whoever asked for the assessment itself
         paper = assess(robot, task, method="paper")
         counted = assess(robot, task, sn_curve=paper_curve)
         real = assess(robot, task, sn_curve=sn_curve, miner="elementary")

@@ -14,6 +14,8 @@ from picchio.core.arrays import FloatArray
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
 from picchio.robot.drives.reducer import TorqueLimit
+from picchio.studies.assessment.verdict import Verdict, judge
+from picchio.studies.assessment.verdict import format_count as format_count
 
 # What an assessment found: the life of every joint, and where it goes.
 
@@ -103,6 +105,11 @@ class JointLife:
         reducer_limits: every limit that applies, largest share over the task first: which torque
             acts, which is allowed.
         reducer_warnings: what the catalogue does not promise, and which limits are exceeded.
+        yield_utilisation: `peak_total_stress` over the static strength in shear; NaN where either
+            is not known.
+        shaft_ratio: the shaft's own stiffness, G Jp / l, over the joint's; NaN without a shaft.
+        rate_sensitivity: the peak of the worst rivet with the blows 5 % faster or slower, the
+            larger one, over its peak as stated; NaN where that was not asked for.
     """
 
     name: str
@@ -125,6 +132,9 @@ class JointLife:
     reducer_governed_by: str = ""
     reducer_limits: tuple[TorqueLimit, ...] = ()
     reducer_warnings: tuple[str, ...] = ()
+    yield_utilisation: float = math.nan
+    shaft_ratio: float = math.nan
+    rate_sensitivity: float = math.nan
 
     @property
     def life(self) -> float:
@@ -189,6 +199,9 @@ class Assessment(TableResult):
         assumptions: what was taken for granted, a sentence each.
         origins: where each value of the robot came from.
         provenance: version and hashes.
+        inputs: what entered: robot, sidecar, effects, task, options, S-N curves, reducers.
+        warnings: of loading the robot and of the assessment.
+        doubts: what else lowers trust in the result, a sentence each.
     """
 
     PAGE = "visuals.report.assessment:assessment_report"
@@ -214,6 +227,14 @@ class Assessment(TableResult):
     assumptions: tuple[str, ...]
     origins: Mapping[str, str]
     provenance: Mapping[str, Any]
+    inputs: Mapping[str, Any] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """What it comes to: safe, limited, fails or cannot be told, by what, and how surely."""
+        return judge(self)
 
     def joint(self, name: str) -> JointLife:
         """The entry of one joint.
@@ -233,7 +254,7 @@ class Assessment(TableResult):
         return tuple(f"{', '.join(names)}: {text}" for text, names in said.items())
 
     def _headline(self) -> str:
-        return f"{self.robot!r}, method={self.method!r}: {verdict(self)}"
+        return f"{self.robot!r}, method={self.method!r}: {self.verdict.headline}"
 
     def _rows(self) -> list[dict[str, Any]]:
         left_out = ("damage_share", "reducer_limits", "reducer_warnings")
@@ -261,45 +282,10 @@ class Assessment(TableResult):
             table["reducer's limit"] = [j.reducer_governed_by for j in joints]
         facts = {"method": self.method, "S-N curve": self.sn_curve or None}
         rows = zip(*table.values(), strict=True)
-        return sheet(f"Assessment of {self.robot}", facts, list(table), rows, verdict(self))
+        told = self.verdict
+        note = " ".join([told.headline, *(f"Doubt: {line}." for line in told.reasons)])
+        return sheet(f"Assessment of {self.robot}", facts, list(table), rows, note)
 
     def _content(self) -> dict[str, Any]:
-        return {"format": FORMAT, **vars(self)}
-
-
-def verdict(found: Assessment) -> str:
-    """The result in a sentence."""
-    if found.limiting_joint is None:
-        return (
-            "No joint has a shaft or a reducer, so no life can be given; state them in the sidecar."
-        )
-    joint = next(j for j in found.joints if j.name == found.limiting_joint)
-    if math.isfinite(joint.life):
-        return f"The robot survives {format_count(joint.life)} rivets; {joint.name} fails first."
-    over = [j.name for j in found.joints if j.reducer_utilisation > 1.0]
-    if over:
-        return (
-            f"Blows and gravity exceed the torque limits of the reducer in {', '.join(over)}: no "
-            "life can be promised there."
-        )
-    part = f"reducer {joint.reducer}" if joint.reducer_utilisation > joint.utilisation else "shaft"
-    if not joint.sn_curve:
-        part = f"reducer {joint.reducer}"
-    shafts = any(j.sn_curve for j in found.joints)
-    first = "No shaft fails: every stress stays below its endurance limit. " if shafts else ""
-    return (
-        f"{first}The {part} of {joint.name} comes closest, at "
-        f"{100 * joint.governing_utilisation:.3g} % of its allowable."
-    )
-
-
-def format_count(value: float) -> str:
-    """A number of rivets as people read it; "no end" for infinity."""
-    if math.isnan(value):
-        return "-"
-    if math.isinf(value):
-        return "no end"
-    if value < 10:
-        return f"{value:.3g}"
-    # Four digits are more than the physics deserves.
-    return f"{float(f'{value:.4g}'):,.0f}" if value < 1e12 else f"{value:.3e}"
+        own = {key: value for key, value in vars(self).items() if key != "doubts"}
+        return {"format": FORMAT, "verdict": self.verdict, **own}

@@ -10,13 +10,13 @@ from typing import Literal
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, gathered
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.miner import life, peak_damage
-from picchio.fatigue.shaft_stress import shear_stress
+from picchio.fatigue.shaft_stress import check_shaft, shear_stress
 from picchio.fatigue.sn.curve import MinerRule, SNCurve
 from picchio.fatigue.sn.library import PAPER_SN_CURVE, load_sn_curve
 from picchio.model.model import Model
@@ -25,10 +25,13 @@ from picchio.robot.dynamics.pose import warn_beyond_limits
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.checks import (
     assumptions_of,
+    doubts_of,
+    rate_sensitivity,
     steady_state_checks,
     warn_about_shafts,
     warn_about_yield,
 )
+from picchio.studies.assessment.inputs import inputs_of
 from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
 from picchio.studies.rivet.life_rules import LifeRule, PaperRule, RainflowRule, curves_of, peak
 from picchio.studies.rivet.pose import Rivet, need_springs
@@ -73,8 +76,8 @@ def assess(
         paper_mean_stress: the paper's life at the mean of the poses' peak stresses (Table 2).
         gravity_stiffness: add dg/dq to the springs; as the model has it if not given.
         gravity_balanced: gravity leaves no torque in the joints; see `Model`; likewise.
-        steady_check: also say what the steady state misjudges; False leaves NaN there and takes
-            about half the time.
+        steady_check: also say what the steady state misjudges, and whether a resonance is near;
+            False leaves NaN there and takes about half the time.
         progress: called with (poses done, poses in all).
 
     Returns:
@@ -94,11 +97,12 @@ def assess(
     rule: LifeRule = PaperRule() if method == "paper" else RainflowRule(residue, mean_stress, miner)
     if sn_curve is None and method == "paper":
         sn_curve = PAPER_SN_CURVE
-    curves = curves_of(robot, sn_curve)
-    warn_about_shafts(robot)
-    for operation in task.operations:
-        warn_beyond_limits(robot, operation.poses, f"operation {operation.name!r}")
-    reducers = tuple(joint.reducer for joint in robot.flexible_joints)
+    with gathered() as said:
+        curves = curves_of(robot, sn_curve)
+        warn_about_shafts(robot)
+        for operation in task.operations:
+            warn_beyond_limits(robot, operation.poses, f"operation {operation.name!r}")
+        reducers = tuple(joint.reducer for joint in robot.flexible_joints)
     paper_curve = load_sn_curve(PAPER_SN_CURVE, quiet=True)
     job = _Job(model, rule, curves, reducers, paper_curve, steady_check)
     total = sum(len(operation.poses) for operation in task.operations)
@@ -132,7 +136,14 @@ def assess(
         _joint_life(j, robot, task, results, curves[j], reducers[j], largest[j])
         for j in range(len(curves))
     )
-    warn_about_yield(joints, curves)
+    with gathered() as more:
+        warn_about_yield(joints)
+    steady = steady_state_checks(joints, task, results, checks)
+    doubts = doubts_of(model, curves, steady, rule.needs)
+    if steady_check:
+        rates = rate_sensitivity(model, task, joints, results, rule.needs)
+        joints = tuple(replace(j, rate_sensitivity=rates[j.name][0]) for j in joints)
+        doubts = (*doubts, *filter(None, (text for _, text in rates.values())))
     limiting = _limiting(joints)
     return Assessment(
         robot=robot.name,
@@ -143,9 +154,22 @@ def assess(
         operations=tuple(results),
         limiting_joint=limiting.name if limiting else None,
         rivets_to_failure=limiting.life if limiting else math.inf,
-        steady_state=steady_state_checks(joints, task, results, checks),
+        steady_state=steady,
         origins=robot.origins,
         provenance=provenance([*robot.files, *task.files]),
+        inputs=inputs_of(
+            model,
+            task,
+            curves,
+            reducers,
+            method=method,
+            residue=residue,
+            mean_stress=mean_stress,
+            miner=miner,
+            paper_mean_stress=paper_mean_stress,
+        ),
+        warnings=tuple(dict.fromkeys([*robot.warnings, *said, *more])),
+        doubts=doubts,
     )
 
 
@@ -229,6 +253,7 @@ def _joint_life(
     torques: FloatArray,
 ) -> JointLife:
     joint = robot.flexible_joints[j]
+    strength = (curve.yield_shear or curve.ultimate_shear or math.nan) if curve else math.nan
     # Each limit is for one of the two: their largest values give each limit's worst pose.
     check = None
     if reducer is not None and np.isfinite(torques[0]):
@@ -258,6 +283,8 @@ def _joint_life(
         reducer_governed_by=check.governing.name if check is not None else "",
         reducer_limits=check.limits if check is not None else (),
         reducer_warnings=check.warnings if check is not None else (),
+        yield_utilisation=largest["peak_total_stress"] / strength,
+        shaft_ratio=1.0 + check_shaft(joint.stiffness, joint.shaft) if joint.shaft else math.nan,
     )
 
 

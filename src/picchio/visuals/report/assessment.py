@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,7 +13,7 @@ from picchio.fatigue.sn.library import load_sn_curve
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.method_comparison import Term
-from picchio.studies.assessment.result import Assessment, verdict
+from picchio.studies.assessment.result import Assessment
 from picchio.studies.backwards import Allowable
 from picchio.studies.envelopes import envelope
 from picchio.studies.tasks import Task
@@ -181,27 +180,25 @@ def assessment_report(
     robot = worst.rivet.model.robot
     life = assessment.joint(worst.joint.name)
     curve = _curve(sn_curve, robot, life.sn_curve)
-    over_limit = any(joint.reducer_utilisation > 1.0 for joint in assessment.joints)
-    bad = math.isfinite(assessment.rivets_to_failure) or over_limit
-    estimated = ", ".join(joint.name for joint in robot.flexible_joints if joint.estimated)
-    guessed = f"Stiffness and damping of {estimated} are estimates, not measurements."
+    told = assessment.verdict
     return render(
         "assessment.html.j2",
         a=assessment,
+        verdict=told,
         robot=robot,
         task=task,
         life=life,
         curve=curve,
         figures=_figures(assessment, worst, curve, spread),
-        headline=verdict(assessment),
-        tone="bad" if bad else "good" if assessment.limiting_joint else "",
+        headline=told.headline,
+        tone=told.tone,
         reducers=any(joint.reducer for joint in assessment.joints),
         allowed=list(allowed),
         spread=spread,
         spread_rows=[*spread.joints.items(), ("robot", spread.robot)] if spread else [],
         terms=list(terms),
         shafts=any(joint.sn_curve for joint in assessment.joints),
-        warnings=list(dict.fromkeys([*([guessed] if estimated else []), *warnings])),
+        warnings=list(dict.fromkeys([*told.reasons, *warnings])),
         slides=any(joint.kind == "prismatic" for joint in robot.flexible_joints),
         command=command or f"picchio assess {robot.name}",
         scene=scene,

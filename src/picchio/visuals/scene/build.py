@@ -60,7 +60,7 @@ def build_scene(
         hits: of a burst from rest; None for the steady state.
         direction: (3,) of the force, for the vibration; the worst one if not given.
         assessment: of a task, for the rivets and the joints' colours.
-        joint: whose envelope is shown first; the limiting one if not given.
+        joint: whose envelope is shown first; the verdict's if not given.
         workspace: of `picchio.workspace_map`, coloured by the peak of the joint shown.
         diagnosis: of this robot: its causes are drawn where they sit, and the layers about life
             start hidden.
@@ -90,6 +90,7 @@ def build_scene(
     _add_tool(scene, body, blow)
     if assessment is not None:
         _add_rivets(scene, body, assessment)
+        scene.verdict = assessment.verdict.headline
     if workspace is not None:
         _add_workspace(scene, dataset_of(workspace), units)
     if diagnosis is not None:
@@ -141,8 +142,8 @@ def _first(envelope: DirectionEnvelope, assessment: Assessment | None, joint: st
         if joint not in names:
             raise InputError("no such flexible joint", key="joint", value=joint, choices=names)
         return names.index(joint)
-    if assessment is not None and assessment.limiting_joint is not None:
-        return names.index(assessment.limiting_joint)
+    if assessment is not None:
+        return names.index(assessment.verdict.joint)
     return int(np.argmax(envelope.peak_deflection))
 
 

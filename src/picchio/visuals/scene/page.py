@@ -84,6 +84,7 @@ def scene_html(scene: Scene) -> str:
     parts = {
         "title": escape(scene.title),
         "subtitle": escape(scene.subtitle),
+        "judged": f'<p id="judged">{escape(scene.verdict)}</p>' if scene.verdict else "",
         "version": escape(scene.version),
         "style": (folder / "page.css").read_text("utf-8"),
         "viewer": _viewer(),

@@ -57,6 +57,7 @@ class Scene(Page, Result):
         chosen: index of the joint whose envelope is shown at first.
         reach: m, size of the robot.
         envelope: what the double balls are of.
+        verdict: of the task's assessment, where one is shown.
         file: where it was saved last, or None.
     """
 
@@ -74,6 +75,7 @@ class Scene(Page, Result):
     motion: dict[str, Any] = field(default_factory=dict)
     tracks: list[dict[str, Any]] = field(default_factory=list)
     diagnosis: dict[str, Any] | None = None
+    verdict: str = ""
     playing: bool = True
     camera: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
     floor: dict[str, Any] = field(default_factory=dict)
@@ -119,6 +121,7 @@ class Scene(Page, Result):
             "format": "picchio-scene/1",
             "file": self.file,
             "bytes": 0 if self.file is None else self.file.stat().st_size,
+            "verdict": self.verdict or None,
             "layers": [{"id": name, "text": text} for name, text, _ in self.layers],
             "envelope": self.envelope.to_dict(),
             "provenance": self.envelope.origin,

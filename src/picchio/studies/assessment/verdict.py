@@ -1,0 +1,284 @@
+"""What an assessment comes to: safe, limited, fails or cannot be told; by what, and how surely.
+
+This is the one place that judges. Terminal, JSON, report, scene and notebook show what stands here.
+
+The order of the statuses is that of the harm of a wrong promise. A part beyond its limit `fails`
+(the shaft at its yield strength, the reducer at a limit of its catalogue, a shaft that breaks in
+its first rivet). Otherwise, inputs that contradict each other, a joint of which no part is known,
+or a limit that is kept only at exactly the stated rate of the blows, mean that it `cannot-be-told`.
+Otherwise a shaft with a finite life makes it `limited`, and only then it is `safe`.
+
+The margin is allowable over actual of the governing part, so below 1 it fails. A finite life has
+none: its stress is above the endurance limit and that is no failure. It is held against a wanted
+life instead (`picchio.allowable`), which gives the factor by which the force may grow.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
+
+Status = Literal["safe", "limited", "fails", "cannot-be-told"]
+Governor = Literal["shaft", "reducer", "yield", "resonance", "input"]
+
+# A shaft that disagrees with its joint's stiffness by more than this is told; a softer one cannot
+# be.
+SHAFT_TOLERANCE = 0.05
+# A peak that grows by more than this when the blows come 5 % faster or slower is a resonance's.
+RATE_STEP = 0.05
+MUCH_GROWTH = 1.25
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The result of an assessment in a few words.
+
+    Attributes:
+        status: "safe" (no part of a flexible joint reaches its limit, and no life has an end),
+            "limited" (a finite life), "fails" (a limit is exceeded) or "cannot-be-told".
+        governed_by: shaft (fatigue), reducer (a limit of its catalogue), yield (the shaft's static
+            strength), resonance or input.
+        joint: that governs.
+        margin: allowable over actual of the governing part; below 1 it fails; NaN where there is
+            none: of a finite life, and where nothing can be told.
+        reasons: everything that lowers trust, a sentence each.
+        operation: where the governing part fares worst.
+        pose: index of the pose there, from 0.
+        limit: that the governing part is nearest to, in words.
+        headline: the verdict as sentences.
+    """
+
+    status: Status
+    governed_by: Governor
+    joint: str
+    margin: float
+    reasons: tuple[str, ...]
+    operation: str
+    pose: int
+    limit: str
+    headline: str
+
+    @property
+    def tone(self) -> str:
+        """How a page shows it: "good", "bad", or "" for neither."""
+        return {"safe": "good", "cannot-be-told": ""}.get(self.status, "bad")
+
+
+class _Part(NamedTuple):
+    """What may fail in a joint, how near that is, and where."""
+
+    governor: Governor
+    joint: JointLife
+    margin: float
+    limit: str
+    operation: str
+    pose: int
+
+    @property
+    def name(self) -> str:
+        what = f"reducer {self.joint.reducer}" if self.governor == "reducer" else "shaft"
+        return f"{what} of {self.joint.name}"
+
+    @property
+    def used(self) -> str:
+        return f"{100.0 / self.margin:.3g} % of its {self.limit}"
+
+    @property
+    def margin_at_other_rates(self) -> float:
+        """With the blows 5 % faster or slower, where that makes the peak much higher."""
+        joint, growth = self.joint, self.joint.rate_sensitivity
+        if not growth > MUCH_GROWTH:
+            return self.margin
+        share = {  # of the vibration in the load; gravity does not grow
+            "shaft": 1.0,
+            "yield": joint.peak_shear_stress / joint.peak_total_stress,
+            "reducer": joint.peak_torque / (joint.peak_torque + joint.gravity_torque),
+        }[self.governor]
+        return self.margin / (1.0 + (growth - 1.0) * min(share, 1.0))
+
+
+def judge(found: Assessment) -> Verdict:
+    """The verdict of an assessment.
+
+    Args:
+        found: its joints and operations, and what its run found to doubt.
+
+    Returns:
+        the verdict; its reasons name every other part that fails or wears, what was not assessed,
+        every doubt and every warning.
+    """
+    parts = [part for k, j in enumerate(found.joints) for part in _parts(k, j, found.operations)]
+    worst = sorted(parts, key=lambda part: part.margin)
+    over = [part for part in worst if part.margin < 1.0]
+    wearing = sorted((p for p in parts if _wears(p)), key=lambda part: part.joint.life)
+    contrary = [p for p in parts if p.joint.shaft_ratio < 1.0 - SHAFT_TOLERANCE]
+    contrary.sort(key=lambda part: part.joint.shaft_ratio)
+    unknown = [j for j in found.joints if all(part.joint is not j for part in parts)]
+    unknown.sort(key=lambda joint: -joint.peak_deflection)
+    near = [part for part in worst if part.margin_at_other_rates < 1.0]
+    reasons = [*map(_failure, over[1:]), *map(_wear, wearing), *_gaps(found), *found.doubts]
+    reasons += found.warnings
+
+    def made(status: Status, text: str, governor: Governor, joint: JointLife, part: _Part | None,
+             margin: float = math.nan) -> Verdict:  # fmt: skip
+        operation, pose = (part.operation, part.pose) if part else (
+            joint.worst_operation, joint.worst_pose)  # fmt: skip
+        told = tuple(dict.fromkeys(line for line in reasons if line not in text))
+        headline = f"{_SAID[status]}. {text}."
+        limit = part.limit if part else ""
+        return Verdict(status, governor, joint.name, margin, told, operation, pose, limit, headline)
+
+    if over:
+        part = over[0]
+        return made("fails", _failure(part), part.governor, part.joint, part, part.margin)
+    if contrary:
+        part = contrary[0]
+        text = f"{part.joint.name}: the shaft, by G Jp / l, {softer(part.joint.shaft_ratio)}"
+        return made("cannot-be-told", text, "input", part.joint, part)
+    if unknown:
+        text = _unknown(unknown, [*wearing, *worst], whole=len(unknown) == len(found.joints))
+        return made("cannot-be-told", text, "input", unknown[0], None)
+    if near:
+        part = near[0]
+        text = (
+            f"The {part.name} is beyond its {part.limit} as soon as the blows come "
+            f"{100 * RATE_STEP:g} % faster or slower: at a resonance its peak grows "
+            f"{part.joint.rate_sensitivity:.3g} times"
+        )
+        return made("cannot-be-told", text, "resonance", part.joint, part)
+    if wearing:
+        part = wearing[0]
+        return made("limited", _life(part), "shaft", part.joint, part)
+    part = worst[0]
+    return made("safe", _closest(worst), part.governor, part.joint, part, part.margin)
+
+
+_SAID: dict[Status, str] = {
+    "safe": "Safe", "limited": "Limited", "fails": "Fails", "cannot-be-told": "Cannot be told",
+}  # fmt: skip
+
+
+def softer(ratio: float) -> str:
+    """What is wrong with a shaft whose own stiffness is a smaller share of its joint's than 1."""
+    return (
+        f"is {1.0 / ratio:.3g} times softer than the joint it is a part of, which cannot be: "
+        "radius, length or stiffness is wrong"
+    )
+
+
+def _parts(k: int, joint: JointLife, operations: tuple[OperationResult, ...]) -> Iterator[_Part]:
+    """The parts of the joint in column k that were assessed."""
+
+    def largest(column: str) -> tuple[str, int]:
+        tops = [np.nan_to_num(getattr(op, column)[:, k], nan=-1.0) for op in operations]
+        best = int(np.argmax([top.max() for top in tops]))
+        return operations[best].name, int(tops[best].argmax())
+
+    if joint.sn_curve and math.isfinite(joint.utilisation):
+        # A finite life has no margin, unless it ends in its first rivet.
+        margin = min(_inverse(joint.utilisation), math.inf)
+        if math.isfinite(joint.life):
+            margin = joint.life if joint.life < 1.0 else math.inf
+        place = joint.worst_operation, joint.worst_pose
+        yield _Part("shaft", joint, margin, "allowable", *place)
+    if math.isfinite(joint.yield_utilisation):
+        place = largest("peak_total_stress")
+        yield _Part("yield", joint, _inverse(joint.yield_utilisation), "yield strength", *place)
+    if joint.reducer and math.isfinite(joint.reducer_utilisation):
+        limit, place = joint.reducer_governed_by, largest("reducer_utilisation")
+        yield _Part("reducer", joint, _inverse(joint.reducer_utilisation), limit, *place)
+
+
+def _inverse(used: float) -> float:
+    return 1.0 / used if used > 0.0 else math.inf
+
+
+def _wears(part: _Part) -> bool:
+    return part.governor == "shaft" and 1.0 <= part.joint.life < math.inf
+
+
+def _failure(part: _Part) -> str:
+    joint = part.joint
+    if part.governor == "shaft":
+        return f"The shaft of {joint.name} breaks in its first rivet"
+    if part.governor == "yield":
+        stress = joint.peak_total_stress / 1e6
+        return (
+            f"Gravity and blows take the shaft of {joint.name} to {stress:.4g} MPa in shear, and "
+            f"it yields at {stress * part.margin:.4g} MPa: no fatigue life holds there"
+        )
+    return (
+        f"Gravity and blows take the {part.name} to {1.0 / part.margin:.3g} times its "
+        f"{part.limit}: no life can be promised there"
+    )
+
+
+def _life(part: _Part) -> str:
+    return (
+        f"The robot survives {format_count(part.joint.life)} rivets; {part.joint.name} fails first"
+    )
+
+
+def _wear(part: _Part) -> str:
+    return f"the shaft of {part.joint.name} survives {format_count(part.joint.life)} rivets"
+
+
+def _closest(worst: list[_Part]) -> str:
+    first = worst[0]
+    text = f"No part fails or wears; the {first.name} comes closest, at {first.used}"
+    fatigue = next((part for part in worst if part.governor == "shaft"), first)
+    if fatigue is first:
+        return text
+    who = "it" if fatigue.name == first.name else f"the {fatigue.name}"
+    return f"{text}; in fatigue {who} is at {fatigue.used}"
+
+
+def _unknown(unknown: list[JointLife], known: list[_Part], *, whole: bool) -> str:
+    if whole:
+        return (
+            "No joint has a shaft or a reducer, so no life can be given; state them in the sidecar"
+        )
+    names = ", ".join(joint.name for joint in unknown)
+    rest = _wear(known[0]) if _wears(known[0]) else f"the {known[0].name} is at {known[0].used}"
+    return f"Neither a shaft nor a reducer is given for {names}; of the others {rest}"
+
+
+def _gaps(found: Assessment) -> Iterator[str]:
+    """What was not assessed, and what the reducers' catalogues do not promise."""
+    for text, names in (
+        (
+            "no reducer is named for {}: it is not assessed",
+            [j.name for j in found.joints if not j.reducer],
+        ),
+        (
+            "the reducer of {} is not assessed: its vibration from rest has no end",
+            [j.name for j in found.joints if j.reducer and math.isnan(j.reducer_utilisation)],
+        ),
+        (
+            "whether the shaft of {} yields is not assessed: the S-N curve gives no static "
+            "strength, or the vibration from rest has no end",
+            [j.name for j in found.joints if j.sn_curve and math.isnan(j.yield_utilisation)],
+        ),
+    ):
+        if names:
+            yield text.format(", ".join(names))
+    yield from found.reducer_warnings
+
+
+def format_count(value: float) -> str:
+    """A number of rivets as people read it; "no end" for infinity."""
+    if math.isnan(value):
+        return "-"
+    if math.isinf(value):
+        return "no end"
+    if value < 10:
+        return f"{value:.3g}"
+    # Four digits are more than the physics deserves.
+    return f"{float(f'{value:.4g}'):,.0f}" if value < 1e12 else f"{value:.3e}"
