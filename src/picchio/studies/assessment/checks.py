@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import warn_user
+from picchio.core.errors import InputError, warn_user
 from picchio.fatigue.miner import life
 from picchio.fatigue.shaft_stress import check_shaft
 from picchio.fatigue.sn.curve import SNCurve

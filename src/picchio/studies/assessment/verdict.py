@@ -166,7 +166,11 @@ _SAID: dict[Status, str] = {
 
 
 def softer(ratio: float) -> str:
-    """What is wrong with a shaft whose own stiffness is a smaller share of its joint's than 1."""
+    """What is wrong with a shaft that is softer than its joint, in words.
+
+    Args:
+        ratio: its own stiffness over the joint's, below 1.
+    """
     return (
         f"is {1.0 / ratio:.3g} times softer than the joint it is a part of, which cannot be: "
         "radius, length or stiffness is wrong"
@@ -273,7 +277,11 @@ def _gaps(found: Assessment) -> Iterator[str]:
 
 
 def format_count(value: float) -> str:
-    """A number of rivets as people read it; "no end" for infinity."""
+    """A number of rivets as people read it; "no end" for infinity.
+
+    Args:
+        value: the number; NaN is a dash.
+    """
     if math.isnan(value):
         return "-"
     if math.isinf(value):
