@@ -189,7 +189,11 @@ class PiecewiseForce:
             (p, k) complex, N s.
         """
         lam = pole[:, None]
-        total = self.constant[index] * (u * phi1(lam * u))
+        index, u = np.asarray(index), np.asarray(u)
+        constant = self.constant[index]
+        acts = np.flatnonzero(constant)  # most pieces are silence, and phi1 is what costs
+        total = np.zeros((pole.size, index.size), dtype=np.complex128)
+        total[:, acts] = constant[acts] * (u[acts] * phi1(lam * u[acts]))
         if (slope := self.slope[index]).any():
             total = total + slope * (u * u * phi2(lam * u))
         amplitude = self.amplitude[index]

@@ -109,13 +109,15 @@ def assess(
     results, checks, torques = [], [], []
     done = 0
     for operation in task.operations:
-        rows = []
-        for pose in operation.poses:
-            rows.append(job.at_pose(operation, pose))
+        stacked: dict[str, FloatArray] = {}
+        for k, pose in enumerate(operation.poses):
+            for key, values in job.at_pose(operation, pose).items():
+                if key not in stacked:
+                    stacked[key] = np.empty((len(operation.poses), *values.shape))
+                stacked[key][k] = values
             done += 1
             if progress is not None:
                 progress(done, total)
-        stacked = {key: np.array([row[key] for row in rows]) for key in rows[0]}
         checks.append(stacked.pop("check"))
         torques.append(stacked.pop("reducer_torques").max(axis=0))
         results.append(

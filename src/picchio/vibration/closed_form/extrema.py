@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from picchio.core.arrays import ComplexArray, FloatArray, IndexArray
+from picchio.core.errors import InputError
 from picchio.excitation.piecewise import PiecewiseForce
 
 _SAMPLES_PER_CYCLE = 16
@@ -17,6 +18,8 @@ _MOST_ITERATIONS = 60
 # A root known to this share of its interval: the extremum's value is then off by its square.
 _PRECISION = 1e-9
 _BEND_HALVINGS = 12
+# Samples times poles of one response: some minutes. What needs more is a slip in a number.
+MOST_VALUES = 1_000_000_000
 
 Slope = Callable[[IndexArray, FloatArray], tuple[FloatArray, FloatArray]]
 
@@ -49,40 +52,109 @@ class Grid:
             force: over one period, or a burst.
             horizon: s, up to which they are wanted.
             density: so many times as many.
+
+        Raises:
+            InputError: as `blocks`.
+        """
+        blocks = list(cls.blocks(poles, force, horizon, density=density, most=MOST_VALUES))
+        return cls(*(np.concatenate(p) for p in zip(*(b.parts for b in blocks), strict=True)))
+
+    @property
+    def parts(self) -> tuple[IndexArray, FloatArray]:
+        """Pieces and local times."""
+        return self.index, self.local
+
+    @classmethod
+    def blocks(
+        cls,
+        poles: ComplexArray,
+        force: PiecewiseForce,
+        horizon: float,
+        *,
+        density: int = 1,
+        most: int,
+    ) -> Iterator[Grid]:
+        """The same samples, some at a time, so that a long burst does not fill the memory.
+
+        Args:
+            poles: as in `of`.
+            force: as in `of`.
+            horizon: as in `of`.
+            density: as in `of`.
+            most: samples at a time. A piece with more is cut at a sample, which both parts have.
+
+        Raises:
+            InputError: more samples than can be computed in reasonable time.
         """
         speed = np.abs(poles)
         decay = np.maximum(-poles.real, 1e-300)
         lengths = np.minimum(force.start + force.duration, horizon) - force.start
-        locals_: dict[tuple[float, float], FloatArray] = {}
-        parts, pieces = [], []
-        for i, (length, own) in enumerate(zip(lengths, force.angular_frequency, strict=True)):
-            key = (float(length), float(own))
-            if key not in locals_:
-                locals_[key] = _samples(speed, decay, length, own, density)
-            parts.append(locals_[key])
-            pieces.append(np.full(locals_[key].size, i))
-        return cls(np.concatenate(pieces), np.concatenate(parts))
+        keys = list(zip(lengths.tolist(), force.angular_frequency.tolist(), strict=True))
+        plans = {key: _stretches(speed, decay, *key, density) for key in dict.fromkeys(keys)}
+        sizes = {key: 1 + sum(count for _, count in plan) for key, plan in plans.items()}
+        _check_size(poles, horizon, sum(sizes[key] for key in keys), sizes[keys[-1]])
+        locals_ = {key: _samples(plan, key[0]) for key, plan in plans.items()}
+        held: list[tuple[int, FloatArray]] = []
+        count = 0
+        for i, key in enumerate(keys):
+            for first in range(0, max(locals_[key].size - 1, 1), most):
+                part = locals_[key][first : first + most + 1]
+                if held and (first or count + part.size > most):
+                    yield cls._joined(held)
+                    held, count = [], 0
+                held.append((i, part))
+                count += part.size
+        yield cls._joined(held)
+
+    @classmethod
+    def _joined(cls, held: list[tuple[int, FloatArray]]) -> Grid:
+        pieces = np.repeat([i for i, _ in held], [part.size for _, part in held])
+        return cls(pieces, np.concatenate([part for _, part in held]))
 
 
-def _samples(
-    speed: FloatArray,
-    decay: FloatArray,
-    length: float,
-    own: float,
-    density: int,
-) -> FloatArray:
-    """Samples of one piece: each pole asks for its own step as long as it lives."""
+def _check_size(poles: ComplexArray, horizon: float, samples: int, in_last: int) -> None:
+    """Refuse what would take hours; the key is what most of the samples come from."""
+    if samples * poles.size <= MOST_VALUES:
+        return
+    ratio = float((-poles.real / np.abs(poles)).min())
+    rings = 2 * in_last > samples
+    raise InputError(
+        f"the response lasts {horizon:.4g} s and has {poles.size} modes of up to "
+        f"{np.abs(poles).max() / (2.0 * np.pi):.4g} Hz: {float(samples) * poles.size:.2g} values, "
+        f"where {MOST_VALUES:.0e} are computed at most",
+        key="damping_ratio" if rings else "hits",
+        value=ratio if rings else None,
+        hint="give more damping" if rings else "give fewer hits, or a shorter period",
+    )
+
+
+def _stretches(
+    speed: FloatArray, decay: FloatArray, length: float, own: float, density: int
+) -> list[tuple[float, int]]:
+    """Where one piece's samples change their step, s, and how many there are up to there.
+
+    Each pole asks for its own step as long as it lives.
+    """
     rates = np.append(speed, own)
     lives = np.append(np.minimum(_DECAYED / decay, length), length if own > 0 else 0.0)
     order = np.argsort(-rates)
-    points = [np.zeros(1)]
+    plan: list[tuple[float, int]] = []
     reached = 0.0
-    for rate, life in zip(rates[order], lives[order], strict=True):
+    for rate, life in zip(rates[order].tolist(), lives[order].tolist(), strict=True):
         if life > reached and rate > 0:
             step = 2.0 * np.pi / rate / (_SAMPLES_PER_CYCLE * density)
-            count = int(np.ceil((life - reached) / step))
-            points.append(reached + (life - reached) / count * np.arange(1, count + 1))
+            plan.append((life, int(np.ceil((life - reached) / step))))
             reached = life
+    return plan
+
+
+def _samples(plan: list[tuple[float, int]], length: float) -> FloatArray:
+    """The samples of one piece, both ends included."""
+    points = [np.zeros(1)]
+    reached = 0.0
+    for life, count in plan:
+        points.append(reached + (life - reached) / count * np.arange(1, count + 1))
+        reached = life
     samples = np.concatenate(points)
     if samples[-1] < length:
         samples = np.append(samples, length)
@@ -187,27 +259,22 @@ def _newton(
 
 
 def golden_maximum(
-    grid: Grid, values: FloatArray, function: Callable[[IndexArray, FloatArray], FloatArray]
-) -> tuple[IndexArray, FloatArray]:
-    """Where a function is largest, by golden sections beside every sample that may be the top.
+    low: FloatArray, high: FloatArray, function: Callable[[FloatArray], FloatArray]
+) -> FloatArray:
+    """Where a function is largest within intervals, by golden sections in all of them at once.
 
     Args:
-        grid: the samples.
-        values: the function there, (k,), not negative.
-        function: the same anywhere.
+        low: (k,) where each interval begins.
+        high: (k,) where it ends.
+        function: of (k,) arguments, one in each interval.
 
     Returns:
-        (piece, local time) of the candidates.
+        (k,) the arguments.
     """
-    top = np.flatnonzero(values >= 0.9 * values.max())
-    # A piece has its own ends as samples, so that no bracket leaves it.
-    low = np.where((top > 0) & (grid.index[top - 1] == grid.index[top]), top - 1, top)
-    after = np.minimum(top + 1, grid.index.size - 1)
-    high = np.where(grid.index[after] == grid.index[top], after, top)
-    index, a, b = grid.index[top], grid.local[low].copy(), grid.local[high].copy()
+    a, b = low.copy(), high.copy()
     section = (np.sqrt(5.0) - 1.0) / 2.0
     for _ in range(50):
         c, d = b - section * (b - a), a + section * (b - a)
-        left = function(index, c) > function(index, d)
+        left = function(c) > function(d)
         a, b = np.where(left, a, c), np.where(left, d, b)
-    return index, 0.5 * (a + b)
+    return 0.5 * (a + b)

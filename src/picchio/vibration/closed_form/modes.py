@@ -98,7 +98,7 @@ def modal_analysis(system: LinearSystem) -> Modes:
         poles, left, right = _oscillators(omega, ratio)
     else:
         poles, left, right = _complex_modes(omega, damping)
-    residues = np.einsum("mi,ip,pk,kd->mpd", output, left, right, participation)
+    residues = (output @ left)[:, :, None] * (right @ participation)
     return Modes(
         natural_frequencies=omega / (2.0 * np.pi),
         damping_ratios=ratio,

@@ -5,6 +5,7 @@ A `Response` has the deflection at any time, the turning points, and the worst d
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -23,7 +24,7 @@ from picchio.vibration.closed_form.modes import Modes
 RING_DOWN_LEVEL = 1e-4
 # |1 - exp(pole T)| below this: the blows are in resonance with an undamped mode.
 _RESONANCE = 1e-10
-# Directions times samples that `peak_deflections` evaluates together: 16 MB.
+# Numbers that are evaluated together: 16 MB.
 _CELLS = 2_000_000
 
 
@@ -147,26 +148,48 @@ class Response:
             for each output, (time (k,) s, deflection (k,) rad).
         """
         along = self._along(direction)
-        grid = Grid.of(self.modes.poles, self.force, self.horizon)
-        modal = self._modal(grid.index, grid.local)
-        result = []
-        for row in along:
-            on_grid = self._slope(row, grid.index, grid.local, modal)
-            index, u = refine_roots(grid, on_grid, partial(self._slope, row))
-            time = self.force.start[index] + u
-            value = (row @ self._modal(index, u)).real
-            result.append(self._close(time, value, row))
-        return result
+        m, pieces = len(along), self.force.start.size
+        weighted = along * self.modes.poles
+        curved = weighted * self.modes.poles
+        jump = weighted.sum(axis=1).real
 
-    def _slope(
-        self, row: ComplexArray, index: IndexArray, u: FloatArray, modal: ComplexArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
-        """First and second derivative of one output; `modal` where it is known already."""
-        modal = self._modal(index, u) if modal is None else modal
-        # Not by BLAS: its threads cost more than these few rows.
-        weighted = row * self.modes.poles
-        first, second = np.einsum("dp,pk->dk", [weighted, weighted * self.modes.poles], modal).real
-        return first, second + weighted.sum().real * self.force.in_piece(index, u)
+        def slope(index: IndexArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+            """First and second derivative; `index` counts the pieces output by output."""
+            row, piece = np.divmod(index, pieces)
+            modal = self._modal(piece, u)
+            # Not by BLAS: its threads cost more than these few rows.
+            first = np.einsum("kp,pk->k", weighted[row], modal).real
+            second = np.einsum("kp,pk->k", curved[row], modal).real
+            return first, second + jump[row] * self.force.in_piece(piece, u)
+
+        times: list[list[FloatArray]] = [[] for _ in along]
+        values: list[list[FloatArray]] = [[] for _ in along]
+        for grid in self._grids(m):
+            modal = self._modal(grid.index, grid.local)
+            force = self.force.in_piece(grid.index, grid.local)
+            first = np.einsum("mp,pk->mk", weighted, modal).real
+            second = np.einsum("mp,pk->mk", curved, modal).real + jump[:, None] * force
+            # All outputs at once, each on pieces of its own.
+            own = (pieces * np.arange(m)[:, None] + grid.index).ravel()
+            every = Grid(own, np.tile(grid.local, m))
+            index, u = refine_roots(every, (first.ravel(), second.ravel()), slope)
+            row, piece = np.divmod(index, pieces)
+            found = np.einsum("kp,pk->k", along[row], self._modal(piece, u)).real
+            ends = np.searchsorted(row, np.arange(1, m))
+            time = self.force.start[piece] + u
+            for j, part in enumerate(zip(np.split(time, ends), np.split(found, ends), strict=True)):
+                times[j].append(part[0])
+                values[j].append(part[1])
+        return [
+            self._close(np.concatenate(time), np.concatenate(value), row)
+            for time, value, row in zip(times, values, along, strict=True)
+        ]
+
+    def _grids(self, outputs: int, density: int = 1) -> Iterator[Grid]:
+        """The samples in blocks that keep what `outputs` of them need within the memory."""
+        poles = self.modes.poles
+        most = max(_CELLS // (poles.size * (1 + outputs // 8) + outputs), 64)
+        return Grid.blocks(poles, self.force, self.horizon, density=density, most=most)
 
     def _close(
         self, time: FloatArray, value: FloatArray, row: ComplexArray
@@ -204,23 +227,28 @@ class Response:
         Returns:
             one for each output; either sign of the direction gives the same deflection.
         """
-        grid = Grid.of(self.modes.poles, self.force, self.horizon, density=2)
-        modal = self._modal(grid.index, grid.local)
-        result = []
-        for residue in self.modes.residues:
-            if np.abs(residue).max() == 0.0:
-                result.append(WorstDirection(0.0, np.array([0.0, 0.0, 1.0]), 0.0))
-                continue
-            on_grid = self._norm_slope(residue, grid.index, grid.local, modal)
-            index, u = refine_roots(grid, on_grid, partial(self._norm_slope, residue))
-            # The grid itself as well: a monotonic response has its maximum at an end.
-            index, u = np.append(grid.index, index), np.append(grid.local, u)
-            g = np.einsum("pd,pk->dk", residue, self._modal(index, u)).real
-            norm = np.sqrt((g * g).sum(axis=0))
-            k = int(norm.argmax())
-            time = float(self.force.start[index[k]] + u[k])
-            direction = g[:, k] / norm[k] if norm[k] > 0 else np.array([0.0, 0.0, 1.0])
-            result.append(WorstDirection(float(norm[k]), direction, time))
+        poles, residues = self.modes.poles, self.modes.residues
+        up = np.array([0.0, 0.0, 1.0])
+        result = [WorstDirection(0.0, up, 0.0)] * len(residues)
+        for grid in self._grids(3 * len(residues), density=2):
+            modal = self._modal(grid.index, grid.local)
+            norms = np.linalg.norm(_real(residues, modal), axis=1)
+            rises = _rise(grid, np.linalg.norm(_real(residues * poles[:, None], modal), axis=1))
+            for j, (residue, norm, rise) in enumerate(zip(residues, norms, rises, strict=True)):
+                # The grid itself as well: a monotonic response has its maximum at an end.
+                top = int(norm.argmax())
+                index, u = grid.index[top : top + 1], grid.local[top : top + 1]
+                ends, pieces = _hopeful(grid, norm, rise, max(norm[top], result[j].value))
+                if pieces.size:
+                    slope = partial(self._norm_slope, residue, pieces)
+                    which, root = refine_roots(ends, slope(ends.index, ends.local), slope)
+                    index, u = np.append(index, pieces[which]), np.append(u, root)
+                g = np.einsum("pd,pk->dk", residue, self._modal(index, u)).real
+                size = np.sqrt((g * g).sum(axis=0))
+                k = int(size.argmax())
+                if size[k] > result[j].value or not np.isfinite(size[k]):
+                    time = float(self.force.start[index[k]] + u[k])
+                    result[j] = WorstDirection(float(size[k]), g[:, k] / size[k], time)
         return result
 
     def worst_combination(self, rows: FloatArray) -> tuple[float, FloatArray]:
@@ -235,34 +263,80 @@ class Response:
         Returns:
             the value (per unit of the rows) and the direction (3,).
         """
-        grid = Grid.of(self.modes.poles, self.force, self.horizon, density=2)
         residues = np.einsum("rm,mpd->rpd", rows, self.modes.residues)
-
-        def largest(index: IndexArray, u: FloatArray) -> FloatArray:
-            g = np.einsum("rpd,pk->krd", residues, self._modal(index, u)).real
-            return np.asarray(np.linalg.svd(g, compute_uv=False)[:, 0])
-
-        size = largest(grid.index, grid.local)
-        index, u = golden_maximum(grid, size, largest)
-        k = int(np.argmax(final := largest(index, u)))
-        at = np.einsum("rpd,pk->krd", residues, self._modal(index[k : k + 1], u[k : k + 1])).real[0]
-        return float(final[k]), np.linalg.svd(at)[2][0]
+        rates = residues * self.modes.poles[:, None]
+        best, along = 0.0, np.array([0.0, 0.0, 1.0])
+        for grid in self._grids(3 * len(residues), density=2):
+            modal = self._modal(grid.index, grid.local)
+            size = _largest(_real(residues, modal))
+            top = int(size.argmax())
+            rise = _rise(grid, _largest(_real(rates, modal)))
+            ends, pieces = _hopeful(grid, size, rise, max(size[top], best))
+            index, u = grid.index[top : top + 1], grid.local[top : top + 1]
+            if pieces.size:
+                low, high = ends.local[0::2], ends.local[1::2]
+                found = golden_maximum(
+                    low, high, lambda s, p=pieces: _largest(_real(residues, self._modal(p, s)))
+                )
+                index, u = np.append(index, pieces), np.append(u, found)
+            g = _real(residues, self._modal(index, u))
+            final = _largest(g)
+            k = int(final.argmax())
+            if final[k] > best or not np.isfinite(final[k]):
+                best, along = float(final[k]), np.linalg.svd(g[:, :, k])[2][0]
+        return best, along
 
     def _norm_slope(
-        self,
-        residue: ComplexArray,
-        index: IndexArray,
-        u: FloatArray,
-        modal: ComplexArray | None = None,
+        self, residue: ComplexArray, pieces: IndexArray, which: IndexArray, u: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """First and second derivative of |g|^2 / 2; `modal` where it is known already."""
-        modal = self._modal(index, u) if modal is None else modal
+        """First and second derivative of |g|^2 / 2 at `u` in the pieces `pieces[which]`."""
+        index = pieces[which]
+        modal = self._modal(index, u)
         poles = self.modes.poles[:, None]
         g = (residue.T @ modal).real
         v = ((residue * poles).T @ modal).real
         a = ((residue * poles**2).T @ modal).real
         a += (residue * poles).sum(axis=0).real[:, None] * self.force.in_piece(index, u)
         return (g * v).sum(axis=0), (v * v).sum(axis=0) + (g * a).sum(axis=0)
+
+
+def _real(residues: ComplexArray, modal: ComplexArray) -> FloatArray:
+    """(m, 3, k): residues (m, p, 3) on modal states (p, k)."""
+    m, p, _ = residues.shape
+    return (residues.swapaxes(1, 2).reshape(3 * m, p) @ modal).real.reshape(m, 3, -1)
+
+
+def _largest(g: FloatArray) -> FloatArray:
+    """(k,) the largest singular value of every matrix of (r, 3, k)."""
+    return np.asarray(np.linalg.svd(np.moveaxis(g, -1, 0), compute_uv=False)[:, 0])
+
+
+def _rise(grid: Grid, speed: FloatArray) -> FloatArray:
+    """(..., k - 1): how far a peak may stand out between samples whose speeds are (..., k)."""
+    step = np.diff(grid.local)
+    # Neighbours in time that belong to different pieces of the force span no interval.
+    step[grid.index[1:] != grid.index[:-1]] = -np.inf
+    with np.errstate(invalid="ignore"):  # no interval, and no speed
+        return np.asarray(step * np.maximum(speed[..., 1:], speed[..., :-1]))
+
+
+def _hopeful(
+    grid: Grid, size: FloatArray, rise: FloatArray, best: float
+) -> tuple[Grid, IndexArray]:
+    """The intervals in which a peak may exceed `best`, as pieces of their own with two ends.
+
+    Args:
+        grid: the samples.
+        size: (k,) there.
+        rise: (k - 1,) see `_rise`.
+        best: known so far.
+
+    Returns:
+        the two ends of each interval, numbered by it; (c,) the piece of the force of each.
+    """
+    at = np.flatnonzero(np.maximum(size[1:], size[:-1]) + rise > best)
+    local = grid.local[np.stack([at, at + 1], axis=1)].ravel()
+    return Grid(np.repeat(np.arange(at.size), 2), local), grid.index[at]
 
 
 def ring_down(modes: Modes) -> float:
@@ -422,13 +496,8 @@ def peak_deflections(response: Response, directions: ArrayLike) -> FloatArray:
     poles, residues = response.modes.poles, response.modes.residues
     grid = Grid.of(poles, response.force, response.horizon)
     modal = response._modal(grid.index, grid.local)
-    value = np.einsum("mpd,pk->mdk", residues, modal).real
-    rate = np.einsum("mpd,p,pk->mdk", residues, poles, modal).real
-    speed = np.linalg.norm(rate, axis=1)
-    step = np.diff(grid.local)
-    # Neighbours in time that belong to different pieces of the force span no interval.
-    step[grid.index[1:] != grid.index[:-1]] = -np.inf
-    rise = step * np.maximum(speed[:, 1:], speed[:, :-1])  # how far a peak may stand out
+    value = _real(residues, modal)
+    rise = _rise(grid, np.linalg.norm(_real(residues * poles[:, None], modal), axis=1))
     result = np.empty((len(residues), len(wanted)))
     block = max(1, _CELLS // grid.local.size)
     for j in range(len(residues)):
