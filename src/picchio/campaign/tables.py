@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator
 
 from picchio.campaign.clock import FASTEST, SLOWEST
 from picchio.core.toml import Finite, NotNegative, Positive, StrictModel
+from picchio.excitation.piecewise import Hits
 from picchio.excitation.table import ExcitationTable
 
 FORMAT = "picchio-campaign/1"
@@ -82,7 +83,6 @@ _AnyPose = dict[str, float] | list[float]
 Pose = Annotated[_AnyPose, PlainValidator(_pose, json_schema_input_type=_AnyPose)]
 SampleRate = Annotated[Positive, Field(ge=SLOWEST, le=FASTEST)]
 FreeTable = Annotated[dict[str, Any], AfterValidator(_finite_leaves)]
-Hits = Annotated[int, Field(gt=0, le=1_000_000, strict=True)]
 
 
 class CampaignExcitation(ExcitationTable):

@@ -65,7 +65,11 @@ PeriodOption = Annotated[
 WidthOption = Annotated[float | None, typer.Option(help="Duration of a blow, s; likewise.")]
 HitsOption = Annotated[
     int | None,
-    typer.Option(metavar="N", min=1, help="Blows of a burst from rest; steady state if not given."),
+    typer.Option(
+        metavar="N",
+        min=1,
+        help="Blows of a burst from rest, at most 10000; steady state if not given.",
+    ),
 ]
 DataOption = Annotated[
     Path, typer.Option(metavar="CAMPAIGN", help="Measured data: a folder with a campaign.toml.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import re
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from picchio.cli.layout import FittedTable, Row
 from picchio.cli.waiting import waiting
 from picchio.core.errors import InputError, OutputError
-from picchio.core.files import is_stream, write_text
+from picchio.core.files import atomic_write, is_stream
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -223,11 +224,15 @@ def deliver(
     """
     waiting.end()
     if target is not None:
-        text = json.dumps(content, indent=2, allow_nan=False) + "\n"
+        # In pieces: a task of many poses makes more text than its numbers take in memory.
+        pieces = itertools.chain(
+            json.JSONEncoder(indent=2, allow_nan=False).iterencode(content), ["\n"]
+        )
         if target == "-":
-            sys.stdout.write(text)
+            sys.stdout.writelines(pieces)
             return
-        write_text(target, text)
+        with atomic_write(target) as stream:
+            stream.writelines(pieces)
     show()
 
 

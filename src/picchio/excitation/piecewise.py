@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field
 
 from picchio.core.arrays import ComplexArray, FloatArray, IndexArray
 from picchio.core.errors import InputError
@@ -44,6 +46,35 @@ def phi2(z: ArrayLike) -> ComplexArray:
     series = 0.5 * (1.0 + series)
     safe = np.where(small, 1.0, z)
     return np.where(small, series, (phi1(safe) - 1.0) / safe)
+
+
+# A rivet takes a dozen; more hits than this are a slip, and would fill the memory.
+MOST_HITS = 10_000
+MOST_PIECES = 2_000_000
+
+Hits = Annotated[int, Field(gt=0, le=MOST_HITS, strict=True)]
+"""Blows of a burst, in a file."""
+
+
+def check_hits(count: int, key: str = "hits") -> None:
+    """Refuse a burst of no blow, or of more than anybody means.
+
+    Args:
+        count: blows of the burst.
+        key: what gives them, for the message.
+
+    Raises:
+        InputError: below 1, or above `MOST_HITS`.
+    """
+    if count < 1:
+        raise InputError("a burst needs at least one hit", key=key, value=count)
+    if count > MOST_HITS:
+        raise InputError(
+            f"a burst has at most {MOST_HITS} hits, as each is computed; a rivet takes a dozen",
+            key=key,
+            value=count,
+            hint="a longer train is a steady state: leave the hits out",
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,10 +270,17 @@ class PiecewiseForce:
             count: at least 1.
 
         Raises:
-            InputError: a count below 1.
+            InputError: a count below 1, or more hits or pieces than anybody means.
         """
-        if count < 1:
-            raise InputError("a burst needs at least one hit", key="hits", value=count)
+        check_hits(count)
+        if count * self.start.size > MOST_PIECES:
+            raise InputError(
+                f"a blow of {self.start.size} pieces makes {count * self.start.size} of them, and "
+                f"at most {MOST_PIECES} are computed",
+                key="hits",
+                value=count,
+                hint="give fewer hits, or a force measured at a lower rate",
+            )
         offset = np.repeat(np.arange(count) * self.end, self.start.size)
         pieces = {name: np.tile(getattr(self, name), count) for name in _PER_PIECE}
         pieces["start"] = pieces["start"] + offset

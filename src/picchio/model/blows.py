@@ -9,7 +9,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.excitation.excitation import Excitation
-from picchio.excitation.piecewise import PiecewiseForce, superposed
+from picchio.excitation.piecewise import PiecewiseForce, check_hits, superposed
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,12 @@ class Blows:
             excitation: the tool's blows.
             hits: of a burst; None for a steady train.
             direction: (3,) unit vector, world axes.
+
+        Raises:
+            InputError: hits below 1, or more than anybody means.
         """
+        if hits is not None:
+            check_hits(hits)
         count = hits or 1
         height = excitation.peak_force or 1.0
         shape, other = excitation.unit_blows

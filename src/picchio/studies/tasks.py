@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -15,6 +15,7 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.toml import Finite, Positive, StrictModel, parse_toml, validate
 from picchio.excitation.excitation import Excitation
+from picchio.excitation.piecewise import Hits
 from picchio.excitation.table import ExcitationTable, excitation_class
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.vibration.closed_form.response import unit_vector
@@ -22,10 +23,6 @@ from picchio.vibration.closed_form.response import unit_vector
 FORMAT = "picchio-task/1"
 # An arm of fewer joints cannot choose where its tool points.
 _LEAST_JOINTS_TO_AIM = 5
-
-
-# A rivet takes a dozen; more than this is a slip, and would fill the memory.
-Hits = Annotated[int, Field(gt=0, le=10_000, strict=True)]
 
 
 class OperationTable(ExcitationTable):

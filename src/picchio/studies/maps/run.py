@@ -23,6 +23,7 @@ from picchio.core.files import atomic_write, locked, regular_file, write_text
 from picchio.core.processes import one_thread, safe_start
 from picchio.core.provenance import provenance
 from picchio.excitation.excitation import Excitation
+from picchio.excitation.piecewise import check_hits
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.maps.chunk import Columns, MapJob
@@ -121,8 +122,9 @@ def workspace_map(
             value=direction,
             hint="give --direction x,y,z",
         )
-    if damage is not None and damage < 1:
-        raise InputError("must be at least 1", key="damage", value=damage)
+    for key, count in {"hits": hits, "damage": damage}.items():
+        if count is not None:
+            check_hits(count, key)
     if damage is not None and all(joint.shaft is None for joint in robot.flexible_joints):
         raise InputError(
             "no joint has a shaft, so damage cannot be computed",

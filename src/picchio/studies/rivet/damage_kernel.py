@@ -84,7 +84,8 @@ def damages(  # type: ignore[no-untyped-def]
         lines: (n, k + 1, 3).
         known: (n,) how many of the k knots a curve has; below zero for a joint without one.
         frequency: (p, n) Hz, out; NaN where the mass matrix is not positive definite.
-        lowest: (p, n) rad, out; NaN where a mode is not underdamped: take the exact path there.
+        lowest: (p, n) rad, out; NaN where a mode is not underdamped, or rings for too long:
+            take the exact path there.
         highest: (p, n) rad, out.
         damage: (p, n) out; zero for a joint without a curve.
     """
@@ -116,6 +117,8 @@ def damages(  # type: ignore[no-untyped-def]
                 poles, weights, limit, duration, constant, slope, amplitude, wave
             )
             size = turns.shape[1]
+            if size == 0:
+                continue
             stack, ranges, means = np.empty(size), np.empty(size), np.empty(size)
             for j in range(n):
                 own = turns[j, : count[j]]

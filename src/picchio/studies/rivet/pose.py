@@ -44,6 +44,8 @@ from picchio.vibration.integration.integrate import Samples, integrate
 _PER_CYCLE = 40
 _FINEST = 5e-5
 _LONGEST_RING = 20.0
+# Of one response: some minutes, and 300 MB.
+_MOST_VALUES = 12_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,11 +318,21 @@ class ModelAtPose:
 
     def _samples(self, force: PiecewiseForce) -> Samples:
         step = max(1.0 / (_PER_CYCLE * float(self.natural_frequencies.max())), _FINEST)
+        length = float(force.end)
+        if not np.isfinite(length):
+            length = float(force.start[-1]) + min(ring_down(self.modes), _LONGEST_RING)
+        most = _MOST_VALUES // len(self.stiffness)
+        if length > most * step:
+            raise InputError(
+                f"{length:.4g} s of a nonlinear model are {length / step:.3g} samples; at most "
+                f"{most} are integrated",
+                key="hits",
+                hint="give fewer hits, or a shorter period",
+            )
         if np.isfinite(force.end):
-            count = max(int(np.ceil(force.end / step)), 64)
-            return Samples(0.0, force.end / count, count + 1)
-        ring = min(ring_down(self.modes), _LONGEST_RING)
-        return Samples(0.0, step, int((float(force.start[-1]) + ring) / step) + 1)
+            count = max(int(np.ceil(length / step)), 64)
+            return Samples(0.0, length / count, count + 1)
+        return Samples(0.0, step, int(length / step) + 1)
 
 
 def _spring_torque(

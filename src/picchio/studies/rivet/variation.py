@@ -205,7 +205,7 @@ class FastRest:
             force: a burst, its last piece endless.
 
         Returns:
-            m arrays; None where the damping reaches critical.
+            m arrays; None where the damping reaches critical, or the ring-down is too long.
         """
         ratio = damping * self.ratio
         if ratio.max() >= _NEARLY_CRITICAL:
@@ -216,4 +216,6 @@ class FastRest:
             poles, self.weights, np.full(len(self.weights), -1.0), force.duration, force.constant,
             force.slope, force.amplitude, force.angular_frequency,
         )  # fmt: skip
+        if not turns.size:
+            return None
         return [row[:k] for row, k in zip(turns, count, strict=True)]

@@ -13,6 +13,8 @@ from picchio.vibration.closed_form.response import RING_DOWN_LEVEL
 _PER_CYCLE = 16.0
 # A mode asks for its own step until its free decay has fallen to exp(-16) = 1e-7.
 _DECAYED = 16.0
+# Samples of one response, 80 MB a joint: a mode almost without damping takes more.
+_MOST = 10_000_000
 # Samples between two looks whether anything larger can still come.
 _LOOK = 64
 
@@ -102,7 +104,8 @@ def turns_from_rest(
         wave: (pieces,) rad/s.
 
     Returns:
-        (n, k) rad, and how many of the k each joint has, (n,).
+        (n, k) rad, and how many of the k each joint has, (n,): none where the ring-down is too
+        long to be held in memory.
     """
     n, m = weights.shape
     pieces = duration.shape[0]
@@ -110,7 +113,10 @@ def turns_from_rest(
     coefficients(poles, duration, constant, slope, amplitude, wave, False, rows)
     length = duration.copy()
     length[-1] = -np.log(RING_DOWN_LEVEL) / (-poles.real).min()
-    turns = np.empty((n, most_samples(poles, wave, length)))
+    most = most_samples(poles, wave, length)
+    if most > _MOST:
+        return np.empty((n, 0)), np.zeros(n, dtype=np.int64)
+    turns = np.empty((n, most))
     count = np.ones(n, dtype=np.int64)
     turns[:, 0] = 0.0
     decay, z = np.empty(m, np.complex128), np.empty(m, np.complex128)

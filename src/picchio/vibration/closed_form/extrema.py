@@ -150,7 +150,7 @@ def _stretches(
 
 def _samples(plan: list[tuple[float, int]], length: float) -> FloatArray:
     """The samples of one piece, both ends included."""
-    points = [np.zeros(1)]
+    points: list[FloatArray] = [np.zeros(1)]
     reached = 0.0
     for life, count in plan:
         points.append(reached + (life - reached) / count * np.arange(1, count + 1))

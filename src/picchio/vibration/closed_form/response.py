@@ -266,6 +266,10 @@ class Response:
         residues = np.einsum("rm,mpd->rpd", rows, self.modes.residues)
         rates = residues * self.modes.poles[:, None]
         best, along = 0.0, np.array([0.0, 0.0, 1.0])
+
+        def length(index: IndexArray, u: FloatArray) -> FloatArray:
+            return _largest(_real(residues, self._modal(index, u)))
+
         for grid in self._grids(3 * len(residues), density=2):
             modal = self._modal(grid.index, grid.local)
             size = _largest(_real(residues, modal))
@@ -275,9 +279,7 @@ class Response:
             index, u = grid.index[top : top + 1], grid.local[top : top + 1]
             if pieces.size:
                 low, high = ends.local[0::2], ends.local[1::2]
-                found = golden_maximum(
-                    low, high, lambda s, p=pieces: _largest(_real(residues, self._modal(p, s)))
-                )
+                found = golden_maximum(low, high, partial(length, pieces))
                 index, u = np.append(index, pieces), np.append(u, found)
             g = _real(residues, self._modal(index, u))
             final = _largest(g)
