@@ -113,7 +113,7 @@ def assess(
         for k, pose in enumerate(operation.poses):
             for key, values in job.at_pose(operation, pose).items():
                 if key not in stacked:
-                    stacked[key] = np.empty((len(operation.poses), *values.shape))
+                    stacked[key] = np.empty((len(operation.poses), *values.shape), values.dtype)
                 stacked[key][k] = values
             done += 1
             if progress is not None:
@@ -229,7 +229,7 @@ class _Job:
                     PaperRule()(joint, load, hits, self.paper_curve).damage,
                     RainflowRule()(joint, load, hits, self.paper_curve).damage,
                 )
-        out["reducer_governed_by"] = np.array(governs)
+        out["reducer_governed_by"] = np.array(governs, dtype=object)
         out["natural_frequencies"] = rivet.natural_frequencies
         out["tool_position"] = rivet.state.tool_position
         return out
