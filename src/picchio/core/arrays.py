@@ -17,9 +17,6 @@ IndexArray: TypeAlias = npt.NDArray[Any]
 BoolArray: TypeAlias = npt.NDArray[Any]
 Vector: TypeAlias = tuple[float, float, float]
 
-# Of one series: 400 MB. More than that is a slip in a rate or a length.
-MOST_SAMPLES = 50_000_000
-
 
 def symmetric(six: Sequence[float]) -> FloatArray:
     """The symmetric matrix (3, 3) of six numbers.

@@ -11,7 +11,6 @@ from pydantic import Field
 
 from picchio.campaign.channels import AXES, Channel, ChannelKind, kinds, parse_channel
 from picchio.campaign.tables import CampaignExcitation, Direction, Pose, SampleRate, Tolerance
-from picchio.core.arrays import MOST_SAMPLES
 from picchio.core.errors import InputError
 from picchio.core.toml import Finite, NotNegative, Positive, StrictModel
 from picchio.excitation.piecewise import Hits
@@ -21,6 +20,7 @@ from picchio.model.effects.registry import from_dict
 from picchio.robot.flexible_robot import FlexibleRobot
 
 FORMAT = "picchio-plan/1"
+MOST_SAMPLES = 50_000_000
 
 
 def _predicted() -> dict[str, ChannelKind]:

@@ -10,7 +10,7 @@ from picchio.campaign.clock import TOLERANCE, not_seconds
 from picchio.campaign.importing.mapping import TimeTable
 from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.campaign.units import conversion
-from picchio.core.arrays import MOST_SAMPLES, FloatArray
+from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 
 # A hole of more usual steps than this is a dropout, over which nothing may be drawn.
@@ -37,8 +37,7 @@ def common_clock(
 
     Raises:
         InputError: stamps that differ, are uneven or out of order and no resampling is asked
-            for; no stamps, or a rate that is missing or makes too many samples; a dropout; no
-            time in common.
+            for; no stamps, or a rate that is missing; a dropout; no time in common.
     """
     file, rate = raw.path, asked.rate
     stamps, scale = _stamps(raw, asked, series, mapping)
@@ -76,12 +75,7 @@ def common_clock(
         raise InputError(f"is more than {_FASTER:g} times the stamps' own {usual:.6g} Hz",
                          file=mapping, key="time.rate", value=rate)  # fmt: skip
     begin, end = max(s[0] for s in stamps), min(s[-1] for s in stamps)
-    wanted = (end - begin) * rate * (1.0 + 1e-12)
-    if wanted > MOST_SAMPLES:
-        raise InputError(f"that is {wanted:.3g} samples a series; at most {MOST_SAMPLES}",
-                         file=mapping, key="time.rate", value=rate,
-                         hint=_advice(stamps))  # fmt: skip
-    samples = int(np.floor(wanted)) + 1
+    samples = int(np.floor((end - begin) * rate * (1.0 + 1e-12))) + 1
     if end <= begin or samples < 2:
         raise InputError("the series have no time in common", file=file)
     clock = begin + np.arange(samples) / rate
