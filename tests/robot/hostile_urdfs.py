@@ -156,7 +156,12 @@ NUMBERS = {
     "python numbers": (urdf(axis='<axis xyz="1_0 0 0x1"/>'), "not a finite number"),
     "arabic digits": (urdf(axis='<axis xyz="٠ ١ ٠"/>'), "not a finite number"),
     "massless": (urdf(links='<link name="a"/><link name="b"/>'), "carries no mass"),
-    "xacro left in": (urdf(axis='<axis xyz="${x} 0 0"/>'), "not a finite number"),
+    "xacro left in": (urdf(axis='<axis xyz="${x} 0 0"/>'), "; expand it first: xacro"),
+    "xacro macros": (
+        urdf(head='<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:arm p="a"/>'),
+        "expand it first: xacro FILE > robot.urdf",
+    ),
+    "xacro undeclared": (urdf(tail="<xacro:arm/></robot>"), "expand it first: xacro FILE"),
 }  # fmt: skip
 
 SIDECARS = {

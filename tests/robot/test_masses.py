@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, PicchioWarning
 from picchio.robot.annotations.annotate import annotate
 from picchio.robot.annotations.sidecar import read_sidecar
 from picchio.robot.loading.load import load_robot
@@ -124,3 +124,95 @@ def test_a_total_below_the_given_masses(shaped, write, sidecar_text):
     text = sidecar_text + "[links]\ntotal_mass = 2.5\n[link.lower]\nmass = 1.0\n"
     with pytest.raises(InputError, match=r"must be above 4 kg"):
         load_robot(shaped, flex=write("bad.toml", text))
+
+
+def serial(*bodies: tuple[float, float, str], length: float = 0.4) -> str:
+    """An arm of boxes: of each link its mass, its moment about each axis, and more of it."""
+    parts = ['<robot name="arm"><link name="base"/>']
+    parent = "base"
+    for k, (mass, moment, more) in enumerate(bodies, 1):
+        inertial = (
+            f'<inertial><origin xyz="0 0 {length / 2}"/><mass value="{mass}"/><inertia '
+            f'ixx="{moment}" ixy="0" ixz="0" iyy="{moment}" iyz="0" izz="{moment}"/></inertial>'
+        )
+        parts.append(
+            f'<joint name="j{k}" type="revolute"><parent link="{parent}"/><child link="l{k}"/>'
+            f'<origin xyz="0 0 {length}"/><axis xyz="{k % 2} {(k + 1) % 2} 0"/>'
+            '<limit lower="-2" upper="2" effort="100" velocity="1"/></joint>'
+            f'<link name="l{k}">{inertial if mass else ""}'
+            f'<collision><origin xyz="0 0 {length / 2}"/><geometry><box size="0.1 0.1 {length}"/>'
+            f"</geometry></collision>{more}</link>"
+        )
+        parent = f"l{k}"
+    return "".join(parts) + "</robot>"
+
+
+REAL = [(9.0, 0.13, ""), (6.0, 0.09, ""), (4.0, 0.06, "")]
+
+
+@pytest.mark.parametrize(
+    ("bodies", "stiffness", "told"),
+    [
+        (REAL, 1e4, []),
+        ([(2.0, 0.01 * k, "") for k in (1.2, 2.1, 3.3)], 1e4,
+         ["3 links have the same mass of 2 kg: l1, l2, l3: placeholders?"]),
+        ([(k, 0.021, "") for k in (1.0, 1.5, 1.8)], 1e4,
+         ["3 links have the same inertia: l1, l2, l3: placeholders?"]),
+        ([(9.0, 0.1, ""), (6.0, 0.01, "")], 1e4,
+         ["the inertias of l1, l2 are round numbers, alike about every axis"]),
+        ([*REAL[:2], (0.5, 0.22, "")], 1e4,
+         ["link 'l3': an inertia of 0.22 kg m^2 for 0.5 kg is more than any body of its size"]),
+        ([*REAL[:2], (3.0, 2e-5, "")], 1e4, ["link 'l3': an inertia of 2e-05 kg m^2 for 3 kg is as "
+         "little as a point's; as a solid of its shape it would have 0.0425"]),
+        ([REAL[0], (0.0, 0.0, ""), REAL[2]], 1e4,
+         ["no mass is given for l2, nor for what is fixed to it"]),
+        (REAL, 1e10, [f"joint '{j}' would vibrate at" for j in ("j1", "j2", "j3")]),
+        (REAL, 1e-1, [f"joint '{j}' would vibrate at" for j in ("j1", "j2", "j3")]),
+    ],
+)  # fmt: skip
+def test_masses_that_can_hardly_be_are_told(write, recwarn, bodies, stiffness, told):
+    urdf = write("arm.urdf", serial(*bodies))
+    load_robot(urdf, values={f"j{k}": {"stiffness": stiffness} for k in range(1, len(bodies) + 1)})
+    said = sorted(str(w.message) for w in recwarn.list if w.category is PicchioWarning)
+    assert len(said) == len(told), said
+    for line, start in zip(said, sorted(told), strict=True):
+        assert line.startswith(f"arm.urdf: {start}")
+
+
+def test_what_a_sidecar_states_is_not_doubted(write, recwarn):
+    urdf = write("arm.urdf", serial(*REAL[:2], (0.5, 0.22, "")))
+    text = "".join(f"[joint.j{k}]\nstiffness = 1e4\n" for k in (1, 2, 3))
+    stated = "[link.l3]\ninertia = [0.22, 0, 0, 0.22, 0, 0.22]\nsource = 'a swing test'\n"
+    load_robot(urdf, flex=write("f.toml", f'format = "picchio-sidecar/1"\n{text}{stated}'))
+    assert not recwarn.list
+
+
+def test_a_robot_of_no_mass_but_its_tools(write):
+    urdf = write("arm.urdf", serial((0.0, 0.0, ""), (0.0, 0.0, ""), (0.0, 0.0, "")))
+    text = 'format = "picchio-sidecar/1"\n[tool]\nmass = 5.0\n[joint.j2]\nstiffness = 1e4\n'
+    with pytest.raises(
+        InputError, match="no link that moves has a mass, only the tool has: l2, l3"
+    ):
+        load_robot(urdf, flex=write("f.toml", text))
+    # The message's way out works.
+    load_robot(urdf, flex=write("g.toml", text + "[links]\ntotal_mass = 20.0\n"))
+
+
+def test_a_pose_at_which_nothing_resists_names_its_joint(write):
+    """Two point masses on a line through both joints: stretched, the second turns for free."""
+    point = '<inertial><origin xyz="{x} 0 0"/><mass value="3"/>' + (
+        '<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial>'
+    )
+    limit = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+    urdf = write("arm.urdf", (
+        '<robot name="r"><link name="base"/><link name="a"/><link name="b">' + point.format(x=0.5)
+        + '</link><joint name="j1" type="revolute"><parent link="base"/><child link="a"/>'
+        f'<axis xyz="0 0 1"/>{limit}</joint><joint name="j2" type="revolute"><parent link="a"/>'
+        f'<child link="b"/><origin xyz="0.4 0 0"/><axis xyz="0 0 1"/>{limit}</joint></robot>'
+    ))  # fmt: skip
+    robot = load_robot(urdf, values={f"j{k}": {"stiffness": 1e4} for k in (1, 2)})
+    with pytest.raises(InputError) as caught:
+        robot.state([0.2, 0.0])
+    said = str(caught.value)
+    assert "can move no mass at the pose (0.2, 0): the mass matrix is not positive" in said
+    assert "or leave the joint rigid" in said

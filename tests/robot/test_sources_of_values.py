@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, PicchioWarning
 from picchio.robot.loading.catalogue import describe_robot
 from picchio.robot.loading.find import FoundRobot
 from picchio.robot.loading.load import load_robot
@@ -97,7 +97,8 @@ def test_a_folders_own_sidecar(arm_text, sidecar_text, write):
             '<limit lower="-2"', '<picchio:flexibility stiffness="1"/><limit lower="-2"'
         )
     )
-    assert load_robot(urdf).flexible_names == ("a",)
+    with pytest.warns(PicchioWarning, match=r"flex.toml: is not read, since robot.urdf has annot"):
+        assert load_robot(urdf).flexible_names == ("a",)
 
 
 def test_springs_beside_the_drive_are_never_read(arm_text, write):
@@ -173,6 +174,43 @@ def test_bad_joint_entries(arm, write, joint, says):
 def test_bad_sidecars(arm, write, text, says):
     with pytest.raises(InputError) as caught:
         load_robot(arm, flex=write("bad.toml", text))
+    assert says in str(caught.value)
+
+
+SHAFT = "shaft = { radius = 0.01, length = 0.1, shear_modulus = 79e9 }"
+
+
+@pytest.mark.parametrize(
+    ("entry", "told"),
+    [
+        (f"[joint.b]\n{SHAFT}", "joint 'b': shaft is not used: the joint has no stiffness"),
+        (
+            "[joint.b]\ndamping_ratio = 0.1\ngear_ratio = 3.0",
+            "damping_ratio and gear_ratio are not",
+        ),
+        ("[joint.b]\nsource = 'x'", "joint 'b': says nothing that is used"),
+    ],
+)
+def test_what_a_rigid_joint_cannot_use_is_told(arm, write, recwarn, entry, told):
+    flex = write("f.toml", f'format = "picchio-sidecar/1"\n[joint.a]\nstiffness = 1e4\n{entry}\n')
+    load_robot(arm, flex=flex)
+    (warning,) = recwarn.list
+    assert str(warning.message).startswith("f.toml: ")
+    assert told in str(warning.message)
+
+
+@pytest.mark.parametrize(
+    ("entry", "says"),
+    [
+        (f"[joint.end]\n{SHAFT}", "a fixed joint cannot be flexible and has no drive"),
+        ("[gun]\nmass = 1.0\ndamping_ratio = 0.1", "a damping ratio needs recoil_stiffness"),
+        ("[tool]\ncom = [0, 0, 0.1]", "a centre of mass needs a mass"),
+    ],
+)
+def test_what_can_have_no_effect_is_refused(arm, write, entry, says):
+    flex = write("f.toml", f'format = "picchio-sidecar/1"\n[joint.a]\nstiffness = 1e4\n{entry}\n')
+    with pytest.raises(InputError) as caught:
+        load_robot(arm, flex=flex)
     assert says in str(caught.value)
 
 

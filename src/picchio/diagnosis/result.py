@@ -54,12 +54,6 @@ class Value:
         return asdict(self)
 
 
-# Of a prismatic joint, in place of a revolute one's.
-_PRISMATIC = {
-    "N*m": "N", "N*m*s/rad": "N*s/m", "N*m/rad": "N/m", "kg*m^2": "kg", "rad/s": "m/s", "rad": "m",
-}  # fmt: skip
-
-
 def unit_of(robot: FlexibleRobot, target: str, unit: str) -> str:
     """A parameter's unit, SI; newtons and metres where the target is a prismatic joint.
 
@@ -69,8 +63,7 @@ def unit_of(robot: FlexibleRobot, target: str, unit: str) -> str:
         unit: at a revolute joint.
     """
     joint = robot.tree.joints.get(target)
-    prismatic = joint is not None and joint.type == "prismatic"
-    return _PRISMATIC.get(unit, unit) if prismatic else unit
+    return unit if joint is None else joint.units.of(unit)
 
 
 @dataclass(frozen=True)

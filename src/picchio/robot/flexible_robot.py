@@ -15,6 +15,7 @@ from picchio.robot.dynamics.pose import check_pose
 from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.dynamics.statics import RobotState, balancing, stiffness_at_torque
 from picchio.robot.joint import Joint
+from picchio.robot.masses.check import check_mass_at
 from picchio.robot.tool import Gun, Mounting, Tool
 from picchio.robot.urdf.tree import UrdfTree
 
@@ -160,7 +161,7 @@ class FlexibleRobot:
             pose: (nv,) rad or m.
 
         Raises:
-            InputError: as `pose`.
+            InputError: as `pose`; a motion that moves no mass there.
         """
         full = self.pose(pose)
         index = self.flexible_index
@@ -168,9 +169,11 @@ class FlexibleRobot:
         jacobian = self.rigid.jacobian(full, point)[:3, index]
         position, rotation = self.rigid.placement(full, point)
         torque = self.gravity_torque(full)
+        mass = self.rigid.mass_matrix(full)[np.ix_(index, index)]
+        check_mass_at(self, full, mass)
         return RobotState(
             pose=full,
-            mass_matrix=self.rigid.mass_matrix(full)[np.ix_(index, index)],
+            mass_matrix=mass,
             jacobian=jacobian,
             stiffness=stiffness_at_torque(self.flexible_joints, torque),
             gravity_torque=torque,

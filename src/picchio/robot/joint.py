@@ -12,6 +12,7 @@ from pydantic import AfterValidator, model_validator
 
 from picchio.core.arrays import Vector
 from picchio.core.toml import Finite, FiniteVector, NotNegative, Positive, StrictModel
+from picchio.robot.units import JointUnits, units_of
 
 if TYPE_CHECKING:
     from picchio.robot.drives.reducer import Reducer
@@ -185,3 +186,8 @@ class Joint:
     stiffness_curve: StiffnessCurve | None = None
     balancer: Balancer | None = None
     estimated: bool = False
+
+    @property
+    def units(self) -> JointUnits:
+        """How its values are written."""
+        return units_of(self.kind)

@@ -40,6 +40,8 @@ class Tool(StrictModel):
             raise ValueError("the axis has length zero")
         if self.mass == 0 and any(self.inertia):
             raise ValueError("an inertia needs a mass")
+        if self.mass == 0 and any(self.com):
+            raise ValueError("a centre of mass needs a mass")
         return self
 
 
@@ -69,6 +71,8 @@ class Gun(StrictModel):
     def _recoiling_mass(self) -> Self:
         if self.recoil_stiffness is not None and self.mass == 0:
             raise ValueError("a recoil spring needs the gun's mass")
+        if self.recoil_stiffness is None and self.damping_ratio > 0:
+            raise ValueError("a damping ratio needs recoil_stiffness: without it the body is fixed")
         return self
 
 

@@ -205,6 +205,9 @@ def _poses(
         raise InputError("needs poses or points", file=file, key=key)
     if entry.poses is not None and entry.points is not None:
         raise InputError("has both poses and points; give one", file=file, key=key)
+    if entry.poses is not None and "branch" in entry.model_fields_set:
+        raise InputError("chooses how points are reached; poses stand as they are", file=file,
+                         key=f"{key}.branch")  # fmt: skip
     given: list[Any] = (entry.poses if entry.poses is not None else entry.points) or []
     what = "poses" if entry.poses is not None else "points"
     if not given:

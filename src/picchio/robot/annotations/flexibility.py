@@ -8,7 +8,7 @@ is kept. Tags that mean a spring beside the drive (Gazebo `springStiffness`, SDF
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,6 +99,26 @@ def flexible_joints(
             where["damping_ratio"] = "picchio's default, not measured"
         origins.update({f"{name}.{key}": text for key, text in where.items()})
     return joints, origins
+
+
+def unused_entries(sources: Sequence[Source], joints: Iterable[str]) -> Iterator[str]:
+    """What a sidecar or annotation says of joints that stay rigid, a sentence each.
+
+    Args:
+        sources: every one.
+        joints: those that are flexible.
+    """
+    flexible = set(joints)
+    for source in sources:
+        for name, entry in source.content.joint.items():
+            if not source.strict or name in flexible:
+                continue
+            keys = [key for key in given(entry) if key not in ("source", "estimated")]
+            what = f"{' and '.join(keys)} {'is' if len(keys) == 1 else 'are'} not used"
+            yield (
+                f"{source.label}: joint {name!r}: {what if keys else 'says nothing that is used'}: "
+                "the joint has no stiffness and stays rigid; give it one"
+            )
 
 
 def check_names(tree: UrdfTree, source: Source) -> None:

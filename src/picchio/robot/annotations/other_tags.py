@@ -14,7 +14,7 @@ from pathlib import Path
 
 from lxml import etree
 
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, warn_user
 from picchio.robot.annotations.sidecar import JointEntry, Sidecar
 from picchio.robot.urdf.tree import UrdfTree, to_number
 from picchio.robot.urdf.xml import children, local_name, parse_urdf, read_urdf_bytes
@@ -40,7 +40,13 @@ class Srdf:
 def find_srdf(tree: UrdfTree) -> Srdf | None:
     """The SRDF that goes with a URDF: same stem or robot name, beside it or in `../srdf`.
 
-    A file that cannot be read is passed over: picchio can do without it.
+    A file of the URDF's own name that cannot be read is told: picchio can do without it.
+
+    Args:
+        tree: of the URDF.
+
+    Returns:
+        what it says, or None where there is none.
     """
     folders = (tree.path.parent, tree.path.parent.parent / "srdf")
     files = [file for folder in folders for file in sorted(folder.glob("*.srdf"))]
@@ -48,7 +54,9 @@ def find_srdf(tree: UrdfTree) -> Srdf | None:
     for file in files:
         try:
             root = parse_urdf(read_urdf_bytes(file), file)
-        except InputError:
+        except InputError as error:
+            if file.stem == tree.path.stem:
+                warn_user(f"{error}: its poses and end effectors are not used")
             continue
         if file.stem == tree.path.stem or root.get("name") == tree.name:
             return _read(root, file, tree)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from lxml import etree
 
 from picchio.core.errors import InputError, gathered, warn_user
 from picchio.core.toml import validate
-from picchio.robot.annotations.flexibility import Source, flexible_joints
+from picchio.robot.annotations.flexibility import Source, flexible_joints, unused_entries
 from picchio.robot.annotations.inline import read_annotations
 from picchio.robot.annotations.other_tags import Srdf, find_srdf, read_drake
 from picchio.robot.annotations.sidecar import FORMAT, Sidecar, read_sidecar
@@ -22,6 +23,7 @@ from picchio.robot.joint import Joint
 from picchio.robot.loading.find import FoundRobot, find_robot
 from picchio.robot.loading.saved_model import is_saved_model, read_saved_model
 from picchio.robot.masses.check import check_masses
+from picchio.robot.masses.doubts import doubts_about_masses
 from picchio.robot.masses.given import give_masses
 from picchio.robot.urdf.check import read_tree
 from picchio.robot.urdf.normalised import normalise
@@ -91,7 +93,7 @@ def _load(
     joints, origins = flexible_joints(tree, sources, all_reducers(reducers))
     tree, mass_origins = give_masses(tree, sources, root)
     _check_balancers(sources, joints)
-    for remark in _remarks(tree, joints, origins):
+    for remark in _remarks(tree, sources, joints, origins):
         warn_user(remark)
     chosen_tool, tool_origins = choose_tool(tree, tool, sources, srdf)
     gun, gun_origins = choose_gun(sources)
@@ -130,6 +132,8 @@ def _load(
         tool_point=tool_point,
     )
     check_masses(result)
+    for doubt in doubts_about_masses(result, root):
+        warn_user(f"{found.urdf.name}: {doubt}")
     return result
 
 
@@ -144,8 +148,12 @@ def _sources(
     annotation = read_annotations(root, found.urdf)
     flex_file = Path(flex) if flex is not None else None
     # A robot folder's own sidecar replaces annotations; the two are never combined.
-    if flex_file is None and annotation is None:
-        flex_file = found.flex
+    if flex_file is None and found.flex is not None:
+        if annotation is None:
+            flex_file = found.flex
+        elif not _same(read_sidecar(found.flex), annotation):
+            warn_user(f"{found.flex}: is not read, since {found.urdf.name} has annotations that "
+                      "say something else; name it with --flex, and it wins")  # fmt: skip
     sources = []
     if values:
         given = validate({"format": FORMAT, "joint": {k: dict(v) for k, v in values.items()}},
@@ -166,6 +174,14 @@ def _sources(
     return sources, flex_file
 
 
+def _same(one: Sidecar, other: Sidecar) -> bool:
+    """Whether both give the same values, whatever their sources."""
+    hidden: Any = {"robot": True, "description": True, "tool": {"source"}, "gun": {"source"},
+              "base": {"source"}, "links": {"source"}, "joint": {"__all__": {"source"}},
+              "link": {"__all__": {"source"}}}  # fmt: skip
+    return one.model_dump(exclude=hidden) == other.model_dump(exclude=hidden)
+
+
 def _check_owner(sidecar: Sidecar, file: Path, found: FoundRobot, name: str) -> None:
     """Warn of a sidecar that names another robot: arms of one maker share their joints' names."""
     known = {text.removesuffix("_robot") for text in (found.name, name, found.urdf.stem) if text}
@@ -174,7 +190,10 @@ def _check_owner(sidecar: Sidecar, file: Path, found: FoundRobot, name: str) -> 
 
 
 def _remarks(
-    tree: UrdfTree, joints: Mapping[str, Joint], origins: Mapping[str, str]
+    tree: UrdfTree,
+    sources: list[Source],
+    joints: Mapping[str, Joint],
+    origins: Mapping[str, str],
 ) -> Iterator[str]:
     """What the user should know of how the robot was read."""
     for remark in tree.remarks:
@@ -182,6 +201,7 @@ def _remarks(
     if tree.locked():
         held = ", ".join(tree.locked())
         yield f"{tree.path}: joints of several degrees of freedom are held fixed: {held}"
+    yield from unused_entries(sources, joints)
     for name, joint in joints.items():
         if joint.damping_ratio > 1:
             yield (

@@ -28,7 +28,7 @@ class Body:
         com: m, their centre in the link's frame.
         moments: m^5, second moments of the volume about `com`, along the link's axes: xx, xy, xz,
             yy, yz, zz; times a density they are the inertia.
-        size: m, the longest edge of the box around them.
+        size: m, the diagonal of the box around them.
     """
 
     volume: float
@@ -101,5 +101,5 @@ def _together(hulls: list[Any]) -> Body:
         float(volumes.sum()),
         (float(com[0]), float(com[1]), float(com[2])),
         tuple(float(moments[i, j]) for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))),
-        float(np.ptp(corners, axis=0).max()),
+        float(np.linalg.norm(np.ptp(corners, axis=0))),
     )

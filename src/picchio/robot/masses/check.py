@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.robot.urdf.check import bad_inertia
 
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
 # Reflected inertia below this, kg m^2 (a 1 mg body at 1 mm has 1e-12), is none.
 _LEAST_INERTIA = 1e-13
 _LEAST_EIGENVALUE = 1e-9
+_WAYS_OUT = (
+    "give masses in the sidecar, [link.NAME] mass, com, inertia or [links] total_mass, or leave "
+    "the joint rigid"
+)
 
 
 def check_masses(robot: FlexibleRobot) -> None:
@@ -25,7 +30,8 @@ def check_masses(robot: FlexibleRobot) -> None:
 
     Raises:
         InputError: a body with an impossible inertia beyond a flexible joint; a flexible joint
-            that carries no mass, or none off its axis; a singular mass matrix.
+            that carries no mass, or none off its axis; no mass but the tool's; a singular mass
+            matrix.
     """
     file = robot.source
     for joint in robot.flexible_joints:
@@ -38,32 +44,64 @@ def check_masses(robot: FlexibleRobot) -> None:
                 raise InputError(f"cannot vibrate: {reason}", file=file, key=f"link {link}",
                                  hint=f"correct it, or leave {joint.name!r} rigid")  # fmt: skip
         _check_carried(robot, joint.name)
+    _check_own_masses(robot)
     _check_mass_matrix(robot)
+
+
+def moving_links(robot: FlexibleRobot) -> list[str]:
+    """The links that flexible joints of the URDF carry, in the URDF's order.
+
+    Args:
+        robot: as it was loaded.
+    """
+    joints = [joint.name for joint in robot.flexible_joints if joint.name in robot.tree.joints]
+    carried = {link for joint in joints for link in robot.tree.beyond(joint)}
+    return [link for link in robot.tree.links if link in carried]
+
+
+def _weighs(robot: FlexibleRobot, link: str) -> bool:
+    """Mass without inertia is a point's; inertia without mass is written by some exporters."""
+    body = robot.tree.links[link]
+    return body is not None and (body.mass > 0 or any(body.inertia))
 
 
 def _check_carried(robot: FlexibleRobot, joint: str) -> None:
     links = robot.tree.beyond(joint)
-    bodies = [robot.tree.links[link] for link in links]
     on_it = robot.tool.frame in links
     added = (robot.tool.mass + (robot.gun.mass if robot.gun else 0.0)) if on_it else 0.0
-    if added > 0 or any(body is not None and body.mass > 0 for body in bodies):
-        return
-    # Mass without weight is written by some exporters: inertia alone does for a rotation.
-    if any(body is not None and any(body.inertia) for body in bodies):
+    if added > 0 or any(_weighs(robot, link) for link in links):
         return
     raise InputError(f"joint {joint!r} is flexible but carries no mass", file=robot.source,
                      key=f"link {links[0]}", hint="give the link an <inertial>, give [tool] a "
                      "mass, or leave the joint rigid")  # fmt: skip
 
 
+def _check_own_masses(robot: FlexibleRobot) -> None:
+    """The tool's mass alone is no arm."""
+    links = moving_links(robot)
+    if len(links) > 1 and not any(_weighs(robot, link) for link in links):
+        some = ", ".join(links[:8]) + (" ..." if len(links) > 8 else "")
+        raise InputError(f"no link that moves has a mass, only the tool has: {some}",
+                         file=robot.source, key="link", hint=_WAYS_OUT)  # fmt: skip
+
+
+def general_pose(robot: FlexibleRobot) -> FloatArray:
+    """A pose (nv,) within the limits that is nothing special, as zero often is.
+
+    Args:
+        robot: whose joints' limits count.
+    """
+    lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
+    part = 0.38 + 0.21 * np.sin(1.0 + np.arange(robot.rigid.nv))
+    return np.asarray(lower + (upper - lower) * part)
+
+
 def _check_mass_matrix(robot: FlexibleRobot) -> None:
     if not robot.flexible_joints:
         return
-    lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
-    # Zero is often a special pose: a general one within the limits tells structure from chance.
-    general = lower + (upper - lower) * (0.38 + 0.21 * np.sin(1.0 + np.arange(robot.rigid.nv)))
-    mass = robot.mass_and_jacobian(general[None])[0][0]
+    pose = general_pose(robot)
+    mass = robot.mass_and_jacobian(pose[None])[0][0]
     names = robot.flexible_names
     if not np.isfinite(mass).all():
         raise InputError("the mass matrix overflows: masses or lengths are absurdly large",
@@ -78,12 +116,30 @@ def _check_mass_matrix(robot: FlexibleRobot) -> None:
         _refuse(robot, joint, "makes the mass matrix singular")
 
 
+def check_mass_at(robot: FlexibleRobot, pose: FloatArray, mass: FloatArray) -> None:
+    """Refuse a pose at which some motion of the flexible joints moves no mass.
+
+    Args:
+        robot: whose pose it is.
+        pose: (nv,) rad or m.
+        mass: (n, n) the mass matrix there.
+
+    Raises:
+        InputError: the mass matrix is not positive definite, with pose, joint and a way out.
+    """
+    try:
+        np.linalg.cholesky(mass)
+    except np.linalg.LinAlgError:
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(mass), 1e-300))
+        vectors = np.linalg.eigh(mass * np.outer(scale, scale))[1]
+        joint = robot.flexible_names[int(np.abs(vectors[:, 0]).argmax())]
+        at = ", ".join(f"{q:.4g}" for q in pose)
+        _refuse(robot, joint, f"can move no mass at the pose ({at}): the mass matrix is not "
+                "positive definite there")  # fmt: skip
+
+
 def _refuse(robot: FlexibleRobot, joint: str, what: str) -> None:
     tree = robot.tree
     link = tree.joints[joint].child if joint in tree.joints else robot.tool.frame
-    raise InputError(
-        f"joint {joint!r} {what}",
-        file=robot.source,
-        key=f"link {link}",
-        hint="give the link and what it carries their inertias, or leave the joint rigid",
-    )
+    raise InputError(f"joint {joint!r} {what}", file=robot.source, key=f"link {link}",
+                     hint=_WAYS_OUT)  # fmt: skip

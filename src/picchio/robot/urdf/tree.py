@@ -17,7 +17,8 @@ from lxml import etree
 
 from picchio.core.arrays import Vector
 from picchio.core.errors import InputError
-from picchio.robot.urdf.xml import children, local_name
+from picchio.robot.units import JointUnits, units_of
+from picchio.robot.urdf.xml import EXPAND, children, local_name
 
 T = TypeVar("T")
 MOVABLE = ("revolute", "continuous", "prismatic")
@@ -65,6 +66,11 @@ class UrdfJoint:
     upper: float
     effort: float
     mimic: Mimic | None
+
+    @property
+    def units(self) -> JointUnits:
+        """How its values are written."""
+        return units_of(self.type)
 
 
 @dataclass(frozen=True)
@@ -302,5 +308,6 @@ def _numbers(
     try:
         return [to_number(part, infinite=infinite) for part in parts]
     except ValueError as error:
-        raise InputError(f"<{local_name(element)} {attribute}> {error}",
-                         value=element.get(attribute)) from None  # fmt: skip
+        text = element.get(attribute, "")
+        raise InputError(f"<{local_name(element)} {attribute}> {error}", value=text,
+                         hint=EXPAND if "${" in text else None) from None  # fmt: skip

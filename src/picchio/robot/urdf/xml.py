@@ -6,6 +6,7 @@ is said in one line. Everything that needs the XML itself (reading, annotating) 
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from picchio.core.files import read_bytes
 
 NAMESPACE = "urn:picchio:1"
 
+EXPAND = "expand it first: xacro FILE > robot.urdf"
+_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 _DOCTYPES = tuple(
     text.encode(code) for text in ("<!DOCTYPE", "<!ENTITY") for code in ("ascii", "utf-16-le")
 )
@@ -39,7 +42,7 @@ def parse_urdf(content: bytes, path: Path) -> etree._Element:
 
     Raises:
         InputError: not XML, a document type declaration, an undeclared prefix, wrong encoding, a
-            TOML file.
+            TOML or xacro file.
     """
     if not content.strip():
         raise InputError("is empty", file=path)
@@ -60,6 +63,9 @@ def parse_urdf(content: bytes, path: Path) -> etree._Element:
         raise _told(error, path) from None
     except (ValueError, LookupError) as error:
         raise InputError(f"is not readable as XML: {error}", file=path) from None
+    # The prefix alone is left by xacro.
+    if path.suffix == ".xacro" or b"<xacro:" in _COMMENT.sub(b"", content):
+        raise InputError("is a xacro file, not a URDF", file=path, hint=EXPAND)
     if root.getroottree().docinfo.doctype:
         raise InputError("has a document type declaration, which is not accepted", file=path)
     return root
@@ -81,6 +87,8 @@ def _told(error: etree.XMLSyntaxError, path: Path) -> InputError:
     if "Namespace prefix" not in text:
         return InputError(f"is not valid XML: {text}", file=path)
     hint = 'declare it: <robot name="..." xmlns:PREFIX="...">'
+    if "Namespace prefix xacro" in text:
+        hint = EXPAND
     if "Namespace prefix picchio" in text:
         hint = f'write <robot name="..." xmlns:picchio="{NAMESPACE}">'
     return InputError(f"uses an XML prefix that is not declared: {text}", file=path, hint=hint)

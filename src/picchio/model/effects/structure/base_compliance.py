@@ -10,6 +10,7 @@ from picchio.model.effects.scales import Scales
 from picchio.model.effects.structure import yielding
 from picchio.model.expansion import BASE_AXES
 from picchio.model.plant import Changes
+from picchio.robot.units import SLIDING
 
 
 class BaseCompliance(Effect):
@@ -33,7 +34,7 @@ class BaseCompliance(Effect):
     def unit(self, parameter: str) -> str:
         """As of any effect; along an axis per metre, where about it per radian."""
         unit = super().unit(parameter)
-        return unit if self.target.startswith("r") else unit.replace("N*m", "N").replace("rad", "m")
+        return unit if self.target.startswith("r") else SLIDING.of(unit)
 
     def structure(self, plant: Changes) -> None:
         """Let the base's coordinate move.
