@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 
 import picchio
 from picchio.core.errors import InputError
@@ -78,28 +79,37 @@ def test_a_map_without_shafts_has_no_damage(tmp_path, robot):
         workspace_map(bare, places.joint_grid(robot, 2), BLOWS, tmp_path / "map.nc", damage=12)
 
 
-def test_points_of_a_mesh(tmp_path, robot):
-    # A panel of 0.4 m by 0.2 m, and a sphere whose normals point away from its middle.
-    panel = trimesh.Trimesh(
-        [[1.3, -0.2, 0.4], [1.3, 0.2, 0.4], [1.3, 0.2, 0.6], [1.3, -0.2, 0.6]],
-        [[0, 2, 1], [0, 3, 2]],
-    )
-    panel.export(tmp_path / "panel.stl")
-    found = places.surface(tmp_path / "panel.stl", spacing=0.05)
-    np.testing.assert_allclose(found.values[:, 0], 1.3, atol=1e-6)
-    np.testing.assert_allclose(found.values.mean(axis=0), [1.3, 0.0, 0.5], atol=1e-6)
-    np.testing.assert_allclose(found.normals, np.tile([-1.0, 0, 0], (len(found), 1)), atol=1e-6)
-    gaps = np.linalg.norm(found.values[:, None] - found.values, axis=-1)
-    np.fill_diagonal(gaps, np.inf)
-    assert gaps.min(axis=1).max() < 0.05
-    ball = trimesh.creation.icosphere(2, 0.1)
-    ball.export(tmp_path / "ball.ply")
-    found = places.surface(tmp_path / "ball.ply", spacing=1.0)
-    assert len(found) == len(ball.faces)
-    assert ((found.values * found.normals).sum(axis=1) > 0.09).all()
-    for name, spacing in (("panel.stl", 0.0), ("none.stl", 0.1), ("panel.stl", 1e-6)):
+BOX = trimesh.creation.box((0.4, 0.6, 0.3))
+BALL = trimesh.creation.icosphere(2, 0.3)
+
+
+@pytest.mark.parametrize("shape", [BOX, BALL], ids=["box", "ball"])
+def test_points_on_a_mesh_do_not_depend_on_its_triangles(tmp_path, shape):
+    counts = []
+    for name, mesh in {"coarse": shape, "fine": shape.subdivide_to_size(0.01)}.items():
+        mesh.export(tmp_path / f"{name}.ply")
+        found = places.surface(tmp_path / f"{name}.ply", spacing=0.05)
+        nearest = cKDTree(found.values).query(found.values, 2)[0][:, 1]
+        assert 0.89 * 0.05 < nearest.min() <= nearest.max() < 1.2 * 0.05
+        # Nothing is left out: no point of the surface is further away than a spacing.
+        everywhere = trimesh.sample.sample_surface(mesh, 3000, seed=1)[0]
+        assert cKDTree(found.values).query(everywhere)[0].max() < 0.05
+        assert len(found) == pytest.approx(mesh.area / 0.05**2, rel=0.06)
+        assert ((found.values * found.normals).sum(axis=1) > 0.1).all()  # outwards
+        counts.append(len(found))
+    assert counts[0] == pytest.approx(counts[1], rel=0.03)
+
+
+def test_both_sides_of_a_thin_sheet_and_what_is_no_surface(tmp_path):
+    trimesh.creation.box((0.002, 0.4, 0.4)).export(tmp_path / "sheet.stl")
+    found = places.surface(tmp_path / "sheet.stl", spacing=0.05)
+    sides = [(found.normals[:, 0] * sign > 0.9).sum() for sign in (1, -1)]
+    assert sides == [pytest.approx(70, abs=8)] * 2
+    for name, spacing in (("sheet.stl", 0.0), ("none.stl", 0.1)):
         with pytest.raises(InputError):
             places.surface(tmp_path / name, spacing=spacing)
+    with pytest.raises(InputError, match=r"^spacing: .*points.*at most 100000.*1e-06"):
+        places.surface(tmp_path / "sheet.stl", spacing=1e-6)
     (tmp_path / "text.stl").write_text("no mesh")
     with pytest.raises(InputError, match=r"text\.stl"):
         places.surface(tmp_path / "text.stl", spacing=0.1)
