@@ -115,6 +115,32 @@ def test_the_task_s_largest_torques_count(tmp_path, capsys):
         assert f"joint_2: {line.removeprefix('RV-20E-121: ')}" in said
 
 
+def test_the_risk_of_false_brinelling_is_a_class_with_its_indicators(tmp_path):
+    robot = robot_with(tmp_path, joint_2="CSG-45-100-2UH", joint_3="RV-40E-121")
+    table = TASK | {
+        "operation": [
+            {"name": "up", "direction": [0, 0, 1], "poses": [[0.3, 0.2, -0.4], [0.3, 0.9, -1.0]]}
+        ]
+    }
+    found = picchio.assess(robot, picchio.task_from_dict(table, robot))
+    told = {j["name"]: j["false_brinelling"] for j in found.to_dict()["joints"]}
+    assert told["joint_1"] is None
+    assert told["joint_3"]["risk"] == "not known" and told["joint_3"]["ratio"] is None
+    two, up = told["joint_2"], found.operations[0]
+    assert two["risk"] == "low"
+    assert two["travel"] == pytest.approx(up.swing[:, 1].max() * 0.111 / 4.0)
+    assert two["pose"] == int(up.swing[:, 1].argmax())
+    assert two["cycles"] == up.swing_cycles[:, 1].max() >= 12
+    assert up.swing[two["pose"], 1] > up.rest_peak_deflection[two["pose"], 1]
+    said = "\n".join(found.reducer_warnings)
+    assert "joint_2: risk of false brinelling of the output bearing: low" in said
+    ranked = found.to_dict()["false_brinelling"]
+    assert [entry["joint"] for entry in ranked] == ["joint_2"] * 2 + ["joint_3"] * 2
+    assert ranked[0]["ratio"] == two["ratio"] > ranked[1]["ratio"] > 0.0
+    still = picchio.assess(robot, picchio.task_from_dict(TASK, robot))
+    assert still.joint("joint_2").false_brinelling.risk == "high"
+
+
 def test_a_reducer_no_catalogue_has_is_an_error_that_names_close_ones(tmp_path):
     match = r"flex\.toml: joint\.joint_1\.reducer: no such reducer, got 'RV-90E'.*RV-80E"
     with pytest.raises(InputError, match=match):

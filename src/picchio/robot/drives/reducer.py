@@ -101,7 +101,7 @@ class ReducerEntry(StrictModel):
         ratcheting_torque: N m, at which teeth skip.
         stiffness_curve: of a strain-wave gear, with its input held.
         stiffness: N m/rad, torsional rigidity, of a gear without a curve (most cycloidal ones).
-        lost_motion: rad, both ways together, at 3 % of the rated torque.
+        lost_motion: rad, as the catalogue has it; for information.
         output_bearing: the bearing at the output, where the reducer has one of its own.
         source: where the ratings come from, if not as for the whole file.
     """

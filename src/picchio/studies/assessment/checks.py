@@ -121,6 +121,12 @@ def assumptions_of(
             "the catalogue has one (the rated torque is for the rated life at the rated speed, no "
             "limit at standstill); a joint that stands still under blows risks false brinelling, "
             "which no catalogue covers",
+            "risk of false brinelling, a class and never a life: high where a joint stands in one "
+            "place, low where it moves on by more than a contact's width after every pose (doi "
+            "10.5194/wes-8-289-2023: wear in every steady oscillation, none with longer movements "
+            "between); the contact's travel over its width (below 1 standstill marks, doi "
+            "10.3390/lubricants11070311) is an estimate from the output bearing's ratings, at the "
+            "moment that the catalogue allows",
             *(f"reducer {r.name}: {r.manufacturer}, {r.kind}; {r.source}" for r in named),
         ]
     if unchecked:

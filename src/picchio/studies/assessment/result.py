@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from picchio.core.arrays import FloatArray
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
+from picchio.fatigue.standstill import RISKS, FalseBrinelling
 from picchio.robot.drives.reducer import TorqueLimit
 from picchio.studies.assessment.verdict import Verdict, judge
 from picchio.studies.assessment.verdict import format_count as format_count
@@ -52,6 +53,8 @@ class OperationResult:
         reducer_limit: (n_poses, n) N m, of the catalogue; NaN likewise.
         reducer_governed_by: (n_poses, n) the limit that binds; "" likewise.
         damage_per_rivet: (n_poses, n).
+        swing: (n_poses, n) rad, of the deflection over a rivet from rest, end to end.
+        swing_cycles: (n_poses, n) of the swing, those that reach a tenth of it, a rivet.
     """
 
     name: str
@@ -76,6 +79,8 @@ class OperationResult:
     reducer_limit: FloatArray
     reducer_governed_by: NDArray[np.str_]
     damage_per_rivet: FloatArray
+    swing: FloatArray
+    swing_cycles: FloatArray
 
 
 @dataclass(frozen=True)
@@ -110,6 +115,7 @@ class JointLife:
         shaft_ratio: the shaft's own stiffness, G Jp / l, over the joint's; NaN without a shaft.
         rate_sensitivity: the peak of the worst rivet with the blows 5 % faster or slower, the
             larger one, over its peak as stated; NaN where that was not asked for.
+        false_brinelling: indicators for its output bearing; None without a reducer.
     """
 
     name: str
@@ -135,6 +141,7 @@ class JointLife:
     yield_utilisation: float = math.nan
     shaft_ratio: float = math.nan
     rate_sensitivity: float = math.nan
+    false_brinelling: FalseBrinelling | None = None
 
     @property
     def life(self) -> float:
@@ -253,11 +260,38 @@ class Assessment(TableResult):
                 said.setdefault(line.removeprefix(f"{joint.reducer}: "), []).append(joint.name)
         return tuple(f"{', '.join(names)}: {text}" for text, names in said.items())
 
+    @property
+    def false_brinelling(self) -> tuple[dict[str, Any], ...]:
+        """Joints with a reducer at every pose, by risk of false brinelling, the highest first.
+
+        Each has joint, operation, pose (its index), risk, ratio (travel of a contact of the output
+        bearing over its width) and cycles of the swing in a pass.
+        """
+        found: list[dict[str, Any]] = []
+        for j, joint in enumerate(self.joints):
+            if (told := joint.false_brinelling) is None:
+                continue
+            largest = max(op.swing[:, j].max() for op in self.operations) or 1.0
+            found += [
+                {
+                    "joint": joint.name,
+                    "operation": op.name,
+                    "pose": k,
+                    "risk": told.risk,
+                    "ratio": float(told.ratio * swing / largest),
+                    "cycles": float(op.swing_cycles[k, j] * op.rivets),
+                }
+                for op in self.operations
+                for k, swing in enumerate(op.swing[:, j])
+            ]
+        # Unknown ratios are NaN and share a risk of their own, so they do not disturb the order.
+        return tuple(sorted(found, key=lambda e: (RISKS.index(e["risk"]), -e["ratio"])))
+
     def _headline(self) -> str:
         return f"{self.robot!r}, method={self.method!r}: {self.verdict.headline}"
 
     def _rows(self) -> list[dict[str, Any]]:
-        left_out = ("damage_share", "reducer_limits", "reducer_warnings")
+        left_out = ("damage_share", "reducer_limits", "reducer_warnings", "false_brinelling")
         return [
             {key: value for key, value in vars(joint).items() if key not in left_out}
             for joint in self.joints
@@ -288,4 +322,5 @@ class Assessment(TableResult):
 
     def _content(self) -> dict[str, Any]:
         own = {key: value for key, value in vars(self).items() if key != "doubts"}
-        return {"format": FORMAT, "verdict": self.verdict, **own}
+        ranked = self.false_brinelling
+        return {"format": FORMAT, "verdict": self.verdict, **own, "false_brinelling": ranked}

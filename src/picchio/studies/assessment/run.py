@@ -19,6 +19,7 @@ from picchio.fatigue.miner import life, peak_damage
 from picchio.fatigue.shaft_stress import check_shaft, shear_stress
 from picchio.fatigue.sn.curve import MinerRule, SNCurve
 from picchio.fatigue.sn.library import PAPER_SN_CURVE, load_sn_curve
+from picchio.fatigue.standstill import false_brinelling, swings
 from picchio.model.model import Model
 from picchio.robot.drives.reducer import Reducer
 from picchio.robot.dynamics.pose import warn_beyond_limits
@@ -194,7 +195,7 @@ class _Job:
         n = len(loads)
         columns = ("peak_deflection", "peak_shear_stress", "utilisation", "damage_per_rivet")
         others = ("gravity_shear_stress", "peak_total_stress", "reducer_utilisation",
-                  "reducer_torque", "reducer_limit")  # fmt: skip
+                  "reducer_torque", "reducer_limit", "swing", "swing_cycles")  # fmt: skip
         out = {key: np.full(n, np.nan) for key in (*columns, *others)}
         out["steady_peak_deflection"] = np.array([peak(load.steady) for load in loads])
         out["rest_peak_deflection"] = np.array([peak(load.rest) for load in loads])
@@ -206,6 +207,8 @@ class _Job:
         out["gravity_torque"] = np.abs(rivet.gravity_torque)
         hits = operation.hits_per_rivet
         for j, (joint, load) in enumerate(zip(robot.flexible_joints, loads, strict=True)):
+            if load.rest is not None:
+                out["swing"][j], out["swing_cycles"][j] = swings(load.rest)
             reducer = self.reducers[j]
             if reducer is not None and load.rest is not None:
                 torques = load.peak_torque_with_gravity, abs(load.stiffness * load.static)
@@ -257,9 +260,17 @@ def _joint_life(
     joint = robot.flexible_joints[j]
     strength = (curve.yield_shear or curve.ultimate_shear or math.nan) if curve else math.nan
     # Each limit is for one of the two: their largest values give each limit's worst pose.
-    check = None
+    check = brinelling = None
+    warnings: tuple[str, ...] = ()
     if reducer is not None and np.isfinite(torques[0]):
         check = reducer.check_blows(*torques)
+        cycles = [r.swing_cycles[:, j] * r.rivets for r in results]
+        places = [r.poses[:, robot.flexible_index[j]] for r in results]
+        swing = [r.swing[:, j] for r in results]
+        brinelling = false_brinelling(
+            reducer.output_bearing, *map(np.concatenate, (swing, cycles, places))
+        )
+        warnings = (*check.warnings, f"{reducer.name}: {brinelling.sentence}")
     # Miner over every pose and operation: eqs. 19-22 with a_i in the hits, b_i in the rivets.
     spent = {r.name: float(r.damage_per_rivet[:, j].sum() * r.rivets) for r in results}
     total = math.fsum(spent.values())
@@ -284,9 +295,10 @@ def _joint_life(
         damage_share=shares,
         reducer_governed_by=check.governing.name if check is not None else "",
         reducer_limits=check.limits if check is not None else (),
-        reducer_warnings=check.warnings if check is not None else (),
         yield_utilisation=largest["peak_total_stress"] / strength,
         shaft_ratio=1.0 + check_shaft(joint.stiffness, joint.shaft) if joint.shaft else math.nan,
+        reducer_warnings=warnings,
+        false_brinelling=brinelling,
     )
 
 
