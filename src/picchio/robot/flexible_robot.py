@@ -16,6 +16,7 @@ from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.dynamics.statics import RobotState, balancing, stiffness_at_torque
 from picchio.robot.joint import Joint
 from picchio.robot.masses.check import check_mass_at
+from picchio.robot.spread import Posterior, Spread
 from picchio.robot.tool import Gun, Mounting, Tool
 from picchio.robot.urdf.tree import UrdfTree
 
@@ -46,6 +47,8 @@ class FlexibleRobot:
         effect_tables: of a saved model: how the world departs from the robot's files, as
             `picchio.model.effects.from_dict` reads it.
         warnings: what was warned of while it was loaded.
+        spreads: how well values are known, by name such as "stiffness.joint_1".
+        posterior: how these hang together, or None.
     """
 
     name: str
@@ -63,6 +66,8 @@ class FlexibleRobot:
     tool_point: str
     effect_tables: tuple[Mapping[str, Any], ...] = ()
     warnings: tuple[str, ...] = ()
+    spreads: Mapping[str, Spread] = field(default_factory=dict)
+    posterior: Posterior | None = None
     lower: Array = field(init=False)
     upper: Array = field(init=False)
     stiffness: Array = field(init=False)

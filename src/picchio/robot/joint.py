@@ -12,6 +12,7 @@ from pydantic import AfterValidator, model_validator
 
 from picchio.core.arrays import Vector
 from picchio.core.toml import Finite, FiniteVector, NotNegative, Positive, StrictModel
+from picchio.robot.spread import with_spreads
 from picchio.robot.units import JointUnits, units_of
 
 if TYPE_CHECKING:
@@ -76,6 +77,7 @@ class StiffnessCurve(StrictModel):
         return np.where(size <= self.t1, self.k1, np.where(size <= self.t2, self.k2, self.k3))
 
 
+@with_spreads
 class Balancer(StrictModel):
     """A gravity balancer: a spring or cylinder beside a joint that carries part of the weight.
 
@@ -125,6 +127,7 @@ class Balancer(StrictModel):
         return pull * rate, self.stiffness * rate * rate + pull * rate_of_rate
 
 
+@with_spreads
 class Shaft(StrictModel):
     """The round solid shaft whose torsion is the joint's spring, or a part of it.
 

@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from picchio.core.arrays import symmetric
 from picchio.core.toml import Finite, FiniteVector, NotNegative, Positive, StrictModel
+from picchio.robot.spread import with_spreads
 
 
 def _can_be(six: tuple[float, ...]) -> tuple[float, ...]:
@@ -24,6 +25,7 @@ SixInertias = Annotated[
 """ixx, ixy, ixz, iyy, iyz, izz of a body, kg m^2: those of some body."""
 
 
+@with_spreads
 class LinkEntry(StrictModel):
     """One link's mass, in place of the URDF's.
 
@@ -44,7 +46,7 @@ class LinkEntry(StrictModel):
 
     @model_validator(mode="after")
     def _says_something(self) -> Self:
-        if self.mass is None and self.com is None and self.inertia is None:
+        if self.model_fields_set <= {"source", "estimated"}:
             raise ValueError("give mass, com or inertia")
         return self
 

@@ -8,10 +8,12 @@ from pydantic import Field, model_validator
 
 from picchio.core.toml import Finite, FiniteVector, NotNegative, Positive, StrictModel
 from picchio.robot.link import SixInertias
+from picchio.robot.spread import with_spreads
 
 RECOIL_JOINT = "gun_recoil"
 
 
+@with_spreads
 class Tool(StrictModel):
     """The tool, held rigidly by a frame of the robot, in addition to the URDF's own masses.
 
@@ -45,6 +47,7 @@ class Tool(StrictModel):
         return self
 
 
+@with_spreads
 class Gun(StrictModel):
     """The percussive tool's body, at the tool point.
 
@@ -76,6 +79,7 @@ class Gun(StrictModel):
         return self
 
 
+@with_spreads
 class Mounting(StrictModel):
     """How the robot stands.
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from statistics import NormalDist
 from typing import Any
 
@@ -14,17 +16,24 @@ from picchio.core.errors import InputError
 from picchio.core.html import sheet
 from picchio.core.processes import one_thread
 from picchio.core.results import TableResult
-from picchio.fatigue.counting.counter import Residue
+from picchio.fatigue.counting.counter import Residue, rainflow
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.mean_stress import Rule
-from picchio.fatigue.miner import damage, life, utilisation
+from picchio.fatigue.miner import damage, utilisation
+from picchio.fatigue.shaft_stress import shear_stress, stress_per_torque
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.fatigue.uncertain_lives import LifeSpread, Uncertain, design
+from picchio.fatigue.uncertain_lives import Draws, LifeSpread, Uncertain, summarise
+from picchio.model.effects.structure.joint_stiffness import JointStiffness
+from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.spread import Spread, root_of
+from picchio.robot.varied import robot_with
 from picchio.studies.assessment.result import format_count
-from picchio.studies.rivet.variation import ShaftStress, VariedRivet, rivets_of
-from picchio.studies.tasks import Task
+from picchio.studies.rivet.pose import Rivet
+from picchio.studies.rivet.poses import curve_tables, stacked
+from picchio.studies.rivet.variation import ShaftStress
+from picchio.studies.tasks import Operation, Task
 
 # Relative, as the campaign's tolerances; the width and the model's error are judgements.
 DEFAULT_INPUTS: dict[str, Uncertain] = {
@@ -34,6 +43,44 @@ DEFAULT_INPUTS: dict[str, Uncertain] = {
     "width": Uncertain(1.0, 0.05),
     "model": Uncertain(1.0, 0.10),
 }
+# Samples go on until the ends of every sampling interval are this near to each other.
+_NEAR = 1.2
+# Draws of a replicate for the total-order indices; rows of a batch; steps of a scan.
+_MIXED, _BATCH, _SCAN = 8, 20_000, 41
+# A life that falls and rises again by more than this along a stiffness is shown.
+_TURN = 0.02
+
+
+@dataclass(frozen=True)
+class LifeScan:
+    """The robot's life against one stiffness, everything else as stated.
+
+    Attributes:
+        factor: (k,) on the stiffness.
+        life: (k,) rivets of the task's mix; infinite where the life has no end.
+    """
+
+    factor: FloatArray
+    life: FloatArray
+
+    @property
+    def turns(self) -> bool:
+        """Whether the life both falls and rises as the stiffness grows: a resonance."""
+        with np.errstate(invalid="ignore"):
+            steps = np.diff(np.log(np.minimum(self.life, 1e300)))
+        return bool((steps > _TURN).any() and (steps < -_TURN).any())
+
+    def turning_points(self) -> FloatArray:
+        """Where the life turns.
+
+        Returns:
+            indices of the ends and of the local extremes, ascending.
+        """
+        log = np.log(np.minimum(self.life, 1e300))
+        slope = np.sign(np.round(np.diff(log), 6))
+        moving = np.flatnonzero(slope)
+        turns = moving[1:][slope[moving[1:]] != slope[moving[:-1]]]
+        return np.unique(np.concatenate([[0], turns, [log.size - 1]]))
 
 
 @dataclass(frozen=True, repr=False)
@@ -43,8 +90,12 @@ class UncertainLife(TableResult):
     Attributes:
         joints: of each joint with a shaft, rivets of the task's mix.
         robot: of the weakest joint, sample by sample.
-        inputs: what was varied: factors on the nominal values; of "strength", ln is the
-            specimens' standard normal score, which each curve's own scatter multiplies.
+        inputs: what was varied: factors on the nominal values ("absolute": the values); of
+            "strength", ln is the specimens' standard normal score, which each curve's own scatter
+            multiplies.
+        sources: where each spread is from.
+        estimated: the inputs that are estimates without a stated spread.
+        scans: stiffnesses along which the life is not monotone (resonance): life against a factor.
         assumptions: what was taken for granted.
         seed: of the samples.
     """
@@ -52,19 +103,22 @@ class UncertainLife(TableResult):
     joints: dict[str, LifeSpread]
     robot: LifeSpread
     inputs: dict[str, Uncertain]
+    sources: dict[str, str]
+    estimated: tuple[str, ...]
+    scans: dict[str, LifeScan]
     assumptions: tuple[str, ...]
     seed: int
 
     def _repr_html_(self) -> str:
         rows = [
-            (name, *map(format_count, (s.p10, s.p50, s.p90)), 100 * s.endless)
+            (name, *(rounded(s, key) for key in s.sampling), 100 * s.endless)
             for name, s in {**self.joints, "robot": self.robot}.items()
         ]
         columns = ("rivets to failure", "P10", "P50", "P90", "without end [%]")
         return sheet("How sure the life is", {"varied": ", ".join(self.inputs)}, columns, rows)
 
     def _headline(self) -> str:
-        lives = (format_count(x) for x in (self.robot.p10, self.robot.p50, self.robot.p90))
+        lives = (rounded(self.robot, key) for key in self.robot.sampling)
         return "rivets to failure P10 {}, P50 {}, P90 {}".format(*lives)
 
     def _rows(self) -> list[dict[str, Any]]:
@@ -78,6 +132,22 @@ class UncertainLife(TableResult):
         return vars(self)
 
 
+def rounded(spread: LifeSpread, quantile: str) -> str:
+    """A quantile of a life with the digits that its sampling error allows.
+
+    Args:
+        spread: the life.
+        quantile: "p10", "p50" or "p90".
+    """
+    value = getattr(spread, quantile)
+    low, high = spread.sampling[quantile]
+    if not (math.isfinite(value) and value > 0.0):
+        return format_count(value)
+    error = 0.5 * (high - low) / value
+    digits = 1 if not error < 0.2 else min(max(1 - math.floor(math.log10(max(error, 1e-4))), 1), 4)
+    return format_count(float(f"{value:.{digits - 1}e}"))
+
+
 @one_thread()
 def uncertain_life(
     robot: FlexibleRobot | Model,
@@ -85,9 +155,9 @@ def uncertain_life(
     *,
     sn_curve: str | SNCurve | None = None,
     inputs: Mapping[str, Uncertain] | None = None,
-    samples: int = 64,
+    samples: int | None = None,
     seed: int = 0,
-    poses: int = 2,
+    totals: bool = True,
     residue: Residue = "half-cycles",
     mean_stress: Rule = "none",
     gravity_stiffness: bool | None = None,
@@ -96,9 +166,14 @@ def uncertain_life(
 ) -> UncertainLife:
     """P10, P50 and P90 of every joint's life, and what makes them uncertain.
 
-    Rivets start from rest and ring down, cycles are counted by rainflow (`assess`'s default). A
-    factor on the stiffness is common to all joints. Specimens' strength scatters as each curve
-    says, one rank for all joints; a curve without scatter counts as certain.
+    Rivets start from rest and ring down, cycles are counted by rainflow (`assess`'s default).
+    Values with a spread of their own (`FlexibleRobot.spreads`) vary by it, correlated as the
+    robot's posterior says. One factor is common to the stiffness of all other joints, and one to
+    their damping. Specimens' strength scatters as each curve says, one rank for all joints; a
+    curve without scatter counts as certain.
+
+    Samples are doubled until every quantile of the robot's life is known within a factor of 1.2
+    (the ends of its 95 % sampling interval), or `samples` are done.
 
     Args:
         robot: with shafts; or a model of it.
@@ -106,16 +181,18 @@ def uncertain_life(
         sn_curve: for all joints, instead of their own.
         inputs: factors on the nominal values, by name: "stiffness", "damping_ratio", "force",
             "width" (of the blows), "model" (error of the computed stress); if not given,
-            `DEFAULT_INPUTS`, without the width where blows have none.
-        samples: a power of two; the dynamics run about five times as often.
+            `DEFAULT_INPUTS`, without the width where blows have none. One joint's stiffness or
+            damping ratio ("stiffness.joint_1"), or any other value with a spread, by its name:
+            in place of its own spread.
+        samples: at most so many; if not given, 16,384, and fewer for models that compiled code
+            cannot take.
         seed: the same seed gives the same result.
-        poses: how many poses of each operation and joint are sampled, the most strained ones; the
-            rest keep their nominal share of the damage.
+        totals: also the total-order indices, which need more runs.
         residue: as in `assess`.
         mean_stress: as in `assess`.
         gravity_stiffness: as in `assess`.
         gravity_balanced: as in `assess`.
-        progress: called with (runs done, runs in all).
+        progress: called with (samples done, samples at most).
 
     Returns:
         the lives as distributions.
@@ -125,37 +202,63 @@ def uncertain_life(
     """
     model = Model.of(robot, gravity_stiffness=gravity_stiffness, gravity_balanced=gravity_balanced)
     stress = ShaftStress.of(model.robot, sn_curve, None, residue, mean_stress)
-    notes = []
-    if inputs is None:
-        inputs = dict(DEFAULT_INPUTS)
-        if any(operation.excitation.width is None for operation in task.operations):
-            del inputs["width"]
-            notes.append("blows that state no width keep theirs")
-    for name in inputs:
-        if name not in DEFAULT_INPUTS:
-            raise InputError("unknown input", key="inputs", value=name, choices=DEFAULT_INPUTS)
-    places = rivets_of(model, task)
-    sampler = _Sampler(stress, places, [len(op.poses) for op in task.operations], poses)
-    varied = dict(inputs)
-    if any(curve.scatter for curve in stress.curves):
-        # A rank: ln of it is the specimen's standard normal score; each curve has its scatter.
-        varied["strength"] = Uncertain(1.0, 1.0)
-    plan = design(varied, samples=samples, seed=seed)
-    lives, used = sampler.run(plan.values, progress)
-    lives *= task.rivets_per_pass
+    notes: list[str] = []
+    sampler = _Sampler(model, task, stress, _inputs_of(model, task, stress, inputs, notes))
+    idle = sampler.without_effect()
+    if idle:
+        notes.append(f"without effect on the life by this method: the spread of {', '.join(idle)}")
+        kept = tuple(each for each in sampler.inputs if each.name not in idle)
+        sampler = _Sampler(model, task, stress, kept)
+    names = [each.name for each in sampler.inputs]
+    root = root_of(names, model.robot.posterior)
+    draws = Draws(len(names), seed)
+    most = samples or sampler.budget
+    lives, used = np.empty((2, len(stress.joints), draws.scores.shape[0], 0))
+    mixed = None
+    while True:
+        new = draws.more()
+        found = sampler.run(new.reshape(-1, len(names)) @ root)
+        shape = (len(stress.joints), *new.shape[:2])
+        lives = np.concatenate([lives, found[0].reshape(shape)], axis=2)
+        used = np.concatenate([used, found[1].reshape(shape)], axis=2)
+        done = draws.scores.shape[0] * draws.scores.shape[1]
+        if progress is not None:
+            progress(min(done, most), most)
+        weakest = summarise(names, draws.scores, lives.min(axis=0), used.max(axis=0))
+        if 2 * done > most or (done >= _FEWEST and weakest.settled(_NEAR)):
+            break
+    if totals:
+        rows = draws.mixed(_MIXED) @ root
+        mixed = sampler.run(rows.reshape(-1, len(names)))[1].reshape(len(used), len(names), -1)
     spreads = {
-        joint.name: plan.summarise(lives[k], used[k])
+        joint.name: summarise(
+            names, draws.scores, lives[k], used[k], None if mixed is None else mixed[k]
+        )
         for k, joint in enumerate(stress.joints)
-        if (used[k] > 0).all()
+        if (used[k] > 0).all() and (mixed is None or (mixed[k] > 0).all())
     }
+    posterior = model.robot.posterior
+    if posterior is not None and posterior.among(names) is not None:
+        notes.append(
+            "correlated values share independent normal factors by the symmetric root of their "
+            "correlation matrix; a share is that of the factor nearest to its value"
+        )
     return UncertainLife(
         joints=spreads,
-        robot=plan.summarise(lives.min(axis=0), used.max(axis=0)),
-        inputs=varied,
+        robot=summarise(
+            names,
+            draws.scores,
+            lives.min(axis=0),
+            used.max(axis=0),
+            None if mixed is None else mixed.max(axis=0),
+        ),
+        inputs={each.name: each.uncertain for each in sampler.inputs},
+        sources={each.name: each.source for each in sampler.inputs},
+        estimated=tuple(each.name for each in sampler.inputs if each.estimated),
+        scans=sampler.scans(),
         assumptions=(
-            "inputs vary independently; a factor on the stiffness is common to all joints",
-            f"{len(sampler.kept)} of {len(places)} poses sampled, the most strained; the rest keep "
-            "their nominal share of the damage",
+            "values with a spread of their own vary by it, one factor on the stiffness is common "
+            "to all other joints, and one on the damping",
             "shares are of the variance of ln utilisation, which is finite where life is not",
             *notes,
             *model.without_load(),
@@ -164,114 +267,390 @@ def uncertain_life(
     )
 
 
+# Samples before a narrow interval is believed.
+_FEWEST = 512
+
+
+@dataclass(frozen=True)
+class _Input:
+    """One thing that varies.
+
+    Attributes:
+        name: as results call it.
+        uncertain: its distribution.
+        source: where its spread is from.
+        key: "stiffness", "damping_ratio" or "radius" of joints, or what is varied as a whole.
+        joints: the flexible joints whose key it is; empty for what has no joint.
+        spread: a value that needs another robot; None otherwise.
+        estimated: an estimate without a stated spread.
+    """
+
+    name: str
+    uncertain: Uncertain
+    source: str
+    key: str
+    joints: tuple[int, ...] = ()
+    spread: Spread | None = None
+    estimated: bool = False
+
+
+_OF_A_JOINT = {("stiffness",): "stiffness", ("damping_ratio",): "damping_ratio",
+               ("shaft", "radius"): "radius"}  # fmt: skip
+
+
+def _inputs_of(
+    model: Model,
+    task: Task,
+    stress: ShaftStress,
+    given: Mapping[str, Uncertain] | None,
+    notes: list[str],
+) -> tuple[_Input, ...]:
+    """What varies: what is asked for, what the robot's files state, and the curves' scatter."""
+    robot = model.robot
+    source = "picchio's default" if given is None else "as asked for"
+    asked = dict(DEFAULT_INPUTS if given is None else given)
+    if given is None and any(op.excitation.width is None for op in task.operations):
+        del asked["width"]
+        notes.append("blows that state no width keep theirs")
+    own = dict(robot.spreads)
+    for joint in robot.flexible_joints:
+        for key in ("stiffness", "damping_ratio"):
+            each = Spread("joint", joint.name, (key,), getattr(joint, key), 0.0, True)
+            if each.name in asked:
+                own.setdefault(each.name, each)
+    found = []
+    taken: dict[str, set[int]] = {"stiffness": set(), "damping_ratio": set()}
+    index = {joint.name: j for j, joint in enumerate(robot.flexible_joints)}
+    for name, spread in own.items():
+        shape = "lognormal" if spread.log else "absolute"
+        middle = 1.0
+        if not spread.log:
+            value = spread.value
+            middle = value[spread.component or 0] if isinstance(value, tuple) else value
+        uncertain = Uncertain(middle, spread.size, shape)  # type: ignore[arg-type]
+        replaced = asked.pop(name, None)
+        told = replaced or uncertain
+        part = _OF_A_JOINT.get(spread.path) if spread.table == "joint" else None
+        where = source if replaced else spread.source
+        guess = spread.estimated and replaced is None
+        if part is None:
+            found.append(_Input(name, told, where, name, (), spread, guess))
+            continue
+        taken.setdefault(part, set()).add(index[spread.owner])
+        found.append(_Input(name, told, where, part, (index[spread.owner],), None, guess))
+    for name, uncertain in asked.items():
+        if name not in DEFAULT_INPUTS:
+            choices = [*DEFAULT_INPUTS, *own, *(f"stiffness.{j}" for j in index)]
+            raise InputError("unknown input", key="inputs", value=name,
+                             choices=dict.fromkeys(choices))  # fmt: skip
+        others = tuple(j for j in index.values() if j not in taken.get(name, ()))
+        if name in taken:
+            if not others:
+                continue
+            found.append(_Input(name, uncertain, source, name, others))
+        else:
+            found.append(_Input(name, uncertain, source, name))
+    if any(curve.scatter for curve in stress.curves):
+        # A rank: ln of it is the specimen's standard normal score; each curve has its scatter.
+        found.append(
+            _Input("strength", Uncertain(1.0, 1.0), "scatter of the S-N curves", "strength")
+        )
+    return tuple(found)
+
+
+@dataclass(frozen=True)
 class _Sampler:
     """Lives of the sampled worlds.
 
-    Args:
-        stress: the joints that count.
-        places: every rivet place, and the rivets of a pass set there.
-        blocks: places of each operation.
-        keep: how many of each operation and joint are sampled, the most strained ones.
-
     Attributes:
-        kept: indices of the places that are sampled.
+        model: the robot and its effects, as stated.
+        task: its work.
+        stress: the joints that count.
+        inputs: what varies.
     """
 
-    def __init__(
-        self,
-        stress: ShaftStress,
-        places: list[tuple[VariedRivet, float]],
-        blocks: list[int],
-        keep: int,
-    ) -> None:
-        self._stress = stress
-        found = [stress.cycles(place.varied()) for place, _ in places]
-        spent = np.array([[self._spend(k, *p, 1.0) for k, p in enumerate(pose)] for pose in found])
-        rivets = np.array([count for _, count in places])
-        kept: set[int] = set()
-        start = 0
-        for block in blocks:
-            order = np.argsort(-spent[start : start + block, :, 1], axis=0)
-            kept |= {start + int(i) for i in order[:keep].ravel()}
-            start += block
-        self.kept = sorted(kept)
-        self._places = [places[i] for i in self.kept]
-        # Each joint's factor, 1 or more, on the damage of the places that are kept.
-        whole, part = rivets @ spent[:, :, 0], rivets[self.kept] @ spent[self.kept, :, 0]
-        self._left_out = np.where(part > 0, whole / np.where(part > 0, part, 1.0), 1.0)
-        # Only of a linear model is the load proportional to the force.
-        self._nonlinear = any(place.nonlinear for place, _ in self._places)
+    model: Model
+    task: Task
+    stress: ShaftStress
+    inputs: tuple[_Input, ...]
 
-    def _spend(
-        self, k: int, cycles: Cycles, steady: float | FloatArray, factor: float
-    ) -> tuple[float, float]:
-        """Damage and utilisation of joint k with its stress times `factor`."""
-        load = Cycles.trusted(factor * cycles.range, factor * cycles.mean + steady, cycles.count)
-        curve, rule = self._stress.curves[k], self._stress.mean_stress
-        return damage(load, curve, rule), utilisation(load, curve, rule)
+    @cached_property
+    def _places(self) -> list[ManyPoses]:
+        return [ManyPoses(self.model, op.poses) for op in self.task.operations]
 
-    def _per_pass(self, **factors: float) -> list[tuple[Cycles, FloatArray]]:
-        """Each joint's cycles of all places, counted as often as rivets are set there.
+    @property
+    def _modal(self) -> bool:
+        """Whether compiled code can take the dynamics."""
+        return all(many.compiled for many in self._places)
 
-        Beside them the steady stress under each cycle, Pa.
+    @property
+    def _plain(self) -> bool:
+        """Whether compiled code can count the damage, too."""
+        return self.stress.residue == "half-cycles" and self.stress.mean_stress == "none"
+
+    @property
+    def _rebuilt(self) -> bool:
+        return any(each.spread is not None for each in self.inputs)
+
+    @property
+    def budget(self) -> int:
+        """Samples at most, by what one takes: micro-, tenths of or whole milliseconds a place."""
+        if not self._modal or (self._rebuilt and not self._plain):
+            return 256
+        return 16_384 if self._plain and not self._rebuilt else 2_048 if self._plain else 512
+
+    def run(self, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Rivets of the mix to failure, and utilisation, each (n_joints, m).
+
+        Args:
+            moved: (m, inputs) normal scores, correlated.
         """
-        found = [
-            self._stress.cycles(place.varied(**factors))  # type: ignore[arg-type]
-            for place, _ in self._places
+        rows = max(1, _BATCH // max(1, sum(len(op.poses) for op in self.task.operations)))
+        parts = [
+            self._batch(_Draw.of(self, moved[k : k + rows])) for k in range(0, len(moved), rows)
         ]
-        joined = []
-        for k in range(len(self._stress.joints)):
-            parts = [pose[k] for pose in found]
-            counts = [c.count * n for (c, _), (_, n) in zip(parts, self._places, strict=True)]
-            joined.append(
-                (
-                    Cycles.trusted(
-                        np.concatenate([cycles.range for cycles, _ in parts]),
-                        np.concatenate([cycles.mean for cycles, _ in parts]),
-                        np.concatenate(counts),
-                    ),
-                    np.concatenate([np.full(len(cycles), steady) for cycles, steady in parts]),
-                )
+        spent = np.concatenate([part[0] for part in parts], axis=1) / self.task.rivets_per_pass
+        used = np.concatenate([part[1] for part in parts], axis=1)
+        with np.errstate(divide="ignore"):
+            return np.where(spent > 0.0, 1.0 / spent, np.inf), used
+
+    def _batch(self, draw: _Draw) -> tuple[FloatArray, FloatArray]:
+        """Damage of a pass and utilisation, (n_joints, m) each."""
+        spent, used = np.zeros((2, len(self.stress.joints), draw.count))
+        plain = self._modal and self._plain
+        for op, many in zip(self.task.operations, self._places, strict=True):
+            damaged, loaded = (
+                self._compiled(draw, op, many) if plain else self._one_by_one(draw, op)
             )
-        return joined
+            spent += op.rivets * damaged.sum(axis=2)
+            np.maximum(used, loaded.max(axis=2), out=used)
+        return spent, used
 
-    def run(
-        self, values: Mapping[str, FloatArray], progress: Callable[[int, int], None] | None
+    def _compiled(
+        self, draw: _Draw, op: Operation, nominal: ManyPoses
     ) -> tuple[FloatArray, FloatArray]:
-        """Passes of the task to failure, and utilisation, each (n_joints, m)."""
-        runs = len(next(iter(values.values())))
-        one = np.ones(runs)
-        dynamic = {
-            "stiffness": values.get("stiffness", one),
-            "damping": values.get("damping_ratio", one),
-            "width": values.get("width", one),
-        }
-        force, load = values.get("force", one), values.get("model", one)
-        if self._nonlinear:
-            dynamic["force"] = force
-        else:
-            load = force * load
-        score = np.log(values["strength"]) if "strength" in values else np.zeros(runs)
-        lives = np.empty((len(self._stress.joints), runs))
-        used = np.empty_like(lives)
-        known: dict[tuple[float, ...], list[tuple[Cycles, FloatArray]]] = {}
-        for m in range(runs):
-            factors = {name: float(column[m]) for name, column in dynamic.items()}
-            key = tuple(factors.values())
-            if key not in known:
-                known[key] = self._per_pass(**factors)
-            for k, curve in enumerate(self._stress.curves):
-                factor = float(load[m] / _strength(curve, score[m]))
-                cycles, steady = known[key][k]
-                spent, used[k, m] = self._spend(k, cycles, steady, factor)
-                lives[k, m] = life(spent * self._left_out[k])
-            if progress is not None:
-                progress(m + 1, runs)
-        return lives, used
+        """(n_joints, m, p) each, of one operation."""
+        from picchio.studies.rivet.damage_kernel import damages
+
+        m, p = draw.count, len(op.poses)
+        worlds = [nominal]
+        if self._rebuilt:
+            models = (replace(self.model, robot=draw.robot(d)) for d in range(m))
+            worlds = [ManyPoses(model, op.poses) for model in models]
+        matrices = [world.mass_and_jacobian() for world in worlds]
+        mass = np.concatenate([mass for mass, _ in matrices])
+        jacobian = np.concatenate([jacobian for _, jacobian in matrices])
+        springs = np.concatenate([world.stiffness for world in worlds])
+        ratio = np.array([world.damping_ratio for world in worlds])
+        d, place = np.repeat(np.arange(m), p), np.tile(np.arange(p), m)
+        world = d if self._rebuilt else np.zeros_like(d)
+        place = place + p * world
+        forces = draw.forces(op)
+        curves: list[SNCurve | None] = [None] * springs.shape[1]
+        for column, curve in zip(self.stress.columns, self.stress.curves, strict=True):
+            curves[column] = curve
+        factor = np.zeros((m, springs.shape[1]))
+        factor[:, self.stress.columns] = stress_per_torque(self.stress.joints) * draw.load
+        frequency, low, high, damaged = np.empty((4, m * p, springs.shape[1]))
+        stiffness = springs[place] * draw.stiffness[d]
+        damages(
+            *stacked(forces), mass, jacobian, d if len(forces) > 1 else np.zeros_like(d), place,
+            stiffness, ratio[world] * draw.damping[d], np.tile(op.direction, (len(mass), 1)),
+            factor[d], *curve_tables(curves), frequency, low, high, damaged,
+        )  # fmt: skip
+        columns = self.stress.columns
+        allowable = np.array([curve.allowable for curve in self.stress.curves])
+        loaded = 0.5 * (stiffness * (high - low) * factor[d])[:, columns] / allowable
+        damaged = damaged[:, columns]
+        for row in np.flatnonzero(np.isnan(low[:, 0])):  # a mode that is not underdamped
+            pair = self._one(draw, int(d[row]), op, int(row) % p)
+            damaged[row], loaded[row] = np.array(pair).T
+        shape = (m, p, len(columns))
+        return damaged.reshape(shape).transpose(2, 0, 1), loaded.reshape(shape).transpose(2, 0, 1)
+
+    def _one_by_one(self, draw: _Draw, op: Operation) -> tuple[FloatArray, FloatArray]:
+        """As `_compiled`, for any model and any rule."""
+        found = np.array(
+            [[self._one(draw, d, op, i) for i in range(len(op.poses))] for d in range(draw.count)]
+        )
+        return found[..., 0].transpose(2, 0, 1), found[..., 1].transpose(2, 0, 1)
+
+    def _one(self, draw: _Draw, d: int, op: Operation, i: int) -> list[tuple[float, float]]:
+        """Damage and utilisation of every joint with a shaft, at one place of one world."""
+        found = []
+        loads = list(draw.loads(d, op, i))
+        for k, (joint, column) in enumerate(
+            zip(self.stress.joints, self.stress.columns, strict=True)
+        ):
+            assert joint.shaft is not None
+            rest, stiffness, static = loads[column]
+            cycles = rainflow(
+                shear_stress(stiffness * rest, joint.shaft), residue=self.stress.residue
+            )
+            factor = draw.load[d, k]
+            steady = float(shear_stress(static, joint.shaft)) * draw.thinner[d, k]
+            load = Cycles.trusted(
+                factor * cycles.range, factor * cycles.mean + steady, cycles.count
+            )
+            curve, rule = self.stress.curves[k], self.stress.mean_stress
+            found.append((damage(load, curve, rule), utilisation(load, curve, rule)))
+        return found
+
+    @cached_property
+    def static_torque(self) -> list[list[FloatArray]]:
+        """Of every place, (n,) N m before the first blow: no stiffness changes it."""
+        return [
+            [
+                Rivet(self.model, op, pose).static_torque(op.excitation, op.direction)
+                for pose in op.poses
+            ]
+            for op in self.task.operations
+        ]
+
+    def without_effect(self) -> list[str]:
+        """The inputs that need another robot, and leave its lives as they are."""
+        asked = [i for i, each in enumerate(self.inputs) if each.spread is not None]
+        if not asked:
+            return []
+        moved = np.zeros((len(asked) + 1, len(self.inputs)))
+        moved[np.arange(1, len(asked) + 1), asked] = 1.0
+        found = np.concatenate(self.run(moved))
+        same = (found == found[:, :1]).all(axis=0)
+        return [self.inputs[i].name for k, i in enumerate(asked) if same[k + 1]]
+
+    def scans(self) -> dict[str, LifeScan]:
+        """The stiffnesses along which the robot's life turns."""
+        found = {}
+        score = np.linspace(-2.0, 2.0, _SCAN)
+        for i, each in enumerate(self.inputs):
+            if each.key != "stiffness":
+                continue
+            moved = np.zeros((_SCAN, len(self.inputs)))
+            moved[:, i] = score
+            scan = LifeScan(each.uncertain.at(score), self.run(moved)[0].min(axis=0))
+            if scan.turns:
+                found[each.name] = scan
+        return found
 
 
-def _strength(curve: SNCurve, score: float) -> float:
-    """A specimen's strength over the curve's: 1 where the curve has no scatter."""
+@dataclass(frozen=True)
+class _Draw:
+    """Some drawn worlds: m of them.
+
+    Attributes:
+        sampler: what they are drawn for.
+        stiffness: (m, n) factors on the flexible joints' stiffness.
+        damping: (m, n) factors on their damping ratios.
+        thinner: (m, k) factors on the stress of the joints that count, by their shafts' radii.
+        load: (m, k) all factors on the stress of the vibration, strength included.
+        width: (m,) factors on the blows' width.
+        force: (m,) factors on the blows' force, where that is not a factor on the stress.
+        others: spreads of values that need another robot, and their (m,) scores.
+    """
+
+    sampler: _Sampler
+    stiffness: FloatArray
+    damping: FloatArray
+    thinner: FloatArray
+    load: FloatArray
+    width: FloatArray
+    force: FloatArray
+    others: list[tuple[Spread, FloatArray]]
+
+    @property
+    def count(self) -> int:
+        """How many worlds, m."""
+        return len(self.width)
+
+    @classmethod
+    def of(cls, sampler: _Sampler, moved: FloatArray) -> _Draw:
+        """From normal scores (m, inputs)."""
+        m, n = len(moved), len(sampler.model.robot.flexible_joints)
+        of_joints = {key: np.ones((m, n)) for key in ("stiffness", "damping_ratio", "radius")}
+        whole = {key: np.ones(m) for key in ("force", "width", "model", "strength")}
+        others = []
+        for i, each in enumerate(sampler.inputs):
+            if each.spread is not None:
+                size = replace(each.spread, size=each.uncertain.spread)
+                others.append((size, moved[:, i]))
+                continue
+            values = each.uncertain.at(moved[:, i])
+            if each.joints:
+                of_joints[each.key][:, list(each.joints)] *= values[:, None]
+            else:
+                whole[each.key] = values
+        stress = sampler.stress
+        thinner = of_joints["radius"][:, stress.columns] ** -3.0
+        score = np.log(whole["strength"])
+        strength = np.stack([_strength(curve, score) for curve in stress.curves], axis=1)
+        load = whole["model"][:, None] * thinner / strength
+        # Only of a linear model is the load proportional to the force.
+        force = whole["force"]
+        if not sampler.model.nonlinear:
+            load, force = load * force[:, None], np.ones(m)
+        return cls(sampler, of_joints["stiffness"], of_joints["damping_ratio"], thinner, load,
+                   whole["width"], force, others)  # fmt: skip
+
+    def robot(self, d: int) -> FlexibleRobot:
+        """The robot of world d, but for stiffness, damping and radii."""
+        values = [(spread, spread.at(float(score[d]))) for spread, score in self.others]
+        return robot_with(self.sampler.model.robot, values)
+
+    def blows(self, d: int, op: Operation) -> Operation:
+        """The operation in world d."""
+        scaled = op.excitation.scaled(force=float(self.force[d]), width=float(self.width[d]))
+        return replace(op, excitation=scaled)
+
+    def forces(self, op: Operation) -> list[Any]:
+        """The bursts of all worlds; one where they are the same."""
+        worlds = range(self.count) if (self.width != self.width[0]).any() else range(1)
+        model = self.sampler.model
+        return [model.force(self.blows(d, op).excitation, op.hits_per_rivet) for d in worlds]
+
+    def loads(self, d: int, op: Operation, i: int) -> Iterator[tuple[FloatArray, float, float]]:
+        """Every joint's turning points, rad, stiffness and static torque, N m, at a place."""
+        sampler = self.sampler
+        which = next(k for k, each in enumerate(sampler.task.operations) if each is op)
+        if sampler._modal and not self.others:
+            from picchio.studies.rivet.damage_kernel import swing
+
+            many = sampler._places[which]
+            mass, jacobian = many.mass_and_jacobian()
+            stiffness = many.stiffness[i] * self.stiffness[d]
+            force = sampler.model.force(self.blows(d, op).excitation, op.hits_per_rivet)
+            burst = [part[0] for part in stacked([force])]
+            turns, count = swing(
+                mass[i], jacobian[i], stiffness, many.damping_ratio * self.damping[d],
+                op.direction, np.full(len(stiffness), -1.0), burst[0], burst[1], burst[2],
+                burst[3], burst[4], np.empty(len(stiffness)),
+            )  # fmt: skip
+            if len(count):
+                static = sampler.static_torque[which][i]
+                for row, k, spring, torque in zip(turns, count, stiffness, static, strict=True):
+                    yield row[:k], float(spring), float(torque)
+                return
+        rivet = Rivet(self._model(d), self.blows(d, op), op.poses[i])
+        for load in rivet.loads("rest", both=False):
+            assert load.rest is not None
+            yield load.rest, load.stiffness, load.stiffness * load.static
+
+    def _model(self, d: int) -> Model:
+        """The whole model of world d."""
+        model, robot = self.sampler.model, self.robot(d)
+        factors = zip(robot.flexible_joints, self.damping[d], strict=True)
+        joints = tuple(replace(j, damping_ratio=f * j.damping_ratio) for j, f in factors)
+        # Factors go onto the springs as the effects leave them.
+        effects = [
+            JointStiffness(joint.name, scale=float(factor))
+            for joint, factor in zip(joints, self.stiffness[d], strict=True)
+            if factor != 1.0
+        ]
+        varied = replace(model, robot=replace(robot, flexible_joints=joints))
+        return replace(varied, effects=(*model.effects, *effects)) if effects else varied
+
+
+def _strength(curve: SNCurve, score: FloatArray) -> FloatArray:
+    """Specimens' strength over the curve's: 1 where the curve has no scatter."""
     if curve.survival is None or not curve.scatter:
-        return 1.0
-    return float(10.0 ** (curve.scatter * (score + NormalDist().inv_cdf(curve.survival))))
+        return np.ones_like(score)
+    return np.asarray(10.0 ** (curve.scatter * (score + NormalDist().inv_cdf(curve.survival))))

@@ -236,7 +236,7 @@ def _elements(
         if target is None:
             own = {key: value for key, value in values.items() if key in attributes}
         else:
-            own = values[target].model_dump(exclude_none=True) if target in values else {}
+            own = given(values[target]) if target in values else {}
         if own:
             elements.append(_element(prefix, tag, own, attributes))
     return elements

@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from picchio.core.errors import InputError
-from picchio.robot.annotations.sidecar import Sidecar, given
+from picchio.core.toml import StrictModel
+from picchio.robot.annotations.sidecar import JointEntry, Sidecar, given, spreads_within
 from picchio.robot.drives.reducer import Reducer, find_reducer
 from picchio.robot.joint import Joint
+from picchio.robot.spread import Spread, numbers_of, overlaid, spreads_in, value_of
 from picchio.robot.urdf.tree import MOVABLE, UrdfJoint, UrdfTree
 
 DEFAULT_DAMPING_RATIO = 0.03
@@ -62,14 +64,14 @@ def strongest(sources: Sequence[Source], table: str) -> tuple[dict[str, Any], di
     for source in reversed(sources):
         found = given(getattr(source.content, table))
         note = found.pop("source", None)
-        values |= found
+        values = overlaid(values, found)
         origins |= {f"{table}.{key}": source.origin(note) for key in found}
     return values, origins
 
 
 def flexible_joints(
     tree: UrdfTree, sources: Sequence[Source], reducers: Mapping[str, Reducer] | None = None
-) -> tuple[dict[str, Joint], dict[str, str]]:
+) -> tuple[dict[str, Joint], dict[str, str], list[Spread]]:
     """Merge the sources.
 
     Args:
@@ -78,8 +80,8 @@ def flexible_joints(
         reducers: those that can be named; the shipped ones if None.
 
     Returns:
-        Flexible joints by name in the URDF's order, and origins such as
-        `{"joint_1.stiffness": "flex.toml: 'Dumas 2011'"}`.
+        Flexible joints by name in the URDF's order; origins such as
+        `{"joint_1.stiffness": "flex.toml: 'Dumas 2011'"}`; how well their values are known.
 
     Raises:
         InputError: an unknown joint, one that cannot be flexible, values that do not fit it.
@@ -88,17 +90,30 @@ def flexible_joints(
         check_names(tree, source)
     joints: dict[str, Joint] = {}
     origins: dict[str, str] = {}
+    spreads: list[Spread] = []
     for name, urdf in tree.joints.items():
-        values, where = _merge(name, sources)
+        values, where, guessed = _merge(name, sources)
         if "reducer" in values:
             _resolve(name, values, where, sources, reducers)
-        if "stiffness" not in values and "stiffness_curve" not in values:
+        flexible = "stiffness" in values or "stiffness_curve" in values
+        if "stiffness_curve" in values:
+            values["stiffness"] = values["stiffness_curve"].k1
+        known = {"damping_ratio": DEFAULT_DAMPING_RATIO, **values}
+        try:
+            found = _spreads(name, known, where, guessed)
+        except InputError as error:
+            key = (error.key or "").rpartition(".")[2]
+            said = (s for s in sources if key in given(s.content.joint.get(name)))
+            raise error.placed(file=next((s.file for s in said), None)) from None
+        if not flexible:
             continue
-        joints[name] = _joint(urdf, values, where, tree)
+        spreads += found
+        known = {key: value for key, value in values.items() if value_of(key) == key}
+        joints[name] = _joint(urdf, known, where, tree)
         if "damping_ratio" not in values:
             where["damping_ratio"] = "picchio's default, not measured"
         origins.update({f"{name}.{key}": text for key, text in where.items()})
-    return joints, origins
+    return joints, origins, spreads
 
 
 def unused_entries(sources: Sequence[Source], joints: Iterable[str]) -> Iterator[str]:
@@ -176,22 +191,50 @@ def _resolve(
         where[key] = f"{ITS_REDUCER} {reducer.name} ({reducer.source})"
 
 
-def _merge(name: str, sources: Sequence[Source]) -> tuple[dict[str, Any], dict[str, str]]:
+def _merge(name: str, sources: Sequence[Source]) -> tuple[dict[str, Any], dict[str, str], set[str]]:
+    """Every key's value, where it is from, and which values are estimates."""
     values: dict[str, Any] = {}
     where: dict[str, str] = {}
+    guessed: set[str] = set()
     for source in sources:
         entry = source.content.joint.get(name)
         if entry is None:
             continue
+        stronger = set(values)
         for key, value in given(entry).items():
             if key == "source" or key in values or EXCLUDED.get(key) in values:
+                continue
+            # A spread is about the value beside it, not about a stronger source's.
+            if value_of(key) in stronger or EXCLUDED.get(value_of(key)) in stronger:
                 continue
             # An estimate is a statement about the stiffness given beside it.
             if key == "estimated" and not entry.flexible:
                 continue
             values[key] = value
             where[key] = source.origin(entry.source)
-    return values, where
+            if entry.estimated and entry.flexible and not stronger & set(_spread_keys(key)):
+                guessed |= {key, *entry.implied}
+    return values, where, guessed
+
+
+def _spread_keys(key: str) -> tuple[str, str]:
+    return f"{key}_spread", f"{key}_std"
+
+
+def _spreads(
+    name: str, values: dict[str, Any], where: dict[str, str], guessed: set[str]
+) -> list[Spread]:
+    """How well a joint's values are known, those of its shaft and balancer included."""
+    found: list[Spread] = []
+    for key in numbers_of(JointEntry):
+        own = {k: values[k] for k in (key, *_spread_keys(key)) if k in values}
+        source = next((where[k] for k in _spread_keys(key) if k in where), where.get(key, ""))
+        found += spreads_in(JointEntry, own, {key} & guessed, table="joint", owner=name,
+                            source=source)  # fmt: skip
+    for key, value in values.items():
+        if isinstance(value, StrictModel):
+            found += spreads_within(value, "joint", name, (key,), where[key])
+    return found
 
 
 def _joint(urdf: UrdfJoint, values: dict[str, Any], where: dict[str, str], tree: UrdfTree) -> Joint:
@@ -202,8 +245,6 @@ def _joint(urdf: UrdfJoint, values: dict[str, Any], where: dict[str, str], tree:
                 raise InputError(f"a prismatic joint has no torsion {key}; its spring is in N/m "
                                  "and its load a force", key=f"joint.{urdf.name}.{key}",
                                  file=where[key])  # fmt: skip
-    if "stiffness_curve" in values:
-        values["stiffness"] = values["stiffness_curve"].k1
     return Joint(
         name=urdf.name,
         kind=kind,

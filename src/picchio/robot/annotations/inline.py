@@ -2,7 +2,8 @@
 
 In a `<joint>`: `<picchio:flexibility>`, `<picchio:shaft>`, `<picchio:stiffness_curve>`,
 `<picchio:balancer>`. In a `<link>`: `<picchio:inertial>`. In `<robot>`: `<picchio:tool>`,
-`<picchio:gun>`, `<picchio:links>`, `<picchio:base>`.
+`<picchio:gun>`, `<picchio:links>`, `<picchio:base>`, `<picchio:posterior>` (the correlation's
+rows one after another).
 The prefix is bound to `urn:picchio:1`; another version is refused by name.
 """
 
@@ -19,6 +20,7 @@ from picchio.core.toml import StrictModel, leaf_types, validate
 from picchio.robot.annotations.sidecar import FORMAT, JointEntry, Sidecar
 from picchio.robot.joint import Balancer, Shaft, StiffnessCurve
 from picchio.robot.link import LinkEntry, LinkMasses
+from picchio.robot.spread import Posterior
 from picchio.robot.tool import Gun, Mounting, Tool
 from picchio.robot.urdf.tree import to_number
 from picchio.robot.urdf.xml import NAMESPACE, local_name
@@ -48,6 +50,7 @@ IN_ROBOT = {
     "gun": _attributes_of(Gun),
     "links": _attributes_of(LinkMasses),
     "base": _attributes_of(Mounting),
+    "posterior": _attributes_of(Posterior),
 }
 
 
@@ -140,6 +143,8 @@ def _convert(text: str, kind: Any, key: str) -> Any:
         if text not in ("true", "false"):
             raise InputError("is neither true nor false", key=key, value=text)
         return text == "true"
+    if kind == tuple[str, ...]:
+        return text.split()
     try:
         return to_number(text) if kind is float else [to_number(part) for part in text.split()]
     except ValueError as error:

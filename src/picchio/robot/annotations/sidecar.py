@@ -26,6 +26,7 @@ frame = "tool0"
 xyz = [0.0, 0.0, 0.1]        # m, from the frame to where the force acts
 axis = [0.0, 0.0, 1.0]       # the way the tool points, in the frame
 mass = 2.0                   # kg
+mass_std = 0.1               # kg, one standard deviation
 com = [0.0, 0.0, 0.05]       # m, in the frame
 inertia = [0.01, 0, 0, 0.01, 0, 0.01]   # kg m^2 about com: ixx ixy ixz iyy iyz izz
 
@@ -48,7 +49,15 @@ shapes = "collision"         # or "visual"
 xyz = [0.0, 0.0, 0.0]        # m
 rpy = [0.0, 0.0, 0.0]        # rad
 gravity = [0.0, 0.0, -9.81]  # m/s^2, world
+
+[posterior]                  # optional: how values with a spread hang together
+names = ["stiffness.elbow_joint", "mass.tool"]
+correlation = [[1.0, -0.3], [-0.3, 1.0]]
 ```
+
+Every number may have a spread beside it, here and in annotations: `stiffness_spread = 2.0` (a
+factor: one standard deviation of the logarithm is ln 2) or `stiffness_std = 1e4` (one standard
+deviation, absolute). An `estimated = true` without a spread is a factor of 2.
 """
 
 from __future__ import annotations
@@ -61,11 +70,13 @@ from pydantic import Field, model_validator
 from picchio.core.toml import Finite, NotNegative, StrictModel, parse_toml
 from picchio.robot.joint import Balancer, Shaft, Stiffness, StiffnessCurve
 from picchio.robot.link import LinkEntry, LinkMasses
+from picchio.robot.spread import Posterior, Spread, spreads_in, with_spreads
 from picchio.robot.tool import Gun, Mounting, Tool
 
 FORMAT = "picchio-sidecar/1"
 
 
+@with_spreads
 class JointEntry(StrictModel):
     """One joint's drive.
 
@@ -82,7 +93,8 @@ class JointEntry(StrictModel):
         gear_ratio: 1, motor turns for one turn of the joint.
         balancer: a spring that carries part of the gravity torque.
         source: where the values come from.
-        estimated: true if the values were not measured.
+        estimated: true if stiffness and damping ratio were not measured: each without a spread
+            of its own is then uncertain by a factor of 2.
     """
 
     stiffness: Stiffness | None = None
@@ -100,6 +112,16 @@ class JointEntry(StrictModel):
     def flexible(self) -> bool:
         """Whether it gives the joint a spring; a reducer's is in its catalogue."""
         return any(x is not None for x in (self.stiffness, self.stiffness_curve, self.reducer))
+
+    @property
+    def implied(self) -> dict[str, Any]:
+        """Values that others stand for: a curve's slope at no load is the stiffness.
+
+        A reducer's is in its catalogue; here it counts as 1.
+        """
+        if self.stiffness_curve is not None:
+            return {"stiffness": self.stiffness_curve.k1}
+        return {"stiffness": 1.0} if self.reducer and self.stiffness is None else {}
 
     @model_validator(mode="after")
     def _one_stiffness(self) -> Self:
@@ -122,6 +144,7 @@ class Sidecar(StrictModel):
         link: masses in place of the URDF's, by its links' names.
         links: a total mass, spread over the links by the volume of their shapes.
         base: how the robot stands.
+        posterior: how values with a spread hang together.
     """
 
     robot: str | None = None
@@ -132,6 +155,17 @@ class Sidecar(StrictModel):
     link: dict[str, LinkEntry] = Field(default_factory=dict)
     links: LinkMasses | None = None
     base: Mounting | None = None
+    posterior: Posterior | None = None
+
+    @model_validator(mode="after")
+    def _known_names(self) -> Self:
+        if self.posterior is not None:
+            known = [spread.name for spread in spreads_of(self)]
+            for name in self.posterior.names:
+                if name not in known:
+                    raise ValueError(f"[posterior] names {name!r}, which has no spread; those that "
+                                     f"have one: {', '.join(known) or 'none'}")  # fmt: skip
+        return self
 
 
 def read_sidecar(path: str | Path) -> Sidecar:
@@ -150,3 +184,56 @@ def given(entry: StrictModel | None) -> dict[str, Any]:
     written = entry.model_fields_set  # a set: its own order changes from run to run
     return {name: getattr(entry, name) for name in type(entry).model_fields
             if name in written and getattr(entry, name) is not None}  # fmt: skip
+
+
+def spreads_of(content: Sidecar) -> list[Spread]:
+    """Every value of a sidecar with a spread, stated or as an estimate.
+
+    Args:
+        content: what one file says, before others join it.
+
+    Raises:
+        InputError: as `picchio.robot.spread.spreads_in`.
+    """
+    found: list[Spread] = []
+    for table, field in type(content).model_fields.items():
+        value = getattr(content, table)
+        owners = value if isinstance(value, dict) else {"": value}
+        for owner, record in owners.items():
+            if isinstance(record, StrictModel) and field.annotation is not None:
+                found += spreads_within(record, table, owner, elsewhere=True)
+    return found
+
+
+def spreads_within(
+    record: StrictModel,
+    table: str,
+    owner: str = "",
+    path: tuple[str, ...] = (),
+    source: str = "",
+    elsewhere: bool = False,
+) -> list[Spread]:
+    """The spreads that a record states, tables within it included.
+
+    Args:
+        record: the table.
+        table: see `spreads_in`; likewise the rest.
+        owner: see `spreads_in`.
+        path: see `spreads_in`.
+        source: see `spreads_in`.
+        elsewhere: see `spreads_in`.
+
+    Raises:
+        InputError: as `picchio.robot.spread.spreads_in`.
+    """
+    values = {**given(record), **getattr(record, "implied", {})}
+    guessed = values if values.get("estimated") else ()
+    kind = type(record)
+    found = list(
+        spreads_in(kind, values, guessed, table=table, owner=owner, path=path, source=source,
+                   elsewhere=elsewhere)
+    )  # fmt: skip
+    for key, value in values.items():
+        if isinstance(value, StrictModel):
+            found += spreads_within(value, table, owner, (*path, key), source, elsewhere)
+    return found

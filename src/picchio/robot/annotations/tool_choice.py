@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from picchio.core.errors import InputError
 from picchio.robot.annotations.flexibility import Source, strongest
 from picchio.robot.annotations.other_tags import Srdf
-from picchio.robot.annotations.sidecar import given
+from picchio.robot.annotations.sidecar import given, spreads_within
+from picchio.robot.spread import Posterior, Spread
 from picchio.robot.tool import Gun, Mounting, Tool
 from picchio.robot.urdf.tree import UrdfTree
 
@@ -80,3 +82,39 @@ def choose_mounting(sources: Sequence[Source]) -> tuple[Mounting, dict[str, str]
     """How the robot stands: of each value the strongest source's."""
     values, origins = strongest(sources, "base")
     return Mounting.model_construct(**values), origins
+
+
+def mounted_spreads(
+    tool: Tool, gun: Gun | None, mounting: Mounting, origins: dict[str, str]
+) -> list[Spread]:
+    """How well the values of tool, gun and mounting are known.
+
+    Args:
+        tool: as chosen.
+        gun: as chosen.
+        mounting: as chosen.
+        origins: where their values are from.
+
+    Raises:
+        InputError: a factor on zero.
+    """
+    found: list[Spread] = []
+    for table, record in (("tool", tool), ("gun", gun), ("base", mounting)):
+        if record is not None:
+            for spread in spreads_within(record, table):
+                source = origins.get(f"{table}.{spread.path[0]}", "")
+                found.append(replace(spread, source=source))
+    return found
+
+
+def choose_posterior(sources: Sequence[Source], spreads: Sequence[Spread]) -> Posterior | None:
+    """The correlations of the strongest source that has some, among the values that are its own.
+
+    Args:
+        sources: the strongest first.
+        spreads: of the robot as merged.
+    """
+    for source in sources:
+        if (posterior := source.content.posterior) is not None:
+            return posterior.among({s.name for s in spreads if s.source.startswith(source.label)})
+    return None

@@ -15,7 +15,13 @@ from picchio.robot.annotations.flexibility import Source, flexible_joints, unuse
 from picchio.robot.annotations.inline import read_annotations
 from picchio.robot.annotations.other_tags import Srdf, find_srdf, read_drake
 from picchio.robot.annotations.sidecar import FORMAT, Sidecar, read_sidecar
-from picchio.robot.annotations.tool_choice import choose_gun, choose_mounting, choose_tool
+from picchio.robot.annotations.tool_choice import (
+    choose_gun,
+    choose_mounting,
+    choose_posterior,
+    choose_tool,
+    mounted_spreads,
+)
 from picchio.robot.drives.reducer import all_reducers
 from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -90,14 +96,17 @@ def _load(
     tree = read_tree(root, found.urdf)
     srdf = find_srdf(tree)
     sources, flex_file = _sources(root, found, flex, values, srdf)
-    joints, origins = flexible_joints(tree, sources, all_reducers(reducers))
-    tree, mass_origins = give_masses(tree, sources, root)
+    joints, origins, spreads = flexible_joints(tree, sources, all_reducers(reducers))
+    tree, mass_origins, mass_spreads = give_masses(tree, sources, root)
+    spreads += mass_spreads
     _check_balancers(sources, joints)
     for remark in _remarks(tree, sources, joints, origins):
         warn_user(remark)
     chosen_tool, tool_origins = choose_tool(tree, tool, sources, srdf)
     gun, gun_origins = choose_gun(sources)
     mounting, base_origins = choose_mounting(sources)
+    mounted = {**tool_origins, **gun_origins, **mass_origins, **base_origins}
+    spreads += mounted_spreads(chosen_tool, gun, mounting, mounted)
     urdf, tool_point, recoil = normalise(tree, chosen_tool, gun, mounting)
     rigid = RigidModel(urdf, tree, mounting.gravity)
     if gun is not None and gun.recoil_stiffness is not None and recoil is not None:
@@ -123,13 +132,15 @@ def _load(
         gun=gun,
         mounting=mounting,
         flexible_joints=tuple(joints[name] for name in rigid.joint_names if name in joints),
-        origins={**origins, **tool_origins, **gun_origins, **mass_origins, **base_origins},
+        origins={**origins, **mounted},
         named_poses={
             pose: tuple(values.get(name, 0.0) for name in rigid.joint_names)
             for pose, values in (srdf.poses if srdf else {}).items()
         },
         rigid=rigid,
         tool_point=tool_point,
+        spreads={spread.name: spread for spread in spreads},
+        posterior=choose_posterior(sources, spreads),
     )
     check_masses(result)
     for doubt in doubts_about_masses(result, root):

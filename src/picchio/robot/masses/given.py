@@ -11,16 +11,17 @@ from lxml import etree
 from picchio.core.errors import InputError
 from picchio.robot.annotations.flexibility import Source, strongest
 from picchio.robot.annotations.sidecar import given
-from picchio.robot.link import LinkMasses
+from picchio.robot.link import LinkEntry, LinkMasses
 from picchio.robot.masses.by_volume import Body, bodies
+from picchio.robot.spread import Spread, overlaid, spreads_in
 from picchio.robot.urdf.check import bad_inertia
 from picchio.robot.urdf.tree import ZERO, Inertial, UrdfTree
 
 
 def give_masses(
     tree: UrdfTree, sources: Sequence[Source], root: etree._Element
-) -> tuple[UrdfTree, dict[str, str]]:
-    """The tree with the masses that the sources give, and where these are from.
+) -> tuple[UrdfTree, dict[str, str], list[Spread]]:
+    """The tree with the masses that the sources give, where these are from, how well known.
 
     Args:
         tree: the robot.
@@ -28,7 +29,8 @@ def give_masses(
         root: of the URDF, for the links' shapes.
 
     Returns:
-        the tree, and origins such as `{"link.forearm.mass": "flex.toml: weighed"}`.
+        the tree; origins such as `{"link.forearm.mass": "flex.toml: weighed"}`; the masses'
+        spreads.
 
     Raises:
         InputError: a mass without a centre of mass, an impossible inertia, a total
@@ -36,11 +38,12 @@ def give_masses(
     """
     values: dict[str, dict[str, Any]] = {}
     origins: dict[str, str] = {}
+    spreads: list[Spread] = []
     for source in reversed(sources):
         for name, entry in source.content.link.items():
             stated = given(entry)
             note = stated.pop("source", None)
-            values.setdefault(name, {}).update(stated)
+            values[name] = overlaid(values.get(name, {}), stated)
             origins |= {f"link.{name}.{key}": source.origin(note) for key in stated}
     links = dict(tree.links)
     spread, where = strongest(sources, "links")
@@ -54,8 +57,15 @@ def give_masses(
             for key in ("mass", "com", "inertia"):
                 origins.setdefault(f"link.{name}.{key}", origin)
     for name, stated in values.items():
-        links[name] = _given(links[name], stated, f"link.{name}")
-    return replace(tree, links=links), origins
+        links[name] = made = _given(links[name], stated, f"link.{name}")
+        # A spread may stand alone: the value is then the URDF's.
+        known = {"mass": made.mass, "com": made.xyz, "inertia": made.inertia} | stated
+        guessed = stated if stated.get("estimated") else ()
+        for each in spreads_in(LinkEntry, known, guessed, table="link", owner=name):
+            keys = (f"link.{name}.{each.path[0]}{end}" for end in ("", "_spread", "_std"))
+            where_from = next((origins[key] for key in keys if key in origins), "")
+            spreads.append(replace(each, source=where_from))
+    return replace(tree, links=links), origins, spreads
 
 
 def _spread(

@@ -59,26 +59,70 @@ def history_damage(turns, factor, knots, lines, stack, ranges, means):  # type: 
     return total
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
-def damages(  # type: ignore[no-untyped-def]
-    start, duration, constant, slope, amplitude, wave, mass, jacobian, stiffness, joint_ratio,
-    along, factor, enough, knots, lines, known, frequency, lowest, highest, damage,
+@njit(cache=True, error_model="numpy")
+def swing(  # type: ignore[no-untyped-def]
+    mass, jacobian, stiffness, joint_ratio, along, limit, duration, constant, slope, amplitude,
+    wave, frequency,
 ):  # fmt: skip
-    """Extremes and damage of one rivet at many poses.
+    """Every joint's turning points from rest, ring-down included.
 
     Args:
-        start: (m,) s, of the pieces of a burst; see `PiecewiseForce` for these.
-        duration: (m,) s, the last endless.
+        mass: (n, n) kg m^2.
+        jacobian: (3, n) m.
+        stiffness: (n,) N m/rad.
+        joint_ratio: (n,) damping ratios.
+        along: (3,) force direction.
+        limit: (n,) rad; see `turns_from_rest`.
+        duration: (m,) s, of the pieces of the burst; see `damages` for these.
         constant: (m,) N.
         slope: (m,) N/s.
         amplitude: (m,) complex N.
         wave: (m,) rad/s.
-        mass: (p, n, n) kg m^2.
-        jacobian: (p, 3, n) m.
+        frequency: (n,) Hz, out; left alone where the mass matrix is not positive definite.
+
+    Returns:
+        (n, k) rad, and how many of the k each joint has; none of either where a mode is not
+        underdamped.
+    """
+    n = stiffness.shape[0]
+    work, vectors, shapes = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    omega, ratio, weights = np.empty(n), np.empty(n), np.empty((n, n))
+    poles = np.empty(n, dtype=np.complex128)
+    if not modes_of(
+        mass, stiffness, joint_ratio, work, vectors, omega, ratio, shapes, frequency, poles
+    ):
+        return np.empty((0, 0)), np.empty(0, dtype=np.int64)
+    for i in range(n):
+        moved = 0.0
+        for d in range(3):
+            for j in range(n):
+                moved += jacobian[d, j] * shapes[j, i] * along[d]
+        for j in range(n):
+            weights[j, i] = shapes[j, i] * moved
+    return turns_from_rest(poles, weights, limit, duration, constant, slope, amplitude, wave)
+
+
+@njit(cache=True, parallel=True, error_model="numpy")
+def damages(  # type: ignore[no-untyped-def]
+    duration, constant, slope, amplitude, wave, mass, jacobian, blows, place, stiffness,
+    joint_ratio, along, factor, enough, knots, lines, known, frequency, lowest, highest, damage,
+):  # fmt: skip
+    """Extremes and damage of p rivets: at many poses, or one varied many times.
+
+    Args:
+        duration: (b, m) s, of the pieces of b bursts, the last endless; see `PiecewiseForce`.
+        constant: (b, m) N.
+        slope: (b, m) N/s.
+        amplitude: (b, m) complex N.
+        wave: (b, m) rad/s.
+        mass: (q, n, n) kg m^2.
+        jacobian: (q, 3, n) m.
+        blows: (p,) which of the bursts.
+        place: (p,) which of the masses and Jacobians.
         stiffness: (p, n) N m/rad.
-        joint_ratio: (n,) damping ratios.
-        along: (p, 3) force directions.
-        factor: (n,) 1/m^3, shear stress per torque; zero without a shaft.
+        joint_ratio: (p, n) damping ratios.
+        along: (q, 3) force directions.
+        factor: (p, n) 1/m^3, shear stress per torque; zero without a shaft.
         enough: (n,) Pa, amplitudes below this do no damage.
         knots: (n, k) Pa, of the S-N curves; see `cost_of`.
         lines: (n, k + 1, 3).
@@ -91,31 +135,18 @@ def damages(  # type: ignore[no-untyped-def]
     """
     poses, n = stiffness.shape
     for block in prange((poses + _BLOCK - 1) // _BLOCK):
-        work, vectors, shapes = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-        omega, ratio = np.empty(n), np.empty(n)
-        weights, limit = np.empty((n, n)), np.empty(n)
-        poles = np.empty(n, dtype=np.complex128)
+        limit = np.empty(n)
         for s in range(block * _BLOCK, min(poses, (block + 1) * _BLOCK)):
             frequency[s, :] = np.nan
             lowest[s, :] = np.nan
-            if not modes_of(
-                mass[s], stiffness[s], joint_ratio, work, vectors, omega, ratio, shapes,
-                frequency[s], poles,
-            ):  # fmt: skip
-                continue
-            for i in range(n):
-                moved = 0.0
-                for d in range(3):
-                    for j in range(n):
-                        moved += jacobian[s, d, j] * shapes[j, i] * along[s, d]
-                for j in range(n):
-                    weights[j, i] = shapes[j, i] * moved
             for j in range(n):
-                stress = factor[j] * stiffness[s, j]
+                stress = factor[s, j] * stiffness[s, j]
                 limit[j] = 2.0 * enough[j] / stress if stress > 0.0 else np.inf
-            turns, count = turns_from_rest(
-                poles, weights, limit, duration, constant, slope, amplitude, wave
-            )
+            q, b = place[s], blows[s]
+            turns, count = swing(
+                mass[q], jacobian[q], stiffness[s], joint_ratio[s], along[q], limit,
+                duration[b], constant[b], slope[b], amplitude[b], wave[b], frequency[s],
+            )  # fmt: skip
             size = turns.shape[1]
             if size == 0:
                 continue
@@ -126,6 +157,6 @@ def damages(  # type: ignore[no-untyped-def]
                 damage[s, j] = 0.0
                 if known[j] >= 0 and highest[s, j] - lowest[s, j] >= limit[j]:
                     damage[s, j] = history_damage(
-                        own, factor[j] * stiffness[s, j], knots[j, : known[j]],
+                        own, factor[s, j] * stiffness[s, j], knots[j, : known[j]],
                         lines[j, : known[j] + 1], stack, ranges, means,
                     )  # fmt: skip

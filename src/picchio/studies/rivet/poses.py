@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.excitation.excitation import Excitation
+from picchio.excitation.piecewise import PiecewiseForce
 from picchio.fatigue.shaft_stress import stress_per_torque
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.many_poses import ManyPoses
@@ -88,10 +89,11 @@ def damage_at(
 
         factor = stress_per_torque(model.robot.flexible_joints, 0.0)
         mass, jacobian = many.mass_and_jacobian()
+        here = np.arange(len(poses))
         damages(
-            force.start, force.duration, force.constant, force.slope, force.amplitude,
-            force.angular_frequency, mass, jacobian, many.stiffness, many.damping_ratio, along,
-            factor, *curve_tables(curves), found.natural_frequencies, found.lowest, found.highest,
+            *stacked([force]), mass, jacobian, np.zeros_like(here), here, many.stiffness,
+            np.tile(many.damping_ratio, (len(poses), 1)), along, np.tile(factor, (len(poses), 1)),
+            *curve_tables(curves), found.natural_frequencies, found.lowest, found.highest,
             found.damage,
         )  # fmt: skip
         left = np.isnan(found.lowest[:, 0]) & ~np.isnan(found.natural_frequencies[:, 0])
@@ -114,6 +116,32 @@ def _exactly(rivet: Rivet, curves: Sequence[SNCurve | None], found: BatchDamage,
         curve = curves[j]
         if curve is not None:
             found.damage[s, j] = RainflowRule()(joint, load, hits, curve).damage
+
+
+def stacked(
+    forces: Sequence[PiecewiseForce],
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Bursts as the compiled code takes them: (b, m) each; empty pieces make them equally many.
+
+    Args:
+        forces: b of them.
+
+    Returns:
+        duration, constant, slope, amplitude and angular frequency, as of `PiecewiseForce`.
+    """
+    most = max(len(force.start) for force in forces)
+
+    def column(name: str) -> FloatArray:
+        rows = [getattr(force, name) for force in forces]
+        blank = [np.zeros(most - len(row), row.dtype) for row in rows]
+        return np.array(
+            [np.concatenate([r[:-1], b, r[-1:]]) for r, b in zip(rows, blank, strict=True)]
+        )
+
+    return (
+        column("duration"), column("constant"), column("slope"), column("amplitude"),
+        column("angular_frequency"),
+    )  # fmt: skip
 
 
 def peaks_at(

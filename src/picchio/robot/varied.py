@@ -1,0 +1,83 @@
+"""A robot with other values: what a spread leaves open, drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+from picchio.core.toml import StrictModel
+from picchio.robot.dynamics.rigid_model import RigidModel
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.joint import Joint
+from picchio.robot.spread import Number, Spread
+from picchio.robot.urdf.normalised import normalise
+from picchio.robot.urdf.tree import Inertial
+
+
+def robot_with(robot: FlexibleRobot, values: Iterable[tuple[Spread, Number]]) -> FlexibleRobot:
+    """The robot with other values, known exactly: it has no spreads any more.
+
+    A stiffness curve keeps its shape: all of it goes with the stiffness.
+
+    Args:
+        robot: as its files have it.
+        values: spreads of it, and the value that each takes.
+    """
+    joints = {joint.name: joint for joint in robot.flexible_joints}
+    mounted = {"tool": robot.tool, "gun": robot.gun, "base": robot.mounting}
+    links = dict(robot.tree.links)
+    moved = False
+    for spread, value in values:
+        if spread.table == "link":
+            links[spread.owner] = _weighed(links[spread.owner], spread, value)
+            moved = True
+        elif spread.table == "joint":
+            joint = joints[spread.owner]
+            joints[spread.owner] = _changed(joint, spread.path, value, spread.component)
+        else:
+            record = mounted[spread.table]
+            mounted[spread.table] = _changed(record, spread.path, value, spread.component)
+            moved = True
+    changes: dict[str, Any] = {"spreads": {}, "posterior": None}
+    if moved:
+        tool, gun, mounting = mounted["tool"], mounted["gun"], mounted["base"]
+        tree = replace(robot.tree, links=links)
+        text, point, recoil = normalise(tree, tool, gun, mounting)  # type: ignore[arg-type]
+        rigid = RigidModel(text, tree, mounting.gravity)  # type: ignore[union-attr]
+        if recoil is not None:
+            joints[recoil] = replace(joints[recoil], stiffness=gun.recoil_stiffness,  # type: ignore
+                                     damping_ratio=gun.damping_ratio)  # type: ignore # fmt: skip
+        changes |= {"tree": tree, "tool": tool, "gun": gun, "mounting": mounting, "rigid": rigid,
+                    "tool_point": point}  # fmt: skip
+    names = [joint.name for joint in robot.flexible_joints]
+    return replace(robot, flexible_joints=tuple(joints[name] for name in names), **changes)
+
+
+def _weighed(body: Inertial | None, spread: Spread, value: Any) -> Inertial:
+    """A link's inertial with another mass (and inertia, in proportion), centre or inertia."""
+    assert body is not None
+    key, k = spread.path[0], spread.component
+    if key == "mass":
+        factor = value / body.mass if body.mass > 0.0 else 0.0
+        return replace(body, mass=value, inertia=tuple(factor * part for part in body.inertia))
+    now: Any = body.xyz if key == "com" else body.inertia
+    new = value if k is None else (*now[:k], value[k], *now[k + 1 :])
+    return replace(body, xyz=new) if key == "com" else replace(body, inertia=new)
+
+
+def _changed(record: Any, path: tuple[str, ...], value: Any, component: int | None) -> Any:
+    """A record with the value at a path changed; of a vector only one component, if given."""
+    key, *rest = path
+    now = getattr(record, key)
+    if rest:
+        value = _changed(now, tuple(rest), value, component)
+    elif component is not None:
+        value = (*now[:component], value[component], *now[component + 1 :])
+    if isinstance(record, StrictModel):
+        return record.model_copy(update={key: value})
+    if isinstance(record, Joint) and key == "stiffness" and record.stiffness_curve is not None:
+        curve, factor = record.stiffness_curve, value / record.stiffness
+        scaled = {name: factor * getattr(curve, name) for name in ("k1", "k2", "k3")}
+        return replace(record, stiffness=value, stiffness_curve=curve.model_copy(update=scaled))
+    return replace(record, **{key: value})
