@@ -72,6 +72,7 @@ def test_what_people_read(task, capsys):
     assert run([*arguments, "--period-range", "0.03,0.05", "--sn-curve", "nie-2016"]) == 0
     shown = " ".join(capsys.readouterr().out.split())
     for part in ("shift by", "or base", "a blow every", "Gain: the weakest joint lives",
+                 "other poses (another branch, say) at the old place",
                  "5 cm beside the best place", "no collision meshes"):  # fmt: skip
         assert part in shown
 

@@ -81,6 +81,31 @@ def test_the_kernel_is_assess(arm):
         np.testing.assert_allclose(fast.lowest, slow.lowest, atol=1e-6 * scale)
 
 
+@pytest.mark.parametrize("move", [[0.0] * 4, [0.1, 0.1, 0.1, 0.2]])
+def test_what_another_branch_gives_is_told_apart_from_what_the_place_gives(arm, move):
+    point, blows = [1.2, 0.3, 0.9], {"force": 300.0, "period": 0.04, "width": 0.004}
+
+    def task(pose):
+        entry = {"name": "a", "direction": [1, 0, 0], "poses": [list(pose)]}
+        return picchio.task_from_dict({"excitation": blows, "operation": [entry]}, arm)
+
+    def life(pose):
+        return picchio.assess(arm, task(pose), sn_curve="nie-2016").rivets_to_failure
+
+    worst, best = sorted(arm.all_branches(point), key=life)
+    found = place(arm, task(worst), move=move, placements=5, sn_curve="nie-2016")
+    poses, there = found.parts["poses"], found.parts["place"]
+    assert (found.poses_alone.spot.move == 0.0).all()
+    assert found.poses_alone.rivets_to_failure == pytest.approx(life(best), rel=1e-9)
+    assert poses.life == pytest.approx(life(best) / life(worst), rel=1e-9) and poses.life > 2.5
+    assert there.life > 1.05 if any(move) else there.life == pytest.approx(1.0, rel=1e-12)
+    assert found.life_gain == pytest.approx(poses.life * there.life, rel=1e-12)
+    assert f"{poses.life:.4g} times the life" in found.explained()
+    assert found.explained() in found._repr_html_()
+    gain = found.to_dict()["gain"]
+    assert (gain["poses"]["life"], gain["place"]["life"]) == (poses.life, there.life)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("sn_curve", [None, "nie-2016"])
 def test_the_papers_panel_against_a_brute_force_grid(sn_curve):

@@ -152,6 +152,8 @@ def _show(found: Placement, off: float) -> None:
              ">utilisation,\nbest, %")  # fmt: skip
     out.print(table(heads, rows))
     out.print(_gain(found))
+    if found.moved and found.explained():
+        out.print(found.explained())
     out.print(_cost_of_off(found, off))
     if found.by_effort:
         out.print("Utilisation: torque over the URDF's effort limit; no shaft or reducer is known.")

@@ -82,6 +82,45 @@ class Standing:
 
 
 @dataclass(frozen=True)
+class Gain:
+    """What one standing of the work has over another.
+
+    Attributes:
+        life: by how much longer the weakest joint lives; NaN where neither life has an end,
+            infinite where only the second has none.
+        utilisation: by how much less the most utilised joint is utilised.
+    """
+
+    life: float
+    utilisation: float
+
+    @classmethod
+    def between(cls, before: Standing, after: Standing) -> Gain:
+        """The gain of `after` over `before`.
+
+        Args:
+            before: where one comes from.
+            after: where one gets to.
+        """
+        finite, used = math.isfinite(before.rivets_to_failure), after.utilisation
+        return cls(
+            after.rivets_to_failure / before.rivets_to_failure if finite else math.nan,
+            before.utilisation / used if used > 0.0 else math.inf,
+        )
+
+    @property
+    def words(self) -> str:
+        """The life's part, or, where no life has an end, the utilisation's."""
+        if math.isinf(self.life):
+            return "a life that has no end"
+        if not math.isnan(self.life):
+            return f"{self.life:.4g} times the life"
+        if self.utilisation < 1.0:
+            return f"{1.0 / self.utilisation:.4g} times the highest utilisation"
+        return f"a highest utilisation that is {self.utilisation:.4g} times lower"
+
+
+@dataclass(frozen=True)
 class Off:
     """The work a little beside where it should be, the robot following on its branch.
 
@@ -110,6 +149,8 @@ class Placement(TableResult):
         by_effort: ranked by torque over the URDF's effort limits, for want of shafts and reducers.
         start: where the work is now, with the task's own poses.
         start_valid: whether these are within the joints' limits and free of self-collisions.
+        poses_alone: the best poses found with the work where it is now; None where none of them
+            is within the limits.
         best: the best place found.
         off: what it costs to be beside it.
         centre: (3,) m, of the work now; it turns about the vertical through it.
@@ -125,6 +166,7 @@ class Placement(TableResult):
     by_effort: bool
     start: Standing
     start_valid: bool
+    poses_alone: Standing | None
     best: Standing
     off: tuple[Off, ...]
     centre: FloatArray
@@ -143,14 +185,39 @@ class Placement(TableResult):
     @property
     def life_gain(self) -> float:
         """By how much longer the weakest joint lives; NaN where neither life has an end."""
-        start, best = self.start.rivets_to_failure, self.best.rivets_to_failure
-        return best / start if math.isfinite(start) else math.nan
+        return self.gain.life
 
     @property
     def utilisation_gain(self) -> float:
         """By how much less the most utilised joint is utilised."""
-        best = self.best.utilisation
-        return self.start.utilisation / best if best > 0.0 else math.inf
+        return self.gain.utilisation
+
+    @property
+    def gain(self) -> Gain:
+        """All that the best place and its poses have over the work as it is now."""
+        return Gain.between(self.start, self.best)
+
+    @property
+    def parts(self) -> dict[str, Gain]:
+        """The gain in two: `poses`, other poses at the old place; `place`, what is left."""
+        if self.poses_alone is None:
+            return {}
+        return {
+            "poses": Gain.between(self.start, self.poses_alone),
+            "place": Gain.between(self.poses_alone, self.best),
+        }
+
+    def explained(self) -> str:
+        """A sentence: what of the gain is the place's; empty where it cannot be told apart."""
+        if not self.parts:
+            return ""
+        place = "the place itself"
+        if self.best.spot.period not in (None, self.poses_alone and self.poses_alone.spot.period):
+            place = "the place and its hit rate"
+        return (
+            "Of this, other poses (another branch, say) at the old place give "
+            f"{self.parts['poses'].words}; {place} gives, over these, {self.parts['place'].words}."
+        )
 
     def _repr_html_(self) -> str:
         from picchio.studies.assessment.result import format_count
@@ -162,7 +229,8 @@ class Placement(TableResult):
         ]  # fmt: skip
         columns = ("joint", "rivets, now", "utilisation [%]", "rivets, best", "utilisation [%]")
         facts = {"work moved by [m, rad]": self.best.spot.move}
-        return sheet(f"Placement of the work of {self.robot}", facts, columns, rows)
+        title = f"Placement of the work of {self.robot}"
+        return sheet(title, facts, columns, rows, self.explained())
 
     def _headline(self) -> str:
         if not self.moved:
@@ -193,7 +261,8 @@ class Placement(TableResult):
             "ranked_by": "effort" if self.by_effort else "life, then utilisation",
             "start": self.start.to_dict(self.centre) | {"valid": self.start_valid},
             "best": self.best.to_dict(self.centre),
-            "gain": {"life": self.life_gain, "utilisation": self.utilisation_gain},
+            "poses_alone": self.poses_alone and self.poses_alone.to_dict(self.centre),
+            "gain": vars(self.gain) | {name: vars(part) for name, part in self.parts.items()},
             "off": [vars(off) | {"reached": off.reached} for off in self.off],
             "searched": {
                 "placements": self.placements,

@@ -123,13 +123,19 @@ def place(
             "nowhere within the range can every rivet be set", key="move", value=half.tolist()
         )
     then = _standing(search, best)
-    if valid and not _exact(then).better_than(_exact(now)):
-        then = now
+    still = Search(work, loads, search.collision, margin)
+    poses = _search(still, start if valid else None, np.zeros(4), None, 1, seed, None)
+    alone = None if poses is None else _standing(search, poses)
+    if valid and (alone is None or not _exact(alone).better_than(_exact(now))):
+        alone = now
+    if alone is not None and not _exact(then).better_than(_exact(alone)):
+        then = alone
     return Placement(
         robot=robot.name,
         by_effort=loads.by_effort,
         start=now,
         start_valid=valid,
+        poses_alone=alone,
         best=then,
         off=_beside(search, then.spot, off),
         centre=work.centre,
