@@ -11,6 +11,7 @@ import pytest
 from lxml import html as lxml_html
 
 import picchio
+from picchio.robot.drives.reducer import TorqueLimit
 from picchio.visuals.report.assessment import assessment_report
 
 OUTSIDE = re.compile(
@@ -182,6 +183,7 @@ def test_reducers_are_shown_beside_the_shafts(arm: SimpleNamespace) -> None:
 
     worn = [dataclasses.replace(joint, reducer="RV-80E-121", reducer_utilisation=1.37,
                                 reducer_governed_by="repeated peak torque",
+                                reducer_limits=(TorqueLimit("repeated peak torque", 2685, 1960),),
                                 reducer_warnings=("RV-80E-121: <too> much",))
             for joint in arm.assessment.joints]  # fmt: skip
     found = dataclasses.replace(arm.assessment, joints=tuple(worn))
@@ -190,7 +192,7 @@ def test_reducers_are_shown_beside_the_shafts(arm: SimpleNamespace) -> None:
     assert "137" in text_of(tree, "(//table)[1]/tbody/tr[1]")
     row = text_of(tree, "//table[@id='reducers']/tbody/tr[1]")
     assert "RV-80E-121" in row
-    assert "137" in row
+    assert "137" in row and "2685" in row and "1960" in row
     assert "repeated peak torque" in row
     (line,) = tree.xpath("//*[@aria-label='Reducers']/li")
     assert line.text_content() == "joint_1, joint_2, joint_3: <too> much"

@@ -12,7 +12,8 @@ bearings every steady oscillation wore the raceway, whatever load, speed and amp
 with longer movements in between (Behnke and Schleich 2023, doi 10.5194/wes-8-289-2023); under some
 conditions wear was severe after 250,000 cycles (Schwack et al. 2020,
 doi 10.1016/j.wear.2020.203335). So the class depends on whether the joint moves between the poses
-of its task by more than a contact's width. The wave generator's and the cranks' bearings are not
+of its task by more than a contact's width (how long a longer movement must be is nowhere said: the
+width is picchio's reading). The wave generator's and the cranks' bearings are not
 judged: no maker publishes them.
 """
 

@@ -225,12 +225,21 @@ def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
     out.print()
     out.print(_life_table(found))
     reducers = [
-        (j.name, j.reducer, _number(100 * j.reducer_utilisation), j.reducer_governed_by or "-")
+        (j.name, j.reducer, j.reducer_governed_by or "-",
+         *([_number(one.torque), _number(one.limit)] if (one := j.reducer_governing) else "--"),
+         _number(100 * j.reducer_utilisation))
         for j in found.joints
         if j.reducer
-    ]
+    ]  # fmt: skip
     if reducers:
-        heads = ("joint", "reducer", ">used, %", "the limit that binds")
+        heads = (
+            "joint",
+            "reducer",
+            "the limit that binds",
+            ">torque\nN m",
+            ">limit\nN m",
+            ">used\n%",
+        )
         out.print(table(heads, reducers, title="The reducers"))
     told = found.verdict
     out.print(told.headline, style="bold")

@@ -43,7 +43,7 @@ def load_robot(
     flex: str | Path | None = None,
     tool: str | None = None,
     values: Mapping[str, Mapping[str, object]] | None = None,
-    reducers: Sequence[str | Path] = (),
+    reducers: str | Path | Sequence[str | Path] = (),
     allow_rigid: bool = False,
 ) -> FlexibleRobot:
     """Load a robot by name or path.
@@ -72,6 +72,8 @@ def load_robot(
                 raise InputError("comes too late for a robot that is loaded", key=key,
                                  hint="give the robot's name or file with it")  # fmt: skip
         return robot
+    if isinstance(reducers, str | Path):
+        reducers = (reducers,)
     with gathered() as said:
         loaded = _load(robot, flex, tool, values, reducers, allow_rigid)
     return replace(loaded, warnings=tuple(said))

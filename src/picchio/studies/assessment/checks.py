@@ -233,8 +233,8 @@ def _estimates(robot: FlexibleRobot) -> list[str]:
         keys = (f"{joint.name}.stiffness", f"{joint.name}.stiffness_curve")
         if joint.reducer and any(robot.origins.get(k, "").startswith(ITS_REDUCER) for k in keys):
             text = (
-                f"stiffness is that of the reducer {joint.reducer.name} alone, from its catalogue; "
-                "bearings, links and shafts in series make the joint softer and are not in it"
+                "stiffness is that of the reducer alone, from its catalogue; bearings, links and "
+                "shafts in series make the joint softer and are not in it"
             )
             said.setdefault(text, []).append(joint.name)
         damping = robot.origins.get(f"{joint.name}.damping_ratio", "")

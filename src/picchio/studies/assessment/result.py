@@ -149,6 +149,11 @@ class JointLife:
         return self.rivets_to_failure if self.sn_curve else float("inf")
 
     @property
+    def reducer_governing(self) -> TorqueLimit | None:
+        """The reducer's limit that binds, with its torque; None without a reducer."""
+        return self.reducer_limits[0] if self.reducer_limits else None
+
+    @property
     def governing_utilisation(self) -> float:
         """The larger of shaft's and reducer's."""
         return float(np.nanmax([self.utilisation, self.reducer_utilisation, 0.0]))
