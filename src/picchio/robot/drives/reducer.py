@@ -8,10 +8,12 @@ against the limit for repeated peaks. A blow is part of the duty, not an acciden
 momentary peaks is for emergencies only.
 
 The rated torque is no limit at standstill: it is that at which the rated life holds at the rated
-speed (Nabtesco, *RV reduction gear, technical document*, glossary: "rated service life"; Harmonic
-Drive, *CSF and CSG catalogue*, "technical terms": continuous load at rated input speed). What is
-held is judged by the limit for the average torque where the catalogue has one, and by no limit of
-its own where it has none: the peak contains it.
+speed (Nabtesco, RV manual, glossary, "rated service life", manualshive.com/en/manual/nabtesco/
+rv-rh-e-series/3113236?page=8; Harmonic Drive SE, CHA manual 1018854, glossary, "nominal service
+life", manualshive.com/en/manual/harmonic-drive/cha-14a-e/3973040?page=88). What is held is judged
+by the limit for the average torque where the catalogue has one, and by no limit of its own where it
+has none: the peak contains it. Makers weigh the average of a duty with the speed, so standing still
+would not count in it at all: to take what is held for the average is on the safe side.
 """
 
 from __future__ import annotations
