@@ -21,9 +21,9 @@ from picchio.fatigue.sn.test_table import SNTests
 from picchio.studies.maps.places import joint_grid
 
 FUNCTIONS = {
-    "allowable", "annotate", "assess", "check", "diagnose", "effects", "envelope", "fit_sn",
-    "formats", "identify", "import_record", "place", "report", "reproduce", "robots", "simulate",
-    "uncertain_life", "view", "workspace_map",
+    "allowable", "annotate", "assess", "check", "compare", "diagnose", "effects", "envelope",
+    "fit_sn", "formats", "identify", "import_record", "place", "report", "reproduce", "robots",
+    "simulate", "uncertain_life", "view", "workspace_map",
 }  # fmt: skip
 SLOW = {"diagnose", "identify", "reproduce"}
 # What they return stands within the JSON of `picchio assess`.
@@ -120,6 +120,7 @@ def calls(folder: Path) -> dict[str, Any]:
         "annotate": lambda: picchio.annotate("fanuc_like_3dof"),
         "assess": lambda: picchio.assess(robot, task),
         "check": lambda: picchio.check(picchio.simulate(robot, folder / "plan.toml").campaign),
+        "compare": lambda: picchio.compare(*[picchio.assess(robot, task)] * 2),
         "diagnose": lambda: picchio.diagnose(robot, rubbing(robot)),
         "effects": lambda: picchio.effects("payload"),
         "envelope": lambda: picchio.envelope(robot, POSE, BLOWS),

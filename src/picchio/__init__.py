@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from picchio.robot.loading.load import load_robot as load_robot
     from picchio.studies.assessment.run import assess as assess
     from picchio.studies.backwards import allowable as allowable
+    from picchio.studies.comparison import compare as compare
     from picchio.studies.envelopes import envelope as envelope
     from picchio.studies.maps.run import workspace_map as workspace_map
     from picchio.studies.placement.run import place as place
@@ -59,6 +60,7 @@ _HOME = {
     "annotate": "robot.loading.annotated",
     "assess": "studies.assessment.run",
     "check": "measurement.quality.report",
+    "compare": "studies.comparison",
     "diagnose": "diagnosis.diagnose",
     "effects": "reference.effects",
     "envelope": "studies.envelopes",

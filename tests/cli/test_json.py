@@ -41,6 +41,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     Path("plan.toml").write_text(PLAN)
     Path("mapping.toml").write_text(MAPPING)
+    for name, force in (("old", 300.0), ("new", 400.0)):
+        content = {"format": "picchio-assessment/1", "inputs": {"task": {"force": force}}}
+        Path(f"{name}.json").write_text(json.dumps(content))
     Path("hit.csv").write_text("t,F\n" + "".join(f"{i / 1e3},{i}\n" for i in range(50)))
     rng = np.random.default_rng(1)
     rows = ["Stress [MPa],Cycles,Comment"]
@@ -81,6 +84,10 @@ COMMANDS: dict[str, tuple[str, Any]] = {
     "annotate": ("annotate fanuc_like_3dof --out a.urdf", annotated),
     "assess": ("assess fanuc_like_3dof", lambda: picchio.assess(*arm())),
     "check": ("check measured", lambda: picchio.check("measured")),
+    "compare": (
+        "compare old.json new.json",
+        lambda: picchio.compare("old.json", "new.json"),
+    ),
     "diagnose": (
         "diagnose fanuc_like_3dof --data measured",
         lambda: picchio.diagnose("fanuc_like_3dof", "measured"),

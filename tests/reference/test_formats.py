@@ -103,6 +103,9 @@ def folder(tmp_path_factory):
         'direction = [0.0, 0.0, 1.0]\n[campaign]\nrobot = "fanuc_like_3dof"\ntool = "tool"\n'
     )
     command(folder, "simulate fanuc_like_3dof --plan plan.toml --to made")
+    command(folder, "assess fanuc_like_3dof --json life.json")
+    text = (folder / "life.json").read_text()
+    (folder / "other.json").write_text(text.replace('"force": 300.0', '"force": 400.0'))
     return folder
 
 
@@ -110,6 +113,7 @@ FAST = {
     "assessment": "assess fanuc_like_3dof",
     "envelope": "envelope fanuc_like_3dof --pose=0.3,0.5,-0.8",
     "robots": "robots",
+    "comparison": "compare life.json other.json",
     "map-summary": "map fanuc_like_3dof --plane xz --spacing 0.5 --out map.nc",
     "check": "check made --robot fanuc_like_3dof",
     "simulation": "simulate fanuc_like_3dof --plan plan.toml --to again",

@@ -17,6 +17,9 @@ import picchio
 from picchio.diagnosis.result import Cause, Diagnosis, Value
 from picchio.excitation.pulse_train import PulseTrain
 from picchio.visuals.report.assessment import assessment_report
+from picchio.visuals.report.comparison import comparison_page
+from picchio.visuals.report.cover import Cover
+from picchio.visuals.report.page import plain_page
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.compare import compare_scene
 
@@ -266,28 +269,51 @@ def test_report_opens_unfolds_and_its_links_work(
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
-def test_report_on_a_telephone(open_page, tmp_path, ur10) -> None:
-    path = tmp_path / "report.html"
-    path.write_text(assessment_report(ur10.assessment, ur10.robot, ur10.task))
-    page = open_page(path, viewport={"width": 390, "height": 800})
-    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory, arm, ur10) -> dict[str, Path]:
+    """A page of every kind that people print or read on a telephone, by its kind."""
+    folder = tmp_path_factory.mktemp("pages")
+    logo = folder / "logo.png"
+    Image.new("RGB", (240, 60), "navy").save(logo)
+    cover = Cover("Riveting of the rear fuselage", "A customer", "An engineer", logo)
+    other = {**arm.assessment.to_dict(), "rivets_to_failure": 1.0}
+    texts = {
+        "report": assessment_report(arm.assessment, arm.robot, arm.task, cover=cover),
+        "bare": assessment_report(ur10.assessment, ur10.robot, ur10.task),
+        "comparison": comparison_page(picchio.compare(arm.assessment, other, ur10.assessment)),
+        "plain": plain_page(picchio.robots()),
+    }
+    for name, text in texts.items():
+        (folder / f"{name}.html").write_text(text)
+    return {name: folder / f"{name}.html" for name in texts}
 
 
-def test_report_prints_on_two_pages(open_page, tmp_path, arm, pictures) -> None:
-    path = tmp_path / "report.html"
-    path.write_text(assessment_report(arm.assessment, arm.robot, arm.task))
-    page = open_page(path)
+def test_pages_on_a_telephone(open_page, pages, pictures) -> None:
+    for name, path in pages.items():
+        for width in (390, 1280):
+            page = open_page(path, viewport={"width": width, "height": 800})
+            page.screenshot(path=str(pictures / f"{name}-{width}.png"), full_page=True)
+            assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), name
+
+
+def test_report_prints_with_page_numbers(open_page, pages, pictures) -> None:
+    page = open_page(pages["report"])
     content = page.pdf(prefer_css_page_size=True)
     (pictures / "report.pdf").write_bytes(content)
     assert content.startswith(b"%PDF")
-    assert 1 <= len(re.findall(rb"/Type\s*/Page\b", content)) <= 2
+    assert 2 <= len(re.findall(rb"/Type\s*/Page\b", content)) <= 5
     page.emulate_media(media="print")
-    # What is wider than the paper would be cut off: 182 mm at 96 dpi.
+    # What is wider than the paper would be cut off: 182 mm at 96 dpi. The verdict, what lowers
+    # trust, the material and the joints are on the first page: 267 mm.
     page.set_viewport_size({"width": 688, "height": 1000})
     assert page.evaluate(
         "[...document.querySelectorAll('table')].filter(t => t.offsetParent !== null)"
         ".every(t => t.scrollWidth <= 688)"
     )
+    first = ("#verdict", ".cover", ".warnings", ".material")
+    assert all(page.locator(e).first.bounding_box()["y"] < 1009 for e in first)
+    # Green is for safe alone.
+    assert "safe" in page.locator("#verdict").get_attribute("class")
 
 
 def test_the_map_follows_the_joint(open_page, tmp_path, pictures, arm) -> None:

@@ -188,7 +188,7 @@ def test_reducers_are_shown_beside_the_shafts(arm: SimpleNamespace) -> None:
             for joint in arm.assessment.joints]  # fmt: skip
     found = dataclasses.replace(arm.assessment, joints=tuple(worn))
     tree = lxml_html.fromstring(assessment_report(found, arm.robot, arm.task))
-    assert "bad" in tree.xpath("//*[@id='verdict']")[0].get("class")
+    assert "fails" in tree.xpath("//*[@id='verdict']")[0].get("class")
     assert "137" in text_of(tree, "(//table)[1]/tbody/tr[1]")
     row = text_of(tree, "//table[@id='reducers']/tbody/tr[1]")
     assert "RV-80E-121" in row

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from picchio.core.errors import InputError
-from picchio.core.files import read_text
+from picchio.core.json_files import read_json
 from picchio.core.toml import Finite, validate
 from picchio.diagnosis.result import FORMAT, Cause, Diagnosis, Value, Verdict
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -60,18 +59,7 @@ def read_diagnosis(path: str | Path, robot: FlexibleRobot) -> Diagnosis:
         InputError: missing, no JSON, another format, a key that is missing or wrong, an effect
             that is not known, a target that this robot does not have.
     """
-    text = read_text(path)
-    try:
-        content = json.loads(text)
-    except ValueError as error:
-        raise InputError(f"is not valid JSON: {error}", file=path) from None
-    except RecursionError:
-        raise InputError("is nested too deeply", file=path) from None
-    if not isinstance(content, dict):
-        raise InputError("is no diagnosis: an object is wanted", file=path)
-    if "format" not in content:
-        raise InputError("the key is missing; `picchio diagnose --json` writes it", file=path,
-                         key="format", choices=[FORMAT])  # fmt: skip
+    content = read_json(path, "diagnosis", [FORMAT])
     table = validate(content, _File, format=FORMAT, file=path)
 
     def values(cause: _Cause) -> dict[str, Value]:

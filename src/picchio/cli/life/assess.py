@@ -123,6 +123,19 @@ def assess(
         ),
     ] = False,
     report: ReportOption = None,
+    title: Annotated[
+        str | None, typer.Option(metavar="TEXT", help="With --report: the page's title.")
+    ] = None,
+    customer: Annotated[
+        str | None, typer.Option(metavar="TEXT", help="With --report: who it is for.")
+    ] = None,
+    author: Annotated[
+        str | None, typer.Option(metavar="TEXT", help="With --report: who it is from.")
+    ] = None,
+    logo: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="With --report: a picture, PNG, JPEG or SVG; 1 MB."),
+    ] = None,
     json: JsonOption = None,
 ) -> None:
     """How many rivets each joint of a robot survives on a task."""
@@ -147,10 +160,18 @@ def assess(
         raise InputError("must be a positive number of rivets", key="--for-life", value=for_life)
     if seed is not None and not uncertainty:
         raise InputError("belongs to --uncertainty", key="--seed", value=seed)
+    for key, text in (("--title", title), ("--customer", customer), ("--author", author),
+                      ("--logo", logo)):  # fmt: skip
+        if text is not None and report is None:
+            raise InputError("belongs to --report", key=key, value=str(text))
+    if logo is not None:
+        from picchio.visuals.report.cover import embedded
+
+        embedded(logo)  # refused before any work
     loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     path = task_file(loaded, task)
     work = picchio.load_task(path, loaded)
-    check_targets((json, report), [*loaded.files, *work.files, sn_curve])
+    check_targets((json, report), [*loaded.files, *work.files, sn_curve, logo])
     options: dict[str, Any] = {
         "sn_curve": sn_curve,
         "residue": residue,
@@ -179,9 +200,15 @@ def assess(
         with progress("samples") as tick:
             spread = picchio.uncertain_life(loaded, work, seed=seed or 0, progress=tick, **options)
         content["uncertainty"] = spread.to_dict()
+    cover = None
+    if report is not None:
+        from picchio.visuals.report.cover import Cover
+
+        cover = Cover(title or "", customer or "", author or "", logo)
     write_report(
         found,
         report,
+        cover=cover,
         robot=loaded,
         task=work,
         gravity_stiffness=gravity_stiffness,

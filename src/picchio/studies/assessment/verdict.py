@@ -65,11 +65,6 @@ class Verdict:
     limit: str
     headline: str
 
-    @property
-    def tone(self) -> str:
-        """How a page shows it: "good", "bad", or "" for neither."""
-        return {"safe": "good", "cannot-be-told": ""}.get(self.status, "bad")
-
 
 class _Part(NamedTuple):
     """What may fail in a joint, how near that is, and where."""

@@ -15,6 +15,7 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.method_comparison import Term
 from picchio.studies.assessment.result import Assessment
 from picchio.studies.backwards import Allowable
+from picchio.studies.comparison import listed
 from picchio.studies.envelopes import envelope
 from picchio.studies.tasks import Task
 from picchio.studies.uncertainty import UncertainLife
@@ -26,7 +27,9 @@ from picchio.visuals.plots.response import plot_response, response_times
 from picchio.visuals.plots.sn import plot_sn_curve
 from picchio.visuals.plots.stress import plot_counted_cycles, plot_stress_history
 from picchio.visuals.plots.style import blank_figure
+from picchio.visuals.report.cover import Cover
 from picchio.visuals.report.page import Picture, inline_svg, render
+from picchio.visuals.scene.portrait import plot_robot
 from picchio.visuals.worst_rivet import WorstRivet, worst_rivet
 
 # The report's plots, each with an alt text that says what it shows.
@@ -134,6 +137,23 @@ def _figures(
     return made
 
 
+def _portrait(assessment: Assessment, robot: FlexibleRobot, worst: WorstRivet) -> Picture:
+    """The robot where the governing part fares worst."""
+    where = f"{worst.operation.name}, pose {worst.pose_number}"
+    axes = plot_robot(robot, worst.pose, assessment, blank_figure(4.6, 3.6))
+    alt = f"The robot {robot.name} with the rivets of the task, at {where}"
+    return Picture(inline_svg(axes, alt, "robot"), f"{robot.name} at its worst rivet ({where}); "
+                   "arrows: the force on the robot.")  # fmt: skip
+
+
+def _materials(
+    assessment: Assessment, robot: FlexibleRobot, given: str | SNCurve | None
+) -> list[SNCurve]:
+    """The S-N curves behind the result."""
+    names = dict.fromkeys(joint.sn_curve for joint in assessment.joints)
+    return [curve for name in names if (curve := _curve(given, robot, name)) is not None]
+
+
 def _ranking(assessment: Assessment) -> str:
     shafts = [j for j in assessment.joints if j.sn_curve or j.reducer]
     if shafts:
@@ -154,6 +174,7 @@ def assessment_report(
     allowed: Sequence[Allowable] = (),
     spread: UncertainLife | None = None,
     terms: Sequence[Term] = (),
+    cover: Cover | None = None,
 ) -> str:
     """The report of an assessment: verdict, table, plots, method, origins, how to reproduce.
 
@@ -172,9 +193,13 @@ def assessment_report(
         allowed: what a wanted life allows, of `picchio.studies.backwards`.
         spread: how sure the lives are, of `picchio.studies.uncertainty`.
         terms: the paper's method against this one, of `method_comparison`.
+        cover: title, customer, author and logo, for the first page.
 
     Returns:
         the HTML.
+
+    Raises:
+        InputError: a logo that is no picture.
     """
     worst = worst_rivet(assessment, robot, task, gravity_stiffness=gravity_stiffness)
     robot = worst.rivet.model.robot
@@ -191,7 +216,11 @@ def assessment_report(
         curve=curve,
         figures=_figures(assessment, worst, curve, spread),
         headline=told.headline,
-        tone=told.tone,
+        tone=told.status,
+        cover=cover or Cover(),
+        picture=_portrait(assessment, robot, worst),
+        entered=listed(assessment.inputs),
+        materials=_materials(assessment, robot, sn_curve),
         reducers=any(joint.reducer for joint in assessment.joints),
         allowed=list(allowed),
         spread=spread,

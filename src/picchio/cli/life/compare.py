@@ -1,0 +1,92 @@
+"""`picchio compare`: robots, guns, tasks, models or saved results side by side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from picchio.cli.app import app
+from picchio.cli.options import FlexOption, JsonOption, ReportOption, TaskOption, ToolOption
+from picchio.cli.output import (
+    check_targets,
+    console,
+    deliver,
+    progress,
+    styled,
+    table,
+    write_report,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from picchio.studies.comparison import Comparison, Difference
+
+_MOST = 40  # rows on a screen
+
+
+@app.command(epilog="Example: picchio compare before.json after.json --report comparison.html")
+def compare(
+    items: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="A B ...",
+            help="Robots, saved models, tasks, sidecars (a gun is in one), or JSON files that "
+            "commands wrote.",
+        ),
+    ],
+    task: TaskOption = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(metavar="ROBOT", help="The robot that tasks and sidecars are compared on."),
+    ] = None,
+    flex: FlexOption = None,
+    tool: ToolOption = None,
+    report: ReportOption = None,
+    json: JsonOption = None,
+) -> None:
+    """What differs between robots, tasks or results.
+
+    Robots, models, tasks and sidecars are assessed first; saved results are compared as they are.
+    """
+    import picchio
+
+    check_targets((report, json), [*(i for i in items if Path(i).is_file()), task, flex])
+    with progress("compared") as tick:
+        found = picchio.compare(*items, task=task, robot=robot, flex=flex, tool=tool, progress=tick)
+    write_report(found, report)
+    deliver(found.to_dict(), json, lambda: _show(found))
+
+
+def _show(found: Comparison) -> None:
+    out = console()
+    for item in found.items:
+        out.print(styled(item.name, f": {item.verdict['headline']}" if item.verdict else ""))
+    out.print()
+    _show_rows(found, found.figures, "What differs in the results")
+    _show_rows(found, found.entered, "What differs in the inputs")
+    for line in found.notes:
+        out.print(f"  - {line}")
+
+
+def _show_rows(found: Comparison, rows: Sequence[Difference], title: str) -> None:
+    out = console()
+    if not rows:
+        out.print(f"{title}: nothing.\n")
+        return
+    names = [item.name for item in found.items]
+    two = len(names) == 2
+    cells = [
+        [row.label, *row.shown, *([_ratio(row.ratios[1])] if two else [])] for row in rows[:_MOST]
+    ]
+    out.print(
+        table(["", *(f">{n}" for n in names), *([">ratio"] if two else [])], cells, title=title)
+    )
+    if len(rows) > _MOST:
+        out.print(f"... and {len(rows) - _MOST} more: --json and --report have them.\n")
+
+
+def _ratio(value: float) -> str:
+    return "" if value != value else f"{value:.3g}"

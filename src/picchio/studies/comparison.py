@@ -1,0 +1,389 @@
+"""Robots, tasks, models or saved results side by side: what differs in them, and what of it comes.
+
+Everything that can be compared becomes what `--json` writes of it: a robot, a model, a task or a
+sidecar by an assessment, a saved result as it is. Two such contents are then compared key by key.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from picchio.core.errors import InputError
+from picchio.core.html import sheet
+from picchio.core.json_files import read_json
+from picchio.core.provenance import provenance
+from picchio.core.results import Result, plain
+from picchio.core.toml import read_toml
+from picchio.robot.loading.load import load_robot
+from picchio.studies.assessment.result import Assessment, format_count
+from picchio.studies.assessment.run import assess
+from picchio.studies.tasks import load_task
+
+FORMAT = "picchio-comparison/1"
+_SAME = 1e-9  # relative: what differs by less is rounding
+_VERSION = re.compile(r"picchio-[a-z-]+/1")
+# Not results: what entered and how, prose, and what is told pose by pose.
+_LEFT_OUT = {"format", "inputs", "provenance", "operations", "origins", "assumptions", "warnings",
+             "steady_state", "method_terms", "doubts"}  # fmt: skip
+_PROSE = {"name", "source", "assumptions", "unverified", "warning"}
+_FIGURES = {
+    "status", "governed_by", "joint", "margin", "rivets_to_failure", "peak_deflection",
+    "peak_torque", "peak_shear_stress", "utilisation", "yield_utilisation", "reducer_utilisation",
+    "reducer_governed_by", "damage_per_rivet", "p10", "p50", "p90",
+}  # fmt: skip
+_UNITS = {
+    **Assessment.UNITS, "stiffness": "N m/rad", "force": "N", "period": "s", "width": "s",
+    "preload": "N", "mass": "kg", "radius": "m", "length": "m", "shear_modulus": "Pa",
+}  # fmt: skip
+_UNITS = {key: unit for key, unit in _UNITS.items() if unit != "1"}
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One of the things compared.
+
+    Attributes:
+        name: short, and no other has it.
+        source: the robot, task or file that was given.
+        format: of its result.
+        content: the result as `--json` writes it.
+    """
+
+    name: str
+    source: str
+    format: str
+    content: Mapping[str, Any]
+
+    @property
+    def verdict(self) -> Mapping[str, Any]:
+        """Status, part, joint, margin and reasons; empty where the result has no verdict."""
+        found = self.content.get("verdict")
+        return found if isinstance(found, Mapping) else {}
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A key that is not the same in all.
+
+    Attributes:
+        key: its path in the JSON, entries of lists by their name.
+        unit: where it is known.
+        values: one each; None where there is none.
+        shown: the same as people read them.
+        table: a table that some lack; the values say who has it.
+    """
+
+    key: str
+    unit: str
+    values: tuple[Any, ...]
+    shown: tuple[str, ...]
+    table: bool = False
+
+    @property
+    def label(self) -> str:
+        """The key in words."""
+        *where, what = self.key.removeprefix("joints.").removeprefix("sidecar.").split(".")
+        if self.table:
+            return " ".join([*where, what])
+        what = what.replace("_", " ") + (f", {self.unit}" if self.unit else "")
+        return f"{' '.join(where)}: {what}" if where else what
+
+    @property
+    def ratios(self) -> tuple[float, ...]:
+        """Each value over the first; NaN where these are no numbers."""
+        first = self.values[0]
+        return tuple(v / first if _number(v) and _number(first) and first else math.nan
+                     for v in self.values)  # fmt: skip
+
+    def to_dict(self) -> dict[str, Any]:
+        """The row as it is written.
+
+        Returns:
+            key, unit, values, and their ratios to the first.
+        """
+        return {"key": self.key, "unit": self.unit, "values": list(self.values),
+                "ratios": list(self.ratios)}  # fmt: skip
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison(Result):
+    """What differs.
+
+    Attributes:
+        items: what was compared, the first being the reference of every ratio.
+        inputs: what entered differently.
+        results: what came out differently.
+        notes: what could not be compared, a sentence each.
+        provenance: versions and hashes.
+    """
+
+    PAGE = "visuals.report.comparison:comparison_page"
+
+    items: tuple[Compared, ...]
+    inputs: tuple[Difference, ...]
+    results: tuple[Difference, ...]
+    notes: tuple[str, ...]
+    provenance: Mapping[str, Any]
+
+    @property
+    def entered(self) -> tuple[Difference, ...]:
+        """The inputs that differ; a table that one of them lacks, such as a joint's, in one row."""
+        sides = [set(_branches(item.content.get("inputs") or {})) for item in self.items]
+        rows: dict[str, Difference] = {}
+        for row in self.inputs:
+            parts = row.key.split(".")
+            ways = (".".join(parts[:k]) for k in range(1, len(parts)))
+            lacking = next((w for w in ways if not all(w in side for side in sides)), None)
+            if lacking is None:
+                rows[row.key] = row
+            elif lacking not in rows:
+                there = tuple(lacking in side for side in sides)
+                shown = tuple("given" if has else "-" for has in there)
+                rows[lacking] = Difference(lacking, "", there, shown, table=True)
+        return tuple(rows.values())
+
+    @property
+    def figures(self) -> tuple[Difference, ...]:
+        """The results that matter most; all of them but of assessments."""
+        if "picchio-assessment/1" not in {item.format for item in self.items}:
+            return self.results
+        return tuple(row for row in self.results if row.key.rpartition(".")[2] in _FIGURES)
+
+    def _headline(self) -> str:
+        names = ", ".join(item.name for item in self.items)
+        return f"{names}: {len(self.inputs)} inputs and {len(self.results)} results differ"
+
+    def _repr_html_(self) -> str:
+        rows = [[row.label, *row.shown] for row in (*self.entered, *self.figures)]
+        heads = ["", *(item.name for item in self.items)]
+        return sheet("Comparison", None, heads, rows, " ".join(self.notes))
+
+    def _content(self) -> dict[str, Any]:
+        items = [
+            {"name": i.name, "source": i.source, "format": i.format, "verdict": i.verdict or None}
+            for i in self.items
+        ]
+        return {"format": FORMAT, "items": items, "inputs": self.inputs, "results": self.results,
+                "notes": self.notes, "provenance": self.provenance}  # fmt: skip
+
+
+def compare(
+    *items: str | Path | Result | Mapping[str, Any],
+    task: str | Path | None = None,
+    robot: str | Path | None = None,
+    flex: str | Path | None = None,
+    tool: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Comparison:
+    """Robots, models, tasks, guns or saved results side by side.
+
+    Args:
+        *items: at least two: results of picchio or the JSON files of them, all of one format; or
+            names and files of robots, saved models, tasks and sidecars, which are assessed.
+        task: for robots, models and sidecars; each robot's example task if not given.
+        robot: for tasks and sidecars.
+        flex: sidecar of `robot`.
+        tool: the frame that carries the tool.
+        progress: called with (done, total) items.
+
+    Returns:
+        what differs in the inputs, and what in the results.
+
+    Raises:
+        InputError: fewer than two, an unknown kind of file, results of different formats, a task
+            or sidecar without a robot.
+    """
+    if len(items) < 2:
+        raise InputError("there must be at least two to compare", key="items", value=len(items))
+    if flex is not None and robot is None:
+        raise InputError("belongs to --robot", key="flex", value=str(flex))
+    found: list[tuple[str, Mapping[str, Any]]] = []
+    for k, item in enumerate(items):
+        found.append(_content_of(item, task, robot, flex, tool))
+        if progress is not None:
+            progress(k + 1, len(items))
+    formats = [str(content["format"]) for _, content in found]
+    if len(set(formats)) > 1:
+        raise InputError("only results of one format can be compared", key="items",
+                         value=", ".join(dict.fromkeys(formats)))  # fmt: skip
+    names = _names([source for source, _ in found])
+    compared = tuple(
+        Compared(name, source, format, content)
+        for name, (source, content), format in zip(names, found, formats, strict=True)
+    )
+    files = [item for item in (*items, task, flex) if isinstance(item, (str, Path))]
+    return Comparison(
+        items=compared,
+        inputs=_differences([dict(leaves(i.content.get("inputs") or {})) for i in compared]),
+        results=_differences([dict(leaves(_results(i.content))) for i in compared]),
+        notes=tuple(
+            f"{i.name} does not say what entered it: an older picchio wrote it"
+            for i in compared if not i.content.get("inputs") and i.format == "picchio-assessment/1"
+        ),
+        provenance=provenance([Path(file) for file in files if Path(file).is_file()]),
+    )  # fmt: skip
+
+
+def _content_of(
+    item: str | Path | Result | Mapping[str, Any],
+    task: str | Path | None,
+    robot: str | Path | None,
+    flex: str | Path | None,
+    tool: str | None,
+) -> tuple[str, Mapping[str, Any]]:
+    """What an item is called, and its result."""
+    if isinstance(item, Result):
+        item = item.to_dict()
+    if isinstance(item, Mapping):
+        return str(item.get("robot", item["format"])), _known(plain(item), None)
+    path = Path(item)
+    if path.suffix == ".json":
+        return str(path), _known(read_json(path, "result", ["picchio-assessment/1"]), path)
+    kind = str(read_toml(path).get("format", "")) if path.suffix == ".toml" else ""
+    base, side, work = robot, flex, task
+    if kind.startswith("picchio-task/"):
+        work = path
+    elif kind.startswith("picchio-sidecar/"):
+        side = path
+    else:  # a robot, or a saved model
+        base, side = item, None
+    if base is None:
+        raise InputError("needs the robot that it is for", file=path, hint="name one with --robot")
+    loaded = load_robot(base, flex=side, tool=tool)
+    work = work or loaded.task_path
+    if work is None:
+        raise InputError(f"{loaded.name} has no example task of its own", key="task",
+                         hint="give one")  # fmt: skip
+    return str(item), assess(loaded, load_task(work, loaded)).to_dict()
+
+
+def _known(content: Mapping[str, Any], path: Path | None) -> Mapping[str, Any]:
+    if not _VERSION.fullmatch(str(content.get("format"))):
+        raise InputError("unknown version", file=path, key="format", value=content.get("format"),
+                         choices=["picchio-assessment/1", "..."])  # fmt: skip
+    return content
+
+
+def _names(sources: Sequence[str]) -> list[str]:
+    """Short names, none twice: of a file its stem, if that will do."""
+    short = [Path(source).stem if Path(source).suffix else source for source in sources]
+    names = short if len(set(short)) == len(short) else list(sources)
+    seen: dict[str, int] = {}
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+    count = dict.fromkeys(names, 0)
+    for k, name in enumerate(names):
+        if seen[name] > 1:
+            count[name] += 1
+            names[k] = f"{name} ({count[name]})"
+    return names
+
+
+def _results(content: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in content.items() if key not in _LEFT_OUT}
+
+
+def leaves(content: Any, before: str = "") -> Iterator[tuple[str, Any]]:
+    """Every leaf of a content.
+
+    Args:
+        content: as `json.dumps` takes it.
+        before: the path to it.
+
+    Yields:
+        (path, value); entries of lists by their name, lists of numbers whole.
+    """
+    if isinstance(content, Mapping):
+        for key, value in content.items():
+            yield from leaves(value, f"{before}.{key}" if before else str(key))
+    elif isinstance(content, list) and content and isinstance(content[0], Mapping):
+        for k, value in enumerate(content):
+            name = value.get("name", value.get("joint", k + 1)) if isinstance(value, Mapping) else k
+            yield from leaves(value, f"{before}.{name}" if before else str(name))
+    else:
+        yield before, content
+
+
+def listed(content: Mapping[str, Any]) -> tuple[Difference, ...]:
+    """Every value of a content in a row of its own, to be shown.
+
+    Args:
+        content: such as an assessment's `inputs`.
+
+    Returns:
+        rows with one value each; names, prose and what is not there are left out.
+    """
+    side = dict(leaves(plain(content)))
+    return tuple(
+        Difference(
+            key, _UNITS.get(key.rpartition(".")[2], ""), (value,), (_shown(key, side, None),)
+        )
+        for key, value in side.items()
+        if value not in (None, "", [], {}) and key.rpartition(".")[2] not in _PROSE
+    )
+
+
+def _branches(content: Any) -> Iterator[str]:
+    """The path of every table in the content."""
+    for path, _ in leaves(content):
+        parts = path.split(".")
+        yield from (".".join(parts[:k]) for k in range(1, len(parts)))
+
+
+def _differences(sides: Sequence[Mapping[str, Any]]) -> tuple[Difference, ...]:
+    keys = dict.fromkeys(key for side in sides for key in side)
+    rows = []
+    for key in keys:
+        values = tuple(side.get(key) for side in sides)
+        if key.rpartition(".")[2] == "name" or all(_same(values[0], value) for value in values[1:]):
+            continue
+        shown = tuple(_shown(key, side, values[0]) for side in sides)
+        rows.append(Difference(key, _unit(key), values, shown))
+    return tuple(rows)
+
+
+def _unit(key: str) -> str:
+    return _UNITS.get(key.rpartition(".")[2], "")
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _same(one: Any, other: Any) -> bool:
+    if _number(one) and _number(other):
+        return math.isclose(one, other, rel_tol=_SAME)
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(_same, one, other))
+    return bool(one == other)
+
+
+def _shown(key: str, side: Mapping[str, Any], first: Any) -> str:
+    """A value as people read it; of a long list, how much of it is not as in the first."""
+    value = side.get(key)
+    before, _, last = key.rpartition(".")
+    if last in ("rivets_to_failure", "p10", "p50", "p90"):
+        # Null is a life without end, if there is a shaft at all.
+        known = key in side and side.get(f"{before}.sn_curve", "?") != ""
+        return format_count(math.inf if known and value is None else value or math.nan)
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        if len(value) <= 4 and not any(isinstance(part, list) for part in value):
+            return ", ".join(_text(part) for part in value) or "none"
+        old = first if isinstance(first, list) else []
+        others = sum(k >= len(old) or not _same(old[k], part) for k, part in enumerate(value))
+        count = f"{len(value)} {'entry' if len(value) == 1 else 'entries'}"
+        return count + (f", {others} of them other" if others and old else "")
+    return _text(value)
+
+
+def _text(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
