@@ -14,6 +14,7 @@ from picchio.cli.options import (
     FlexOption,
     GravityStiffnessOption,
     JsonOption,
+    ReducersOption,
     ReportOption,
     ToolOption,
 )
@@ -58,6 +59,7 @@ def check(
     ] = False,
     flex: FlexOption = None,
     tool: ToolOption = None,
+    reducers: ReducersOption = None,
     keep_going: Annotated[
         bool,
         typer.Option(
@@ -85,16 +87,16 @@ def check(
 
     import picchio
 
-    if no_robot and (robot is not None or flex is not None or tool is not None):
-        raise InputError("stands against --robot, --flex and --tool", key="--no-robot")
+    if no_robot and any(given is not None for given in (robot, flex, tool, reducers)):
+        raise InputError("stands against --robot, --flex, --tool and --reducers", key="--no-robot")
     loaded = picchio.load_campaign(campaign, clock_tolerance=math.inf)
     if report is not None and (no_robot or (robot or loaded.robot) is None):
         raise InputError("needs a robot", key="--report", hint="name one with --robot")
-    check_targets((json, report), [robot, flex, *loaded.files])
+    check_targets((json, report), [robot, flex, *(reducers or ()), *loaded.files])
     with progress("records") as tell:
         found = picchio.check(
-            loaded, robot, flex=flex, tool=tool, use_robot=not no_robot, keep_going=keep_going,
-            progress=tell,
+            loaded, robot, flex=flex, tool=tool, reducers=reducers or (), use_robot=not no_robot,
+            keep_going=keep_going, progress=tell,
         )  # fmt: skip
     write_report(found, report, gravity_stiffness=gravity_stiffness)
     deliver(found.to_dict(), json, lambda: _show(found, verbose))

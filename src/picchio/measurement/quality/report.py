@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -206,6 +206,7 @@ def check(
     *,
     flex: str | Path | None = None,
     tool: str | None = None,
+    reducers: Sequence[str | Path] = (),
     use_robot: bool = True,
     keep_going: bool = False,
     progress: Callable[[int, int], None] | None = None,
@@ -222,6 +223,7 @@ def check(
             campaign's own cannot be loaded, that is a finding.
         flex: sidecar of the robot.
         tool: the frame that carries the tool; as the campaign says if None.
+        reducers: catalogues of reducers, as in `load_robot`.
         use_robot: False leaves out what needs a robot.
         keep_going: a record that cannot be read becomes a finding instead of an error.
         progress: called with (done, total) records.
@@ -234,7 +236,7 @@ def check(
         InputError: a campaign, a robot or a record that cannot be read.
     """
     campaign = load_campaign(campaign, clock_tolerance=math.inf)
-    found, problem = _robot(campaign, robot, flex, tool) if use_robot else (None, None)
+    found, problem = _robot(campaign, robot, flex, tool, reducers) if use_robot else (None, None)
     records = [replace(record, clock_tolerance=math.inf) for record in campaign.records]
     campaign = replace(campaign, records=tuple(records))
     findings: list[Finding] = []
@@ -293,20 +295,22 @@ def _robot(
     robot: str | Path | FlexibleRobot | None,
     flex: str | Path | None,
     tool: str | None,
+    reducers: Sequence[str | Path],
 ) -> tuple[FlexibleRobot | None, Finding | None]:
     """The robot asked for, or else the campaign's; what is wrong with the campaign's own."""
     if isinstance(robot, FlexibleRobot):
-        return load_robot(robot, flex=flex, tool=tool), None
+        return load_robot(robot, flex=flex, tool=tool, reducers=reducers), None
     name = robot or campaign.robot
     if name is None:
-        for key, value in (("flex", flex), ("tool", tool)):
-            if value is not None:
+        for key, value in (("flex", flex), ("tool", tool), ("reducers", reducers)):
+            if value:
                 raise InputError("needs a robot", key=key, value=str(value))
         return None, None
     try:
-        return load_robot(name, flex=flex, tool=tool or campaign.tool), None
+        found = load_robot(name, flex=flex, tool=tool or campaign.tool, reducers=reducers)
+        return found, None
     except InputError as error:
-        if robot is not None or flex is not None or tool is not None:
+        if robot is not None or flex is not None or tool is not None or reducers:
             raise
         return None, Finding(
             "robot",
