@@ -2,10 +2,11 @@
 
     python benchmarks/diagnosis.py [--one-core] [--arms] [--json FILE]
 
-Wall time with all cores, from the campaign in memory to the verdict: effects alone, pairs, nothing
-wrong, as `blind_trial.py` draws them, at 40 dB on the 3-DoF arm. `--one-core` adds the same on one
-core, in turns, and the ratio; `--arms` a single and a null on the UR10 and the Kinova Gen3. Nothing
-else should run meanwhile.
+Wall time with all cores of the whole command, `picchio diagnose ROBOT --data CAMPAIGN --json -`, as
+a user gets it: its start, the records read, the verdict, and the life without and with the causes.
+Effects alone, pairs, nothing wrong, as `blind_trial.py` draws them, at 40 dB on the 3-DoF arm.
+`--one-core` adds the same on one core, in turns, and the ratio; `--arms` a single and a null on the
+UR10 and the Kinova Gen3. Nothing else should run meanwhile.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,10 +28,9 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path[0] = str(ROOT / "tests" / "diagnosis")
 import trial  # noqa: E402
 
-import picchio  # noqa: E402
 from picchio.core.files import atomic_write  # noqa: E402
-from picchio.diagnosis.percussion.diagnosis import diagnose_percussion  # noqa: E402
 
+COMMAND = (sys.executable, "-P", "-c", "from picchio.cli.main import main; main()")
 ARM, OTHERS = "fanuc_like_3dof", ("ur10", "kinova_gen3")
 # An early draw of each, spread over what effects are: structure, contact, blows, sensors.
 SINGLES = (
@@ -52,14 +54,25 @@ def cases(arms: bool) -> Iterator[dict[str, Any]]:
             yield {**common, "robot": robot, "kind": kind, "draw": 0}
 
 
-def timed(case: dict[str, Any], workers: int | None) -> tuple[float, str, bool]:
-    """(s, verdict, whether it is right)."""
+def timed(case: dict[str, Any], one_core: bool = False) -> tuple[float, str, bool]:
+    """(s, verdict, whether it is right) of the command, its start included."""
     campaign, truth = trial.make(case, SALT)
-    robot = picchio.load_robot(case["robot"])
-    began = time.perf_counter()
-    found = diagnose_percussion(robot, campaign, workers=workers)
-    took = time.perf_counter() - began
-    return took, found.diagnosis.verdict, trial.judge(case, truth, found)["right"]
+    with tempfile.TemporaryDirectory() as name:
+        folder = campaign.save(Path(name) / "campaign").folder
+        began = time.perf_counter()
+        done = subprocess.run(
+            [*COMMAND, "diagnose", case["robot"], "--data", str(folder), "--json", "-"],
+            capture_output=True, text=True, check=False,
+            preexec_fn=(lambda: os.sched_setaffinity(0, {0})) if one_core else None,
+        )  # fmt: skip
+        took = time.perf_counter() - began
+    if done.returncode != 0:
+        raise SystemExit(f"{trial.name_of(case)} failed: {done.stderr}")
+    said = json.loads(done.stdout)
+    sets = [{(c["effect"], c["target"]) for c in each}
+            for each in (said["causes"], *said["alternatives"])]  # fmt: skip
+    true = {(c["effect"], c["target"]) for c in truth["causes"]}
+    return took, said["verdict"], true in sets
 
 
 def main() -> None:
@@ -68,16 +81,16 @@ def main() -> None:
     parser.add_argument("--arms", action="store_true", help="the UR10 and the Gen3, too")
     parser.add_argument("--json", type=Path, help="write the figures here")
     given = parser.parse_args()
-    timed({"robot": ARM, "kind": "null", "snr": 40, "draw": 10**6}, None)  # compiles, or loads
+    timed({"robot": ARM, "kind": "null", "snr": 40, "draw": 10**6})  # compiles, or loads
     rows = []
     print(f"{'case':44} {'s':>6}" + (f" {'one core':>9} {'ratio':>6}" if given.one_core else ""))
     for case in cases(given.arms):
-        took, verdict, right = timed(case, None)
+        took, verdict, right = timed(case)
         row = {"case": trial.name_of(case), "kind": case["kind"], "robot": case["robot"]}
         row |= {"seconds": took, "verdict": verdict, "right": right}
         line = f"{row['case']:44} {took:6.1f}"
         if given.one_core:
-            row["one_core_seconds"] = timed(case, 1)[0]
+            row["one_core_seconds"] = timed(case, one_core=True)[0]
             line += f" {row['one_core_seconds']:9.1f} {row['one_core_seconds'] / took:6.2f}"
         rows.append(row)
         print(line, f" {verdict}" + ("" if right else " (wrong)"), flush=True)

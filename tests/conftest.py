@@ -50,6 +50,7 @@ def in_process():
             pytest.raises(SystemExit) as ended,
         ):
             main([str(argument) for argument in arguments])
+        assert "pyngrok" not in sys.modules  # it opens tunnels; meshcat brings it along
         return subprocess.CompletedProcess(
             arguments, ended.value.code, out.getvalue(), err.getvalue()
         )

@@ -1,5 +1,7 @@
 """Linear algebra uses one thread a process in what picchio computes, whatever is set outside."""
 
+import re
+
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -53,12 +55,20 @@ def test_every_study_does(two, monkeypatch):
 
 
 def test_nothing_sets_the_users_variables(repository):
-    """A benchmark, or a test in CI, runs under what a user gets."""
-    files = [repository / ".ci" / "run", *(repository / "benchmarks").glob("*.py")]
-    assert len(files) > 5
-    for file in files:
-        text = file.read_text()
-        assert not any(f"{name}_NUM_THREADS" in text for name in ("OMP", "OPENBLAS", "MKL")), file
+    """A benchmark, a page or a test runs under what a user gets."""
+    files = [
+        path
+        for folder in (".ci", "benchmarks", "docs", "notebooks", "tests")
+        for path in (repository / folder).rglob("*")
+        if path.suffix in ("", ".py", ".md", ".ipynb", ".sh") and path.is_file()
+    ]
+    assert len(files) > 100
+    naming = {path for path in files if re.search(r"(OMP|OPENBLAS|MKL)_NUM_THREADS", text(path))}
+    assert not naming
+
+
+def text(path):
+    return path.read_text("utf-8", errors="replace")
 
 
 def test_a_warning_still_points_at_the_users_line():

@@ -4,6 +4,8 @@ Causes inside the robot (friction, backlash, a payload) are no fault of the data
 one for a swapped axis, a delay or a clipped sensor.
 """
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -138,3 +140,26 @@ def test_measured_blows(worlds, robot):
         _, _, wrong = check(worlds, robot, [cause], sensors=sensors, records=4)
         assert wrong and {f.check for f in wrong} == {"blows"}
         assert words in wrong[0].message
+
+
+def test_what_is_held_does_not_grow_with_the_records(robot):
+    rng = np.random.default_rng(0)
+    time = np.arange(40_000) / 20_000.0 - 0.1
+    wave = np.exp(-5.0 * np.maximum(time, 0.0)) * np.sin(100.0 * time) * (time > 0.0)
+    records = [
+        picchio.Record.from_arrays(
+            f"r{k}.csv", time,
+            {name: wave + 0.01 * rng.normal(size=time.size) for name in ("force", f"{SENSOR}.x")},
+            kind="percussion", pose=[0.1 * k, 0.5, -0.8], direction=[1.0, 0.0, 0.0],
+        )
+        for k in range(6)
+    ]  # fmt: skip
+    excitation = {"kind": "pulse_train", "force": 300.0, "period": 0.04, "width": 0.004, "hits": 12}
+    made = picchio.Campaign.from_records(records, excitation=excitation)
+    held = []
+    tracemalloc.start()
+    try:
+        picchio.check(made, robot, progress=lambda *_: held.append(tracemalloc.get_traced_memory()))
+    finally:
+        tracemalloc.stop()
+    assert (held[-1][0] - held[-4][0]) / 3 < 0.75 * time.nbytes

@@ -72,8 +72,6 @@ def test_it_runs_in_a_fresh_kernel(
     if "datasets.load" in "".join(cell.source for cell in notebook.cells):
         folder = request.getfixturevalue("measured_data")  # skips where there is none
         monkeypatch.setenv("PICCHIO_DATA", str(folder))
-    # Threads of BLAS would add up to more seconds than there are.
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
     began, used = time.monotonic(), cpu_of_children()
     NotebookClient(
         notebook,

@@ -17,6 +17,7 @@ from typing import Any
 
 _NOT_GIVEN = object()
 _MOST_CHOICES = 12
+_LONGEST = 1500  # characters of a message, which may quote a damaged file
 # Modules whose lines are none of the user's; contextlib's are between decorated functions.
 _OURS = ("picchio", "contextlib")
 _listening: ContextVar[tuple[list[str], ...]] = ContextVar("_listening", default=())
@@ -131,7 +132,8 @@ class InputError(PicchioError):
             line += "; " + describe_choices(value, self.choices)
         if self.hint:
             line += f"; {self.hint}"
-        return " ".join(line.split())
+        line = " ".join(line.split())
+        return line if len(line) <= _LONGEST else line[: _LONGEST - 3] + "..."
 
 
 def shorten(value: Any, width: int = 80) -> str:

@@ -245,7 +245,10 @@ def fit_sn(
         amplitude=factor * as_floats(given.amplitude, "amplitude"),
         cycles=as_floats(given.cycles, "cycles"),
     )
-    known = _likelihood(given)
+    try:
+        known = _likelihood(given)
+    except InputError as error:
+        raise error.placed(file=given.file) from None
     run_outs = int((~known.failed).sum())
     with_knee = run_outs > 0 if knee is None else knee
     notes = [

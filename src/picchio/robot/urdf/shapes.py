@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.files import regular_file
 from picchio.robot.urdf.addresses import resolve_mesh
 from picchio.robot.urdf.xml import children
 
@@ -92,23 +93,22 @@ def load_parts(file: Path) -> list[Any]:
         file: of a known format, at most 64 MiB.
 
     Raises:
-        InputError: an unknown format, unreadable, empty, not finite, or above 64 MiB.
+        InputError: missing, an unknown format, above 64 MiB, unreadable, without a triangle, or
+            with a corner that is not finite or not there.
     """
     import trimesh
 
     if file.suffix.lower() not in _FORMATS:
         raise InputError("unknown mesh format", file=file, value=file.suffix, choices=_FORMATS)
-    if file.stat().st_size > _MOST_BYTES:
-        raise InputError("the mesh is above 64 MiB", file=file)
+    regular_file(file, limit=_MOST_BYTES)
     try:
-        parts = [
-            part
-            for part in trimesh.load_scene(file).dump()
-            if isinstance(part, trimesh.Trimesh) and len(part.faces)
-        ]
+        every = trimesh.load_scene(file).dump()
+        parts = [p for p in every if isinstance(p, trimesh.Trimesh) and len(p.faces)]
+        # An index beyond the vertices is an error here, not where the corner is used.
+        finite = all(np.isfinite(part.vertices[part.faces]).all() for part in parts)
     except Exception as error:  # trimesh raises whatever its parsers do
         raise InputError(f"is not a readable mesh: {error}", file=file) from None
-    if not parts or not all(np.isfinite(part.vertices).all() for part in parts):
+    if not parts or not finite:
         raise InputError("holds no finite triangles", file=file)
     return parts
 

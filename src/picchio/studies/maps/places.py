@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
-from picchio.core.files import read_columns, regular_file
+from picchio.core.files import read_columns
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.urdf.shapes import load_parts
 
 PLANES = ("xy", "xz", "yz")
 _AXES = "xyz"
 _MOST_STEPS = 10**6
-_MOST_BYTES = 256 << 20
 # Points on a surface: candidates for one, and the least distance in spacings that makes about one
 # point a square of the spacing.
 _MOST_ON_SURFACE = 100_000
@@ -183,22 +183,15 @@ def surface(path: str | Path, *, spacing: float) -> Listed:
     points every time.
 
     Args:
-        path: STL, OBJ, PLY or whatever else trimesh reads; coordinates in m, world.
+        path: STL, OBJ, PLY or another mesh that a URDF may name; m, world.
         spacing: m.
 
     Raises:
         InputError: no file, no mesh, more points than a map may have.
     """
-    import trimesh
-
     if not (math.isfinite(spacing) and spacing > 0.0):
         raise InputError("must be positive", key="spacing", value=spacing)
-    file = regular_file(path, limit=_MOST_BYTES)
-    try:
-        mesh = trimesh.load_mesh(file)
-    except Exception as error:  # each format's reader raises what it likes
-        raise InputError(f"cannot be read as a mesh: {error}", file=path) from None
-    corners = np.asarray(getattr(mesh, "triangles", ()), dtype=float).reshape(-1, 3, 3)
+    corners = np.concatenate([np.asarray(part.triangles) for part in load_parts(Path(path))])
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice = np.linalg.norm(cross, axis=1)
     area = 0.5 * float(twice.sum())

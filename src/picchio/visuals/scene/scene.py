@@ -10,6 +10,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.html import Page
+from picchio.core.processes import safe_start
 from picchio.core.provenance import package_version
 from picchio.core.results import Result
 from picchio.studies.envelopes import DirectionEnvelope
@@ -100,7 +101,10 @@ class Scene(Page, Result):
         if viewer is None:
             import meshcat
 
-            viewer = meshcat.Visualizer()
+            # Its server is a process of its own. It reaches for pyngrok, which would open the page
+            # to the world, where it is asked for a tunnel, and only there.
+            with safe_start():
+                viewer = meshcat.Visualizer()
         send(self, viewer)
         return viewer
 

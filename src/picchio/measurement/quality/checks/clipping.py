@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from picchio.core.arrays import FloatArray
+from picchio.core.arrays import FloatArray, IndexArray
 from picchio.excitation.table import excitation_class
+from picchio.measurement.noise.window import Window
 from picchio.measurement.quality.check import Check, Context, Finding
 from picchio.measurement.quality.scan import ChannelScan, RecordScan
 
 _KEPT = 4000
+# Widths below the largest value, and above zero, that may count.
+_DEPTH, _CLEAR = 5.4, 7.8
 _ADVICE = "set a larger range and repeat; until then leave these samples out"
 
 
@@ -49,9 +52,22 @@ class ClippingCheck(Check):
                     _ADVICE, record=scan.file, channel=name, value=limit, unit=channel.unit,
                 )  # fmt: skip
             elif not motion:
-                keep = np.argsort(np.abs(values))[-_KEPT:]
-                keep.sort()
-                self._tops[channel.group].append((scan.file, name, keep, values[keep]))
+                keep = self._near_top(scan.window, name)
+                if keep.size:
+                    self._tops[channel.group].append((scan.file, name, keep, values[keep]))
+
+    def _near_top(self, window: Window, name: str) -> IndexArray:
+        """The samples that `_piled` may count, in order: memory must not grow with the records."""
+        size = np.abs(window.arrays[name])
+        group = [channel.name for channel in window.groups[window.channels[name].group]]
+        low = max(size.max() - _DEPTH * self._width(group), _CLEAR * self._width([name]))
+        near = np.flatnonzero(size >= low)
+        return np.sort(near[np.argsort(size[near])[-_KEPT:]])
+
+    def _width(self, names: Iterable[str]) -> float:
+        """How far the noise spreads what lies at one level."""
+        std, hum = (max(map(of, names)) for of in (self.context.std, self.context.hum))
+        return 2.5 * std + hum
 
     def finish(self) -> Iterator[Finding]:
         """Groups whose largest values pile up within the noise of one level."""
@@ -69,15 +85,14 @@ class ClippingCheck(Check):
     def _piled(
         self, group: str, tops: list[tuple[str, str, FloatArray, FloatArray]]
     ) -> Iterator[Finding]:
-        std = max(self.context.std(name) for _, name, _, _ in tops)
-        if std <= 0.0:
+        names = {name for _, name, _, _ in tops}
+        if max(map(self.context.std, names)) <= 0.0:
             return
         most = max(float(np.abs(v).max()) for _, _, _, v in tops)
-        hum = max(self.context.hum(name) for _, name, _, _ in tops)
         # The noise comes after the limit: the level is below the largest reading.
-        width = 2.5 * std + hum
+        width = self._width(names)
         limit = most - 1.2 * width
-        if limit < 12.0 * width:
+        if limit < 12.0 * width:  # `_CLEAR` and `_DEPTH` follow from these numbers
             return
         at, below, runs, both = 0, 0, 0, set()
         files = []

@@ -61,7 +61,7 @@ def load_mesh(file: Path) -> Mesh:
     """A mesh file as triangles with its own colours.
 
     Raises:
-        InputError: an unknown format, unreadable, empty, not finite, or above 64 MiB.
+        InputError: as `load_parts`.
     """
     return merged([_part(part) for part in load_parts(file)])
 
