@@ -75,7 +75,7 @@ def test_feedback_biases_nothing(diagnosis):
 def test_the_screws_turn_is_found(diagnosis):
     """A ripple once in 2.5 mm: the pitch of a common ball screw."""
     ripple = next(c for c in diagnosis.causes if c.effect == "torque_ripple")
-    pitch = 2.0 * 3.14159265 / ripple.parameters["order"].value
+    pitch = ripple.parameters["period"].value
     assert pitch == pytest.approx(2.5e-3, rel=0.003)
 
 

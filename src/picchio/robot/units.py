@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 
@@ -51,21 +51,36 @@ def units_of(kind: str) -> JointUnits:
     return SLIDING if kind == "prismatic" else TURNING
 
 
-def shared(units: Iterable[str]) -> str:
-    """The unit that most of a column's cells have, for its head; the others carry their own.
+def labelled(units: Sequence[str], names: Iterable[str]) -> tuple[str, list[str]]:
+    """Names to label an axis or a curve with, over joints of both kinds.
+
+    Args:
+        units: of each joint's values.
+        names: of the joints.
+
+    Returns:
+        the unit that most have, and the names; the others with theirs in brackets.
+    """
+    head, _ = column(units, units)
+    return head, [
+        name if unit == head else f"{name} [{unit}]"
+        for name, unit in zip(names, units, strict=True)
+    ]
+
+
+def column(units: Sequence[str], texts: Iterable[str]) -> tuple[str, list[str]]:
+    """A table's column over joints of both kinds.
 
     Args:
         units: of each cell.
+        texts: the numbers; "-" for none.
+
+    Returns:
+        the unit that most cells have, for the column's head, and the cells; those that have another
+        unit say so.
     """
-    return Counter(units).most_common(1)[0][0]
-
-
-def written(text: str, unit: str, head: str) -> str:
-    """A cell of a column: with its unit where that is not the head's.
-
-    Args:
-        text: the number.
-        unit: the cell's.
-        head: the column's.
-    """
-    return text if unit == head or text == "-" else f"{text} {unit}"
+    head = Counter(units).most_common(1)[0][0]
+    return head, [
+        text if unit == head or text == "-" else f"{text} {unit}"
+        for text, unit in zip(texts, units, strict=True)
+    ]

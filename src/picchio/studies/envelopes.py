@@ -19,6 +19,7 @@ from picchio.excitation.excitation import Excitation
 from picchio.fatigue.shaft_stress import stress_per_torque
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.units import JointUnits, column, units_of
 from picchio.studies.rivet.pose import ModelAtPose
 from picchio.vibration.closed_form.response import Response, peak_deflections
 
@@ -38,6 +39,7 @@ class DirectionEnvelope(TableResult):
     Attributes:
         robot: name.
         joint_names: n names.
+        kinds: (n) "revolute" or "prismatic"; of a prismatic joint, rad read m and N m read N.
         pose: (nv,) rad or m.
         tool_position: (3,) m.
         excitation: the blows.
@@ -55,6 +57,7 @@ class DirectionEnvelope(TableResult):
 
     robot: str
     joint_names: tuple[str, ...]
+    kinds: tuple[str, ...]
     pose: FloatArray
     tool_position: FloatArray
     excitation: Excitation
@@ -69,6 +72,11 @@ class DirectionEnvelope(TableResult):
     response: Response
     notes: tuple[str, ...] = ()
     origin: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def units(self) -> tuple[JointUnits, ...]:
+        """(n) how each joint's values are written."""
+        return tuple(map(units_of, self.kinds))
 
     def peak(self, quantity: Quantity = "deflection") -> FloatArray:
         """(n,) largest value over all directions: rad, N m or Pa; along `worst_direction`.
@@ -148,10 +156,14 @@ class DirectionEnvelope(TableResult):
         ]
 
     def _repr_html_(self) -> str:
-        columns = ("joint", "peak deflection [mrad, mm]", "worst direction", "peak torque [N m, N]",
-                   "peak stress [MPa]")  # fmt: skip
-        rows = zip(self.joint_names, 1e3 * self.peak_deflection, self.worst_direction.round(3),
-                   self.peak("torque"), 1e-6 * self.peak("stress"), strict=True)  # fmt: skip
+        small, peaks = column([u.small for u in self.units],
+                              [f"{1e3 * x:.4g}" for x in self.peak_deflection])  # fmt: skip
+        load, torques = column([u.load for u in self.units],
+                               [f"{x:.4g}" for x in self.peak("torque")])  # fmt: skip
+        columns = ("joint", f"peak deflection [{small}]", "worst direction",
+                   f"peak torque [{load}]", "peak stress [MPa]")  # fmt: skip
+        rows = zip(self.joint_names, peaks, self.worst_direction.round(3), torques,
+                   1e-6 * self.peak("stress"), strict=True)  # fmt: skip
         facts = {
             "pose [rad, m]": self.pose,
             "blows": self.excitation.describe(),
@@ -163,6 +175,7 @@ class DirectionEnvelope(TableResult):
     def _content(self) -> dict[str, Any]:
         joints = {
             "name": self.joint_names,
+            "kind": self.kinds,
             "peak_deflection": self.peak_deflection,
             "worst_direction": self.worst_direction,
             "peak_torque": self.peak("torque"),
@@ -223,6 +236,7 @@ def envelope(
     return DirectionEnvelope(
         robot=model.robot.name,
         joint_names=model.robot.flexible_names,
+        kinds=tuple(joint.kind for joint in model.robot.flexible_joints),
         pose=at.pose,
         tool_position=at.state.tool_position,
         excitation=excitation,

@@ -34,6 +34,7 @@ from picchio.cli.output import (
 )
 from picchio.core.errors import InputError
 from picchio.core.results import plain
+from picchio.robot.units import column
 from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
@@ -286,13 +287,20 @@ def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
 
 def _life_table(found: Assessment) -> FittedTable:
     shafts = [joint for joint in found.joints if joint.sn_curve]
-    columns: dict[str, Callable[[JointLife], str]] = {
-        "joint": lambda j: j.name,
-        ">peak\ndeflection\nmrad": lambda j: _number(j.peak_deflection * 1e3),
-    }
+    columns: dict[str, Callable[[JointLife], str]] = {"joint": lambda j: j.name}
+
+    def in_units(title: str, unit: str, value: Callable[[JointLife], float]) -> None:
+        """A column whose unit is each joint's own."""
+        joints = found.joints
+        head, cells = column([getattr(j.units, unit) for j in joints],
+                             [_number(value(j)) for j in joints])  # fmt: skip
+        by_name = {joint.name: text for joint, text in zip(joints, cells, strict=True)}
+        columns[f">{title}\n{head}"] = lambda j: by_name[j.name]
+
+    in_units("peak\ndeflection", "small", lambda j: 1e3 * j.peak_deflection)
     if len(shafts) < len(found.joints):
-        columns[">peak\ntorque\nN m"] = lambda j: _number(j.peak_torque)
-        columns[">gravity\ntorque\nN m"] = lambda j: _number(j.gravity_torque)
+        in_units("peak\ntorque", "load", lambda j: j.peak_torque)
+        in_units("gravity\ntorque", "load", lambda j: j.gravity_torque)
     if shafts:
         columns[">peak\nstress\nMPa"] = lambda j: _number(j.peak_shear_stress / 1e6)
         columns[">gravity\nstress\nMPa"] = lambda j: _number(j.gravity_shear_stress / 1e6)
@@ -305,12 +313,10 @@ def _life_table(found: Assessment) -> FittedTable:
             format_count(j.rivets_to_failure) if j.sn_curve else "unknown"
         )
     columns["worst at"] = lambda j: f"{j.worst_operation}, pose {j.worst_pose + 1}"
-    slides = [joint.name for joint in found.joints if joint.kind == "prismatic"]
     made = table(
         columns,
         ([cell(joint) for cell in columns.values()] for joint in found.joints),
         title="Life of the joints" if shafts else "The joints",
-        caption=f"{', '.join(slides)} slides: mm and N, not mrad and N m" if slides else None,
     )
     for row, joint in zip(made.rows, found.joints, strict=True):
         row.style = "bold" if joint.name == found.verdict.joint else None
@@ -329,10 +335,13 @@ def _share_table(found: Assessment) -> FittedTable:
 
 def _steady_table(found: Assessment) -> FittedTable:
     title = "The paper's steady state against a rivet as it happens\n(largest over the task"
-    heads = ["joint", ">steady\npeak\nmrad", ">rivet's\npeak\nmrad", ">\nratio\n"]
+    units = [found.joint(check.joint).units.small for check in found.steady_state]
+    small, steady = column(units, [_number(c.steady_peak * 1e3) for c in found.steady_state])
+    _, rest = column(units, [_number(c.rest_peak * 1e3) for c in found.steady_state])
+    heads = ["joint", f">steady\npeak\n{small}", f">rivet's\npeak\n{small}", ">\nratio\n"]
     rows = [
-        [c.joint, _number(c.steady_peak * 1e3), _number(c.rest_peak * 1e3), _number(c.peak_ratio)]
-        for c in found.steady_state
+        [check.joint, steady[k], rest[k], _number(check.peak_ratio)]
+        for k, check in enumerate(found.steady_state)
     ]
     if any(not math.isnan(check.paper_life) for check in found.steady_state):
         title += "; the paper's S-N curve on both"

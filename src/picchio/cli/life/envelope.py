@@ -59,6 +59,8 @@ def envelope(
 
 
 def _show(found: DirectionEnvelope) -> None:
+    from picchio.robot.units import column
+
     out = console()
     pose = ", ".join(f"{q:g}" for q in found.pose)
     how = "steady state" if found.hits is None else f"{found.hits} hits from rest"
@@ -66,18 +68,22 @@ def _show(found: DirectionEnvelope) -> None:
     out.print(f"  {found.excitation.describe()}")
     frequencies = ", ".join(f"{f:.4f}" for f in found.natural_frequencies)
     out.print(f"  natural frequencies {frequencies} Hz\n")
-    torques, stresses = found.peak("torque"), found.peak("stress") / 1e6
+    stresses = found.peak("stress") / 1e6
+    small, peaks = column([u.small for u in found.units],
+                          [f"{1e3 * x:.5g}" for x in found.peak_deflection])  # fmt: skip
+    load, torques = column([u.load for u in found.units],
+                           [f"{x:.4g}" for x in found.peak("torque")])  # fmt: skip
     rows = [
         (
             name,
-            f"{1e3 * found.peak_deflection[j]:.5g}",
-            f"{torques[j]:.4g}",
+            peaks[j],
+            torques[j],
             "-" if np.isnan(stresses[j]) else f"{stresses[j]:.4g}",
             ", ".join(f"{c + 0.0:.3f}" for c in found.worst_direction[j].round(9)),
         )
         for j, name in enumerate(found.joint_names)
     ]
-    heads = ("joint", ">peak\ndeflection\nmrad", ">peak\ntorque\nN m", ">peak\nstress\nMPa",
+    heads = ("joint", f">peak\ndeflection\n{small}", f">peak\ntorque\n{load}", ">peak\nstress\nMPa",
              ">worst direction\n(either sign)\nx, y, z")  # fmt: skip
     out.print(table(heads, rows))
     x, y, z = found.worst_tool_direction

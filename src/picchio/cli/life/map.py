@@ -193,6 +193,8 @@ def _places(
 
 
 def _show(summary: dict[str, Any]) -> None:
+    from picchio.robot.units import column, units_of
+
     out = console()
     out.print(styled(summary["robot"], f": {summary['poses']} poses in {summary['file']}"))
     hits, counted = summary["hits"], summary["hits_of_damage"]
@@ -205,17 +207,25 @@ def _show(summary: dict[str, Any]) -> None:
     # Stresses rank joints; where not every joint has a shaft, torques do.
     shafts = all(joint["peak_shear_stress"] is not None for joint in summary["joints"])
     limit = "most stress" if shafts else "most torque"
-    heads = ["joint", ">largest\ndeflection\nmrad", ">torque\nthere\nN m", ">stress\nthere\nMPa",
-             ">where\nm", f">{limit},\n% of\nposes"]  # fmt: skip
+    units = [units_of(joint["kind"]) for joint in summary["joints"]]
+    small, peaks = column(
+        [u.small for u in units],
+        [f"{1e3 * joint['peak_deflection']:.4g}" for joint in summary["joints"]],
+    )
+    load, torques = column(
+        [u.load for u in units], [f"{joint['peak_torque']:.4g}" for joint in summary["joints"]]
+    )
+    heads = ["joint", f">largest\ndeflection\n{small}", f">torque\nthere\n{load}",
+             ">stress\nthere\nMPa", ">where\nm", f">{limit},\n% of\nposes"]  # fmt: skip
     if counted:
         heads.append(">damage of\na rivet,\nat most")
     rows = []
-    for joint in summary["joints"]:
+    for k, joint in enumerate(summary["joints"]):
         stress, damage = joint["peak_shear_stress"], joint.get("damage_per_rivet")
         cells = [
             joint["name"],
-            f"{1e3 * joint['peak_deflection']:.4g}",
-            f"{joint['peak_torque']:.4g}",
+            peaks[k],
+            torques[k],
             "-" if stress is None else f"{stress / 1e6:.4g}",
             ", ".join(f"{round(c, 3) + 0.0:.3f}" for c in joint["position"]),
             f"{100 * joint['limits_poses'] / summary['poses']:.1f}",

@@ -74,11 +74,10 @@ def motion_residual(robot: FlexibleRobot, campaign: Campaign) -> MotionResidual:
                          file=campaign.folder, key="record")  # fmt: skip
     found = fit(system, baseline(system, campaign.tolerance.force))
     noise = noise_levels(system)
-    prismatic = {j.name for j in robot.tree.joints.values() if j.type == "prismatic"}
     groups = []
     for group in kept:
         kind, joint = group
-        force, way = ("N", "m") if joint in prismatic else ("N*m", "rad")
+        force, way = map(robot.tree.joints[joint].units.of, ("N*m", "rad"))
         parts = system.of(group)
         groups.append(GroupResidual(
             group, group_words(group), force if kind == TORQUE else way,

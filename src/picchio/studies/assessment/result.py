@@ -15,6 +15,7 @@ from picchio.core.html import sheet
 from picchio.core.results import TableResult
 from picchio.fatigue.standstill import RISKS, FalseBrinelling
 from picchio.robot.drives.reducer import TorqueLimit
+from picchio.robot.units import JointUnits, column, units_of
 from picchio.studies.assessment.verdict import Verdict, judge
 from picchio.studies.assessment.verdict import format_count as format_count
 
@@ -142,6 +143,11 @@ class JointLife:
     shaft_ratio: float = math.nan
     rate_sensitivity: float = math.nan
     false_brinelling: FalseBrinelling | None = None
+
+    @property
+    def units(self) -> JointUnits:
+        """How its values are written."""
+        return units_of(self.kind)
 
     @property
     def life(self) -> float:
@@ -304,10 +310,14 @@ class Assessment(TableResult):
 
     def _repr_html_(self) -> str:
         joints = self.joints
+        small, peaks = column([j.units.small for j in joints],
+                              [f"{1e3 * j.peak_deflection:.4g}" for j in joints])  # fmt: skip
+        load, torques = column([j.units.load for j in joints],
+                               [f"{j.peak_torque:.4g}" for j in joints])  # fmt: skip
         table: dict[str, list[Any]] = {
             "joint": [j.name for j in joints],
-            "peak deflection [mrad, mm]": [1e3 * j.peak_deflection for j in joints],
-            "peak torque [N m, N]": [j.peak_torque for j in joints],
+            f"peak deflection [{small}]": peaks,
+            f"peak torque [{load}]": torques,
         }
         if any(j.sn_curve for j in joints):
             table |= {

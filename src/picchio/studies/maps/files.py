@@ -26,8 +26,16 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "pose": (("point", "coordinate"), "rad", "joint positions (m for prismatic joints)"),
     "branch": (("point",), "1", "bit k is set where joint k's position is negative"),
     "natural_frequency": (("point", "mode"), "Hz", "undamped natural frequency"),
-    "peak_deflection": (("point", "joint"), "rad", "largest deflection over time"),
-    "peak_torque": (("point", "joint"), "N*m", "largest torque of the vibration"),
+    "peak_deflection": (
+        ("point", "joint"),
+        "rad",
+        "largest deflection over time (of slides: m)",
+    ),
+    "peak_torque": (
+        ("point", "joint"),
+        "N*m",
+        "largest torque of the vibration (of slides: N)",
+    ),
     "peak_shear_stress": (("point", "joint"), "Pa", "largest shear stress of the vibration"),
     "worst_direction": (("point", "joint", "xyz"), "1", "unit vector of the force"),
     "limiting_joint": (("point",), "1", "index of the joint with the largest stress or torque"),

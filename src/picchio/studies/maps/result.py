@@ -10,12 +10,23 @@ import numpy as np
 
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
+from picchio.robot.units import column, units_of
 
 if TYPE_CHECKING:
     import pandas
     import xarray
 
 _SLICE = 1_000_000
+
+
+def joint_kinds(found: xarray.Dataset) -> list[str]:
+    """The kind of each joint of a map: "revolute" or "prismatic".
+
+    Args:
+        found: the map.
+    """
+    turning = ["revolute"] * found.sizes["joint"]  # older maps do not say
+    return [str(kind) for kind in np.atleast_1d(found.attrs.get("joint_kinds", turning))]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,12 +68,18 @@ class WorkspaceMap(TableResult):
 
     def _repr_html_(self) -> str:
         content = self._content()
-        columns = ("joint", "largest deflection [mrad, mm]", "torque there [N m, N]",
+        joints = content["joints"]
+        units = [units_of(j["kind"]) for j in joints]
+        small, peaks = column([u.small for u in units],
+                              [f"{1e3 * j['peak_deflection']:.4g}" for j in joints])  # fmt: skip
+        load, torques = column([u.load for u in units],
+                               [f"{j['peak_torque']:.4g}" for j in joints])  # fmt: skip
+        columns = ("joint", f"largest deflection [{small}]", f"torque there [{load}]",
                    "stress there [MPa]", "where [m]", "limits [poses]")  # fmt: skip
         rows = [
-            (j["name"], 1e3 * j["peak_deflection"], j["peak_torque"],
-             1e-6 * j["peak_shear_stress"], j["position"], j["limits_poses"])
-            for j in content["joints"]
+            (j["name"], peaks[k], torques[k], 1e-6 * j["peak_shear_stress"], j["position"],
+             j["limits_poses"])
+            for k, j in enumerate(joints)
         ]  # fmt: skip
         facts = {key: content[key] for key in ("file", "excitation", "direction", "poses")}
         return sheet(f"Workspace map of {content['robot']}", facts, columns, rows)
@@ -72,7 +89,10 @@ class WorkspaceMap(TableResult):
         found = self.dataset
         count = int(found.sizes["point"])
         names = [str(name) for name in found["joint"].values]
-        best: list[dict[str, Any]] = [{"name": name, "peak_deflection": -1.0} for name in names]
+        best: list[dict[str, Any]] = [
+            {"name": name, "kind": kind, "peak_deflection": -1.0}
+            for name, kind in zip(names, joint_kinds(found), strict=True)
+        ]
         limits = np.zeros(len(names), dtype=int)
         for first in range(0, count, _SLICE):
             part = found.isel(point=slice(first, first + _SLICE))

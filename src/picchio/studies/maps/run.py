@@ -259,6 +259,7 @@ def _attributes(job: MapJob) -> dict[str, Any]:
         "format": "picchio-map/1",
         "robot": job.model.robot.name,
         "joint": list(job.model.robot.flexible_names),
+        "joint_kinds": [joint.kind for joint in job.model.robot.flexible_joints],
         "coordinate": list(job.model.robot.joint_names),
         "excitation": job.excitation.describe(),
         "direction": str(job.direction),

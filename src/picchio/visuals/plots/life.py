@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
+from picchio.robot.units import labelled
 from picchio.studies.assessment.result import Assessment
 from picchio.studies.uncertainty import UncertainLife
 from picchio.visuals.plots.style import (
@@ -49,12 +50,14 @@ def plot_utilisation(assessment: Assessment, ax: Axes | None = None) -> Axes:
 
 @styled
 def plot_peak_torque(assessment: Assessment, ax: Axes | None = None) -> Axes:
-    """Largest torque of the vibration (N m) by joint and operation; needs no shaft."""
+    """Largest torque of the vibration (N m, N) by joint and operation; needs no shaft."""
     operations = assessment.operations
     ax = axes_or_new(ax, height=_height(len(assessment.joints), len(operations)))
     values = np.array([operation.peak_torque.max(axis=0) for operation in operations])
-    _bars(ax, assessment, values, "not computed")
-    ax.set(xlabel="peak torque of the vibration [N m]", title="Torque by joint and operation")
+    units = [joint.units.load for joint in assessment.joints]
+    unit, names = labelled(units, [joint.name for joint in assessment.joints])
+    _bars(ax, assessment, values, "not computed", names=names)
+    ax.set(xlabel=f"peak torque of the vibration [{unit}]", title="Torque by joint and operation")
     return ax
 
 
@@ -106,12 +109,17 @@ def _rows(ax: Axes, names: list[str]) -> np.ndarray:
 
 
 def _bars(
-    ax: Axes, assessment: Assessment, values: np.ndarray, missing: str, marks: Sequence[float] = ()
+    ax: Axes,
+    assessment: Assessment,
+    values: np.ndarray,
+    missing: str,
+    marks: Sequence[float] = (),
+    names: list[str] | None = None,
 ) -> float:
     """Grouped bars of values (operation, joint), a mark a joint; NaN becomes a word."""
     operations = [operation.name for operation in assessment.operations]
     height = 0.8 / len(operations)
-    rows = _rows(ax, [joint.name for joint in assessment.joints])
+    rows = _rows(ax, names or [joint.name for joint in assessment.joints])
     for k, (name, row) in enumerate(zip(operations, values, strict=True)):
         y = rows + (k - (len(operations) - 1) / 2) * height
         known = np.isfinite(row)

@@ -10,11 +10,13 @@ from matplotlib.axes import Axes
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.robot.units import labelled
 from picchio.studies.envelopes import DirectionEnvelope, Quantity
 from picchio.visuals.plots.style import INK, MUTED, axes_or_new, look, plain, styled
 
 Plane = Literal["xy", "xz", "yz"]
 PLANES: tuple[Plane, ...] = ("xy", "xz", "yz")
+# The factor, and a turning joint's unit.
 _UNITS = {"deflection": ("mrad", 1e3), "torque": ("N m", 1.0), "stress": ("MPa", 1e-6)}
 
 
@@ -50,7 +52,7 @@ def plot_polar_envelope(
         plane: of the world axes; the first is at 0 degrees, the second at 90.
         ax: polar axes.
         joints: names; all if not given.
-        quantity: "deflection" (mrad), "torque" (N m) or "stress" (MPa).
+        quantity: "deflection" (mrad, mm), "torque" (N m, N) or "stress" (MPa).
         count: directions over half a turn; the other half is its mirror image.
 
     Raises:
@@ -60,6 +62,8 @@ def plot_polar_envelope(
     angle, directions = cut_directions(plane, count)
     support = envelope.support(directions, quantity)
     unit, factor = _UNITS[quantity]
+    units = [kind.of(unit) for kind in envelope.units]
+    unit, names = labelled(units, map(plain, envelope.joint_names))
     for name in joints or envelope.joint_names:
         if name not in envelope.joint_names:
             raise InputError("no such joint", key="joints", value=name,
@@ -70,7 +74,7 @@ def plot_polar_envelope(
         radius = np.concatenate([support[j], support[j], support[j][:1]]) * factor
         turn = np.concatenate([angle, angle + np.pi, [2 * np.pi]])
         style = look(j)
-        ax.plot(turn, radius, label=plain(name), **style)
+        ax.plot(turn, radius, label=names[j], **style)
         ax.fill(turn, radius, color=style["color"], alpha=0.10)
     ax.set_title(f"Peak {quantity} by force direction, {plane} plane [{unit}]", pad=18)
     ax.set_xticks(np.arange(8) * np.pi / 4,

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from picchio.core.arrays import BoolArray, FloatArray
+from picchio.robot.units import SLIDING, TURNING
 from picchio.visuals.plots.diagnosis import AFTER, BEFORE, plain_numbers
 from picchio.visuals.plots.style import (
     BLUE,
@@ -229,10 +230,11 @@ def plot_restoring(
             "o-", color=VERMILION, markersize=3.5, linewidth=1.6, label="median")  # fmt: skip
     ax.axvline(0.0, color=MUTED, linewidth=0.8)
     _frame_most(ax, y)
-    length = ("" if whole else "m") + ("m" if prismatic else "rad")
+    units = SLIDING if prismatic else TURNING
+    length = units.length if whole else units.small
     unit = f"{length}/s" if over == "velocity" else length
     ax.set(xlabel=f"{over} of {plain(joint)} [{unit}]",
-           ylabel=f"missing {'force [N]' if prismatic else 'torque [N m]'}")  # fmt: skip
+           ylabel=f"missing {units.load_word} [{units.load}]")  # fmt: skip
     return ax
 
 
@@ -294,17 +296,17 @@ def plot_orders(
     found: Sequence[float],
     ax: Axes | None = None,
     *,
-    geared: bool = True,
+    per: str = "turn of the motor",
 ) -> Axes:
     """A residual's power over its neighbourhood's, by the order; 1 is noise.
 
     Args:
-        orders: (k,) cycles a turn.
+        orders: (k,) cycles a turn, or a metre.
         before: (k,).
         after: (k,).
         found: orders of the ripples that were found.
         ax: where to draw.
-        geared: whether turns are the motor's.
+        per: what the cycles are counted over.
     """
     ax = axes_or_new(ax)
     # Of every few lines the highest, so that none of the narrow ones is lost.
@@ -324,7 +326,7 @@ def plot_orders(
         ax.annotate(f"{order:.4g}", (order, top), xytext=(0, 3),
                     textcoords="offset points", ha="center", fontsize=8, color=INK)  # fmt: skip
     plain_numbers(ax.yaxis, 0.5, 4.0 * high)
-    ax.set(xlabel=f"cycles a turn of the {'motor' if geared else 'joint'}",
+    ax.set(xlabel=f"cycles a {per}",
            ylabel="power / its neighbourhood's")  # fmt: skip
     ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     return ax

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.studies.maps.result import WorkspaceMap
+from picchio.robot.units import units_of
+from picchio.studies.maps.result import WorkspaceMap, joint_kinds
 from picchio.visuals.plots.style import CMAP, axes_or_new, plain, styled
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def spacing(places: FloatArray) -> float:
 def plot_workspace_map(
     workspace: WorkspaceMap | xarray.Dataset, joint: str, ax: Axes | None = None
 ) -> Axes:
-    """The peak deflection of a joint (mrad) over the plane that the map spans (m).
+    """The peak deflection of a joint (mrad, mm) over the plane that the map spans (m).
 
     Of several poses that reach a place the one with the smallest peak counts. A map of a box is
     seen along its shortest side, the smallest peak in front.
@@ -79,6 +80,9 @@ def plot_workspace_map(
         InputError: an unknown joint, a map without values.
     """
     places, peak = best_branch(workspace, joint)
+    found = dataset_of(workspace)
+    names = [str(name) for name in found["joint"].values]
+    unit = units_of(joint_kinds(found)[names.index(joint)]).small
     ax = axes_or_new(ax, width=5.6, height=4.4)
     spread = np.ptp(places, axis=0)
     across, up = sorted(np.argsort(spread)[1:])
@@ -96,6 +100,6 @@ def plot_workspace_map(
     shown = ax.scatter(places[order, across], places[order, up], c=peak[order] * 1e3, s=size**2,
                        marker="s", cmap=CMAP, vmin=0.0, linewidths=0)  # fmt: skip
     bar = ax.figure.colorbar(shown, ax=ax, shrink=0.85, pad=0.02)
-    bar.set_label("peak deflection [mrad]")
+    bar.set_label(f"peak deflection [{unit}]")
     bar.outline.set_visible(False)  # type: ignore[operator]
     return ax

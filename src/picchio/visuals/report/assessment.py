@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -47,8 +48,7 @@ def _figures(
 
     joint, operation = worst.joint, worst.operation
     where = f"{operation.name}, pose {worst.pose_number}"
-    slides = joint.kind == "prismatic"
-    unit, spoken = ("mm", "millimetres") if slides else ("mrad", "milliradians")
+    unit, spoken = joint.units.small, joint.units.spoken
     joints, operations = len(assessment.joints), len(assessment.operations)
     shafts = any(j.sn_curve or j.reducer for j in assessment.joints)
     tall = 0.9 + 0.3 * joints * (1 + 0.5 * (operations - 1))
@@ -228,7 +228,7 @@ def assessment_report(
         terms=list(terms),
         shafts=any(joint.sn_curve for joint in assessment.joints),
         warnings=list(dict.fromkeys([*told.reasons, *warnings])),
-        slides=any(joint.kind == "prismatic" for joint in robot.flexible_joints),
+        units=Counter(joint.units for joint in assessment.joints).most_common(1)[0][0],
         command=command or f"picchio assess {robot.name}",
         scene=scene,
     )

@@ -220,23 +220,27 @@ def _phrase(kind: str, causes: Sequence[Cause]) -> str:
         return f"{what}, {len(causes)} harmonics" if catalogue()[kind].periodic else what
     said = []
     for cause in causes:
-        parts = ", ".join(f"{words(name)} {_value_text(v)}" for name, v in _shown(cause).items())
+        parts = ", ".join(
+            f"{'every' if name == 'period' else words(name)} {_value_text(v)}"
+            for name, v in _shown(cause).items()
+        )
         where = "" if cause.target in ("robot", "tool") else f" of {cause.target}"
         said.append(f"{words(kind)}{where}, {parts}" if parts else f"{words(kind)}{where}")
     return "; ".join(said)
 
 
 def _shown(cause: Cause) -> dict[str, Value]:
-    """Without the two parts of a wave, whose amplitude is given."""
-    left_out = ("cosine", "sine") if "amplitude" in cause.parameters else ()
+    """Without the two parts of a wave, whose amplitude is given, or a slide's turns."""
+    replaced = {"amplitude": {"cosine", "sine"}, "period": {"order"}}
+    left_out = {old for new in replaced.keys() & cause.parameters.keys() for old in replaced[new]}
     return {name: v for name, v in cause.parameters.items() if name not in left_out}
 
 
 def _value_text(v: Value) -> str:
     """Value and standard deviation."""
-    # Delays are told in milliseconds.
-    if v.unit == "s":
-        return spread(1e3 * v.value, 1e3 * v.std, "ms")
+    # Delays are told in milliseconds, the pitch of a screw in millimetres.
+    if v.unit in ("s", "m"):
+        return spread(1e3 * v.value, 1e3 * v.std, f"m{v.unit}")
     return spread(v.value, v.std, v.unit)
 
 
@@ -248,7 +252,7 @@ def _set_words(pairs: Sequence[tuple[str, str]]) -> str:
 # The causes, each with its meaning: heads and rows of a table, and what stands above and below.
 
 
-_DERIVED = {"amplitude": "of the wave", "stiffness": "of the joint"}
+_DERIVED = {"amplitude": "of the wave", "stiffness": "of the joint", "period": "along its way"}
 
 
 def _card(robot: FlexibleRobot, cause: Cause) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from picchio.diagnosis.motion.residual import GroupResidual, MotionResidual, rms
 from picchio.diagnosis.result import Diagnosis
 from picchio.model.effects.registry import effect_class
 from picchio.model.motion import TORQUE, WINDUP
+from picchio.robot.units import SLIDING, JointUnits
 from picchio.visuals.plots.diagnosis import (
     plot_left_over,
     plot_motion_scores,
@@ -73,23 +74,21 @@ class View:
         return self.segment.measured
 
     @property
-    def prismatic(self) -> bool:
-        """Whether the joint slides."""
-        joint = self.system.robot.tree.joints.get(self.group[1])
-        return joint is not None and joint.type == "prismatic"
+    def units(self) -> JointUnits:
+        """How the joint's values are written."""
+        return self.system.robot.tree.joints[self.group[1]].units
 
     @property
     def words(self) -> str:
         """For people."""
-        kind = "force" if self.prismatic and self.group[0] == TORQUE else _WORDS[self.group[0]]
+        kind = self.units.load_word if self.group[0] == TORQUE else _WORDS[self.group[0]]
         return f"{kind} of {self.group[1]}"
 
     @property
     def channel(self) -> Channel:
         """With a short name, to label axes with."""
         kind, joint = self.group
-        length = "m" if self.prismatic else "rad"
-        unit = {TORQUE: "N" if self.prismatic else "N*m"}.get(kind, length)
+        unit = self.units.of({TORQUE: "N*m"}.get(kind, "rad"))
         name = f"{'torque' if kind == TORQUE else 'position'}.{joint}"
         short = f"link - motor, {joint}" if kind == WINDUP else f"{self.words.split()[0]}, {joint}"
         return replace(parse_channel(name, unit)[0], name=short)
@@ -141,12 +140,12 @@ _NOMINAL = {
 _CANDIDATES = 8
 _PICTURED = 4  # steps of the search
 _BEYOND = 1.5  # times the highest order that was found
-# Of the motion: name for people, and unit, of a joint that turns and of one that slides.
+# Of the motion: name for people, and unit of a joint that turns.
 _OVER = {
-    "angle": ("position", "rad", "m"),
-    "velocity": ("velocity", "rad/s", "m/s"),
-    "acceleration": ("acceleration", "rad/s²", "m/s²"),
-    "body": ("torque that the gear carries", "N m", "N"),
+    "angle": ("position", "rad"),
+    "velocity": ("velocity", "rad/s"),
+    "acceleration": ("acceleration", "rad/s²"),
+    "body": ("torque that the gear carries", "N m"),
 }
 _READ = {
     "angle": "a wrong mass or counterweight is a curve, ripple are waves",
@@ -224,9 +223,9 @@ class MotionFigures(Pictures):
             scale, unit = shown_unit(view.channel)
             before = scale * np.concatenate([v.before for v in same])
             after = scale * np.concatenate([v.after for v in same]) if self.changed else None
-            over, *units = _OVER[name]
+            over, per = _OVER[name]
             ax = plot_clouds(x, before, after,
-                             f"{over} of {view.group[1]} [{units[view.prismatic]}]",
+                             f"{over} of {view.group[1]} [{view.units.of(per)}]",
                              f"left of the {view.words.split()[0]}\n[{unit.replace('*', ' ')}]",
                              blank_figure(5.2, 3.2))  # fmt: skip
             caption = (
@@ -254,17 +253,21 @@ class MotionFigures(Pictures):
         )  # fmt: skip
         if before is None or after is None:
             return []
-        geared = before.ratio != 1.0
-        shown = before.orders / before.ratio <= _BEYOND * max(ripples[joint])
-        ax = plot_orders(
-            (before.orders / before.ratio)[shown], before.strength[shown], after.strength[shown],
-            ripples[joint], blank_figure(5.2, 3.2), geared=geared,
-        )  # fmt: skip
-        orders = ", ".join(f"{order:.4g}" for order in sorted(ripples[joint]))
-        length = "turn of the motor" if geared else "turn of the joint (2π m of a slide)"
+        units, found = system.robot.tree.joints[joint].units, np.array(sorted(ripples[joint]))
+        scale, per = 1.0 / before.ratio, "turn of the motor" if before.ratio != 1.0 else ""
+        if units is SLIDING:  # phase by metre, where a turning joint has phase by turn
+            scale, per, found = 1.0 / (2.0 * np.pi), "metre", found * before.ratio / (2.0 * np.pi)
+        per = per or "turn of the joint"
+        shown = scale * before.orders <= _BEYOND * found.max()
+        ax = plot_orders((scale * before.orders)[shown], before.strength[shown],
+                         after.strength[shown], found.tolist(), blank_figure(5.2, 3.2),
+                         per=per)  # fmt: skip
+        orders = ", ".join(f"{order:.4g}" for order in found)
+        if units is SLIDING:
+            orders = ", ".join(f"every {1e3 / cycles:.4g} mm" for cycles in found)
         caption = (
-            f"{joint}, torque before and after its ripples were taken into account, by cycles a "
-            f"{length}; found, not given: {orders}."
+            f"{joint}, {units.load_word} before and after its ripples were taken into account, by "
+            f"cycles a {per}; found, not given: {orders}."
         )
         return [self.picture(ax, f"Residual of {joint} by order, with {orders} found", caption)]
 
@@ -363,10 +366,10 @@ class MotionResidualFigures(Pictures):
             name = {"angle": "position", "body": "torque"}.get(over, over)
             x = np.concatenate([v.motion(over) for v in views]) * (1e-3 if over == "body" else 1.0)
             ax = plot_restoring(x, left, joint, blank_figure(5.2, 3.0), over=name,
-                                prismatic=view.prismatic)  # fmt: skip
+                                prismatic=view.units is SLIDING)  # fmt: skip
             if over == "body":
-                carried = "N" if view.prismatic else "N m"
-                ax.set_xlabel(f"torque that {plain(joint)} carries [{carried}]")
+                ax.set_xlabel(f"{view.units.load_word} that {plain(joint)} carries "
+                              f"[{view.units.load}]")  # fmt: skip
             if not torque:
                 ax.set_ylabel(f"left of the angle [{unit}]")
             hint = ": a soft gear is a line, play a step" if over == "body" else ""

@@ -83,7 +83,7 @@ def build_scene(
     scene = Scene(robot.name, f"pose ({where}); {excitation.describe()}; {how}", envelope, tree)
     scene.chosen, scene.reach = _first(envelope, assessment, joint), body.reach
     _add_body(scene, body)
-    units = ["mm" if j.kind == "prismatic" else "mrad" for j in robot.flexible_joints]
+    units = [joint.units.small for joint in robot.flexible_joints]
     _add_rings(scene, body, assessment, units)
     _add_envelopes(scene, body, units, subdivisions)
     blow = unit_vector(direction) if direction is not None else None

@@ -10,6 +10,7 @@ from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit
 from picchio.diagnosis.result import Value, unit_of
 from picchio.model.effects.effect import Effect
+from picchio.robot.units import SLIDING
 
 _POSES = 50
 
@@ -36,6 +37,12 @@ def parameters(system: System, current: Fit, effect: Effect) -> dict[str, Value]
         unit = unit_of(robot, effect.target, "N*m/rad")
         scale = found["scale"]
         found["stiffness"] = Value(scale.value * documented, scale.std * documented, unit)
+    joint = robot.tree.joints.get(effect.target)
+    if effect.periodic and joint is not None and joint.units is SLIDING:
+        # A slide does not turn: what repeats, repeats along its way.
+        order, ratio = found["order"], system.predictors[0].nominal.gear_ratio[effect.target]
+        length = 2.0 * math.pi / (order.value * ratio)
+        found["period"] = Value(length, length * order.std / order.value, "m")
     if effect.periodic and {"cosine", "sine"} <= found.keys():
         cosine, sine = found["cosine"], found["sine"]
         size = math.hypot(cosine.value, sine.value)
