@@ -1,33 +1,48 @@
-"""The allowable force, hits and shaft radius for a target life."""
+"""What a wanted life allows: force, hits, rivets, shaft radius and reducer, over every part."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
+from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
 from picchio.core.processes import one_thread
 from picchio.core.results import TableResult
-from picchio.fatigue.counting.counter import Residue
+from picchio.fatigue.counting.counter import Residue, rainflow
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.mean_stress import Rule
-from picchio.fatigue.miner import damage
+from picchio.fatigue.miner import damage, utilisation
+from picchio.fatigue.shaft_stress import check_shaft
 from picchio.fatigue.sn.curve import SNCurve
+from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, load_sn_curve
 from picchio.model.model import Model
+from picchio.robot.drives.reducer import Reducer, all_reducers
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.studies.rivet.variation import ShaftStress, VariedRivet, rivets_of
+from picchio.robot.joint import Joint
+from picchio.studies.assessment.verdict import SHAFT_TOLERANCE, format_count, softer
+from picchio.studies.rivet.life_rules import curves_of
+from picchio.studies.rivet.pose import JointLoad, need_springs
+from picchio.studies.rivet.variation import VariedRivet, rivets_of
 from picchio.studies.tasks import Task
 
 _MOST_HITS = 1 << 10
-# How exactly the force is found where every trial must be integrated in time.
-_NONLINEAR_TOLERANCE = 1e-6
+# A value given lies this far on the safe side, relative, so that rounding does not undo it.
+_GUARD = 1e-11
+# How near the allowable force is to the least that is too much, where every trial is integrated.
+_NONLINEAR_TOLERANCE = 1e-9
+# A torque, N m, and a stress, Pa, below these are rounding.
+_NO_TORQUE, _NO_STRESS = 1e-3, 1.0
+# What is further beyond a limit, or below it, is not told apart.
+_FAR = 50.0
 
 
 @dataclass(frozen=True)
@@ -38,12 +53,20 @@ class Allowable:
         joint: its name.
         rivets: the wanted life, rivets of the task's mix.
         survival: the wanted probability that a specimen lives so long; None: the curve's own.
-        force_factor: by which every blow's force may be multiplied; inf where the blows do not
-            move the joint.
-        radius: m, the smallest shaft radius, at the same joint stiffness.
+        force_factor: by which every blow's force may be multiplied, the least over the joint's
+            parts; inf where no force is too much or no part is known, 0 where gravity alone is.
+        radius: m, the smallest shaft radius, at the same joint stiffness; of a joint without a
+            shaft, for the default steel (or the curve that was given); NaN for a slide without one.
         hits: blows a rivet may take; None where operations differ in it, or where more than 1024
             are allowed.
-        life: rivets to failure as things are, at that survival.
+        life: rivets to failure of the shaft as things are, at that survival; NaN without a shaft.
+        met: whether every part of the joint holds as things are; None where it has none.
+        most_rivets: the most rivets that may be wanted; None where there is no end.
+        governed_by: shaft, yield or reducer: the part that limits the force; "" where none does.
+        reducer: the smallest of the catalogues that bears the torque; None where none does, and
+            of a slide.
+        peak_torque: N m, largest magnitude of gravity and blows together; N of a slide.
+        failing: what does not hold as things are, in words; "" where all does.
     """
 
     joint: str
@@ -53,22 +76,51 @@ class Allowable:
     radius: float
     hits: int | None
     life: float
+    met: bool | None = None
+    most_rivets: int | None = None
+    governed_by: str = ""
+    reducer: str | None = None
+    peak_torque: float = math.nan
+    failing: str = ""
+
+
+def _needs(joint: Allowable) -> str:
+    """What the task asks of a joint of which no part is known."""
+    if not joint.peak_torque > _NO_TORQUE:
+        return f"{joint.joint} any"
+    shaft = "" if math.isnan(joint.radius) else f"{1e3 * joint.radius:.4g} mm, "
+    unit = "N" if math.isnan(joint.radius) else "N m"
+    small = f" ({joint.reducer})" if joint.reducer else ""
+    return f"{joint.joint} {shaft}{joint.peak_torque:.4g} {unit}{small}"
 
 
 @dataclass(frozen=True, repr=False)
 class AllowableLoads(TableResult):
-    """What a target life allows, joint by joint.
+    """What a target life allows, joint by joint and for the robot.
 
     Attributes:
-        joints: of each joint with a shaft.
+        joints: of each flexible joint.
         notes: what was left out, and why.
+        force_factor: the least of the joints'.
+        force: N, of the strongest blows, by which the whole robot just holds; the blows of all
+            operations are scaled alike. Inf where there is no end.
+        hits: blows a rivet may take; as in `Allowable`.
+        contrary: why the answer cannot be told whatever the parts bear; "" where it can.
+        steel: the S-N curve for the radius where a joint has no shaft.
     """
 
     INDEX = "joint"
-    UNITS: ClassVar[Mapping[str, str]] = {"radius": "m", "life": "1", "rivets": "1"}
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "radius": "m", "life": "1", "rivets": "1", "peak_torque": "N m",
+    }  # fmt: skip
 
     joints: tuple[Allowable, ...]
     notes: tuple[str, ...] = ()
+    force_factor: float = math.inf
+    force: float = math.inf
+    hits: int | None = None
+    contrary: str = ""
+    steel: str = DEFAULT_SN_CURVE
 
     def __iter__(self) -> Iterator[Allowable]:
         return iter(self.joints)
@@ -79,24 +131,96 @@ class AllowableLoads(TableResult):
     def __getitem__(self, index: int) -> Allowable:
         return self.joints[index]
 
+    @property
+    def met(self) -> bool | None:
+        """Whether every part, as given, holds; None where a joint has none and no other fails."""
+        told = [joint.met for joint in self.joints]
+        return False if False in told else None if None in told else True
+
+    @property
+    def yes(self) -> bool:
+        """Whether the life can be promised."""
+        return self.met is True and not self.contrary
+
+    @property
+    def rivets(self) -> int | None:
+        """The most rivets that may be wanted; None where there is no end."""
+        known = [joint.most_rivets for joint in self.joints if joint.most_rivets is not None]
+        return min(known, default=None)
+
+    @property
+    def answer(self) -> str:
+        """Yes, no, or why it cannot be told; then what may be changed."""
+        first = self.joints[0]
+        sure = "" if first.survival is None else f" at {100 * first.survival:.6g} %"
+        wanted = f"{format_count(first.rivets)} rivets{sure}"
+        if self.met is False:
+            worst = min(self.joints, key=lambda joint: (joint.met is not False, joint.force_factor))
+            return f"No: {worst.failing}, so {wanted} cannot be promised. {self._force()}"
+        if self.contrary:
+            return f"Cannot be told: {self.contrary}."
+        if self.met is None:
+            bare = [joint.joint for joint in self.joints if joint.met is None]
+            who = "no joint has" if len(bare) == len(self.joints) else f"{', '.join(bare)} lack"
+            needs = "; ".join(_needs(joint) for joint in self.joints if joint.met is None)
+            return (
+                f"Cannot be told: {who} a shaft or a reducer. For {wanted} this task needs a shaft "
+                f"of at least this radius ({self.steel}) and a reducer with at least this repeated "
+                f"peak torque: {needs}."
+            )
+        return f"Yes: every part that is given survives {wanted}. {self._force()}"
+
+    def _force(self) -> str:
+        if math.isinf(self.force_factor):
+            return "No force of the blows is too much."
+        if self.force_factor == 0.0:
+            return "No force of the blows is small enough: what does not scale with it is too much."
+        least = min(self.joints, key=lambda joint: joint.force_factor)
+        part = "reducer" if least.governed_by == "reducer" else "shaft"
+        return (
+            f"The force may be {self.force_factor:.4g} times as large, {self.force:.4g} N, by the "
+            f"{part} of {least.joint}."
+        )
+
     def _rows(self) -> list[dict[str, Any]]:
         return [dataclasses.asdict(joint) for joint in self.joints]
 
     def _content(self) -> dict[str, Any]:
-        return {"for_life": self._rows(), "for_life_notes": self.notes}
+        first = self.joints[0]
+        least = min(self.joints, key=lambda joint: joint.force_factor)
+        return {
+            "for_life": self._rows(),
+            "for_life_notes": self.notes,
+            "allowable": {
+                "met": self.met,
+                "answer": self.answer,
+                "life": first.rivets,
+                "survival": first.survival,
+                "force": self.force,
+                "force_factor": self.force_factor,
+                "governed_by": least.governed_by or None,
+                "joint": least.joint if least.governed_by else None,
+                "hits": self.hits,
+                "rivets": self.rivets,
+                "radius": {joint.joint: joint.radius for joint in self.joints},
+                "reducer": {joint.joint: joint.reducer for joint in self.joints},
+                "peak_torque": {joint.joint: joint.peak_torque for joint in self.joints},
+            },
+        }
 
     def _headline(self) -> str:
-        least = min(self.joints, key=lambda joint: joint.force_factor)
-        return (
-            f"for {least.rivets:g} rivets the force may be {least.force_factor:.4g} times as "
-            f"large, by {least.joint}"
-        )
+        return self.answer
 
     def _repr_html_(self) -> str:
-        rows = [(j.joint, j.life, j.force_factor, 1e3 * j.radius, j.hits) for j in self.joints]
-        columns = ("joint", "life now [rivets]", "force factor", "least radius [mm]", "most hits")
+        rows = [
+            (j.joint, j.life, j.force_factor, j.governed_by or None, j.hits, 1e3 * j.radius,
+             j.reducer)
+            for j in self.joints
+        ]  # fmt: skip
+        columns = ("joint", "life now [rivets]", "force factor", "by", "most hits",
+                   "least radius [mm]", "least reducer")  # fmt: skip
         facts = {"target life [rivets]": self.joints[0].rivets, "survival": self.joints[0].survival}
-        return sheet("Allowable loads", facts, columns, rows)
+        return sheet("Allowable loads", facts, columns, rows, self.answer)
 
 
 @one_thread()
@@ -111,15 +235,16 @@ def allowable(
     mean_stress: Rule = "none",
     gravity_stiffness: bool | None = None,
     gravity_balanced: bool | None = None,
+    reducers: Sequence[str | Path] = (),
 ) -> AllowableLoads:
-    """Allowable force, hits and shaft radius of every joint for a target life.
+    """Whether a task can be done for a target life, and what that life allows.
 
-    Rivets start from rest and ring down, cycles are counted by rainflow. Gravity's stress does not
-    grow with the force, but with a thinner shaft. Where the curve knows its yield strength in
-    shear, the largest stress must stay below it, too.
+    Every part counts: a shaft's fatigue and its static strength in shear (where its curve knows
+    one), and the torque limits of a reducer. Rivets start from rest and ring down, cycles are
+    counted by rainflow. Gravity's stress does not grow with the force, but with a thinner shaft.
 
     Args:
-        robot: with shafts; or a model of it.
+        robot: with stiffnesses, and shafts or reducers where they are known; or a model of it.
         task: what it does.
         rivets: the target life, in rivets of the task's mix.
         survival: move each curve to this probability; None leaves it.
@@ -128,157 +253,431 @@ def allowable(
         mean_stress: as in `assess`.
         gravity_stiffness: as in `assess`.
         gravity_balanced: as in `assess`.
+        reducers: catalogues beside the shipped ones, to choose from.
 
     Returns:
-        what each joint with a shaft allows.
+        yes or no, and what each joint allows: the force and the radius hold to 1e-9, from the safe
+        side; of hits, rivets and reducer the value given holds and the next one does not.
 
     Raises:
-        InputError: no joint with a shaft, a life that is not positive, a curve without scatter
-            where a survival is asked for, gravity alone too much.
+        InputError: no flexible joint, a life that is not positive, a curve without scatter where a
+            survival is asked for.
     """
     if not (math.isfinite(rivets) and rivets > 0):
         raise InputError("must be positive", key="rivets", value=rivets)
     model = Model.of(robot, gravity_stiffness=gravity_stiffness, gravity_balanced=gravity_balanced)
-    stress = ShaftStress.of(model.robot, sn_curve, survival, residue, mean_stress)
-    search = _Backwards(stress, rivets_of(model, task), task, rivets, survival)
+    need_springs(model.robot)
+    curves = curves_of(model.robot, sn_curve)
+    steel = sn_curve if isinstance(sn_curve, SNCurve) else load_sn_curve(
+        sn_curve or DEFAULT_SN_CURVE, quiet=True
+    )  # fmt: skip
+    if survival is not None:
+        curves = tuple(curve and curve.at_survival(survival) for curve in curves)
+        steel = steel.at_survival(survival)
+    parts = [
+        _Parts(joint, curve, steel, residue, mean_stress)
+        for joint, curve in zip(model.robot.flexible_joints, curves, strict=True)
+    ]
+    catalogue = all_reducers(reducers) | {p.reducer.name: p.reducer for p in parts if p.reducer}
+    search = _Backwards(model, task, rivets, survival, parts, sorted(catalogue.values(), key=_size))
+    joints = tuple(search.joint(k) for k in range(len(parts)))
+    factor = search.force_of_all(min(joint.force_factor for joint in joints))
+    strongest = max(operation.excitation.peak_force for operation in task.operations)
     return AllowableLoads(
-        tuple(search.joint(k) for k in range(len(stress.joints))), model.without_load()
+        joints,
+        (*model.without_load(), *search.notes(joints)),
+        force_factor=factor,
+        force=factor * strongest if strongest else math.inf,
+        hits=search.hits_of_all(joints),
+        contrary="; ".join(part.contrary for part in parts if part.contrary),
+        steel=steel.name,
     )
 
 
-Load = list[tuple[Cycles, float, float]]
-"""For each rivet place: the stress cycles of a rivet, the steady stress, the rivets set there."""
+def _size(reducer: Reducer) -> tuple[float, float, float, str]:
+    """By which one reducer is smaller than another."""
+    return (reducer.repeated_peak_torque, reducer.momentary_peak_torque, reducer.rated_torque,
+            reducer.name)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Load:
+    """What a joint carries in a pass of the task, N m (N of a slide).
+
+    Of every cycle of the vibration `range`, `mean`, `count` and the `steady` torque beside it; of
+    every place the torque `at_rest` and the vibration's `low` and `high`.
+    """
+
+    range: FloatArray
+    mean: FloatArray
+    count: FloatArray
+    steady: FloatArray
+    at_rest: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+    @classmethod
+    def of(cls, loads: Sequence[tuple[JointLoad, float]], residue: Residue) -> _Load:
+        """Of a joint at every place, with the rivets of a pass set there."""
+        columns: list[list[FloatArray]] = [[], [], [], []]
+        ends = []
+        for load, rivets in loads:
+            assert load.rest is not None
+            torque, rest = load.stiffness * load.rest, load.stiffness * load.static
+            cycles = rainflow(torque, residue=residue)
+            steady = np.full(len(cycles), rest)
+            found = (cycles.range, cycles.mean, cycles.count * rivets, steady)
+            for column, values in zip(columns, found, strict=True):
+                column.append(values)
+            ends.append((rest, float(torque.min()), float(torque.max())))
+        return cls(*map(np.concatenate, columns), *np.array(ends).T)
+
+    def scaled(self, factor: float) -> _Load:
+        """With the blows so many times as high, in a linear model."""
+        keys = ("range", "mean", "low", "high")
+        return dataclasses.replace(self, **{key: getattr(self, key) * factor for key in keys})
+
+    def stress(self, per: float) -> Cycles:
+        """The cycles of stress, Pa, where a torque brings `per` times as much."""
+        return Cycles.trusted(self.range * per, (self.mean + self.steady) * per, self.count)
+
+    @property
+    def swing(self) -> float:
+        return float(max(-self.low.min(), self.high.max()))
+
+    @property
+    def peak(self) -> float:
+        ends = np.abs(self.at_rest + self.low), np.abs(self.at_rest + self.high)
+        return float(np.max(ends))
+
+    @property
+    def held(self) -> float:
+        return float(np.abs(self.at_rest).max())
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """What may fail in a joint: how far its load is from what each part bears.
+
+    A score is the logarithm of actual over allowable: above 0 it is too much.
+    """
+
+    joint: Joint
+    curve: SNCurve | None
+    steel: SNCurve
+    residue: Residue
+    mean_stress: Rule
+
+    @property
+    def reducer(self) -> Reducer | None:
+        return self.joint.reducer
+
+    @property
+    def contrary(self) -> str:
+        """Why the shaft cannot be; "" where it can."""
+        joint = self.joint
+        ratio = 1.0 + check_shaft(joint.stiffness, joint.shaft) if joint.shaft else 1.0
+        if ratio >= 1.0 - SHAFT_TOLERANCE:
+            return ""
+        return f"the shaft of {joint.name}, by G Jp / l, {softer(ratio)}"
+
+    @property
+    def radius(self) -> float:
+        """m, of the shaft; any where there is none."""
+        return self.joint.shaft.radius if self.joint.shaft else 0.01
+
+    @property
+    def per_torque(self) -> float:
+        """1/m^3, the stress of a unit torque."""
+        return 2.0 / (math.pi * self.radius**3)
+
+    def spent(self, load: _Load, curve: SNCurve, factor: float = 1.0) -> float:
+        """Damage of the shaft in a pass, its stresses times a factor; inf at its strength."""
+        try:
+            return damage(load.stress(factor * self.per_torque), curve, self.mean_stress)
+        except InputError:  # mean and amplitude together are above the static strength
+            return math.inf
+
+    def shaft_scores(
+        self, load: _Load, curve: SNCurve, limit: float, factor: float = 1.0
+    ) -> dict[str, float]:
+        """Of fatigue and of yield, the stresses times a factor."""
+        per = factor * self.per_torque
+        strength = curve.yield_shear or curve.ultimate_shear or math.inf
+        spent = self.spent(load, curve, factor)
+        scores = {"shaft": _log(spent / limit), "yield": _log(per * load.peak / strength)}
+        if spent == 0.0 or limit < spent < math.inf:
+            # At an endurance limit the damage leaps; the stress does not.
+            used = _log(utilisation(load.stress(per), curve, self.mean_stress))
+            if spent == 0.0:
+                scores["shaft"] = min(used, 0.0)
+            elif used > 0.0:
+                scores["shaft"] = min(scores["shaft"], used)
+        return scores
+
+    def scores(self, load: _Load, limit: float) -> dict[str, float]:
+        """Of every part that the joint has."""
+        found = self.shaft_scores(load, self.curve, limit) if self.curve else {}
+        if self.reducer is not None:
+            shares = self.reducer.shares(load.peak, load.held)
+            found["reducer"] = _log(max(shares.values()))
+        return found
+
+    def failing(self, load: _Load, limit: float, per_pass: float) -> str:
+        """The part that is worst beyond what it bears, in words; "" where none is."""
+        scores = self.scores(load, limit)
+        worst = max(scores, key=lambda part: scores[part], default="")
+        if not worst or scores[worst] <= 0.0:
+            return ""
+        name = self.joint.name
+        if scores.get("yield", 0.0) > 0.0 and worst != "reducer":
+            return (
+                f"gravity and blows take the shaft of {name} to {math.exp(scores['yield']):.3g} "
+                "times its yield strength"
+            )
+        if worst == "shaft":
+            assert self.curve is not None
+            life = per_pass / self.spent(load, self.curve)
+            return f"the shaft of {name} survives {format_count(life)} rivets"
+        assert self.reducer is not None
+        shares = self.reducer.shares(load.peak, load.held)
+        most = max(shares, key=lambda key: shares[key])
+        return (
+            f"gravity and blows take the reducer {self.reducer.name} of {name} to "
+            f"{shares[most]:.3g} times its {most}"
+        )
 
 
 @dataclass(frozen=True)
 class _Backwards:
     """The search, joint by joint; the loads are computed once for all of them."""
 
-    stress: ShaftStress
-    places: list[tuple[VariedRivet, float]]
+    model: Model
     task: Task
     rivets: float
     survival: float | None
-    known: dict[tuple[float, int | None], list[Load]] = field(default_factory=dict)
+    parts: list[_Parts]
+    order: list[Reducer]
+    known: dict[tuple[float, int | None], list[_Load]] = field(default_factory=dict)
+
+    @cached_property
+    def places(self) -> list[tuple[VariedRivet, float]]:
+        """Every rivet of a pass."""
+        return rivets_of(self.model, self.task)
 
     @cached_property
     def nonlinear(self) -> bool:
         """Whether every trial must be integrated in time."""
         return any(place.nonlinear for place, _ in self.places)
 
-    def _loads(self, joint: int, force: float = 1.0, hits: int | None = None) -> Load:
-        """Of a joint, with the force times a factor; a linear model's cycles are scaled."""
-        solved = force if self.nonlinear else 1.0
-        if (solved, hits) not in self.known:
-            found = [
-                (self.stress.cycles(place.varied(force=solved, hits=hits, compiled=False)), count)
-                for place, count in self.places
-            ]
-            self.known[solved, hits] = [
-                [(*cycles[k], count) for cycles, count in found]
-                for k in range(len(self.stress.joints))
-            ]
-        load = self.known[solved, hits][joint]
-        rest = force / solved
-        return load if rest == 1.0 else [(c.scaled(rest), steady, n) for c, steady, n in load]
-
     @property
     def limit(self) -> float:
         """Damage that a pass of the task may do."""
         return self.task.rivets_per_pass / self.rivets
 
+    def load(self, k: int, force: float = 1.0, hits: int | None = None) -> _Load:
+        """Of joint k, with the force times a factor; a linear model's is scaled."""
+        solved = force if self.nonlinear else 1.0
+        if (solved, hits) not in self.known:
+            every = [
+                (place.varied(force=solved, hits=hits, compiled=False), rivets)
+                for place, rivets in self.places
+            ]
+            self.known[solved, hits] = [
+                _Load.of([(loads[j], rivets) for loads, rivets in every], part.residue)
+                for j, part in enumerate(self.parts)
+            ]
+        found = self.known[solved, hits][k]
+        return found if force == solved else found.scaled(force / solved)
+
+    def score(self, k: int, load: _Load) -> float:
+        """The worst of joint k's parts; above 0 it is too much."""
+        return max(self.parts[k].scores(load, self.limit).values(), default=-math.inf)
+
     def joint(self, k: int) -> Allowable:
         """What joint k allows."""
-        shaft = self.stress.joints[k].shaft
-        assert shaft is not None
-        load = self._loads(k)
-        # A stress below one pascal is rounding: the blows do not move this joint.
-        moved = any(len(cycles) and cycles.range.max() > 1.0 for cycles, _, _ in load)
-        force = slimmer = math.inf
-        if moved:
-            force = largest_factor(
-                lambda f: self._spent(k, self._loads(k, f)),
-                self.limit,
-                _NONLINEAR_TOLERANCE if self.nonlinear else 0.0,
-            )
-            # A thinner shaft raises every stress of the same torques.
-            slimmer = largest_factor(lambda f: self._spent(k, load, f), self.limit)
-        now = self._spent(k, load)
+        part, load = self.parts[k], self.load(k)
+        curve, limit = part.curve, self.limit
+        least = _NO_STRESS / part.per_torque if curve else _NO_TORQUE
+        moved = load.swing > least
+        has_part = bool(part.scores(load, limit))
+        force, governor = self._force(k) if moved and has_part else (math.inf, "")
+        failing = part.failing(load, limit, self.task.rivets_per_pass)
+        slide = part.joint.kind == "prismatic"
+        radius = self._radius(k) if load.peak > least else 0.0
+        spent = part.spent(load, curve) if curve else math.nan
         return Allowable(
-            joint=self.stress.joints[k].name,
+            joint=part.joint.name,
             rivets=self.rivets,
             survival=self.survival,
             force_factor=force,
-            radius=0.0 if math.isinf(slimmer) else shaft.radius * slimmer ** (-1.0 / 3.0),
-            hits=self._hits(k) if moved else None,
-            life=math.inf if now == 0.0 else self.task.rivets_per_pass / now,
+            radius=math.nan if slide and not curve else radius,
+            hits=self._most_hits(k) if moved and has_part else None,
+            life=self.task.rivets_per_pass / spent if spent else math.inf,
+            met=not failing if has_part else None,
+            most_rivets=self._most_rivets(k),
+            governed_by=governor,
+            reducer=None if slide else self._reducer(load),
+            peak_torque=load.peak,
+            failing=failing,
         )
 
-    def _spent(self, k: int, load: Load, factor: float = 1.0) -> float:
-        """Damage of joint k in a pass, every stress times `factor`; inf beyond its strength."""
-        curve, rule = self.stress.curves[k], self.stress.mean_stress
-        stresses = [(cycles.scaled(factor), steady * factor, n) for cycles, steady, n in load]
-        if _largest(stresses) >= (curve.yield_shear or curve.ultimate_shear or math.inf):
-            return math.inf
-        return math.fsum(
-            n * damage(cycles.shifted(steady), curve, rule) for cycles, steady, n in stresses
-        )
+    def _force(self, k: int) -> tuple[float, str]:
+        """The largest factor on the force, and the part that does not bear more."""
 
-    def _hits(self, k: int) -> int | None:
+        def over(factor: float) -> str:
+            scores = self.parts[k].scores(self.load(k, factor), self.limit)
+            return max(scores, key=lambda part: scores[part])
+
+        still = self.parts[k].scores(self.load(k).scaled(0.0), self.limit)
+        if max(still.values()) > 0.0:
+            return 0.0, max(still, key=lambda part: still[part])
+        tolerance = _NONLINEAR_TOLERANCE if self.nonlinear else 0.1 * _GUARD
+        most = largest_factor(lambda f: self.score(k, self.load(k, f)), 0.0, tolerance)
+        # What was integrated holds as it is; what was scaled is solved anew when it is fed back.
+        return most if self.nonlinear else most * (1.0 - _GUARD), over(most * (1.0 + tolerance))
+
+    def force_of_all(self, factor: float) -> float:
+        """The largest factor at which every joint holds, from the least of the joints' own."""
+
+        def worst(force: float) -> float:
+            return max(self.score(k, self.load(k, force)) for k in range(len(self.parts)))
+
+        if not self.nonlinear or factor in (0.0, math.inf) or worst(factor) <= 0.0:
+            return factor
+        return largest_factor(worst, 0.0, _NONLINEAR_TOLERANCE, start=factor)
+
+    def _radius(self, k: int) -> float:
+        """m, the least that bears the torques as they are."""
+        part, load = self.parts[k], self.load(k)
+        curve = part.curve or part.steel
+        # A thinner shaft raises every stress of the same torques.
+        slimmer = largest_factor(
+            lambda f: max(part.shaft_scores(load, curve, self.limit, f).values()), 0.0, 0.1 * _GUARD
+        )
+        return float(part.radius * slimmer ** (-1.0 / 3.0) * (1.0 + _GUARD))
+
+    def _reducer(self, load: _Load) -> str | None:
+        fits = (r for r in self.order if max(r.shares(load.peak, load.held).values()) <= 1.0)
+        found = next(fits, None)
+        return None if found is None else found.name
+
+    def _most_rivets(self, k: int) -> int | None:
+        """The largest number of rivets that the joint survives; None: no end."""
+        part, load, per_pass = self.parts[k], self.load(k), self.task.rivets_per_pass
+        if max(part.scores(load, math.inf).values(), default=0.0) > 0.0:
+            return 0  # beyond what no shorter life changes
+        spent = part.spent(load, part.curve) if part.curve else 0.0
+        if spent == 0.0:
+            return None
+        most = int(per_pass / spent)
+        if most < 1 << 50:
+            while most and spent > per_pass / most:
+                most -= 1
+            while spent <= per_pass / (most + 1):
+                most += 1
+        return most
+
+    def _most_hits(self, k: int) -> int | None:
         """The most blows a rivet may take; the response to each number is computed anew."""
-        if len({operation.hits_per_rivet for operation in self.task.operations}) != 1:
+        stated = {operation.hits_per_rivet for operation in self.task.operations}
+        if len(stated) != 1:
             return None
 
-        def too_much(hits: int) -> bool:
-            return self._spent(k, self._loads(k, hits=hits)) > self.limit
+        def holds(hits: int) -> bool:
+            return self.score(k, self.load(k, hits=hits)) <= 0.0
 
-        if not too_much(_MOST_HITS):
+        low, high = 0, stated.pop()
+        if not self.nonlinear and holds(_MOST_HITS):  # the usual end, without the way there
             return None
-        low, high = 0, _MOST_HITS
+        while holds(high):
+            if high >= _MOST_HITS:
+                return None
+            low, high = high, min(2 * high, _MOST_HITS)
         while high - low > 1:
             middle = (low + high) // 2
-            low, high = (low, middle) if too_much(middle) else (middle, high)
+            low, high = (middle, high) if holds(middle) else (low, middle)
         return low
 
+    def hits_of_all(self, joints: tuple[Allowable, ...]) -> int | None:
+        """The most blows at which every joint holds."""
+        most = min((joint.hits for joint in joints if joint.hits is not None), default=None)
+        while most and any(
+            self.score(k, self.load(k, hits=most)) > 0.0 for k in range(len(self.parts))
+        ):
+            most -= 1
+        return most
 
-def _largest(load: Load) -> float:
-    """The largest stress of all, gravity and blows together, Pa."""
-    largest = 0.0
-    for cycles, steady, _ in load:
-        largest = max(largest, abs(steady))
-        if len(cycles):
-            largest = max(largest, float((np.abs(steady + cycles.mean) + cycles.amplitude).max()))
-    return largest
+    def notes(self, joints: tuple[Allowable, ...]) -> Iterator[str]:
+        """What an answer leaves out."""
+        bare = [part.joint.name for part in self.parts if part.curve is None]
+        if bare:
+            steel = self.parts[0].steel.name
+            yield f"no shaft is given for {', '.join(bare)}: the radius is for {steel}"
+        if len({operation.hits_per_rivet for operation in self.task.operations}) != 1:
+            yield "the operations differ in their hits a rivet, so no number of hits is given"
+        none = [j.joint for j in joints if j.reducer is None and not math.isnan(j.radius)]
+        if none:
+            yield f"no reducer of the catalogues bears the torque in {', '.join(none)}"
 
 
-def largest_factor(spent: Callable[[float], float], limit: float, tolerance: float = 0.0) -> float:
-    """The largest factor whose damage is within a limit, by bisection.
+def _log(ratio: float) -> float:
+    return math.log(ratio) if 0.0 < ratio < math.inf else math.copysign(math.inf, ratio - 1.0)
+
+
+def largest_factor(
+    spent: Callable[[float], float], limit: float, tolerance: float = 0.0, start: float = 1.0
+) -> float:
+    """The largest factor at which no more than a limit is spent.
+
+    Regula falsi over the factor's logarithm (Illinois: an end that stays is weighed half), and
+    halving where that does not narrow.
 
     Args:
-        spent: damage at a factor, never falling; an InputError (above the static strength)
-            counts as endless damage.
+        spent: at a factor, never falling; an InputError (above the static strength) is too much.
         limit: what may be spent.
         tolerance: relative, of the factor; 0: to the last bit.
+        start: a factor to begin with.
+
+    Returns:
+        a factor that was tried and is not too much; one that is too much lies within the tolerance.
 
     Raises:
         InputError: even a vanishing factor spends more, so what does not scale breaks the part.
     """
 
-    def too_much(factor: float) -> bool:
+    def excess(factor: float) -> float:
         try:
-            return spent(factor) > limit
+            return min(max(spent(factor) - limit, -_FAR), _FAR)
         except InputError:
-            return True
+            return _FAR
 
-    low, high = 1.0, 1.0
-    while too_much(low):
-        high, low = low, low / 2.0
+    low = high = start
+    below = above = excess(start)
+    while below > 0.0:
         if low < 1e-12:
             raise InputError("the steady stress alone breaks the part", key="steady_stress")
-    while not too_much(high):
-        low, high = high, high * 2.0
-    while True:
-        middle = 0.5 * (low + high)
-        if middle in (low, high) or high - low <= tolerance * high:
-            return low
-        low, high = (low, middle) if too_much(middle) else (middle, high)
+        high, above, low = low, below, low / 2.0
+        below = excess(low)
+    while above <= 0.0:
+        low, below, high = high, above, high * 2.0
+        above = excess(high)
+    last, tried = 0, 0
+    while high > low * (1.0 + tolerance):
+        width, tried = math.log(high / low), tried + 1
+        share = 0.5 if tried % 4 == 0 else -below / (above - below)
+        # Near an end, beside it: so that the other end comes near, too.
+        near = 0.5 * min(tolerance / width, 1.0)
+        middle = low * math.exp(width * min(max(share, near), 1.0 - near))
+        if not low < middle < high:
+            middle = 0.5 * (low + high)
+            if not low < middle < high:
+                break
+        value = excess(middle)
+        if value > 0.0:
+            high, above, below = middle, value, below / 2.0 if last > 0 else below
+            last = 1
+        else:
+            low, below, above = middle, value, above / 2.0 if last < 0 else above
+            last = -1
+    return low

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from picchio.cli.layout import FittedTable
     from picchio.studies.assessment.method_comparison import Term
     from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
-    from picchio.studies.backwards import AllowableLoads
+    from picchio.studies.backwards import Allowable, AllowableLoads
     from picchio.studies.tasks import Task
     from picchio.studies.uncertainty import UncertainLife
 
@@ -88,7 +88,9 @@ def assess(
     for_life: Annotated[
         float | None,
         typer.Option(
-            metavar="N", help="Allowable force, hits and shaft radius for a life of N rivets."
+            metavar="N",
+            help="Yes or no: does it survive N rivets? And the force, hits, shafts and reducers "
+            "that this life allows.",
         ),
     ] = None,
     survival: Annotated[
@@ -195,7 +197,9 @@ def assess(
         content["method_terms"] = plain(terms)
     allowed = spread = None
     if for_life is not None:
-        allowed = picchio.allowable(loaded, work, for_life, survival=survival, **options)
+        allowed = picchio.allowable(
+            loaded, work, for_life, survival=survival, reducers=reducers or (), **options
+        )
         content |= allowed.to_dict()
     if uncertainty:
         with progress("samples") as tick:
@@ -220,6 +224,8 @@ def assess(
     )
 
     def show_all() -> None:
+        if allowed is not None:
+            console().print(f"{allowed.answer}\n", style="bold")
         show(found, path, terms)
         if allowed is not None:
             _show_allowable(allowed, work)
@@ -227,7 +233,8 @@ def assess(
             _show_spread(spread)
 
     deliver(content, json, show_all)
-    if strict and found.verdict.status != "safe":
+    promised = found.verdict.status == "safe" if allowed is None else allowed.yes
+    if strict and not promised:
         raise typer.Exit(_NOT_SAFE)
 
 
@@ -372,25 +379,38 @@ def _terms_table(terms: tuple[Term, ...]) -> FittedTable:
 def _show_allowable(found: AllowableLoads, task: Task) -> None:
     """Print what a target life allows."""
     out = console()
-    rows = []
-    for joint in found:
-        force = "no end" if math.isinf(joint.force_factor) else f"{joint.force_factor:.4g}"
-        hits = "no end" if joint.hits is None else str(joint.hits)
-        rows.append(
-            [joint.joint, format_count(joint.life), force, hits, f"{1e3 * joint.radius:.4g}"]
-        )
+    columns: dict[str, Callable[[Allowable], str]] = {
+        "joint": lambda j: j.joint,
+        ">rivets\nas it is": lambda j: format_count(j.life),
+        ">force\ntimes": lambda j: (
+            "-"
+            if j.met is None
+            else "no end"
+            if math.isinf(j.force_factor)
+            else f"{j.force_factor:.4g}"
+        ),
+        "by its": lambda j: j.governed_by or "-",
+        ">hits\na rivet": lambda j: (
+            "-" if j.met is None else "no end" if j.hits is None else str(j.hits)
+        ),
+        ">shaft radius\nat least, mm": lambda j: _number(1e3 * j.radius),
+        ">peak\ntorque, N m": lambda j: _number(j.peak_torque),
+        "smallest\nreducer": lambda j: j.reducer or "-",
+    }
     sure = "" if found[0].survival is None else f", survival {found[0].survival:g}"
     out.print(table(
-        ("joint", ">rivets\nas it is", ">force\ntimes", ">hits\na rivet",
-         ">shaft radius\nat least, mm"),
-        rows, title=f"What a life of {format_count(found[0].rivets)} rivets{sure} allows",
+        columns, ([cell(joint) for cell in columns.values()] for joint in found),
+        title=f"What a life of {format_count(found[0].rivets)} rivets{sure} allows",
     ))  # fmt: skip
-    factor = min(joint.force_factor for joint in found)
-    if math.isfinite(factor):
+    if math.isfinite(found.force_factor):
         forces = ", ".join(
-            f"{op.name} {factor * op.excitation.peak_force:.4g} N" for op in task.operations
+            f"{op.name} {found.force_factor * op.excitation.peak_force:.4g} N"
+            for op in task.operations
         )
-        out.print(f"Allowable force of the blows, all scaled alike: {forces}.\n")
+        out.print(f"Allowable force of the blows, all scaled alike: {forces}.")
+    for line in found.notes:
+        out.print(f"  - {line}", style="dim")
+    out.print()
 
 
 def _show_spread(found: UncertainLife) -> None:

@@ -15,7 +15,7 @@ from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.method_comparison import Term
 from picchio.studies.assessment.result import Assessment
-from picchio.studies.backwards import Allowable
+from picchio.studies.backwards import Allowable, AllowableLoads
 from picchio.studies.comparison import listed
 from picchio.studies.envelopes import envelope
 from picchio.studies.tasks import Task
@@ -171,7 +171,7 @@ def assessment_report(
     gravity_stiffness: bool | None = None,
     sn_curve: str | SNCurve | None = None,
     scene: str | None = None,
-    allowed: Sequence[Allowable] = (),
+    allowed: Sequence[Allowable] | AllowableLoads = (),
     spread: UncertainLife | None = None,
     terms: Sequence[Term] = (),
     cover: Cover | None = None,
@@ -206,6 +206,7 @@ def assessment_report(
     life = assessment.joint(worst.joint.name)
     curve = _curve(sn_curve, robot, life.sn_curve)
     told = assessment.verdict
+    answer = allowed.answer if isinstance(allowed, AllowableLoads) else ""
     return render(
         "assessment.html.j2",
         a=assessment,
@@ -223,6 +224,7 @@ def assessment_report(
         materials=_materials(assessment, robot, sn_curve),
         reducers=any(joint.reducer for joint in assessment.joints),
         allowed=list(allowed),
+        answer=answer,
         spread=spread,
         spread_rows=[*spread.joints.items(), ("robot", spread.robot)] if spread else [],
         terms=list(terms),
