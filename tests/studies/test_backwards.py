@@ -126,7 +126,7 @@ def test_bad_questions_are_named(robot: FlexibleRobot) -> None:
 # A steel that yields before it wears, and the part kinds whose limits are fed back.
 BRITTLE = SNCurve(
     name="brittle", strength=500e6, cycles=1e6, slopes=(8.0,), knees=(1e6,), survival=0.975,
-    scatter=0.04, yield_shear=260e6,
+    scatter=0.04, yield_shear=400e6,
 )  # fmt: skip
 KINDS = {
     "shaft": (STRAIGHT, {}, "shaft"),
