@@ -91,6 +91,17 @@ def recorded(table, *words):
     return Case("check c", ("r.csv", *words), {"c/campaign.toml": CAMPAIGN, "c/r.csv": table})
 
 
+def model(effect, target, *words):
+    text = MODEL.replace("payload", effect).replace('"tool"', f'"{target}"')
+    return Case(
+        "assess m.toml", ("m.toml", f"{effect}.target", f"got '{target}'", *words), {"m.toml": text}
+    )
+
+
+def typed(text, *words, **files):
+    return Case(text, words, {name.replace("_", "."): content for name, content in files.items()})
+
+
 RESAMPLED = 'rate = 1000.0\nresample = "linear"'
 DAY = 1_772_352_000  # 2026-03-01, s
 CASES = {
@@ -147,6 +158,39 @@ CASES = {
     "seed-digits": plan("seed", HUGE, "64 bits"),
     "pose-digits": plan("poses", f"[[{HUGE}, 0, 0]]", "poses[0][0]", "64 bits"),
     "damping-digits": sidecar(HUGE, "64 bits"),
+    "damping-tiny": sidecar("1e-320", "1e-320"),
+    "damping-small": sidecar("1e-9"),
+    "damping-large": sidecar("1e300"),
+    "joint-grid": typed(f"map {ARM} --joint-grid nan --out m.nc", "--joint-grid", "whole", "nan"),
+    "joint-grid-inf": typed(f"map {ARM} --joint-grid 3,inf,2 --out m.nc", "--joint-grid", "whole"),
+    "workers": typed(f"map {ARM} --joint-grid 3 --workers {HUGE} --out m.nc", "--workers", "1024"),
+    "level": typed("fit-sn t.csv --level 0.9999999999999999", "--level", "0.9999", t_csv=TESTS),
+    "level-low": typed("fit-sn t.csv --level 1e-320", "--level", "0.01", t_csv=TESTS),
+    # targets
+    "payload": model("payload", "nope", "valid: tool"),
+    "modal_damping": model("modal_damping", "nope", "valid: robot"),
+    "joint_stiffness": model("joint_stiffness", "nope", "joint_2"),
+    "viscous_friction": model("viscous_friction", "nope", "joint_2"),
+    "link_mass": model("link_mass", "nope", "link_2"),
+    "cable": model("cable", "nope", "link_2"),
+    "base_compliance": model("base_compliance", "nope", "rz"),
+    "transverse_compliance": model("transverse_compliance", "nope", "joint_2"),
+    "sensor_gain": model("sensor_gain", "accelerometer.nope", "tool"),
+    "force_amplitude": model("force_amplitude", "joint_1", "valid: tool"),
+    "plan-target": typed(
+        f"simulate {ARM} --plan p.toml --to c", "p.toml", "payload.target", "valid: tool",
+        p_toml=PLAN + '[[effect]]\neffect = "payload"\ntarget = "nope"\n',
+    ),
+    # what is empty
+    "sn-curve": Case(f"assess {ARM} --sn-curve  --json -", ("--sn-curve: is empty",)),
+    "sn-curve=": typed(f"assess {ARM} --sn-curve=", "--sn-curve: is empty"),
+    "robot": Case("assess ", ("assess: is empty",)),
+    "tool": Case(f"envelope {ARM} --pose=0,0,0 --tool ", ("--tool: is empty",)),
+    "shaft-curve": typed(
+        f"assess {ARM} --flex s.toml", "s.toml", "joint.joint_1.shaft.sn_curve", "at least 1",
+        s_toml=SIDECAR.replace("damping_ratio = 0.03", "shaft = { radius = 0.02, length = 0.05, "
+                               'shear_modulus = 79.3e9, sn_curve = "" }'),
+    ),
     # poses
     "pose-empty": plan("poses", "[{}]", "names no joint"),
     "pose-list": plan("poses", "[[]]", "names no joint"),

@@ -312,7 +312,7 @@ def test_effects_go_through_files(tmp_path, arm):
     file.write_text(saved_model_text("fanuc_like_3dof", [e.to_dict() for e in effects]))
     robot = picchio.load_robot(file)
     assert Model(robot).effects == tuple(effects)
-    assert [from_dict(e.to_dict()) for e in effects] == effects
+    assert [from_dict(e.to_dict(), arm) for e in effects] == effects
 
 
 def test_a_saved_model_is_assessed_as_any_robot(tmp_path, arm):
@@ -477,7 +477,7 @@ def test_a_base_that_turns_about_the_first_joint_is_a_spring_in_series(arm, geom
     stiffness, damping = 9e5, 400.0
     turns = from_dict(
         {"effect": "base_compliance", "target": "rz",
-         "parameters": {"stiffness": stiffness, "damping": damping, "modal_share": 0.0}}
+         "parameters": {"stiffness": stiffness, "damping": damping, "modal_share": 0.0}}, arm
     )  # fmt: skip
     force = np.array([-np.sin(0.3), np.cos(0.3), 0.0])  # across the arm: joint 1 alone answers
     plain = Model(arm, True).plant(geometry).build(force)
@@ -497,7 +497,9 @@ def test_a_base_that_turns_about_the_first_joint_is_a_spring_in_series(arm, geom
 def test_an_axis_that_is_none_is_refused_by_name(arm, geometry):
     """It once came out as a mass matrix that is not positive definite."""
     values = {"stiffness": 1e6, "damping": 10.0}
-    turns = from_dict({"effect": "base_compliance", "target": "rw", "parameters": values})
+    with pytest.raises(InputError, match=r"no such axis.*rw.*rz"):
+        from_dict({"effect": "base_compliance", "target": "rw", "parameters": values}, arm)
+    turns = effect_class("base_compliance")("rw", **values)
     with pytest.raises(InputError, match=r"no such axis.*rw.*rz"):
         Model(arm, True).with_effects([turns]).plant(geometry)
 

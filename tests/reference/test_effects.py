@@ -7,6 +7,7 @@ import tomllib
 
 import pytest
 
+from picchio import load_robot
 from picchio.cli.main import run
 from picchio.core.errors import InputError
 from picchio.model.effects.registry import catalogue, from_dict
@@ -29,7 +30,7 @@ def test_everything_about_it_is_said(entry):
 @pytest.mark.parametrize("entry", ALL.values(), ids=list(ALL))
 def test_the_example_is_an_effect_that_does_something(entry):
     table = tomllib.loads(entry.example)["effect"][0]
-    effect = from_dict(table)
+    effect = from_dict(table, load_robot("fanuc_like_3dof"))
     assert effect.name == entry.name
     assert effect != type(effect)(effect.target), "every parameter of the example is neutral"
 

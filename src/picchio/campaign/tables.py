@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator
 
 from picchio.campaign.clock import FASTEST, SLOWEST
-from picchio.core.toml import Finite, NotNegative, Positive, StrictModel
+from picchio.core.toml import Finite, Name, NotNegative, Positive, StrictModel
 from picchio.excitation.piecewise import Hits
 from picchio.excitation.table import ExcitationTable
 
@@ -174,8 +174,8 @@ class CampaignTable(StrictModel):
         provenance: where the data come from; any keys.
     """
 
-    robot: Annotated[str, Field(min_length=1)] | None = None
-    tool: Annotated[str, Field(min_length=1)] | None = None
+    robot: Name | None = None
+    tool: Name | None = None
     excitation: CampaignExcitation = CampaignExcitation()
     tolerance: Tolerance = Tolerance()
     controller: FreeTable | None = None

@@ -54,14 +54,17 @@ def _terminated(*_: object) -> None:
 
 
 def _not_lost(met: Any) -> None:
-    """Python drops an exception in a destructor; one that asks this to end is raised again."""
+    """Python drops an exception in a destructor; one that asks this to end is raised again.
+
+    A library's complaint, such as that of a file that never opened, is of no use to anybody.
+    """
     if met.exc_type in (KeyboardInterrupt, _Terminated):
         number = signal.SIGTERM if met.exc_type is _Terminated else signal.SIGINT
         # A moment later: raised in here it would be dropped again.
         later = threading.Timer(0.05, _thread.interrupt_main, [number])
         later.daemon = True
         later.start()
-    else:
+    elif str(getattr(met.object, "__module__", "picchio")).partition(".")[0] == "picchio":
         sys.__unraisablehook__(met)
 
 
@@ -86,6 +89,9 @@ def run(arguments: list[str] | None = None) -> int:
     """
     given = sys.argv[1:] if arguments is None else arguments
     begin(given)
+    for before, text in zip(["", *given], given, strict=False):
+        if not text or (text.startswith("--") and text.endswith("=")):
+            return _fail(f"{text.rstrip('=') or before or 'an argument'}: is empty")
     if given and given[-1] == "--version":  # of every subcommand, too
         given = ["--version"]
     try:

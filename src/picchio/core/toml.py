@@ -45,6 +45,7 @@ class StrictModel(BaseModel, metaclass=_Checked):
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=True)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False, strict=True)]
 Finite = Annotated[float, Field(allow_inf_nan=False, strict=True)]
+Name = Annotated[str, Field(min_length=1)]
 FiniteVector = tuple[Finite, Finite, Finite]
 
 

@@ -59,7 +59,7 @@ class Model:
     def __post_init__(self) -> None:
         if self.robot.effect_tables and not self.own:
             try:
-                own = tuple(from_dict(table) for table in self.robot.effect_tables)
+                own = tuple(from_dict(table, self.robot) for table in self.robot.effect_tables)
             except InputError as error:  # a saved model is the last file that was read
                 raise error.placed(file=next(reversed(self.robot.files), None)) from None
             object.__setattr__(self, "own", own)

@@ -12,7 +12,7 @@ from pydantic import Field
 from picchio.campaign.channels import AXES, Channel, ChannelKind, kinds, parse_channel
 from picchio.campaign.tables import CampaignExcitation, Direction, Pose, SampleRate, Tolerance
 from picchio.core.errors import InputError
-from picchio.core.toml import Finite, NotNegative, Positive, StrictModel
+from picchio.core.toml import Finite, Name, NotNegative, Positive, StrictModel
 from picchio.excitation.piecewise import Hits
 from picchio.excitation.table import catalogue, excitation_class
 from picchio.model.effects.effect import Effect
@@ -43,7 +43,7 @@ class SensorTable(StrictModel):
         unit: of `noise`; the channel's SI unit where left out.
     """
 
-    channels: Annotated[str, Field(min_length=1)]
+    channels: Name
     noise: NotNegative = 0.0
     unit: str | None = None
 
@@ -114,13 +114,16 @@ class EffectTable(StrictModel):
     target: str
     parameters: dict[str, Finite] = Field(default_factory=dict)
 
-    def build(self) -> Effect:
+    def build(self, robot: FlexibleRobot) -> Effect:
         """The effect.
 
+        Args:
+            robot: that has its target.
+
         Raises:
-            InputError: no such effect or parameter, a value out of bounds.
+            InputError: no such effect, target or parameter, a value out of bounds.
         """
-        return from_dict(self.model_dump())
+        return from_dict(self.model_dump(), robot)
 
 
 class Plan(StrictModel):

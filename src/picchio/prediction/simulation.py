@@ -120,7 +120,7 @@ def simulate(
         digits = max(2, len(str(asked.count)))
         names = [f"r{index + 1:0{digits}d}.{suffix}" for index in range(asked.count)]
         warn_beyond_limits(loaded, [loaded.pose(p) for p in asked.poses], "the plan")  # type: ignore[arg-type]
-        every = [*(table.build() for table in asked.effect), *effects]
+        every = [*(table.build(loaded) for table in asked.effect), *effects]
         model = Model(loaded, gravity_stiffness).with_effects(_drawn(asked, every, names))
         table: dict[str, Any] = {
             "robot": robot_name or (loaded.name if robot is loaded else str(robot)),

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, model_validator
 
 from picchio.core.arrays import Vector
-from picchio.core.toml import Finite, FiniteVector, NotNegative, Positive, StrictModel
+from picchio.core.toml import Finite, FiniteVector, Name, NotNegative, Positive, StrictModel
 from picchio.robot.spread import with_spreads
 from picchio.robot.units import JointUnits, units_of
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from picchio.robot.drives.reducer import Reducer
 
 LONGEST_SHAFT = 2.0  # m: no arm has a longer one, a number beyond it is in millimetres
+LEAST_DAMPED, MOST_DAMPED = 1e-4, 100.0  # 1: no built drive rings longer; 1 is critical
 SOFTEST, STIFFEST = 1e-3, 1e12  # N m/rad or N/m: far beyond any drive on either side
 
 
@@ -36,6 +37,13 @@ def _in_newtons(value: float) -> float:
     return value
 
 
+def _damps(value: float) -> float:
+    if value != 0.0 and not LEAST_DAMPED <= value <= MOST_DAMPED:
+        raise ValueError(f"is neither 0 (undamped) nor within {LEAST_DAMPED:g} to {MOST_DAMPED:g}")
+    return value
+
+
+DampingRatio = Annotated[NotNegative, AfterValidator(_damps)]
 ShaftLength = Annotated[Positive, AfterValidator(_in_metres)]
 Stiffness = Annotated[Positive, AfterValidator(_in_newtons)]
 
@@ -141,7 +149,7 @@ class Shaft(StrictModel):
     radius: ShaftLength
     length: ShaftLength
     shear_modulus: Positive
-    sn_curve: str | None = None
+    sn_curve: Name | None = None
 
     @property
     def polar_moment(self) -> float:

@@ -16,7 +16,7 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
 from picchio.studies.assessment.run import assess
 from picchio.studies.maps.result import WorkspaceMap
-from picchio.studies.maps.run import open_map
+from picchio.studies.maps.stored import open_map
 from picchio.studies.tasks import Task, blows_of, load_task
 from picchio.visuals.diagnosis_file import read_diagnosis
 from picchio.visuals.scene.build import build_scene

@@ -178,7 +178,7 @@ def _places(
         return places.points_from_csv(points)
     if grid is not None:
         counts = numbers(grid, "--joint-grid")
-        if any(n != round(n) for n in counts):
+        if not all(n.is_integer() for n in counts):
             raise InputError("must be whole numbers", key="--joint-grid", value=grid)
         whole = [round(n) for n in counts]
         return places.joint_grid(robot, whole[0] if len(whole) == 1 else whole)

@@ -27,6 +27,8 @@ METHOD = (
     "adjusted profile"
 )
 
+# Beyond, an interval has no ends that these numbers could find.
+LOWEST_LEVEL, HIGHEST_LEVEL = 0.01, 0.9999
 # What shear stress a tested stress stands for, and the note that says so. Distortion energy: the
 # shear strength of ductile steel is 1 / sqrt(3) of the normal one.
 _TO_SHEAR = {
@@ -236,6 +238,10 @@ def fit_sn(
     for key, value in (("survival", survival), ("level", level)):
         if not 0.0 < value < 1.0:
             raise InputError("must lie between 0 and 1", key=key, value=value)
+    if not LOWEST_LEVEL <= level <= HIGHEST_LEVEL:
+        raise InputError(
+            f"must lie between {LOWEST_LEVEL} and {HIGHEST_LEVEL}", key="level", value=level
+        )
     given = tests
     if not isinstance(given, SNTests):
         given = read_sn_tests(given, run_out_cycles=run_out_cycles)

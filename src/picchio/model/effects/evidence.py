@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from picchio.model.effects.effect import TargetKind
+from picchio.core.errors import InputError
+from picchio.model.effects.effect import Effect, TargetKind
 from picchio.model.expansion import BASE_AXES
 from picchio.robot.flexible_robot import FlexibleRobot
 
+_ANYWHERE: dict[TargetKind, Callable[[FlexibleRobot], Iterable[str]]] = {
+    "joint": lambda robot: robot.joint_names,
+    "joint or link": lambda robot: (*robot.joint_names, *robot.tree.links),
+    "link": lambda robot: robot.tree.links,
+    "axis": lambda _: BASE_AXES,
+    "tool": lambda _: ("tool",),
+    "robot": lambda _: ("robot",),
+}
 LACKING = {
     "bursts": "no record has a burst of several blows",
     "programmed": "the force was recorded in every record",
@@ -16,6 +26,29 @@ LACKING = {
     "kelvin": "the records are not of several known temperatures",
 }
 """What an effect may take of the records (`Effect.takes`), and what is wrong without it."""
+
+
+def check_target(effect: Effect, robot: FlexibleRobot) -> None:
+    """Raise for a target that this robot does not have.
+
+    Of a channel group, which is named like "accelerometer.tool" or "deflection", the frame is
+    checked; whether it is measured only records tell.
+
+    Args:
+        effect: as read from a file.
+        robot: that it is about.
+
+    Raises:
+        InputError: no such joint, link, axis or frame.
+    """
+    kind, target = effect.target_kind, effect.target
+    if kind in _ANYWHERE:
+        choices = _ANYWHERE[kind](robot)
+    else:
+        target, choices = target.partition(".")[2], ("", *robot.tree.links)
+    if target not in choices:
+        raise InputError(f"no such {kind}", key=f"{effect.name}.target", value=effect.target,
+                         choices=[name for name in choices if name])  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

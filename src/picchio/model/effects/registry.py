@@ -9,6 +9,8 @@ from typing import Any
 from picchio.core.errors import InputError
 from picchio.core.registry import classes_in, is_concrete, with_entry_points
 from picchio.model.effects.effect import Effect
+from picchio.model.effects.evidence import check_target
+from picchio.robot.flexible_robot import FlexibleRobot
 
 GROUP = "picchio.effects"
 
@@ -42,11 +44,16 @@ def effect_class(name: str) -> type[Effect]:
         raise InputError("no such effect", value=name, choices=catalogue()) from None
 
 
-def from_dict(table: Mapping[str, Any]) -> Effect:
+def from_dict(table: Mapping[str, Any], robot: FlexibleRobot) -> Effect:
     """An effect as a model file has it: effect, target, parameters.
 
+    Args:
+        table: of the file.
+        robot: that has the target.
+
     Raises:
-        InputError: an unknown effect or parameter, a value out of bounds.
+        InputError: an unknown effect, target or parameter, a value out of bounds.
     """
     effect = effect_class(table["effect"])(table["target"], **table.get("parameters", {}))
+    check_target(effect, robot)
     return effect.with_hidden(table.get("hidden", {}))

@@ -67,8 +67,8 @@ from typing import Any, Self
 
 from pydantic import Field, model_validator
 
-from picchio.core.toml import Finite, NotNegative, StrictModel, parse_toml
-from picchio.robot.joint import Balancer, Shaft, Stiffness, StiffnessCurve
+from picchio.core.toml import Finite, Name, NotNegative, StrictModel, parse_toml
+from picchio.robot.joint import Balancer, DampingRatio, Shaft, Stiffness, StiffnessCurve
 from picchio.robot.link import LinkEntry, LinkMasses
 from picchio.robot.spread import Posterior, Spread, spreads_in, with_spreads
 from picchio.robot.tool import Gun, Mounting, Tool
@@ -99,9 +99,9 @@ class JointEntry(StrictModel):
 
     stiffness: Stiffness | None = None
     stiffness_curve: StiffnessCurve | None = None
-    damping_ratio: NotNegative | None = None
+    damping_ratio: DampingRatio | None = None
     shaft: Shaft | None = None
-    reducer: str | None = None
+    reducer: Name | None = None
     rotor_inertia: NotNegative | None = None
     gear_ratio: Finite | None = None
     balancer: Balancer | None = None

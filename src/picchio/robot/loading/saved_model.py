@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 from pydantic import Field
 
 from picchio.core.errors import InputError
 from picchio.core.files import relative_name
-from picchio.core.toml import Finite, StrictModel, parse_toml, read_toml
+from picchio.core.toml import Finite, Name, StrictModel, parse_toml, read_toml
 
 FORMAT = "picchio-model/1"
 
@@ -26,8 +26,8 @@ class EffectTable(StrictModel):
         hidden: by record, the numbers that differ from record to record.
     """
 
-    effect: Annotated[str, Field(min_length=1)]
-    target: Annotated[str, Field(min_length=1)]
+    effect: Name
+    target: Name
     parameters: dict[str, Finite] = Field(default_factory=dict)
     hidden: dict[str, list[Finite]] = Field(default_factory=dict)
 
@@ -44,9 +44,9 @@ class SavedModel(StrictModel):
         effect: how the real robot differs from its files, one table for each effect.
     """
 
-    robot: Annotated[str, Field(min_length=1)]
-    flex: str | None = None
-    tool: str | None = None
+    robot: Name
+    flex: Name | None = None
+    tool: Name | None = None
     notes: str | None = None
     provenance: dict[str, Any] | None = None
     effect: list[EffectTable] = Field(default_factory=list)

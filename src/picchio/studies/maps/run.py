@@ -7,6 +7,7 @@ The chunks are then joined, one at a time, to one netCDF file or Zarr store.
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import json
 import logging
@@ -14,12 +15,12 @@ import shutil
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from picchio.core.errors import InputError
-from picchio.core.files import atomic_write, locked, regular_file, write_text
+from picchio.core.files import atomic_write, locked, write_text
 from picchio.core.processes import one_thread, safe_start
 from picchio.core.provenance import provenance
 from picchio.excitation.excitation import Excitation
@@ -30,17 +31,18 @@ from picchio.studies.maps.chunk import Columns, MapJob
 from picchio.studies.maps.files import join_chunks
 from picchio.studies.maps.places import Places
 from picchio.studies.maps.result import WorkspaceMap
+from picchio.studies.maps.stored import open_map
 from picchio.studies.rivet.pose import need_springs
 from picchio.vibration.closed_form.response import unit_vector
-
-if TYPE_CHECKING:
-    import xarray
 
 CHUNK, CHUNK_WITH_DAMAGE = 4096, 64
 MOST_PLACES = 10**10
 ENDINGS = (".nc", ".zarr")
 # Fewer places than this are not worth starting workers for.
 _WORTH_WORKERS = 50_000
+MOST_WORKERS = 1024
+# s that a scheduler has to answer.
+_PATIENCE = 5.0
 
 
 @one_thread()
@@ -106,6 +108,8 @@ def workspace_map(
         chunk = CHUNK if damage is None else CHUNK_WITH_DAMAGE
     if chunk < 1:
         raise InputError("must be at least 1", key="chunk", value=chunk)
+    if workers is not None and not 0 <= workers <= MOST_WORKERS:
+        raise InputError(f"must lie between 0 and {MOST_WORKERS}", key="workers", value=workers)
     if len(places) > MOST_PLACES:
         raise InputError(
             f"{len(places):.3g} places are more than the {MOST_PLACES:.0e} of one map",
@@ -132,6 +136,8 @@ def workspace_map(
             hint="give shafts in a sidecar",
         )
     job = MapJob(model, excitation, places, direction, branch, hits, damage)
+    if scheduler is not None:
+        _require_scheduler(scheduler)
     with locked(target):
         if restart:
             shutil.rmtree(_folder_of(target), ignore_errors=True)
@@ -147,27 +153,6 @@ def workspace_map(
         join_chunks(target, (_read(_file(folder, span)) for span in spans), _attributes(job))
         shutil.rmtree(folder)
     return WorkspaceMap(open_map(target), target)
-
-
-def open_map(path: str | Path) -> xarray.Dataset:
-    """Open a map lazily.
-
-    Raises:
-        InputError: no such file, or none that can be read.
-    """
-    import xarray
-
-    target = Path(path)
-    if target.suffix != ".zarr":
-        regular_file(target)
-    elif not target.exists():
-        raise InputError("no such file", file=target)
-    try:
-        if target.suffix == ".zarr":
-            return xarray.open_zarr(target, consolidated=False)
-        return xarray.open_dataset(target, engine="h5netcdf")
-    except Exception as error:  # h5py raises whatever a damaged file makes it
-        raise InputError(f"cannot be read as a map: {error}", file=target) from None
 
 
 def _folder_of(target: Path) -> Path:
@@ -252,6 +237,28 @@ def _run(
         )  # fmt: skip
         for future in as_completed(futures):
             yield future.result()
+
+
+def _require_scheduler(address: str) -> None:
+    """Raise where no dask scheduler answers, which a client would wait long for.
+
+    Raises:
+        InputError: none does.
+    """
+    from distributed.comm.core import connect
+    from distributed.security import Security
+
+    async def greet() -> None:
+        arguments = Security().get_connection_args("client")
+        comm = await asyncio.wait_for(connect(address, timeout=_PATIENCE, **arguments), _PATIENCE)
+        comm.abort()
+
+    try:
+        asyncio.run(greet())
+    except (OSError, ValueError, TypeError) as error:  # what dask makes of an address
+        reason = "" if isinstance(error, OSError) else f": {error}"
+        raise InputError(f"no dask scheduler answers there within {_PATIENCE:g} s{reason}",
+                         key="scheduler", value=address) from None  # fmt: skip
 
 
 def _attributes(job: MapJob) -> dict[str, Any]:

@@ -125,7 +125,7 @@ def curves_of(
         elif isinstance(override, SNCurve):
             curves.append(override)
         else:
-            name = override or joint.shaft.sn_curve or DEFAULT_SN_CURVE
+            name = joint.shaft.sn_curve or DEFAULT_SN_CURVE if override is None else override
             if name not in loaded:
                 loaded[name] = load_sn_curve(name)
             curves.append(loaded[name])

@@ -11,6 +11,7 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.robot.units import units_of
 from picchio.studies.maps.result import WorkspaceMap, joint_kinds
+from picchio.studies.maps.stored import values_of
 from picchio.visuals.plots.style import CMAP, axes_or_new, plain, styled
 
 if TYPE_CHECKING:
@@ -38,11 +39,12 @@ def best_branch(
         InputError: an unknown joint, a map without any value.
     """
     workspace = dataset_of(workspace)
-    names = [str(name) for name in workspace["joint"].values]
+    names = [str(name) for name in values_of(workspace, "joint", 1)]
     if joint not in names:
         raise InputError("no such joint in the map", key="joint", value=joint, choices=names)
-    position = np.asarray(workspace["position"].values, dtype=float)
-    values = np.asarray(workspace["peak_deflection"].values, dtype=float)[:, names.index(joint)]
+    position = np.asarray(values_of(workspace, "position", 2), dtype=float)
+    values = np.asarray(values_of(workspace, "peak_deflection", 2), dtype=float)
+    values = values[:, names.index(joint)]
     known = np.isfinite(values) & np.isfinite(position).all(axis=1)
     if not known.any():
         raise InputError("the map has no value for this joint", key="joint", value=joint)

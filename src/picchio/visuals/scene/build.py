@@ -19,6 +19,7 @@ from picchio.studies.assessment.result import Assessment
 from picchio.studies.envelopes import DirectionEnvelope
 from picchio.studies.envelopes import envelope as envelope_of
 from picchio.studies.maps.result import WorkspaceMap
+from picchio.studies.maps.stored import values_of
 from picchio.vibration.closed_form.response import unit_vector
 from picchio.visuals.kinematics import frames, world
 from picchio.visuals.plots.style import direction_label
@@ -245,7 +246,7 @@ def _add_rivets(scene: Scene, body: Body, assessment: Assessment) -> None:
 
 
 def _add_workspace(scene: Scene, workspace: xarray.Dataset, units: list[str]) -> None:
-    mapped = [str(name) for name in workspace["joint"].values]
+    mapped = [str(name) for name in values_of(workspace, "joint", 1)]
     for k, name in enumerate(scene.envelope.joint_names):
         if name not in mapped and k != scene.chosen:
             continue
