@@ -104,8 +104,10 @@ def load_parts(file: Path) -> list[Any]:
     try:
         every = trimesh.load_scene(file).dump()
         parts = [p for p in every if isinstance(p, trimesh.Trimesh) and len(p.faces)]
-        # An index beyond the vertices is an error here, not where the corner is used.
-        finite = all(np.isfinite(part.vertices[part.faces]).all() for part in parts)
+        # An index beyond the vertices is an error here, not where the corner is used; so is a
+        # vertex of two coordinates.
+        corners = [np.asarray(part.vertices[part.faces]) for part in parts]
+        finite = all(c.shape[1:] == (3, 3) and np.isfinite(c).all() for c in corners)
     except Exception as error:  # trimesh raises whatever its parsers do
         raise InputError(f"is not a readable mesh: {error}", file=file) from None
     if not parts or not finite:
