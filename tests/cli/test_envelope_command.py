@@ -27,11 +27,25 @@ def test_the_blows_can_be_set(picchio):
     assert (blows["force"], blows["period"], blows["width"]) == (600.0, 0.05, 0.01)
 
 
+def test_a_pose_by_joint_names(picchio):
+    names = "joint_3=-1.0, joint_1=0.3,joint_2=1.1"
+    given = [picchio("envelope", "fanuc_like_3dof", f"--pose={pose}", "--json", "-").stdout
+             for pose in ("0.3,1.1,-1.0", names)]  # fmt: skip
+    assert given[0] == given[1]
+    some = picchio("envelope", "fanuc_like_3dof", "--pose=joint_2=1.1", "--json", "-")
+    assert json.loads(some.stdout)["pose"] == [0.0, 1.1, 0.0]
+
+
 @pytest.mark.parametrize(
     ("arguments", "part"),
     [
         (["--pose=1,2"], "3"),
         (["--pose=1,b,2"], "--pose"),
+        (["--pose=joint_1=0.1,joint_1=0.2"], "the joint is given twice, got 'joint_1'"),
+        (["--pose=joint_1=0.1,0.2"], "NAME=VALUE, or none, got '0.2'"),
+        (["--pose=join_1=0.1"], "did you mean 'joint_1'"),
+        (["--pose=joint_1=x"], "--pose joint_1"),
+        (["--pose=home"], "no pose of this name, got 'home'"),
         (["--pose=1,nan,2"], "finite"),
         (["--pose=0,0,0", "--width", "0.05"], "width"),
         (["--pose=0,0,0", "--period", "-1"], "--period"),

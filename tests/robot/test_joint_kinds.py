@@ -98,7 +98,7 @@ def test_many_poses_at_once(arm, write, which, sidecar_text):
 def test_every_tool_frame_that_is_guessed_says_why(arm_text, write):
     values = {"a": {"stiffness": 1e4}}
     robot = load_robot(write("a.urdf", arm_text), values=values)
-    assert (robot.tool_frame, robot.origins["tool.frame"]) == ("tip", "the only link at an end")
+    assert (robot.tool_frame, robot.origins["tool.frame"]) == ("tip", "the only place at an end")
     two = arm_text.replace(
         "</robot>",
         '<link name="lamp"/><joint name="l" type="fixed"><parent link="upper"/>'
@@ -108,6 +108,33 @@ def test_every_tool_frame_that_is_guessed_says_why(arm_text, write):
         load_robot(write("b.urdf", two), values=values)
     named = two.replace('"lamp"', '"tcp"')
     assert load_robot(write("c.urdf", named), values=values).tool_frame == "tcp"
+
+
+FIXED = '<link name="{0}"/><joint name="to_{0}" type="fixed"><parent link="slide"/>' + (
+    '<child link="{0}"/><origin xyz="{1} 0 0"/></joint>'
+)
+
+
+@pytest.mark.parametrize(
+    ("frames", "chosen"),
+    [
+        ([("lamp", 0.3), ("arm_tcp", 0.2)], "arm_tcp"),
+        ([("lamp", 0.3), ("left_tool_link", 0.2)], "left_tool_link"),
+        ([("a_ee", 0.2), ("b_ee", 0.2), ("lamp", 0.3)], "a_ee"),
+        ([("weld", 0.1)], "tip"),  # where the arm's own tip is
+        ([("a_ee", 0.2), ("b_ee", 0.3)], None),
+        ([("lamp", 0.3)], None),
+        ([("tool_camera", 0.3)], None),
+    ],
+)
+def test_the_tools_frame_by_convention(arm_text, write, frames, chosen):
+    text = arm_text.replace("</robot>", "".join(FIXED.format(*f) for f in frames) + "</robot>")
+    urdf = write("f.urdf", text)
+    if chosen is None:
+        with pytest.raises(InputError, match="several frames could carry the tool"):
+            load_robot(urdf, values={"a": {"stiffness": 1e4}})
+    else:
+        assert load_robot(urdf, values={"a": {"stiffness": 1e4}}).tool_frame == chosen
 
 
 @pytest.mark.parametrize("name", sorted(shipped_robots()))

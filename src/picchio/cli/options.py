@@ -109,6 +109,44 @@ def numbers(text: str, key: str, count: int | None = None) -> list[float]:
     return values
 
 
+def pose_given(text: str, key: str = "--pose") -> list[float] | dict[str, float] | str:
+    """A pose as it is typed: numbers, NAME=VALUE pairs, or the name of a pose.
+
+    Args:
+        text: such as "0.3,1.1,-1.0", "joint_1=0.3,joint_2=-0.5" or "home".
+        key: the option, for the message.
+
+    Returns:
+        what `FlexibleRobot.pose` takes.
+
+    Raises:
+        InputError: a joint twice, or a value that is no number.
+    """
+    if "=" not in text:
+        word = "," not in text and not _is_number(text)
+        return text.strip() if word else numbers(text, key)
+    pose: dict[str, float] = {}
+    for part in text.split(","):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
+        if not equals:
+            raise InputError("give every joint as NAME=VALUE, or none", key=key, value=part)
+        if name in pose:
+            raise InputError("the joint is given twice", key=key, value=name)
+        pose[name] = numbers(value, f"{key} {name}", 1)[0]
+    return pose
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+POSE_HELP = "Joint positions, rad or m: Q1,Q2,..., or NAME=VALUE,... (the rest at zero), or a name."
+
+
 def task_file(robot: FlexibleRobot, task: Path | None) -> Path:
     """The task that was given, or else the robot's example.
 

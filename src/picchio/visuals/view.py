@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +31,7 @@ def view(
     robot: str | Path | FlexibleRobot | Model,
     *,
     task: str | Path | Task | None = None,
-    pose: ArrayLike | None = None,
+    pose: ArrayLike | Mapping[str, float] | None = None,
     excitation: Excitation | None = None,
     hits: int | None = None,
     workspace: str | Path | WorkspaceMap | xarray.Dataset | None = None,

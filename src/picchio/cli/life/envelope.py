@@ -9,6 +9,7 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import (
+    POSE_HELP,
     FlexOption,
     ForceOption,
     GravityStiffnessOption,
@@ -19,7 +20,7 @@ from picchio.cli.options import (
     RobotArgument,
     ToolOption,
     WidthOption,
-    numbers,
+    pose_given,
 )
 from picchio.cli.output import check_targets, console, deliver, styled, table
 
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 @app.command(epilog="Example: picchio envelope fanuc_like_3dof --pose=0.3,1.1,-1.0")
 def envelope(
     robot: RobotArgument,
-    pose: Annotated[str, typer.Option(metavar="Q1,Q2,...", help="Joint positions, rad or m.")],
+    pose: Annotated[str, typer.Option(metavar="Q1,Q2,...", help=POSE_HELP)],
     force: ForceOption = None,
     period: PeriodOption = None,
     width: WidthOption = None,
@@ -52,7 +53,7 @@ def envelope(
     loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     check_targets([json], loaded.files)
     blows = blows_of(loaded, force=force, period=period, width=width)
-    at = loaded.pose(numbers(pose, "--pose"))
+    at = loaded.pose(pose_given(pose))
     warn_beyond_limits(loaded, [at], "the pose")
     found = picchio.envelope(loaded, at, blows, hits=hits, gravity_stiffness=gravity_stiffness)
     deliver(found.to_dict(), json, lambda: _show(found))

@@ -9,6 +9,7 @@ import typer
 
 from picchio.cli.app import app
 from picchio.cli.options import (
+    POSE_HELP,
     FlexOption,
     ForceOption,
     GravityStiffnessOption,
@@ -19,7 +20,7 @@ from picchio.cli.options import (
     TaskOption,
     ToolOption,
     WidthOption,
-    numbers,
+    pose_given,
 )
 from picchio.cli.output import check_targets, deliver, progress, telling
 from picchio.core.errors import InputError
@@ -40,7 +41,7 @@ def view(
         str | None,
         typer.Option(
             metavar="Q1,Q2,...",
-            help="Joint positions, rad or m; the task's worst rivet if not given.",
+            help=f"{POSE_HELP} The task's worst rivet if not given.",
         ),
     ] = None,
     hits: Annotated[
@@ -91,7 +92,7 @@ def view(
         scene = picchio.view(
             loaded,
             task=task,
-            pose=None if pose is None else numbers(pose, "--pose"),
+            pose=None if pose is None else pose_given(pose),
             excitation=blows,
             hits=hits,
             workspace=map_,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -13,10 +14,13 @@ from picchio.robot.annotations.other_tags import Srdf
 from picchio.robot.annotations.sidecar import given, spreads_within
 from picchio.robot.spread import Posterior, Spread
 from picchio.robot.tool import Gun, Mounting, Tool
-from picchio.robot.urdf.tree import UrdfTree
+from picchio.robot.urdf.shapes import placement
+from picchio.robot.urdf.tree import MOVABLE, UrdfTree
 
 # Usual names of the frame at the end of an arm, the likeliest first.
 USUAL = ("tool", "tcp", "tool0", "tool_frame", "ee_link", "flange", "link_tcp", "end_effector")
+# What such names end in, likewise.
+CONVENTION = ("tcp", "tool0", "tool", "ee", "eef", "effector", "flange")
 
 
 def choose_tool(
@@ -24,8 +28,8 @@ def choose_tool(
 ) -> tuple[Tool, dict[str, str]]:
     """The tool, and where its values are from.
 
-    The frame: the argument, a sidecar or annotation, a usual name, the SRDF's end effector, or
-    the only link that carries no other.
+    The frame: the argument, a sidecar or annotation, a usual name, the SRDF's end effector, a name
+    that ends as usual, or the only place at which something ends.
 
     Raises:
         InputError: no such frame, or several links could be it.
@@ -57,16 +61,41 @@ def _usual_frame(tree: UrdfTree, srdf: Srdf | None) -> tuple[str, str]:
     if srdf is not None and len(set(srdf.end_effectors)) == 1:
         return srdf.end_effectors[0], f"{srdf.path.name}, end_effector"
     movable = set(tree.movable())
-    leaves = [
-        link for link in tree.leaves() if any(joint.name in movable for joint in tree.chain(link))
-    ]
-    if len(leaves) == 1:
-        return leaves[0], "the only link at an end"
     if not movable:
         return tree.root, "the root: nothing moves"
+    carried = [
+        link for link in tree.links if any(joint.name in movable for joint in tree.chain(link))
+    ]
+    for word in CONVENTION:
+        named = [link for link in carried if _is_called(link, word)]
+        if len({_place(tree, link) for link in named}) == 1:
+            return named[0], f"the link's name ends in {word!r}, as the tool's frame usually does"
+    ends = tree.leaves()
+    leaves = [link for link in carried if link in ends]
+    if len({_place(tree, link) for link in leaves}) == 1:
+        return leaves[0], "the only place at an end"
     raise InputError("several frames could carry the tool", file=tree.path, key="tool",
                      choices=leaves, hint="name one with --tool, or as [tool] frame in the "
                      "sidecar")  # fmt: skip
+
+
+def _is_called(link: str, word: str) -> bool:
+    """Whether a name ends in a word, as "panda_hand_tcp" and "arm_tool_link" do."""
+    parts = [part for part in re.split("[^a-z0-9]+", link.lower()) if part]
+    while parts and parts[-1] in ("link", "frame"):
+        parts.pop()
+    return bool(parts) and parts[-1] == word
+
+
+def _place(tree: UrdfTree, link: str) -> tuple[str, tuple[float, ...]]:
+    """What a link is fixed to, and where: frames at one place are one."""
+    matrix = np.eye(4)
+    for joint in reversed(tree.chain(link)):
+        if joint.type in MOVABLE:
+            break
+        matrix = placement(joint.xyz, joint.rpy) @ matrix
+        link = joint.parent
+    return link, tuple((matrix.round(6) + 0.0).ravel().tolist())
 
 
 def choose_gun(sources: Sequence[Source]) -> tuple[Gun | None, dict[str, str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 
 def build_scene(
     robot: FlexibleRobot | Model,
-    pose: ArrayLike,
+    pose: ArrayLike | Mapping[str, float],
     excitation: Excitation,
     *,
     hits: int | None = None,
