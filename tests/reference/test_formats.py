@@ -150,6 +150,15 @@ def test_every_json_output_is_held_against_a_command():
     assert outputs == FAST.keys() | SLOW.keys()
 
 
+def test_every_format_that_the_source_names_is_listed(repository):
+    named = set()
+    for path in (repository / "src/picchio").rglob("*"):
+        if path.suffix in (".py", ".toml") and path.parent.name != "paper":
+            named |= set(re.findall(r"picchio-[a-z-]+/\d", path.read_text()))
+    # The paper's printed numbers are not the user's to write.
+    assert named - {"picchio-paper/1"} <= {entry.format for entry in ALL.values()}
+
+
 def written(folder, line, repository):
     text = command(folder, line.format(robots=repository / "robots") + " --json -")
     return json.loads(text)

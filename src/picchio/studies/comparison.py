@@ -339,7 +339,7 @@ def _differences(sides: Sequence[Mapping[str, Any]]) -> tuple[Difference, ...]:
     keys = dict.fromkeys(key for side in sides for key in side)
     rows = []
     for key in keys:
-        values = tuple(side.get(key) for side in sides)
+        values = tuple(None if side.get(key) == "" else side.get(key) for side in sides)
         if key.rpartition(".")[2] == "name" or all(_same(values[0], value) for value in values[1:]):
             continue
         shown = tuple(_shown(key, side, values[0]) for side in sides)
@@ -371,7 +371,7 @@ def _shown(key: str, side: Mapping[str, Any], first: Any) -> str:
         # Null is a life without end, if there is a shaft at all.
         known = key in side and side.get(f"{before}.sn_curve", "?") != ""
         return format_count(math.inf if known and value is None else value or math.nan)
-    if value is None:
+    if value in (None, ""):
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from picchio.studies.comparison import Comparison, Difference
@@ -26,7 +27,7 @@ def comparison_page(
 
     def rows(differences: Sequence[Difference]) -> list[list[str]]:
         return [
-            [row.label, *row.shown, *([number(row.ratios[1], 3)] if two else [])]
+            [row.label, *row.shown, *([_ratio(row.ratios[1])] if two else [])]
             for row in differences
         ]
 
@@ -43,3 +44,7 @@ def comparison_page(
         warnings=[*warnings, *found.notes],
         provenance=found.provenance,
     )
+
+
+def _ratio(value: float) -> str:
+    return "" if math.isnan(value) else number(value, 3)
