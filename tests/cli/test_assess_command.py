@@ -263,3 +263,20 @@ def test_a_report_that_opens_offline(picchio, tmp_path):
         assert word in page
     missing = picchio("assess", "fanuc_like_3dof", "--report", tmp_path / "no" / "report.html")
     check_refused(missing, ["folder does not exist"])
+
+
+def test_for_life_answers_first_and_strict_asks_for_a_yes(in_process, tmp_path):
+    # At 300 N the reducer is past its limit; its shafts alone would allow 13 times the force.
+    flex = tmp_path / "flex.toml"
+    flex.write_text('format = "picchio-sidecar/1"\n[joint.joint_2]\nreducer = "RV-20E"\n')
+    out = tmp_path / "life.json"
+    command = ["assess", "fanuc_like_3dof", "--for-life", "1e6", "--survival", "0.99", "--strict"]
+    command += ["--json", out]
+    done = in_process(*command, "--flex", flex)
+    assert done.returncode == 3, done.stderr
+    assert done.stdout.startswith("No: gravity and blows take the reducer RV-20E of joint_2")
+    found = json.loads(out.read_text())
+    assert found["verdict"]["status"] == "fails"
+    assert not found["allowable"]["met"] and found["allowable"]["governed_by"] == "reducer"
+    assert in_process(*command).returncode == 0
+    assert json.loads(out.read_text())["allowable"]["met"] is True

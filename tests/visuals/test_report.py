@@ -196,3 +196,13 @@ def test_reducers_are_shown_beside_the_shafts(arm: SimpleNamespace) -> None:
     assert "repeated peak torque" in row
     (line,) = tree.xpath("//*[@aria-label='Reducers']/li")
     assert line.text_content() == "joint_1, joint_2, joint_3: <too> much"
+
+
+def test_the_answer_to_a_wanted_life_stands_at_the_top(arm: SimpleNamespace) -> None:
+    allowed = picchio.allowable(arm.robot, arm.task, 1e6)
+    tree = lxml_html.fromstring(
+        assessment_report(arm.assessment, arm.robot, arm.task, allowed=allowed)
+    )
+    (answer,) = tree.xpath("//header//*[@id='answer']")
+    assert answer.text_content() == allowed.answer and "safe" in answer.get("class")
+    assert allowed[1].reducer in text_of(tree, "//section[.//*[@id='backwards']]")

@@ -28,7 +28,7 @@ from picchio.model.model import Model
 from picchio.robot.drives.reducer import Reducer, all_reducers
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
-from picchio.studies.assessment.verdict import SHAFT_TOLERANCE, format_count, softer
+from picchio.studies.assessment.verdict import SHAFT_TOLERANCE, Status, format_count, softer
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.pose import JointLoad, need_springs
 from picchio.studies.rivet.variation import VariedRivet, rivets_of
@@ -143,6 +143,11 @@ class AllowableLoads(TableResult):
         return self.met is True and not self.contrary
 
     @property
+    def tone(self) -> Status:
+        """The status of an assessment that stands for the answer, on a page."""
+        return "fails" if self.met is False else "safe" if self.yes else "cannot-be-told"
+
+    @property
     def rivets(self) -> int | None:
         """The most rivets that may be wanted; None where there is no end."""
         known = [joint.most_rivets for joint in self.joints if joint.most_rivets is not None]
@@ -174,7 +179,9 @@ class AllowableLoads(TableResult):
         if math.isinf(self.force_factor):
             return "No force of the blows is too much."
         if self.force_factor == 0.0:
-            return "No force of the blows is small enough: what does not scale with it is too much."
+            return (
+                "No force of the blows is small enough: gravity and feed force alone are too much."
+            )
         least = min(self.joints, key=lambda joint: joint.force_factor)
         part = "reducer" if least.governed_by == "reducer" else "shaft"
         return (

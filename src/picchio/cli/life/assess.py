@@ -228,7 +228,7 @@ def assess(
             console().print(f"{allowed.answer}\n", style="bold")
         show(found, path, terms)
         if allowed is not None:
-            _show_allowable(allowed, work)
+            _show_allowable(allowed, work, found)
         if spread is not None:
             _show_spread(spread)
 
@@ -376,9 +376,13 @@ def _terms_table(terms: tuple[Term, ...]) -> FittedTable:
     )
 
 
-def _show_allowable(found: AllowableLoads, task: Task) -> None:
+def _show_allowable(found: AllowableLoads, task: Task, life: Assessment) -> None:
     """Print what a target life allows."""
     out = console()
+    load, torques = column(
+        [life.joint(j.joint).units.load for j in found], [_number(j.peak_torque) for j in found]
+    )
+    peaks = dict(zip((j.joint for j in found), torques, strict=True))
     columns: dict[str, Callable[[Allowable], str]] = {
         "joint": lambda j: j.joint,
         ">rivets\nas it is": lambda j: format_count(j.life),
@@ -393,8 +397,8 @@ def _show_allowable(found: AllowableLoads, task: Task) -> None:
         ">hits\na rivet": lambda j: (
             "-" if j.met is None else "no end" if j.hits is None else str(j.hits)
         ),
-        ">shaft radius\nat least, mm": lambda j: _number(1e3 * j.radius),
-        ">peak\ntorque, N m": lambda j: _number(j.peak_torque),
+        ">shaft radius\nat least\nmm": lambda j: _number(1e3 * j.radius),
+        f">peak\ntorque\n{load}": lambda j: peaks[j.joint],
         "smallest\nreducer": lambda j: j.reducer or "-",
     }
     sure = "" if found[0].survival is None else f", survival {found[0].survival:g}"

@@ -206,7 +206,7 @@ def assessment_report(
     life = assessment.joint(worst.joint.name)
     curve = _curve(sn_curve, robot, life.sn_curve)
     told = assessment.verdict
-    answer = allowed.answer if isinstance(allowed, AllowableLoads) else ""
+    answer = allowed if isinstance(allowed, AllowableLoads) else None
     return render(
         "assessment.html.j2",
         a=assessment,
