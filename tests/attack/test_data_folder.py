@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from held import one_line
 from scipy.io import savemat
 
 NAMES = ("numpy", "json", "pickle", "numba", "pinocchio", "distributed", "picchio")
@@ -21,6 +22,14 @@ def test_a_mat_file_beside_a_numpy(trapped, picchio_process):
     savemat(trapped / "x.mat", {"t": time, "a": np.sin(time)})
     done = picchio_process("import", "x.mat", "--write-mapping", "m.toml")
     assert done.returncode == 0, done.stderr
+    assert not (trapped / "RAN").exists()
+
+
+@pytest.mark.parametrize("ending", ["mcap", "uff"])
+def test_other_foreign_files_beside_a_numpy(ending, trapped, picchio_process):
+    (trapped / f"x.{ending}").write_bytes(b"none of its kind")
+    done = picchio_process("import", f"x.{ending}", "--write-mapping", "m.toml")
+    one_line(done, 2, f"x.{ending}")
     assert not (trapped / "RAN").exists()
 
 

@@ -181,6 +181,13 @@ CASES = {
         f"simulate {ARM} --plan p.toml --to c", "p.toml", "payload.target", "valid: tool",
         p_toml=PLAN + '[[effect]]\neffect = "payload"\ntarget = "nope"\n',
     ),
+    "model-robot": typed("assess m.toml", "m.toml: robot: no such robot", "got 'x'",
+                         m_toml=MODEL.replace("fanuc_like_3dof", "x")),
+    "direction": plan("directions", "[[1e308, 0.0, 0.8]]", "directions[0]", "length 1"),
+    "recoil": typed(
+        f"envelope {ARM} --pose=0,0,0 --flex s.toml", "s.toml", "gun.recoil_stiffness",
+        s_toml=SIDECAR + "[gun]\nmass = 1.0\nrecoil_stiffness = 1e-320\n",
+    ),
     # what is empty
     "sn-curve": Case(f"assess {ARM} --sn-curve  --json -", ("--sn-curve: is empty",)),
     "sn-curve=": typed(f"assess {ARM} --sn-curve=", "--sn-curve: is empty"),

@@ -45,6 +45,8 @@ def _date(value: Any) -> Any:
 def _direction(value: list[float]) -> list[float]:
     if math.hypot(*value) == 0.0:
         raise ValueError("must not be the zero vector")
+    if not 1e-100 < math.hypot(*value) < 1e100:
+        raise ValueError("must be a vector of about the length 1")
     return value
 
 

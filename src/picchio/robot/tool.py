@@ -6,8 +6,8 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from picchio.core.toml import Finite, FiniteVector, NotNegative, Positive, StrictModel
-from picchio.robot.joint import DampingRatio
+from picchio.core.toml import Finite, FiniteVector, NotNegative, StrictModel
+from picchio.robot.joint import DampingRatio, Stiffness
 from picchio.robot.link import SixInertias
 from picchio.robot.spread import with_spreads
 
@@ -66,7 +66,7 @@ class Gun(StrictModel):
     """
 
     mass: NotNegative
-    recoil_stiffness: Positive | None = None
+    recoil_stiffness: Stiffness | None = None
     damping_ratio: DampingRatio = 0.0
     feed_force: Finite = 0.0
     source: str | None = None

@@ -90,7 +90,12 @@ def _load(
     if is_saved_model(robot):
         saved = read_saved_model(Path(robot))
         flex, tool = flex or saved.flex, tool or saved.tool
-        loaded = _load(saved.robot, flex, tool, values, reducers, allow_rigid)
+        try:
+            loaded = _load(saved.robot, flex, tool, values, reducers, allow_rigid)
+        except InputError as error:
+            if error.key != "ROBOT":
+                raise
+            raise error.placed(file=robot, key="robot") from None
         tables = tuple(table.model_dump() for table in saved.effect)
         return replace(loaded, effect_tables=tables, files=(*loaded.files, Path(robot)))
     found = find_robot(robot)
