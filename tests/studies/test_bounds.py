@@ -1,5 +1,6 @@
 """What would fill the memory or take hours is refused in one line, or keeps its memory bounded."""
 
+import dataclasses
 import time
 import tracemalloc
 from types import SimpleNamespace
@@ -23,16 +24,14 @@ MEASURED = picchio.MeasuredForce(np.linspace(0.0, 0.04, 1000), np.ones(1000))
 
 
 @pytest.fixture(scope="module")
-def arm(tmp_path_factory):
+def arm():
     """The 3-DoF arm; with joints almost without damping; with a gap in a joint."""
-    still = tmp_path_factory.mktemp("flex") / "still.toml"
-    joints = "".join(f"[joint.joint_{k}]\ndamping_ratio = 1e-9\n" for k in (1, 2, 3))
-    still.write_text(f'format = "picchio-sidecar/1"\n{joints}')
     usual = picchio.load_robot("fanuc_like_3dof")
+    joints = [dataclasses.replace(j, damping_ratio=1e-9) for j in usual.flexible_joints]
     gap = effect_class("backlash")("joint_2", gap=1e-4)
     return SimpleNamespace(
         usual=usual,
-        still=picchio.load_robot("fanuc_like_3dof", flex=still),
+        still=dataclasses.replace(usual, flexible_joints=tuple(joints)),
         loose=picchio.Model(usual).with_effects([gap]),
     )
 

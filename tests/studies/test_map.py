@@ -62,6 +62,17 @@ def test_both_endings_and_any_chunk_hold_the_same(tmp_path, robot):
             np.testing.assert_array_equal(maps[0][name].values, other[name].values)
 
 
+@pytest.mark.parametrize(("hits", "told"), [(None, "steady state"), (12, "12 hits from rest")])
+@pytest.mark.parametrize("ending", [".nc", ".zarr"])
+def test_envelopes_and_maps_say_which_response_they_are_of(tmp_path, robot, hits, told, ending):
+    grid = places.joint_grid(robot, 2)
+    with compute_map(robot, grid, BLOWS, tmp_path / f"m{ending}", hits=hits) as found:
+        assert found.dataset.attrs["response"] == told == found.to_dict()["response"]
+        assert told in found._repr_html_()
+    shown = envelope_of(robot, (0.3, 1.1, -1.0), BLOWS, hits=hits)
+    assert shown.to_dict()["response"] == told and told in shown._repr_html_()
+
+
 def test_a_fixed_direction_and_surface_normals(tmp_path, robot):
     csv = tmp_path / "points.csv"
     csv.write_text("x [m],y [m],z [m],nx,ny,nz\n1.35,0,0.4,0,0,2\n1.35,0.25,0.65,0,0,1\n")

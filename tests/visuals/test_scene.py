@@ -184,7 +184,10 @@ def test_the_map_is_a_layer_coloured_by_peak(arm: SimpleNamespace) -> None:
         {"position": (("point", "xyz"), places), "peak_deflection": (("point", "joint"), peak)},
         coords={"joint": names},
     )
+    workspace.attrs["hits"] = 12
     scene = build_scene(arm.robot, arm.worst.pose, BLOWS, workspace=workspace, subdivisions=1)
+    assert "12 hits from rest" in next(text for name, text, _ in scene.layers if name == "map")
+    assert "steady state" in scene.subtitle
     mesh = scene.meshes[next(item.mesh for item in scene.items if item.layer == "map")]
     grains = mesh.vertices.reshape(3, -1, 3)
     np.testing.assert_allclose(grains.mean(axis=1), places, atol=1e-12)

@@ -21,7 +21,7 @@ from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.units import JointUnits, column, units_of
 from picchio.studies.rivet.pose import ModelAtPose
-from picchio.vibration.closed_form.response import Response, peak_deflections
+from picchio.vibration.closed_form.response import Response, described, peak_deflections
 
 FORMAT = "picchio-envelope/1"
 Quantity = Literal["deflection", "torque", "stress"]
@@ -167,7 +167,7 @@ class DirectionEnvelope(TableResult):
         facts = {
             "pose [rad, m]": self.pose,
             "blows": self.excitation.describe(),
-            "response": "steady state" if self.hits is None else f"{self.hits} hits from rest",
+            "response": described(self.hits),
             "natural frequencies [Hz]": self.natural_frequencies,
         }
         return sheet(f"Direction envelope of {self.robot}", facts, columns, rows)
@@ -187,6 +187,7 @@ class DirectionEnvelope(TableResult):
             "pose": self.pose,
             "tool_position": self.tool_position,
             "excitation": {**self.excitation.to_dict(), "hits": self.hits},
+            "response": described(self.hits),
             "natural_frequencies": self.natural_frequencies,
             "joints": [
                 dict(zip(joints, row, strict=True)) for row in zip(*joints.values(), strict=True)

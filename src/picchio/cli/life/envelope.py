@@ -61,10 +61,11 @@ def envelope(
 
 def _show(found: DirectionEnvelope) -> None:
     from picchio.robot.units import column
+    from picchio.vibration.closed_form.response import described
 
     out = console()
     pose = ", ".join(f"{q:g}" for q in found.pose)
-    how = "steady state" if found.hits is None else f"{found.hits} hits from rest"
+    how = described(found.hits)
     out.print(styled(found.robot, f" at ({pose}), {how}"))
     out.print(f"  {found.excitation.describe()}")
     frequencies = ", ".join(f"{f:.4f}" for f in found.natural_frequencies)

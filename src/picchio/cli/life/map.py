@@ -197,11 +197,10 @@ def _show(summary: dict[str, Any]) -> None:
 
     out = console()
     out.print(styled(summary["robot"], f": {summary['poses']} poses in {summary['file']}"))
-    hits, counted = summary["hits"], summary["hits_of_damage"]
-    when = "steady state" if hits is None else f"{hits} hits from rest"
+    counted = summary["hits_of_damage"]
     along = {"worst": "each joint's worst direction", "normal": "along the surface's normal"}
     out.print(
-        f"  {summary['excitation']}; {when}, "
+        f"  {summary['excitation']}; {summary['response']}, "
         f"{along.get(summary['direction'], 'along ' + summary['direction'])}"
     )
     # Stresses rank joints; where not every joint has a shaft, torques do.

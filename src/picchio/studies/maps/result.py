@@ -11,6 +11,7 @@ import numpy as np
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
 from picchio.robot.units import column, units_of
+from picchio.vibration.closed_form.response import described
 
 if TYPE_CHECKING:
     import pandas
@@ -27,6 +28,15 @@ def joint_kinds(found: xarray.Dataset) -> list[str]:
     """
     turning = ["revolute"] * found.sizes["joint"]  # older maps do not say
     return [str(kind) for kind in np.atleast_1d(found.attrs.get("joint_kinds", turning))]
+
+
+def response_of(dataset: xarray.Dataset) -> str:
+    """Whether a map is of the steady state or of so many hits from rest, for people.
+
+    Args:
+        dataset: of a map.
+    """
+    return described(int(dataset.attrs.get("hits", 0)) or None)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,7 +91,9 @@ class WorkspaceMap(TableResult):
              j["limits_poses"])
             for k, j in enumerate(joints)
         ]  # fmt: skip
-        facts = {key: content[key] for key in ("file", "excitation", "direction", "poses")}
+        facts = {
+            key: content[key] for key in ("file", "excitation", "response", "direction", "poses")
+        }
         return sheet(f"Workspace map of {content['robot']}", facts, columns, rows)
 
     def _content(self) -> dict[str, Any]:
@@ -125,6 +137,7 @@ class WorkspaceMap(TableResult):
             "excitation": attrs["excitation"],
             "direction": attrs["direction"],
             "hits": int(attrs["hits"]) or None,
+            "response": response_of(found),
             "hits_of_damage": int(attrs["hits_of_damage"]) or None,
             "poses": count,
             "joints": best,

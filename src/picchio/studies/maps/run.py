@@ -33,7 +33,7 @@ from picchio.studies.maps.places import Places
 from picchio.studies.maps.result import WorkspaceMap
 from picchio.studies.maps.stored import open_map
 from picchio.studies.rivet.pose import need_springs
-from picchio.vibration.closed_form.response import unit_vector
+from picchio.vibration.closed_form.response import described, unit_vector
 
 CHUNK, CHUNK_WITH_DAMAGE = 4096, 64
 MOST_PLACES = 10**10
@@ -274,6 +274,7 @@ def _attributes(job: MapJob) -> dict[str, Any]:
         "effects": [repr(effect) for effect in job.model.effects],
         "notes": list(job.model.without_load()),
         "hits": job.hits or 0,
+        "response": described(job.hits),
         "hits_of_damage": job.damage or 0,
         "provenance": json.dumps(provenance(job.model.robot.files)),
     }

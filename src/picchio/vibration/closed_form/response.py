@@ -379,6 +379,15 @@ def unit_vector(direction: ArrayLike) -> FloatArray:
     return n / length
 
 
+def described(hits: int | None) -> str:
+    """Which response a result is of, for people.
+
+    Args:
+        hits: of a burst from rest; None for the steady state.
+    """
+    return "steady state" if hits is None else f"{hits} hit{'s' * (hits > 1)} from rest"
+
+
 def steady_state(modes: Modes, excitation: Excitation | PiecewiseForce) -> Response:
     """The exact periodic response, no Fourier sum: paper eq. 13 without truncation.
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.robot.units import units_of
-from picchio.studies.maps.result import WorkspaceMap, joint_kinds
+from picchio.studies.maps.result import WorkspaceMap, joint_kinds, response_of
 from picchio.studies.maps.stored import values_of
 from picchio.visuals.plots.style import CMAP, axes_or_new, plain, styled
 
@@ -95,7 +95,8 @@ def plot_workspace_map(
     ax.set_xlim(places[:, across].min() - margin, places[:, across].max() + margin)
     ax.set_ylim(places[:, up].min() - margin, places[:, up].max() + margin)
     ax.set(xlabel=f"{'xyz'[across]} [m]", ylabel=f"{'xyz'[up]} [m]",
-           title=f"Peak deflection of {plain(joint)}, by place")  # fmt: skip
+           title=f"Peak deflection of {plain(joint)}, by place; "
+           f"{response_of(dataset_of(workspace))}")  # fmt: skip
     # Squares that touch: the marker's size is in points, the map's spacing in metres.
     wide = ax.get_window_extent().width / (ax.get_xlim()[1] - ax.get_xlim()[0])
     size = 72.0 / ax.figure.dpi * wide * step * 0.8

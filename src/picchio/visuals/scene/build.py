@@ -19,9 +19,9 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import Assessment
 from picchio.studies.envelopes import DirectionEnvelope
 from picchio.studies.envelopes import envelope as envelope_of
-from picchio.studies.maps.result import WorkspaceMap
+from picchio.studies.maps.result import WorkspaceMap, response_of
 from picchio.studies.maps.stored import values_of
-from picchio.vibration.closed_form.response import unit_vector
+from picchio.vibration.closed_form.response import described, unit_vector
 from picchio.visuals.kinematics import frames, world
 from picchio.visuals.plots.style import direction_label
 from picchio.visuals.plots.workspace import best_branch, dataset_of, spacing
@@ -81,7 +81,7 @@ def build_scene(
     places = world(tree)
     body = build_body(robot, checked, tree, places)
     where = ", ".join(f"{q:.3g}" for q in checked)
-    how = "steady state" if hits is None else f"{hits} hits from rest"
+    how = described(hits)
     scene = Scene(robot.name, f"pose ({where}); {excitation.describe()}; {how}", envelope, tree)
     scene.chosen, scene.reach = _first(envelope, assessment, joint), body.reach
     _add_body(scene, body)
@@ -264,7 +264,8 @@ def _add_workspace(scene: Scene, workspace: xarray.Dataset, units: list[str]) ->
         scene.items.append(Item(scene.add(cloud), "map", "", np.eye(4), joint=k))
         if k == scene.chosen:
             scene.scales["map"] = scale
-    scene.layers.append(("map", "workspace map: peak of the joint, best branch", True))
+    text = f"workspace map, {response_of(workspace)}: peak of the joint, best branch"
+    scene.layers.append(("map", text, True))
 
 
 def _aim(scene: Scene, body: Body, places: dict[str, FloatArray]) -> None:
