@@ -252,9 +252,9 @@ def test_map_shows_every_place_once_at_its_best(workspace) -> None:
     assert shown == {(0.0, 0.0): pytest.approx(1.0), (0.1, 0.0): pytest.approx(3.0),
                      (0.0, 0.1): pytest.approx(2.0)}  # fmt: skip
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("x [m]", "z [m]")
-    assert "steady state" in ax.get_title()
+    assert "steady state" in ax.get_title(loc="left")
     burst = plot_workspace_map(workspace.assign_attrs(hits=12), "a")
-    assert "12 hits from rest" in burst.get_title()
+    assert "12 hits from rest" in burst.get_title(loc="left")
     drawn(ax)
     with pytest.raises(picchio.InputError, match=r"'c'.*a, b"):
         plot_workspace_map(workspace, "c")
