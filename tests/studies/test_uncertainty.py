@@ -2,18 +2,23 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.special import ndtr
 
 from picchio.core.errors import InputError
+from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.miner import damage
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.fatigue.uncertain_lives import Uncertain
+from picchio.fatigue.uncertain_lives import QUANTILES, Draws, Uncertain
 from picchio.model.effects.registry import effect_class
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
+from picchio.robot.varied import robot_with
 from picchio.studies.assessment.run import assess
 from picchio.studies.rivet.pose import Rivet
 from picchio.studies.rivet.variation import FastRest, ShaftStress, VariedRivet
@@ -21,6 +26,9 @@ from picchio.studies.tasks import Task, task_from_dict
 from picchio.studies.uncertainty import DEFAULT_INPUTS, uncertain_life
 
 STRAIGHT = SNCurve(name="straight", strength=60e6, cycles=1e6, slopes=(5.0,))
+STEEL = dataclasses.replace(
+    STRAIGHT, ultimate_shear=700e6, tensile_strength=1000e6, yield_shear=430e6
+)
 SURE = 1e-9
 
 
@@ -186,3 +194,99 @@ def test_bad_input_is_named(robot: FlexibleRobot, task: Task) -> None:
     bare = dataclasses.replace(robot, flexible_joints=joints)
     with pytest.raises(InputError, match="no joint has a shaft"):
         uncertain_life(bare, task)
+
+
+@pytest.mark.parametrize("correlation", [-1.0, 0.0, 1.0])
+def test_a_correlation_moves_the_interval_as_its_closed_form_says(
+    task: Task, tmp_path: Path, correlation: float
+) -> None:
+    # Of a straight curve of slope 5 the life goes with radius^15: log-normal in each joint. The
+    # weaker of two that are tied together: P(min < l) from the bivariate normal distribution.
+    posterior = (
+        '\n[posterior]\nnames = ["shaft.radius.joint_2", "shaft.radius.joint_3"]\n'
+        f"correlation = [[1.0, {correlation}], [{correlation}, 1.0]]\n"
+    )
+    text = (Path(load_robot("fanuc_like_3dof").source).parent / "flex.toml").read_text()
+    text = text.replace("radius = 0.01765", "radius = 0.5").replace(
+        "radius = 0.0132", "radius = 0.0132, radius_spread = 1.02"
+    )
+    file = tmp_path / "flex.toml"
+    file.write_text(text + posterior)
+    robot = load_robot("fanuc_like_3dof", flex=file)
+    nominal = assess(robot, task, sn_curve=STRAIGHT, uncertainty=False)
+    lives = [j.rivets_to_failure for j in nominal.joints[1:]]
+    found = uncertain_life(robot, task, sn_curve=STRAIGHT, inputs={}, samples=4096).robot
+    sigma = 15.0 * math.log(1.02)
+    for name, p in QUANTILES.items():
+
+        def below(log: float, p: float = p) -> float:
+            a, b = ((log - math.log(life)) / sigma for life in lives)
+            if correlation == 1.0:
+                return float(ndtr(max(a, b))) - p
+            if correlation == 0.0:
+                return float(1.0 - ndtr(-a) * ndtr(-b)) - p
+            return float(min(ndtr(a) + ndtr(b), 1.0)) - p
+
+        exact = math.exp(brentq(below, math.log(min(lives)) - 5.0, math.log(min(lives)) + 5.0))
+        low, high = found.sampling[name]
+        assert 0.98 * low <= exact <= 1.02 * high
+        assert getattr(found, name) == pytest.approx(exact, rel=0.05)
+
+
+def test_an_estimate_yields_an_interval_and_no_lone_number(
+    robot: FlexibleRobot, task: Task
+) -> None:
+    guess = load_robot("fanuc_like_3dof", values={"joint_2": {"stiffness": 1e5, "estimated": True}})
+    found = assess(guess, task, sn_curve=STRAIGHT, steady_check=False)
+    told = found.to_dict()
+    assert told["estimated"] is True
+    assert (
+        told["life"]["p10"] < told["life"]["p50"] == told["rivets_to_failure"] < told["life"]["p90"]
+    )
+    assert set(told["joints"][1]["life"]) == {"p10", "p50", "p90"}
+    assert sum(told["spread_shares"].values()) <= 1.2
+    assert told["uncertainty"]["inputs"]["stiffness.joint_2"]["spread"] == pytest.approx(
+        math.log(2.0)
+    )
+    assert " to " in found.verdict.headline and "median" in found.verdict.headline
+    assert any("stiffness.joint_2" in line for line in found.verdict.reasons)
+    # What is known for sure has a life, and no interval.
+    assert "life" not in assess(robot, task, sn_curve=STRAIGHT, steady_check=False).to_dict()
+
+
+def test_a_resonance_shows_in_the_scan(task: Task) -> None:
+    guess = load_robot(
+        "fanuc_like_3dof", values={"joint_3": {"stiffness": 1e5, "stiffness_spread": 2.0}}
+    )
+    found = uncertain_life(guess, task, sn_curve=STRAIGHT, inputs={}, samples=256, totals=False)
+    scan = found.scans["stiffness.joint_3"]
+    factor = float(scan.factor[np.argmin(scan.life)])
+    stiff = load_robot("fanuc_like_3dof", values={"joint_3": {"stiffness": factor * 1e5}})
+    worst = assess(stiff, task, sn_curve=STRAIGHT, steady_check=False).rivets_to_failure
+    assert scan.life.min() == pytest.approx(worst, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("rule", "masses"), [("none", True), ("goodman", False), ("goodman", True)]
+)
+def test_a_drawn_world_is_assess_on_the_changed_robot(
+    task: Task, tmp_path: Path, rule: Rule, masses: bool
+) -> None:
+    # Every kind of value at once, by each path of the sampler and by assess on another robot.
+    file = tmp_path / "flex.toml"
+    text = (Path(load_robot("fanuc_like_3dof").source).parent / "flex.toml").read_text()
+    text = text.replace("radius = 0.0132", "radius = 0.0132, radius_spread = 1.02")
+    text = text.replace("stiffness = 1.0e5", "stiffness = 1.0e5\nstiffness_spread = 1.5")
+    if masses:
+        text += "mass = 3.0\nmass_spread = 1.2\ncom = [0.0, 0.0, 0.1]\ncom_std = 0.02\n"
+    file.write_text(text)
+    robot = load_robot("fanuc_like_3dof", flex=file)
+    found = uncertain_life(robot, task, sn_curve=STEEL, inputs={}, samples=256, totals=False,
+                           mean_stress=rule, seed=3)  # fmt: skip
+    spreads = [robot.spreads[name] for name in found.inputs]
+    lives = []
+    for row in Draws(len(spreads), 3).more().reshape(-1, len(spreads))[:3]:
+        drawn = robot_with(robot, [(s, s.at(float(z))) for s, z in zip(spreads, row, strict=True)])
+        told = assess(drawn, task, sn_curve=STEEL, mean_stress=rule, steady_check=False)
+        lives.append(told.rivets_to_failure)
+    np.testing.assert_allclose(found.lives[:3], lives, rtol=1e-4)

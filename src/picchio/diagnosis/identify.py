@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from picchio.robot.annotations.sidecar import FORMAT as SIDECAR
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
 from picchio.robot.loading.load import load_robot
+from picchio.robot.spread import ESTIMATED
 from picchio.robot.tool import Mounting
 
 FORMAT = "picchio-identification/1"
@@ -248,7 +250,7 @@ def _sidecar(
     remarks: list[str] = []
     # Without a mass there is neither its centre nor an inertia.
     left_out = {"source"} if robot.tool.mass > 0.0 else {"source", "com", "inertia"}
-    tool = robot.tool.model_dump(mode="json", exclude=left_out)
+    tool = robot.tool.model_dump(mode="json", exclude=left_out, exclude_none=True)
     ratios = {joint.name: abs(joint.gear_ratio or 0.0) for joint in robot.flexible_joints}
     for cause in diagnosis.causes:
         key = effect_class(cause.effect).sidecar
@@ -256,15 +258,18 @@ def _sidecar(
             value = _stiffness(robot, cause)
             entry = joints[cause.target]
             entry.pop("stiffness_curve", None)
-            entry.pop("estimated", None)
-            entry |= {"stiffness": value.value, "source": _said(source, "stiffness", value)}
+            if entry.pop("estimated", False):  # the damping still is
+                entry.setdefault("damping_ratio_spread", ESTIMATED)
+            entry |= {"source": _said(source, "stiffness", value)}
+            _tell(entry, "stiffness", value)
         elif key == "rotor_inertia" and (ratio := ratios.get(cause.target)):
             value = cause.parameters["inertia"]
-            joints[cause.target]["rotor_inertia"] = max(value.value, 0.0) / ratio**2
+            inertia = Value(max(value.value, 0.0) / ratio**2, value.std / ratio**2, "kg*m^2")
+            _tell(joints[cause.target], "rotor_inertia", inertia)
             remarks.append(_remark(cause) + f" (written as rotor_inertia, over {ratio:g}^2)")
         elif key == "mass" and tool["mass"] + cause.parameters["mass"].value >= 0.0:
             value = cause.parameters["mass"]
-            tool["mass"] += value.value
+            _tell(tool, "mass", Value(tool["mass"] + value.value, value.std, "kg"))
             tool["source"] = _said(source, "mass", value)
         else:
             remarks.append(_remark(cause))
@@ -272,7 +277,8 @@ def _sidecar(
         if name.startswith("stiffness.") and name.partition(".")[2] in joints:
             entry = joints[name.partition(".")[2]]
             if "stiffness" in entry:
-                entry |= {"stiffness": value.value, "source": _said(source, "stiffness", value)}
+                entry |= {"source": _said(source, "stiffness", value)}
+                _tell(entry, "stiffness", value)
         else:
             remarks.append(f"{name} = {_number(value)}")
     return {**table, "joint": joints, "tool": tool, **_standing(robot)}, remarks
@@ -291,6 +297,9 @@ def _joint(robot: FlexibleRobot, joint: Joint) -> dict[str, Any]:
         found["reducer"] = joint.reducer.name
     if joint.estimated:
         found["estimated"] = True
+    for spread in robot.spreads.values():
+        if spread.table == "joint" and spread.owner == joint.name and len(spread.path) == 1:
+            found |= {} if spread.estimated else {f"{spread.path[0]}_spread": math.exp(spread.size)}
     origin = robot.origins.get(f"{joint.name}.stiffness")
     if origin:
         found["source"] = origin
@@ -314,6 +323,13 @@ def _stiffness(robot: FlexibleRobot, cause: Cause) -> Value:
     nominal = {j.name: j.stiffness for j in robot.flexible_joints}[cause.target]
     unit = unit_of(robot, cause.target, "N*m/rad")
     return Value(scale.value * nominal, scale.std * nominal, unit)
+
+
+def _tell(table: dict[str, Any], key: str, value: Value) -> None:
+    """Put a value that was found, and how well it is known, in place of what was stated."""
+    table.pop(f"{key}_spread", None)
+    table[key] = value.value
+    table[f"{key}_std"] = value.std
 
 
 def _said(source: str, what: str, value: Value) -> str:

@@ -129,7 +129,7 @@ def _life(
     unsure: Uncertain | None = None,
     bare: FlexibleRobot | None = None,
 ) -> dict[str, Any]:
-    found = assess(robot, task, **options)
+    found = assess(robot, task, **{"uncertainty": False, **options})
     told: dict[str, Any] = {
         "rivets_to_failure": found.rivets_to_failure,
         "utilisation": max((joint.utilisation for joint in found.joints), default=0.0),
@@ -187,7 +187,7 @@ def life_intervals(
     """
     worst = _most_strained(task, found)
     z = NormalDist().inv_cdf(0.5 + 0.5 * LEVEL)
-    settings = {**options, "steady_check": False}
+    settings = {**options, "steady_check": False, "uncertainty": False}
 
     def at(vector: FloatArray, task: Task = worst) -> tuple[FloatArray, FloatArray] | None:
         """Utilisation and damage there; None where the model is none."""

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.stats import t as student
 
 from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError
+from picchio.fatigue.miner import format_count
 
 Shape = Literal["normal", "lognormal", "uniform", "absolute"]
 QUANTILES = {"p10": 0.1, "p50": 0.5, "p90": 0.9}
@@ -91,6 +91,33 @@ class LifeSpread:
     totals: dict[str, float]
     samples: int
     sampling: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def quantiles(self) -> dict[str, float]:
+        """P10, P50 and P90."""
+        return {name: getattr(self, name) for name in QUANTILES}
+
+    def rounded(self, quantile: str) -> float:
+        """A quantile with the digits that its sampling error allows.
+
+        Args:
+            quantile: "p10", "p50" or "p90".
+        """
+        value = self.quantiles[quantile]
+        low, high = self.sampling.get(quantile, (value, value))
+        if not (math.isfinite(value) and value > 0.0):
+            return value
+        error = max(0.5 * (high - low) / value, 1e-4)
+        digits = 1 - math.floor(math.log10(error)) if error < 0.2 else 1
+        return float(f"{value:.{min(digits, 4) - 1}e}")
+
+    @property
+    def told(self) -> str:
+        """The life as an interval in words: from P10 to P90, about the median."""
+        p10, p50, p90 = (format_count(self.rounded(name)) for name in QUANTILES)
+        if p10 == p90:
+            return p50
+        return f"{p10} to {p90} (median {p50})"
 
     def settled(self, factor: float) -> bool:
         """Whether every quantile's sampling interval is narrow.
@@ -206,6 +233,8 @@ def summarise(
 
 def _quantile(lives: FloatArray, p: float) -> tuple[float, tuple[float, float]]:
     """The pooled quantile and its sampling interval."""
+    from scipy.stats import t as student
+
     pooled = np.sort(lives, axis=None)
 
     def at(level: float) -> float:

@@ -20,7 +20,7 @@ from picchio.core.results import TableResult
 from picchio.fatigue.counting.counter import Residue, rainflow
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.mean_stress import Rule
-from picchio.fatigue.miner import damage, utilisation
+from picchio.fatigue.miner import damage, format_count, utilisation
 from picchio.fatigue.shaft_stress import check_shaft
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, load_sn_curve
@@ -28,7 +28,7 @@ from picchio.model.model import Model
 from picchio.robot.drives.reducer import Reducer, all_reducers
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
-from picchio.studies.assessment.verdict import SHAFT_TOLERANCE, Status, format_count, softer
+from picchio.studies.assessment.verdict import SHAFT_TOLERANCE, Status, softer
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.pose import JointLoad, need_springs
 from picchio.studies.rivet.variation import VariedRivet, rivets_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from statistics import NormalDist
 from typing import Any
@@ -19,7 +19,7 @@ from picchio.core.results import TableResult
 from picchio.fatigue.counting.counter import Residue, rainflow
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.mean_stress import Rule
-from picchio.fatigue.miner import damage, utilisation
+from picchio.fatigue.miner import damage, format_count, utilisation
 from picchio.fatigue.shaft_stress import shear_stress, stress_per_torque
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.uncertain_lives import Draws, LifeSpread, Uncertain, summarise
@@ -27,9 +27,8 @@ from picchio.model.effects.structure.joint_stiffness import JointStiffness
 from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.robot.spread import Spread, root_of
+from picchio.robot.spread import ESTIMATED, Spread, root_of
 from picchio.robot.varied import robot_with
-from picchio.studies.assessment.result import format_count
 from picchio.studies.rivet.pose import Rivet
 from picchio.studies.rivet.poses import curve_tables, stacked
 from picchio.studies.rivet.variation import ShaftStress
@@ -49,6 +48,19 @@ _NEAR = 1.2
 _MIXED, _BATCH, _SCAN = 8, 20_000, 41
 # A life that falls and rises again by more than this along a stiffness is shown.
 _TURN = 0.02
+
+
+def default_inputs(task: Task) -> dict[str, Uncertain]:
+    """`DEFAULT_INPUTS`, without the width where a blow of the task states none.
+
+    Args:
+        task: the work.
+
+    Returns:
+        the factors by name.
+    """
+    known = all(operation.excitation.width is not None for operation in task.operations)
+    return {name: each for name, each in DEFAULT_INPUTS.items() if known or name != "width"}
 
 
 @dataclass(frozen=True)
@@ -98,6 +110,7 @@ class UncertainLife(TableResult):
         scans: stiffnesses along which the life is not monotone (resonance): life against a factor.
         assumptions: what was taken for granted.
         seed: of the samples.
+        lives: (samples,) of the robot, replicate after replicate; not in the JSON.
     """
 
     joints: dict[str, LifeSpread]
@@ -108,17 +121,43 @@ class UncertainLife(TableResult):
     scans: dict[str, LifeScan]
     assumptions: tuple[str, ...]
     seed: int
+    lives: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    def spread_words(self, name: str) -> str:
+        """How much an input varies, in words.
+
+        Args:
+            name: of the input.
+        """
+        each = self.inputs[name]
+        if name == "strength":
+            return "as the specimens do"
+        if each.shape != "lognormal":
+            return f"+- {each.spread:.3g}"
+        text = f"a factor of {math.exp(each.spread):.3g}"
+        return f"{text} (estimate)" if name in self.estimated else text
+
+    def doubt(self) -> str:
+        """Why the life is an interval, in a sentence."""
+        most = max(self.robot.shares, key=lambda name: self.robot.shares[name])
+        guessed = ", ".join(self.estimated)
+        why = f" ({guessed}: estimated, a factor of {ESTIMATED:g})" if guessed else ""
+        return (
+            f"values are uncertain{why}: rivets to failure are an interval that holds 80 % of the "
+            f"cases; {most} matters most, {100 * self.robot.shares[most]:.0f} % of the variance of "
+            "the logarithm of the utilisation"
+        )
 
     def _repr_html_(self) -> str:
         rows = [
-            (name, *(rounded(s, key) for key in s.sampling), 100 * s.endless)
+            (name, *(format_count(s.rounded(key)) for key in s.quantiles), 100 * s.endless)
             for name, s in {**self.joints, "robot": self.robot}.items()
         ]
         columns = ("rivets to failure", "P10", "P50", "P90", "without end [%]")
         return sheet("How sure the life is", {"varied": ", ".join(self.inputs)}, columns, rows)
 
     def _headline(self) -> str:
-        lives = (rounded(self.robot, key) for key in self.robot.sampling)
+        lives = (format_count(self.robot.rounded(key)) for key in self.robot.quantiles)
         return "rivets to failure P10 {}, P50 {}, P90 {}".format(*lives)
 
     def _rows(self) -> list[dict[str, Any]]:
@@ -129,23 +168,7 @@ class UncertainLife(TableResult):
         ]
 
     def _content(self) -> dict[str, Any]:
-        return vars(self)
-
-
-def rounded(spread: LifeSpread, quantile: str) -> str:
-    """A quantile of a life with the digits that its sampling error allows.
-
-    Args:
-        spread: the life.
-        quantile: "p10", "p50" or "p90".
-    """
-    value = getattr(spread, quantile)
-    low, high = spread.sampling[quantile]
-    if not (math.isfinite(value) and value > 0.0):
-        return format_count(value)
-    error = 0.5 * (high - low) / value
-    digits = 1 if not error < 0.2 else min(max(1 - math.floor(math.log10(max(error, 1e-4))), 1), 4)
-    return format_count(float(f"{value:.{digits - 1}e}"))
+        return {key: value for key, value in vars(self).items() if key != "lives"}
 
 
 @one_thread()
@@ -264,6 +287,7 @@ def uncertain_life(
             *model.without_load(),
         ),
         seed=seed,
+        lives=lives.min(axis=0).ravel(),
     )
 
 
@@ -307,10 +331,15 @@ def _inputs_of(
 ) -> tuple[_Input, ...]:
     """What varies: what is asked for, what the robot's files state, and the curves' scatter."""
     robot = model.robot
-    source = "picchio's default" if given is None else "as asked for"
-    asked = dict(DEFAULT_INPUTS if given is None else given)
-    if given is None and any(op.excitation.width is None for op in task.operations):
-        del asked["width"]
+    default = default_inputs(task)
+    asked = dict(default if given is None else given)
+
+    def source(name: str) -> str:
+        same = asked.get(name) == DEFAULT_INPUTS.get(name)
+        return "picchio's default" if same else "as asked for"
+
+    said = {name: source(name) for name in asked}
+    if "width" not in asked and "width" not in default:
         notes.append("blows that state no width keep theirs")
     own = dict(robot.spreads)
     for joint in robot.flexible_joints:
@@ -331,7 +360,7 @@ def _inputs_of(
         replaced = asked.pop(name, None)
         told = replaced or uncertain
         part = _OF_A_JOINT.get(spread.path) if spread.table == "joint" else None
-        where = source if replaced else spread.source
+        where = said[name] if replaced else spread.source
         guess = spread.estimated and replaced is None
         if part is None:
             found.append(_Input(name, told, where, name, (), spread, guess))
@@ -347,9 +376,9 @@ def _inputs_of(
         if name in taken:
             if not others:
                 continue
-            found.append(_Input(name, uncertain, source, name, others))
+            found.append(_Input(name, uncertain, said[name], name, others))
         else:
-            found.append(_Input(name, uncertain, source, name))
+            found.append(_Input(name, uncertain, said[name], name))
     if any(curve.scatter for curve in stress.curves):
         # A rank: ln of it is the specimen's standard normal score; each curve has its scatter.
         found.append(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from picchio.cli.app import app
+from picchio.cli.life.how_sure import parse_spreads, show_spread
 from picchio.cli.options import (
     FlexOption,
     GravityStiffnessOption,
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
     from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
     from picchio.studies.backwards import Allowable, AllowableLoads
     from picchio.studies.tasks import Task
-    from picchio.studies.uncertainty import UncertainLife
 
 
 @app.command(epilog="Example: picchio assess fanuc_like_3dof --method paper --json life.json")
@@ -103,6 +103,15 @@ def assess(
             "--uncertainty", help="The life's P10, P50 and P90, and what they depend on; a minute."
         ),
     ] = False,
+    spread: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--spread",
+            metavar="NAME=FACTOR",
+            help="How uncertain a value is, for --uncertainty: stiffness, damping_ratio, force, "
+            "width, model, or one value such as stiffness.joint_2. Repeat it for more.",
+        ),
+    ] = None,
     seed: Annotated[
         int | None,
         typer.Option(metavar="N", min=0, help="Random seed for --uncertainty; 0 if not given."),
@@ -151,6 +160,7 @@ def assess(
         "--residue": None if residue == "half-cycles" else residue,
         "--mean-stress": None if mean_stress == "none" else mean_stress,
         "--uncertainty": uncertainty or None,
+        "--spread": spread or None,
     }
     for key, given in rainflow_only.items():
         if method == "paper" and given is not None:
@@ -161,6 +171,8 @@ def assess(
         raise InputError("must lie between 0 and 1", key="--survival", value=survival)
     if for_life is not None and not (math.isfinite(for_life) and for_life > 0):
         raise InputError("must be a positive number of rivets", key="--for-life", value=for_life)
+    asked = parse_spreads(spread or ())
+    uncertainty = uncertainty or bool(asked)
     if seed is not None and not uncertainty:
         raise InputError("belongs to --uncertainty", key="--seed", value=seed)
     for key, text in (("--title", title), ("--customer", customer), ("--author", author),
@@ -182,10 +194,20 @@ def assess(
         "gravity_stiffness": gravity_stiffness,
         "gravity_balanced": gravity_balanced,
     }
+    unsure = None
+    if uncertainty:
+        from picchio.studies.uncertainty import default_inputs
+
+        inputs = default_inputs(work) | asked
+        with progress("samples") as tick:
+            unsure = picchio.uncertain_life(
+                loaded, work, inputs=inputs, seed=seed or 0, progress=tick, **options
+            )
     with progress("poses") as tick:
         found = picchio.assess(
             loaded,
             work,
+            uncertainty=unsure or True,
             method=method,  # type: ignore[arg-type]
             paper_mean_stress=paper_mean_stress,
             progress=tick,
@@ -195,21 +217,20 @@ def assess(
     terms = method_terms(loaded, work, found) if compare_methods or report is not None else ()
     if terms:
         content["method_terms"] = plain(terms)
-    allowed = spread = None
+    allowed = None
     if for_life is not None:
         allowed = picchio.allowable(
             loaded, work, for_life, survival=survival, reducers=reducers or (), **options
         )
         content |= allowed.to_dict()
-    if uncertainty:
-        with progress("samples") as tick:
-            spread = picchio.uncertain_life(loaded, work, seed=seed or 0, progress=tick, **options)
-        content["uncertainty"] = spread.to_dict()
     cover = None
     if report is not None:
         from picchio.visuals.report.cover import Cover
 
         cover = Cover(title or "", customer or "", author or "", logo)
+    unsure = unsure or found.uncertainty
+    if unsure is not None:
+        content["uncertainty"] = unsure.to_dict()
     write_report(
         found,
         report,
@@ -219,7 +240,7 @@ def assess(
         gravity_stiffness=gravity_stiffness,
         sn_curve=sn_curve,
         allowed=allowed or (),
-        spread=spread,
+        spread=unsure,
         terms=terms,
     )
 
@@ -229,8 +250,8 @@ def assess(
         show(found, path, terms)
         if allowed is not None:
             _show_allowable(allowed, work, found)
-        if spread is not None:
-            _show_spread(spread)
+        if unsure is not None:
+            show_spread(unsure)
 
     deliver(content, json, show_all)
     promised = found.verdict.status == "safe" if allowed is None else allowed.yes
@@ -316,9 +337,7 @@ def _life_table(found: Assessment) -> FittedTable:
         columns[">reducer\nused\n%"] = lambda j: _number(100 * j.reducer_utilisation)
     if shafts:
         columns[">damage\na rivet\n"] = lambda j: f"{j.damage_per_rivet:.4g}" if j.sn_curve else "-"
-        columns[">rivets to\nfailure\n"] = lambda j: (
-            format_count(j.rivets_to_failure) if j.sn_curve else "unknown"
-        )
+        columns[">rivets to\nfailure\n"] = lambda j: j.told_life if j.sn_curve else "unknown"
     columns["worst at"] = lambda j: f"{j.worst_operation}, pose {j.worst_pose + 1}"
     made = table(
         columns,
@@ -415,24 +434,6 @@ def _show_allowable(found: AllowableLoads, task: Task, life: Assessment) -> None
     for line in found.notes:
         out.print(f"  - {line}", style="dim")
     out.print()
-
-
-def _show_spread(found: UncertainLife) -> None:
-    """Print how sure the lives are."""
-    out = console()
-    rows = []
-    for name, spread in {**found.joints, "robot": found.robot}.items():
-        lives = [format_count(value) for value in (spread.p10, spread.p50, spread.p90)]
-        shares = [f"{100 * max(spread.totals[key], 0.0):.0f}" for key in found.inputs]
-        rows.append([name, *lives, *shares])
-    inputs = (f">{name}".replace("_", "\n") for name in found.inputs)
-    out.print(table(
-        ["", ">P10", ">P50", ">P90", *inputs], rows,
-        title="How sure the life is: rivets that 90, 50 and 10 % exceed, and where the doubt is "
-        "from, %",
-    ))  # fmt: skip
-    for line in found.assumptions:
-        out.print(f"  - {line}", style="dim")
 
 
 def _number(value: float) -> str:

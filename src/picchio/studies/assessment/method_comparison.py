@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -58,16 +59,17 @@ def compare_methods(
         InputError: as `assess`.
     """
     paper_curve = load_sn_curve(PAPER_SN_CURVE, quiet=True)
+    told = partial(assess, robot, task, uncertainty=False)
     with unheard():  # what assess has to say, it says to whoever asked for the assessment itself
-        paper = assess(robot, task, method="paper")
-        counted = assess(robot, task, sn_curve=paper_curve)
-        real = assess(robot, task, sn_curve=sn_curve, miner="elementary")
-        limit = assess(robot, task, sn_curve=sn_curve, miner="original")
-        corrected = assess(robot, task, sn_curve=sn_curve, miner="elementary", mean_stress="fkm")
+        paper = told(method="paper")
+        counted = told(sn_curve=paper_curve)
+        real = told(sn_curve=sn_curve, miner="elementary")
+        limit = told(sn_curve=sn_curve, miner="original")
+        corrected = told(sn_curve=sn_curve, miner="elementary", mean_stress="fkm")
         median = None
         if sn_curve.scatter and sn_curve.survival is not None:
             half = sn_curve.at_survival(0.5)
-            median = assess(robot, task, sn_curve=half, miner="elementary")
+            median = told(sn_curve=half, miner="elementary")
     table = [
         ("paper", "the paper's method", _life(paper), None),
         ("transient", "peak of a rivet from rest, not of a steady state",

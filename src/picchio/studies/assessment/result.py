@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,15 @@ from numpy.typing import NDArray
 from picchio.core.arrays import FloatArray
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
+from picchio.fatigue.miner import format_count as format_count
 from picchio.fatigue.standstill import RISKS, FalseBrinelling
 from picchio.robot.drives.reducer import TorqueLimit
 from picchio.robot.units import JointUnits, column, units_of
 from picchio.studies.assessment.verdict import Verdict, judge
-from picchio.studies.assessment.verdict import format_count as format_count
+
+if TYPE_CHECKING:
+    from picchio.fatigue.uncertain_lives import LifeSpread
+    from picchio.studies.uncertainty import UncertainLife
 
 # What an assessment found: the life of every joint, and where it goes.
 
@@ -117,6 +121,8 @@ class JointLife:
         rate_sensitivity: the peak of the worst rivet with the blows 5 % faster or slower, the
             larger one, over its peak as stated; NaN where that was not asked for.
         false_brinelling: indicators for its output bearing; None without a reducer.
+        spread: the life as a distribution, where a value of the robot has a spread; None otherwise.
+        estimated: a value is an estimate: `rivets_to_failure` is then the median.
     """
 
     name: str
@@ -143,6 +149,27 @@ class JointLife:
     shaft_ratio: float = math.nan
     rate_sensitivity: float = math.nan
     false_brinelling: FalseBrinelling | None = None
+    spread: LifeSpread | None = None
+    estimated: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        """The entry as plain values, its life's quantiles under "life" where it has some."""
+        own = {
+            key: value for key, value in vars(self).items() if key not in ("spread", "estimated")
+        }
+        return own if self.spread is None else own | {"life": self.spread.quantiles}
+
+    @property
+    def sure_life(self) -> float:
+        """The life that 90 % of the worlds exceed, where values are estimates; else `life`."""
+        return self.life if self.spread is None or not self.estimated else self.spread.p10
+
+    @property
+    def told_life(self) -> str:
+        """The rivets to failure as people read them: an interval where a value has a spread."""
+        if self.spread is not None:
+            return self.spread.told
+        return format_count(self.rivets_to_failure)
 
     @property
     def units(self) -> JointUnits:
@@ -220,6 +247,7 @@ class Assessment(TableResult):
         inputs: what entered: robot, sidecar, effects, task, options, S-N curves, reducers.
         warnings: of loading the robot and of the assessment.
         doubts: what else lowers trust in the result, a sentence each.
+        uncertainty: the lives as distributions, where a value of the robot has a spread.
     """
 
     PAGE = "visuals.report.assessment:assessment_report"
@@ -248,6 +276,12 @@ class Assessment(TableResult):
     inputs: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
+    uncertainty: UncertainLife | None = None
+
+    @property
+    def estimated(self) -> bool:
+        """Whether a value that enters the life is an estimate."""
+        return self.uncertainty is not None and bool(self.uncertainty.estimated)
 
     @property
     def verdict(self) -> Verdict:
@@ -302,9 +336,11 @@ class Assessment(TableResult):
         return f"{self.robot!r}, method={self.method!r}: {self.verdict.headline}"
 
     def _rows(self) -> list[dict[str, Any]]:
-        left_out = ("damage_share", "reducer_limits", "reducer_warnings", "false_brinelling")
+        left_out = ("damage_share", "reducer_limits", "reducer_warnings", "false_brinelling",
+                    "spread", "estimated")  # fmt: skip
         return [
             {key: value for key, value in vars(joint).items() if key not in left_out}
+            | (joint.spread.quantiles if joint.spread is not None else {})
             for joint in self.joints
         ]
 
@@ -324,7 +360,7 @@ class Assessment(TableResult):
                 "peak stress [MPa]": [1e-6 * j.peak_shear_stress for j in joints],
                 "utilisation [%]": [100 * j.utilisation for j in joints],
                 "damage a rivet": [j.damage_per_rivet for j in joints],
-                "rivets to failure": [format_count(j.rivets_to_failure) for j in joints],
+                "rivets to failure": [j.told_life for j in joints],
             }
         if any(j.reducer for j in joints):
             table["reducer used [%]"] = [100 * j.reducer_utilisation for j in joints]
@@ -336,6 +372,14 @@ class Assessment(TableResult):
         return sheet(f"Assessment of {self.robot}", facts, list(table), rows, note)
 
     def _content(self) -> dict[str, Any]:
-        own = {key: value for key, value in vars(self).items() if key != "doubts"}
+        hidden = ("doubts", "uncertainty")
+        own = {key: value for key, value in vars(self).items() if key not in hidden}
+        if self.uncertainty is not None:
+            own |= {
+                "life": self.uncertainty.robot.quantiles,
+                "spread_shares": self.uncertainty.robot.shares,
+                "estimated": self.estimated,
+                "uncertainty": self.uncertainty.to_dict(),
+            }
         ranked = self.false_brinelling
         return {"format": FORMAT, "verdict": self.verdict, **own, "false_brinelling": ranked}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -37,9 +37,12 @@ from picchio.studies.assessment.result import Assessment, JointLife, OperationRe
 from picchio.studies.rivet.life_rules import LifeRule, PaperRule, RainflowRule, curves_of, peak
 from picchio.studies.rivet.pose import Rivet, need_springs
 from picchio.studies.tasks import Operation, Task
+from picchio.studies.uncertainty import UncertainLife, uncertain_life
 
 Method = Literal["rainflow", "paper"]
 METHODS: tuple[Method, ...] = ("rainflow", "paper")
+# Samples of the lives where the robot's own values have spreads.
+_SAMPLES = 2048
 # Given for a joint as the largest value over all poses.
 _LARGEST = (
     "peak_deflection", "peak_torque", "gravity_torque", "peak_shear_stress",
@@ -61,6 +64,7 @@ def assess(
     gravity_stiffness: bool | None = None,
     gravity_balanced: bool | None = None,
     steady_check: bool = True,
+    uncertainty: UncertainLife | bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Assessment:
     """Life of every joint of a robot on a riveting task (paper section 3.4, eqs. 18-22).
@@ -79,10 +83,13 @@ def assess(
         gravity_balanced: gravity leaves no torque in the joints; see `Model`; likewise.
         steady_check: also say what the steady state misjudges, and whether a resonance is near;
             False leaves NaN there and takes about half the time.
+        uncertainty: where values of the robot have a spread, and the method is rainflow: the lives
+            as distributions (True: with 2,048 samples at most); False leaves them out, and every
+            value counts as stated.
         progress: called with (poses done, poses in all).
 
     Returns:
-        the assessment.
+        the assessment; with an estimated value, the medians stand as the rivets to failure.
 
     Raises:
         InputError: no flexible joint, an unknown method, a resonance without damping, a
@@ -147,7 +154,23 @@ def assess(
         rates = rate_sensitivity(model, task, joints, results, rule.needs)
         joints = tuple(replace(j, rate_sensitivity=rates[j.name][0]) for j in joints)
         doubts = (*doubts, *filter(None, (text for _, text in rates.values())))
+    unsure = None
+    if robot.spreads and rule.needs == "rest" and miner is None and any(curves):
+        if uncertainty is True:
+            unsure = uncertain_life(
+                model, task, sn_curve=sn_curve, residue=residue, mean_stress=mean_stress,
+                samples=_SAMPLES, totals=False,
+            )  # fmt: skip
+        elif uncertainty is not False:
+            unsure = uncertainty
+    if unsure is not None:
+        guess = bool(unsure.estimated)
+        joints = tuple(_with_spread(joint, unsure, guess) for joint in joints)
+        doubts = (*doubts, unsure.doubt())
     limiting = _limiting(joints)
+    lasts = limiting.life if limiting else math.inf
+    if unsure is not None and unsure.estimated:
+        lasts = unsure.robot.p50
     return Assessment(
         robot=robot.name,
         method="paper, at the poses' mean stress" if paper_mean_stress else method,
@@ -156,7 +179,8 @@ def assess(
         joints=joints,
         operations=tuple(results),
         limiting_joint=limiting.name if limiting else None,
-        rivets_to_failure=limiting.life if limiting else math.inf,
+        rivets_to_failure=lasts,
+        uncertainty=unsure,
         steady_state=steady,
         origins=robot.origins,
         provenance=provenance([*robot.files, *task.files]),
@@ -278,7 +302,7 @@ def _joint_life(
     ranked = [r.utilisation if curve is not None else r.peak_deflection for r in results]
     k = int(np.argmax([column[:, j].max() for column in ranked]))
     shares = {name: value / total for name, value in spent.items()} if total > 0.0 else {}
-    largest = {
+    largest: dict[str, Any] = {
         name: float(max(getattr(result, name)[:, j].max() for result in results))
         for name in _LARGEST
     }
@@ -302,9 +326,18 @@ def _joint_life(
     )
 
 
+def _with_spread(joint: JointLife, unsure: UncertainLife, guess: bool) -> JointLife:
+    """The joint with its life as a distribution; of estimates the median is its life."""
+    spread = unsure.joints.get(joint.name)
+    if spread is None:
+        return joint
+    lasts = spread.p50 if guess else joint.rivets_to_failure
+    return replace(joint, spread=spread, estimated=guess, rivets_to_failure=lasts)
+
+
 def _limiting(joints: tuple[JointLife, ...]) -> JointLife | None:
     """The joint that ends the robot's life: the shortest, or else the most utilised part."""
     known = [joint for joint in joints if joint.sn_curve or joint.reducer]
     if not known:
         return None
-    return min(known, key=lambda joint: (joint.life, -joint.governing_utilisation))
+    return min(known, key=lambda j: (j.life, j.sure_life, -j.governing_utilisation))

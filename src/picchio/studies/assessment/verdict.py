@@ -112,7 +112,7 @@ def judge(found: Assessment) -> Verdict:
     parts = [part for k, j in enumerate(found.joints) for part in _parts(k, j, found.operations)]
     worst = sorted(parts, key=lambda part: part.margin)
     over = [part for part in worst if part.margin < 1.0]
-    wearing = sorted((p for p in parts if _wears(p)), key=lambda part: part.joint.life)
+    wearing = sorted((p for p in parts if _wears(p)), key=lambda part: part.joint.sure_life)
     contrary = [p for p in parts if p.joint.shaft_ratio < 1.0 - SHAFT_TOLERANCE]
     contrary.sort(key=lambda part: part.joint.shaft_ratio)
     unknown = [j for j in found.joints if all(part.joint is not j for part in parts)]
@@ -183,7 +183,7 @@ def _parts(k: int, joint: JointLife, operations: tuple[OperationResult, ...]) ->
     if joint.sn_curve and math.isfinite(joint.utilisation):
         # A finite life has no margin, unless it ends in its first rivet.
         margin = min(_inverse(joint.utilisation), math.inf)
-        if math.isfinite(joint.life):
+        if math.isfinite(joint.sure_life):
             margin = joint.life if joint.life < 1.0 else math.inf
         place = joint.worst_operation, joint.worst_pose
         yield _Part("shaft", joint, margin, "allowable", *place)
@@ -200,7 +200,7 @@ def _inverse(used: float) -> float:
 
 
 def _wears(part: _Part) -> bool:
-    return part.governor == "shaft" and 1.0 <= part.joint.life < math.inf
+    return part.governor == "shaft" and part.joint.life >= 1.0 and part.joint.sure_life < math.inf
 
 
 def _failure(part: _Part) -> str:
@@ -220,13 +220,11 @@ def _failure(part: _Part) -> str:
 
 
 def _life(part: _Part) -> str:
-    return (
-        f"The robot survives {format_count(part.joint.life)} rivets; {part.joint.name} fails first"
-    )
+    return f"The robot survives {part.joint.told_life} rivets; {part.joint.name} fails first"
 
 
 def _wear(part: _Part) -> str:
-    return f"the shaft of {part.joint.name} survives {format_count(part.joint.life)} rivets"
+    return f"the shaft of {part.joint.name} survives {part.joint.told_life} rivets"
 
 
 def _closest(worst: list[_Part]) -> str:
@@ -269,19 +267,3 @@ def _gaps(found: Assessment) -> Iterator[str]:
         if names:
             yield text.format(", ".join(names))
     yield from found.reducer_warnings
-
-
-def format_count(value: float) -> str:
-    """A number of rivets as people read it; "no end" for infinity.
-
-    Args:
-        value: the number; NaN is a dash.
-    """
-    if math.isnan(value):
-        return "-"
-    if math.isinf(value):
-        return "no end"
-    if value < 10:
-        return f"{value:.3g}"
-    # Four digits are more than the physics deserves.
-    return f"{float(f'{value:.4g}'):,.0f}" if value < 1e12 else f"{value:.3e}"
