@@ -1,6 +1,7 @@
-"""Memory and time of what is large: a check of many long records, and a map of many poses.
+"""Memory and time of what is large: a check of long records, a map and a task of many poses.
 
     python benchmarks/memory.py [--records 10 50 200] [--samples 1000000] [--poses 5000000]
+                                [--tasks 1000 10000 100000]
                                 [--folder DIR] [--json FILE]
 
 The records (three channels in Parquet, 24 MB each a million samples) are made one by one in a
@@ -117,12 +118,33 @@ def mapped(folder: Path, poses: int) -> list[dict[str, Any]]:
     return rows
 
 
+def assessed(folder: Path, counts: list[int]) -> list[dict[str, Any]]:
+    """`assess` of tasks with so many poses, to JSON."""
+    print(f"{'assess':>8} {'poses':>9} {'GB':>6} {'s':>8} {'peak, MB':>9}")
+    rows, told = [], folder / "life.json"
+    for count in counts:
+        poses = np.random.default_rng(0).uniform((-1, 0.2, -1.2), (1, 1.2, -0.2), (count, 3))
+        blows = 'kind = "pulse_train"\nforce = 300.0\nperiod = 0.04\nwidth = 0.004\n'
+        lines = ",\n".join(map(str, poses.round(5).tolist()))
+        entry = f'name = "a"\ndirection = [1.0, 0.0, 0.0]\nposes = [\n{lines}]\n'
+        text = f'format = "picchio-task/1"\n[excitation]\n{blows}[[operation]]\n{entry}'
+        write_text(folder / "task.toml", text)
+        row = {"poses": count}
+        row |= measured("assess", ARM, "--task", folder / "task.toml", "--json", told)
+        row["bytes"] = told.stat().st_size
+        rows.append(row)
+        print(f"{'':8} {count:9} {row['bytes'] / 1e9:6.2f} {row['seconds']:8.1f} "
+              f"{row['peak_mb']:9.0f}", flush=True)  # fmt: skip
+    return rows
+
+
 def main() -> None:
-    """Print both tables."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--records", type=int, nargs="*", default=[10, 50, 200])
     parser.add_argument("--samples", type=int, default=1_000_000)
     parser.add_argument("--poses", type=int, default=5_000_000, help="0: no map")
+    parser.add_argument("--tasks", type=int, nargs="*", default=[1000, 10_000, 100_000])
     parser.add_argument(
         "--folder", type=Path, help="where there is room; the system's if not given"
     )
@@ -136,6 +158,8 @@ def main() -> None:
             found["check"] = checks(campaign, given.records, given.samples)
         if given.poses:
             found["map"] = mapped(Path(name), given.poses)
+        if given.tasks:
+            found["assess"] = assessed(Path(name), given.tasks)
     if given.json:
         write_text(given.json, json.dumps(found, indent=2))
 
