@@ -16,6 +16,7 @@ from PIL import Image
 import picchio
 from picchio.diagnosis.result import Cause, Diagnosis, Value
 from picchio.excitation.pulse_train import PulseTrain
+from picchio.studies.assessment.method_comparison import method_terms
 from picchio.visuals.report.assessment import assessment_report
 from picchio.visuals.report.comparison import comparison_page
 from picchio.visuals.report.cover import Cover
@@ -278,7 +279,14 @@ def pages(tmp_path_factory, arm, ur10) -> dict[str, Path]:
     cover = Cover("Riveting of the rear fuselage", "A customer", "An engineer", logo)
     other = {**arm.assessment.to_dict(), "rivets_to_failure": 1.0}
     texts = {
-        "report": assessment_report(arm.assessment, arm.robot, arm.task, cover=cover),
+        "report": assessment_report(
+            arm.assessment,
+            arm.robot,
+            arm.task,
+            cover=cover,
+            allowed=picchio.allowable(arm.robot, arm.task, 1e6, survival=0.99),
+            terms=method_terms(arm.robot, arm.task, arm.assessment),
+        ),
         "bare": assessment_report(ur10.assessment, ur10.robot, ur10.task),
         "comparison": comparison_page(picchio.compare(arm.assessment, other, ur10.assessment)),
         "plain": plain_page(picchio.robots()),
@@ -292,6 +300,7 @@ def test_pages_on_a_telephone(open_page, pages, pictures) -> None:
     for name, path in pages.items():
         for width in (390, 1280):
             page = open_page(path, viewport={"width": width, "height": 800})
+            page.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true })")
             page.screenshot(path=str(pictures / f"{name}-{width}.png"), full_page=True)
             assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), name
 
