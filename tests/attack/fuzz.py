@@ -351,7 +351,7 @@ def map_to(ending: str) -> Callable[[Path], None]:
 
 
 def mapped_values(folder: Path) -> None:
-    from picchio.studies.maps.run import open_map
+    from picchio.studies.maps.stored import open_map
     from picchio.visuals.plots.workspace import best_branch
 
     (file,) = folder.glob("map.*")

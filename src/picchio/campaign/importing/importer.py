@@ -209,7 +209,10 @@ def _appended(new: Campaign, to: Path, mapping: bytes) -> tuple[Campaign, dict[s
                              hint="what is this record's own belongs under [record]")  # fmt: skip
     if old.robot is not None:
         standing["robot"] = old.robot
-    campaign = Campaign.from_records([*old.records, *new.records], **standing)
+    try:
+        campaign = Campaign.from_records([*old.records, *new.records], **standing)
+    except InputError as error:
+        raise error.placed(file=to) from None
     first = to / "mapping.toml"
     if first.is_file() and first.read_bytes() != mapping:
         return campaign, {f"{Path(new.records[0].file).stem}.mapping.toml": mapping}
