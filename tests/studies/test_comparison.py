@@ -64,6 +64,15 @@ def test_robots_whose_joints_have_other_names(folder):
     assert all(math.isnan(row.ratios[1]) for row in found.results)
 
 
+def test_a_slide_has_the_units_of_a_slide():
+    sides = [{"format": "picchio-x/1", "joints": [
+        {"name": "rail", "kind": "prismatic", "peak_deflection": x, "peak_torque": x},
+        {"name": "hinge", "kind": "revolute", "peak_deflection": x, "peak_torque": x},
+    ]} for x in (1.0, 2.0)]  # fmt: skip
+    units = [row.unit for row in picchio.compare(*sides).results]
+    assert units == ["m", "N", "rad", "N m"]
+
+
 @pytest.mark.parametrize(
     ("items", "options", "words"),
     [

@@ -20,6 +20,7 @@ from picchio.core.provenance import provenance
 from picchio.core.results import Result, plain
 from picchio.core.toml import read_toml
 from picchio.robot.loading.load import load_robot
+from picchio.robot.units import units_of
 from picchio.studies.assessment.result import Assessment, format_count
 from picchio.studies.assessment.run import assess
 from picchio.studies.tasks import load_task
@@ -343,12 +344,17 @@ def _differences(sides: Sequence[Mapping[str, Any]]) -> tuple[Difference, ...]:
         if key.rpartition(".")[2] == "name" or all(_same(values[0], value) for value in values[1:]):
             continue
         shown = tuple(_shown(key, side, values[0]) for side in sides)
-        rows.append(Difference(key, _unit(key), values, shown))
+        unit = next((_unit(key, side) for side in sides if key in side), "")
+        rows.append(Difference(key, unit, values, shown))
     return tuple(rows)
 
 
-def _unit(key: str) -> str:
-    return _UNITS.get(key.rpartition(".")[2], "")
+def _unit(key: str, side: Mapping[str, Any]) -> str:
+    """A key's unit; of a joint's keys by the kind that stands beside them."""
+    before, _, last = key.rpartition(".")
+    unit = _UNITS.get(last, "")
+    kind = side.get(f"{before}.kind")
+    return units_of(kind).of(unit) if unit and kind in ("revolute", "prismatic") else unit
 
 
 def _number(value: Any) -> bool:
