@@ -11,7 +11,6 @@ from scipy.special import ndtr
 
 from picchio.core.errors import InputError
 from picchio.fatigue.mean_stress import Rule
-from picchio.fatigue.miner import damage
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.uncertain_lives import QUANTILES, Draws, Uncertain
 from picchio.model.effects.registry import effect_class
@@ -20,10 +19,9 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
 from picchio.robot.varied import robot_with
 from picchio.studies.assessment.run import assess
-from picchio.studies.rivet.pose import Rivet
-from picchio.studies.rivet.variation import FastRest, ShaftStress, VariedRivet
+from picchio.studies.rivet.variation import ShaftStress
 from picchio.studies.tasks import Task, task_from_dict
-from picchio.studies.uncertainty import DEFAULT_INPUTS, uncertain_life
+from picchio.studies.uncertainty import DEFAULT_INPUTS, _inputs_of, _Sampler, uncertain_life
 
 STRAIGHT = SNCurve(name="straight", strength=60e6, cycles=1e6, slopes=(5.0,))
 STEEL = dataclasses.replace(
@@ -90,92 +88,27 @@ def test_specimens_scatter_as_their_curve_says(robot: FlexibleRobot, task: Task)
     assert found.robot.shares["strength"] == pytest.approx(1.0, abs=0.03)
 
 
-def stress_of(robot: FlexibleRobot) -> ShaftStress:
-    return ShaftStress.of(robot, STRAIGHT)
-
-
-def test_a_varied_rivet_is_the_varied_robot(robot: FlexibleRobot, task: Task) -> None:
-    factor, damping = 1.2, 0.8
-    other = dataclasses.replace(
-        robot,
-        flexible_joints=tuple(
-            dataclasses.replace(
-                j, stiffness=factor * j.stiffness, damping_ratio=damping * j.damping_ratio
-            )
-            for j in robot.flexible_joints
-        ),
-    )
-    operation = task.operations[0]
-    pose = operation.poses[0]
-    rivet = VariedRivet(Model(robot), operation, pose)
-    theirs = Rivet(Model(other), operation, pose).loads("rest", both=False)
-    for compiled in (True, False):
-        ours = rivet.varied(stiffness=factor, damping=damping, compiled=compiled)
-        cycles = zip(stress_of(robot).cycles(ours), stress_of(robot).cycles(theirs), strict=True)
-        for (a, steady), (b, expected) in cycles:
-            assert steady == pytest.approx(expected, rel=1e-12)
-            big = b.range > 1.0  # Pa; an upward force does not move joint_1
-            close = 1e-5 * b.range.max(initial=0.0) if compiled else 0.0  # of the ring-down's end
-            np.testing.assert_allclose(a.range[: len(b)][big], b.range[big], rtol=1e-6, atol=close)
-
-
-@pytest.mark.parametrize("factors", [(1.0, 1.0, 1.0), (0.8, 1.6, 1.3), (1.3, 0.4, 0.7)])
-def test_the_compiled_path_is_the_exact_one(
-    robot: FlexibleRobot, task: Task, factors: tuple[float, float, float]
-) -> None:
-    # Damage goes with the fifth power of the range, so every cycle must be there, and right.
-    stress = stress_of(robot)
-    varied = dict(zip(("stiffness", "damping", "width"), factors, strict=True))
-    for operation in task.operations:
-        for pose in operation.poses:
-            rivet = VariedRivet(Model(robot), operation, pose)
-            ours = stress.cycles(rivet.varied(**varied))
-            exact = stress.cycles(rivet.varied(**varied, compiled=False))
-            for (a, steady), (b, other) in zip(ours, exact, strict=True):
-                assert steady == pytest.approx(other, rel=1e-12)
-                if not len(b) or b.range.max() < 1.0:  # Pa; an upward force does not move joint_1
-                    continue
-                assert a.range.max() == pytest.approx(b.range.max(), rel=1e-6)
-                assert damage(a.shifted(steady), STRAIGHT) == pytest.approx(
-                    damage(b.shifted(other), STRAIGHT), rel=1e-5
-                )
-
-
-def test_damping_beyond_critical_takes_the_exact_path(robot: FlexibleRobot, task: Task) -> None:
-    operation = task.operations[0]
-    rivet = VariedRivet(Model(robot), operation, operation.poses[0])
-    fast = FastRest(rivet.modes, operation.direction)
-    assert fast.turns(1.0, 100.0, operation.excitation.burst(3)) is None
-    ours, exact = (rivet.varied(damping=40.0, compiled=compiled) for compiled in (True, False))
-    for a, b in zip(ours, exact, strict=True):
-        np.testing.assert_array_equal(a.rest, b.rest)
-
-
-@pytest.mark.parametrize("effect", ["base_compliance", "backlash"])
-def test_a_model_that_is_no_sum_of_oscillators_is_varied_whole(
-    robot: FlexibleRobot, task: Task, effect: str
-) -> None:
-    # What yields beside the joints keeps its stiffness, and a gap its size, when the joints vary.
+@pytest.mark.parametrize("effect", [None, "base_compliance", "backlash"])
+def test_any_model_is_varied_whole(robot: FlexibleRobot, task: Task, effect: str | None) -> None:
+    # What yields beside the joints keeps its stiffness, and a gap its size, when the joints vary;
+    # damping beyond critical (without an effect) leaves the compiled path.
     given = {
-        "base_compliance": effect_class("base_compliance")("ry", stiffness=2e6, damping=2e3),
-        "backlash": effect_class("backlash")("joint_2", gap=1e-4),
+        None: [],
+        "base_compliance": [effect_class("base_compliance")("ry", stiffness=2e6, damping=2e3)],
+        "backlash": [effect_class("backlash")("joint_2", gap=1e-4)],
     }[effect]
-    model = Model(robot).with_effects([given])
-    softer = [effect_class("joint_stiffness")(name, scale=0.7) for name in robot.flexible_names]
-    operation = task.operations[0]
-    expected = Rivet(model.with_effects([given, *softer]), operation, operation.poses[1]).loads()
-    ours = VariedRivet(model, operation, operation.poses[1]).varied(stiffness=0.7)
-    for a, b in zip(ours, expected, strict=True):
-        np.testing.assert_allclose(a.rest, b.rest, rtol=1e-9, atol=1e-15)
-
-
-def test_it_starts_from_the_same_load_as_assess(robot: FlexibleRobot, task: Task) -> None:
-    operation = task.operations[0]
-    found = assess(robot, task).operations[0]
-    for k, pose in enumerate(operation.poses):
-        ours = VariedRivet(Model(robot), operation, pose).varied()
-        peaks = [np.abs(load.rest).max() for load in ours if load.rest is not None]
-        np.testing.assert_allclose(peaks, found.peak_deflection[k], rtol=1e-7, atol=1e-12)
+    key, factor = ("damping_ratio", 40.0) if effect is None else ("stiffness", 0.7)
+    model = Model(robot).with_effects(given)
+    stress = ShaftStress.of(robot, STRAIGHT)
+    inputs = _inputs_of(model, task, stress, {key: Uncertain(1.0, 1.0)}, [])
+    lives, _ = _Sampler(model, task, stress, inputs).run(np.array([[math.log(factor)]]))
+    joints = tuple(
+        dataclasses.replace(j, **{key: factor * getattr(j, key)}) for j in robot.flexible_joints
+    )
+    other = Model(dataclasses.replace(robot, flexible_joints=joints)).with_effects(given)
+    told = assess(other, task, sn_curve=STRAIGHT, steady_check=False).joints
+    expected = [joint.rivets_to_failure for joint in told]
+    np.testing.assert_allclose(lives[:, 0], expected, rtol=1e-4)
 
 
 def test_one_seed_one_result(robot: FlexibleRobot, task: Task) -> None:

@@ -487,8 +487,7 @@ class _Backwards:
         solved = force if self.nonlinear else 1.0
         if (solved, hits) not in self.known:
             every = [
-                (place.varied(force=solved, hits=hits, compiled=False), rivets)
-                for place, rivets in self.places
+                (place.varied(force=solved, hits=hits), rivets) for place, rivets in self.places
             ]
             self.known[solved, hits] = [
                 _Load.of([(loads[j], rivets) for loads, rivets in every], part.residue)
