@@ -191,3 +191,20 @@ def test_strict_says_it_by_the_exit_status(tmp_path, in_process, robot, case, co
     told = json.loads(out.read_text())["verdict"]
     assert told["headline"] in " ".join(done.stdout.split())
     assert in_process(*command).returncode == 0
+
+
+def test_a_guns_recoil_spring_is_no_joint_that_lacks_a_part(tmp_path):
+    """It is a part of the tool: neither shaft nor reducer is missing there."""
+    sidecar = tmp_path / "gun.toml"
+    sidecar.write_text(
+        'format = "picchio-sidecar/1"\n[tool]\nframe = "tool"\n[gun]\nmass = 1.5\n'
+        "recoil_stiffness = 3e4\ndamping_ratio = 0.1\n"
+    )
+    robot = picchio.load_robot("fanuc_like_3dof", flex=sidecar)
+    task = picchio.load_task(robot.task_path, robot)
+    found = picchio.assess(robot, task, steady_check=False)
+    assert found.verdict.status == "safe"
+    assert not any("gun_recoil" in reason for reason in found.verdict.reasons)
+    allowed = picchio.allowable(robot, task, 1e4)
+    assert [joint.joint for joint in allowed] == ["joint_1", "joint_2", "joint_3"]
+    assert "gun_recoil" not in " ".join(allowed.notes)

@@ -162,6 +162,19 @@ class Shaft(StrictModel):
         return self.shear_modulus * self.polar_moment / self.length
 
 
+# The spring on which a gun's body slides.
+RECOIL_JOINT = "gun_recoil"
+
+
+def is_drive(name: str) -> bool:
+    """Whether a flexible joint is one of the robot's: a gun's recoil spring is part of the tool.
+
+    Args:
+        name: of the joint.
+    """
+    return name != RECOIL_JOINT
+
+
 @dataclass(frozen=True)
 class Joint:
     """A joint with a spring between its motor side and its link side.

@@ -11,8 +11,6 @@ from picchio.robot.joint import DampingRatio, Stiffness
 from picchio.robot.link import SixInertias
 from picchio.robot.spread import with_spreads
 
-RECOIL_JOINT = "gun_recoil"
-
 
 @with_spreads
 class Tool(StrictModel):

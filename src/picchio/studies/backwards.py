@@ -27,7 +27,7 @@ from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, load_sn_curve
 from picchio.model.model import Model
 from picchio.robot.drives.reducer import Reducer, all_reducers
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.robot.joint import Joint
+from picchio.robot.joint import Joint, is_drive
 from picchio.studies.assessment.verdict import SHAFT_TOLERANCE, Status, softer
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.pose import JointLoad, need_springs
@@ -287,7 +287,7 @@ def allowable(
     ]
     catalogue = all_reducers(reducers) | {p.reducer.name: p.reducer for p in parts if p.reducer}
     search = _Backwards(model, task, rivets, survival, parts, sorted(catalogue.values(), key=_size))
-    joints = tuple(search.joint(k) for k in range(len(parts)))
+    joints = tuple(search.joint(k) for k, part in enumerate(parts) if is_drive(part.joint.name))
     factor = search.force_of_all(min(joint.force_factor for joint in joints))
     strongest = max(operation.excitation.peak_force for operation in task.operations)
     return AllowableLoads(
@@ -616,7 +616,8 @@ class _Backwards:
 
     def notes(self, joints: tuple[Allowable, ...]) -> Iterator[str]:
         """What an answer leaves out."""
-        bare = [part.joint.name for part in self.parts if part.curve is None]
+        names = [part.joint.name for part in self.parts if part.curve is None]
+        bare = [name for name in names if is_drive(name)]
         if bare:
             steel = self.parts[0].steel.name
             yield f"no shaft is given for {', '.join(bare)}: the radius is for {steel}"

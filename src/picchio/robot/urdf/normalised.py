@@ -12,7 +12,8 @@ from collections.abc import Iterable
 
 from lxml import etree
 
-from picchio.robot.tool import RECOIL_JOINT, Gun, Mounting, Tool
+from picchio.robot.joint import RECOIL_JOINT
+from picchio.robot.tool import Gun, Mounting, Tool
 from picchio.robot.urdf.tree import INERTIA, MOVABLE, ZERO, Inertial, UrdfTree, Vector
 
 

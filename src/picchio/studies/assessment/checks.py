@@ -16,6 +16,7 @@ from picchio.model.model import Model
 from picchio.robot.annotations.flexibility import ITS_REDUCER
 from picchio.robot.drives.reducer import Reducer
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.joint import is_drive
 from picchio.studies.assessment.result import JointLife, OperationResult, SteadyStateCheck
 from picchio.studies.assessment.verdict import MUCH_GROWTH, RATE_STEP, SHAFT_TOLERANCE, softer
 from picchio.studies.rivet.life_rules import LifeRule, peak
@@ -28,7 +29,7 @@ _ROUNDING = 1e-12
 
 def warn_about_shafts(robot: FlexibleRobot) -> None:
     """Warn of joints without a shaft, and of shafts that do not fit their joint."""
-    bare = [joint.name for joint in robot.flexible_joints if joint.shaft is None]
+    bare = [j.name for j in robot.flexible_joints if j.shaft is None and is_drive(j.name)]
     if bare:
         warn_user(
             f"no shaft is given for {', '.join(bare)}: deflection and torque are given, stress "
@@ -98,7 +99,7 @@ def assumptions_of(
     unchecked = [
         joint.name
         for joint, reducer in zip(model.robot.flexible_joints, reducers, strict=True)
-        if reducer is None
+        if reducer is None and is_drive(joint.name)
     ]
     lines = [
         f"gravity stiffness {'on' if model.gravity_stiffness else 'off'}",

@@ -22,6 +22,8 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from picchio.robot.joint import is_drive
+
 if TYPE_CHECKING:
     from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
 
@@ -115,7 +117,8 @@ def judge(found: Assessment) -> Verdict:
     wearing = sorted((p for p in parts if _wears(p)), key=lambda part: part.joint.sure_life)
     contrary = [p for p in parts if p.joint.shaft_ratio < 1.0 - SHAFT_TOLERANCE]
     contrary.sort(key=lambda part: part.joint.shaft_ratio)
-    unknown = [j for j in found.joints if all(part.joint is not j for part in parts)]
+    told = {part.joint.name for part in parts}
+    unknown = [j for j in found.joints if is_drive(j.name) and j.name not in told]
     unknown.sort(key=lambda joint: -joint.peak_deflection)
     near = [part for part in worst if part.margin_at_other_rates < 1.0]
     reasons = [*map(_failure, over[1:]), *map(_wear, wearing), *_gaps(found), *found.doubts]
@@ -252,7 +255,7 @@ def _gaps(found: Assessment) -> Iterator[str]:
     for text, names in (
         (
             "no reducer is named for {}: it is not assessed",
-            [j.name for j in found.joints if not j.reducer],
+            [j.name for j in found.joints if is_drive(j.name) and not j.reducer],
         ),
         (
             "the reducer of {} is not assessed: its vibration from rest has no end",

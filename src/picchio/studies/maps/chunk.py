@@ -192,7 +192,7 @@ def tool_places(robot: FlexibleRobot, poses: FloatArray) -> FloatArray:
     """(p, 3) m, world: where the tool's force acts at poses (p, nv)."""
     from picchio.robot.ik.chain import tool_chain
     from picchio.robot.ik.chain_kernel import places_of
-    from picchio.robot.tool import RECOIL_JOINT
+    from picchio.robot.joint import RECOIL_JOINT
 
     if RECOIL_JOINT in robot.joint_names:  # the chain ends before it
         return np.array([robot.tool_position(pose) for pose in poses]).reshape(-1, 3)
