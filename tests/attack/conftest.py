@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +19,8 @@ COMMAND = [sys.executable, "-c", "from picchio.cli.main import main; main()"]
 def start(tmp_path):
     """`start(*arguments)`: a `picchio` process whose current folder is `tmp_path`."""
     started = []
+    # What ignores Ctrl-C, such as a shell's background, leaves that to its children.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def begin(*arguments, **options):
         options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options
