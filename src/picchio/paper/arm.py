@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
+from picchio.core.files import write_text
 from picchio.paper.assumptions import Assumptions
 from picchio.paper.printed import PrintedArm, printed
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -46,7 +47,7 @@ def arm(given: Assumptions) -> FlexibleRobot:
 @functools.cache
 def _bare_arm(inertia_about: str) -> FlexibleRobot:
     path = Path(_folder.name) / f"paper_arm_{inertia_about}.urdf"
-    path.write_text(urdf(printed().arm, inertia_about), encoding="utf-8")
+    write_text(path, urdf(printed().arm, inertia_about))
     return load_robot(path, tool="tool")
 
 
