@@ -99,16 +99,18 @@ def test_any_model_is_varied_whole(robot: FlexibleRobot, task: Task, effect: str
     }[effect]
     key, factor = ("damping_ratio", 40.0) if effect is None else ("stiffness", 0.7)
     model = Model(robot).with_effects(given)
-    stress = ShaftStress.of(robot, STRAIGHT)
+    stress = ShaftStress.of(robot, STEEL)
     inputs = _inputs_of(model, task, stress, {key: Uncertain(1.0, 1.0)}, [])
-    lives, _ = _Sampler(model, task, stress, inputs).run(np.array([[math.log(factor)]]))
+    drawn = _Sampler(model, task, stress, inputs).run(np.array([[math.log(factor)]]))
     joints = tuple(
         dataclasses.replace(j, **{key: factor * getattr(j, key)}) for j in robot.flexible_joints
     )
     other = Model(dataclasses.replace(robot, flexible_joints=joints)).with_effects(given)
-    told = assess(other, task, sn_curve=STRAIGHT, steady_check=False).joints
+    told = assess(other, task, sn_curve=STEEL, steady_check=False).joints
     expected = [joint.rivets_to_failure for joint in told]
-    np.testing.assert_allclose(lives[:, 0], expected, rtol=1e-4)
+    np.testing.assert_allclose(drawn.lives[:, 0], expected, rtol=1e-4)
+    expected = [joint.yield_utilisation for joint in told]
+    np.testing.assert_allclose(drawn.yielding[:, 0], expected, rtol=1e-5)
 
 
 def test_one_seed_one_result(robot: FlexibleRobot, task: Task) -> None:
@@ -210,6 +212,7 @@ def test_a_drawn_world_is_assess_on_the_changed_robot(
     text = (Path(load_robot("fanuc_like_3dof").source).parent / "flex.toml").read_text()
     text = text.replace("radius = 0.0132", "radius = 0.0132, radius_spread = 1.02")
     text = text.replace("stiffness = 1.0e5", "stiffness = 1.0e5\nstiffness_spread = 1.5")
+    text = text.replace("[joint.joint_2]", '[joint.joint_2]\nreducer = "RV-80E-121"')
     if masses:
         text += "mass = 3.0\nmass_spread = 1.2\ncom = [0.0, 0.0, 0.1]\ncom_std = 0.02\n"
     file.write_text(text)
@@ -217,9 +220,16 @@ def test_a_drawn_world_is_assess_on_the_changed_robot(
     found = uncertain_life(robot, task, sn_curve=STEEL, inputs={}, samples=256, totals=False,
                            mean_stress=rule, seed=3)  # fmt: skip
     spreads = [robot.spreads[name] for name in found.inputs]
-    lives = []
+    lives, yielding, geared = [], [], []
     for row in Draws(len(spreads), 3).more().reshape(-1, len(spreads))[:3]:
         drawn = robot_with(robot, [(s, s.at(float(z))) for s, z in zip(spreads, row, strict=True)])
         told = assess(drawn, task, sn_curve=STEEL, mean_stress=rule, steady_check=False)
         lives.append(told.rivets_to_failure)
+        yielding.append([joint.yield_utilisation for joint in told.joints])
+        geared.append(told.joints[1].reducer_utilisation)
     np.testing.assert_allclose(found.lives[:3], lives, rtol=1e-4)
+    model, stress = Model(robot), ShaftStress.of(robot, STEEL, mean_stress=rule)
+    rows = Draws(len(spreads), 3).more().reshape(-1, len(spreads))[:3]
+    drawn = _Sampler(model, task, stress, _inputs_of(model, task, stress, {}, [])).run(rows)
+    np.testing.assert_allclose(drawn.yielding.T, yielding, rtol=1e-5)
+    np.testing.assert_allclose(drawn.geared[1], geared, rtol=1e-5)

@@ -208,3 +208,44 @@ def test_a_guns_recoil_spring_is_no_joint_that_lacks_a_part(tmp_path):
     allowed = picchio.allowable(robot, task, 1e4)
     assert [joint.joint for joint in allowed] == ["joint_1", "joint_2", "joint_3"]
     assert "gun_recoil" not in " ".join(allowed.notes)
+
+
+@pytest.mark.filterwarnings("ignore::picchio.PicchioWarning")
+@pytest.mark.parametrize(
+    ("part", "key"),
+    [({"reducer": "CSG-40-100-2UH"}, "reducer"), (shaft(0.018, 0.04), "yield")],
+)
+def test_a_limit_that_drawn_cases_exceed_is_not_safe(tmp_path, part, key):
+    robot = arm(tmp_path, {n: {**part, "estimated": n == 3} for n in (1, 2, 3)})
+    curve = picchio.load_sn_curve("42CrMo4-QT-shaft")
+    curve = dataclasses.replace(curve, yield_shear=60e6)  # so that it governs, and not fatigue
+
+    def at(force):
+        work = TASK | {"excitation": TASK["excitation"] | {"force": force}}
+        task = picchio.task_from_dict(work, robot)
+        return picchio.assess(
+            robot, task, gravity_balanced=True, steady_check=False, sn_curve=curve
+        )
+
+    def used(joint):
+        return getattr(joint, f"{key}_utilisation")
+
+    weak = at(300.0)
+    told, joint = weak.verdict, weak.joint(weak.verdict.joint)
+    assert (told.status, told.governed_by) == ("safe", key)
+    low, high = told.margin_interval
+    assert low < told.margin and 1.0 < low < high
+    assert " to " in told.headline.partition("%")[0]
+    entry = next(
+        e for e in json.loads(json.dumps(weak.to_dict()))["joints"] if e["name"] == told.joint
+    )
+    assert entry[f"{key}_utilisation_interval"] == pytest.approx([1.0 / high, 1.0 / low])
+    assert entry["peak_torque_interval"][0] < entry["peak_torque_interval"][1]
+    # Just below its limit as stated, beyond it in more than a tenth of the cases: a linear arm.
+    force = 300.0 * 0.99 / max(used(j) for j in weak.joints)
+    told = at(force).verdict
+    assert (told.status, told.governed_by) == ("cannot-be-told", key)
+    if told.joint == joint.name:
+        assert told.margin_interval == pytest.approx((low * 300.0 / force, high * 300.0 / force))
+    assert told.margin_interval[0] < 1.0 < told.margin
+    assert at(1.02 * force).verdict.status == "fails"

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from statistics import NormalDist
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from picchio.core.arrays import FloatArray
+from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
 from picchio.core.processes import one_thread
@@ -111,6 +111,9 @@ class UncertainLife(TableResult):
         assumptions: what was taken for granted.
         seed: of the samples.
         lives: (samples,) of the robot, replicate after replicate; not in the JSON.
+        intervals: of each flexible joint the P10 and P90 of what its parts bear: "utilisation",
+            "yield_utilisation" and "reducer_utilisation", where it has such a part, and
+            "peak_torque", N m (N of a slide), gravity and blows together.
     """
 
     joints: dict[str, LifeSpread]
@@ -122,6 +125,7 @@ class UncertainLife(TableResult):
     assumptions: tuple[str, ...]
     seed: int
     lives: FloatArray = field(default_factory=lambda: np.empty(0))
+    intervals: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict)
 
     def spread_words(self, name: str) -> str:
         """How much an input varies, in words.
@@ -199,7 +203,7 @@ def uncertain_life(
     (the ends of its 95 % sampling interval), or `samples` are done.
 
     Args:
-        robot: with shafts; or a model of it.
+        robot: with shafts or reducers; or a model of it.
         task: what it does.
         sn_curve: for all joints, instead of their own.
         inputs: factors on the nominal values, by name: "stiffness", "damping_ratio", "force",
@@ -221,10 +225,12 @@ def uncertain_life(
         the lives as distributions.
 
     Raises:
-        InputError: no joint with a shaft, an unknown input, a width where blows have none.
+        InputError: no joint with a shaft or reducer, an unknown input, a width where blows have
+            none.
     """
     model = Model.of(robot, gravity_stiffness=gravity_stiffness, gravity_balanced=gravity_balanced)
-    stress = ShaftStress.of(model.robot, sn_curve, None, residue, mean_stress)
+    geared = any(joint.reducer for joint in model.robot.flexible_joints)
+    stress = ShaftStress.of(model.robot, sn_curve, None, residue, mean_stress, needed=not geared)
     notes: list[str] = []
     sampler = _Sampler(model, task, stress, _inputs_of(model, task, stress, inputs, notes))
     idle = sampler.without_effect()
@@ -236,23 +242,25 @@ def uncertain_life(
     root = root_of(names, model.robot.posterior)
     draws = Draws(len(names), seed)
     most = samples or sampler.budget
-    lives, used = np.empty((2, len(stress.joints), draws.scores.shape[0], 0))
+    drawn: Drawn | None = None
     mixed = None
     while True:
         new = draws.more()
         found = sampler.run(new.reshape(-1, len(names)) @ root)
-        shape = (len(stress.joints), *new.shape[:2])
-        lives = np.concatenate([lives, found[0].reshape(shape)], axis=2)
-        used = np.concatenate([used, found[1].reshape(shape)], axis=2)
+        found = Drawn(*(part.reshape(-1, *new.shape[:2]) for part in found))
+        drawn = found if drawn is None else Drawn.joined([drawn, found], axis=2)
+        lives, used = drawn.lives, drawn.used
         done = draws.scores.shape[0] * draws.scores.shape[1]
         if progress is not None:
             progress(min(done, most), most)
-        weakest = summarise(names, draws.scores, lives.min(axis=0), used.max(axis=0))
+        weakest = summarise(names, draws.scores, drawn.robots_life, drawn.robots_use)
         if 2 * done > most or (done >= _FEWEST and weakest.settled(_NEAR)):
             break
     if totals:
         rows = draws.mixed(_MIXED) @ root
-        mixed = sampler.run(rows.reshape(-1, len(names)))[1].reshape(len(used), len(names), -1)
+        again = sampler.run(rows.reshape(-1, len(names)))
+        mixed = again.used.reshape(len(used), len(names), -1)
+        mixed_robot = again.robots_use.reshape(len(names), -1)
     spreads = {
         joint.name: summarise(
             names, draws.scores, lives[k], used[k], None if mixed is None else mixed[k]
@@ -271,9 +279,9 @@ def uncertain_life(
         robot=summarise(
             names,
             draws.scores,
-            lives.min(axis=0),
-            used.max(axis=0),
-            None if mixed is None else mixed.max(axis=0),
+            drawn.robots_life,
+            drawn.robots_use,
+            None if mixed is None else mixed_robot,
         ),
         inputs={each.name: each.uncertain for each in sampler.inputs},
         sources={each.name: each.source for each in sampler.inputs},
@@ -287,7 +295,8 @@ def uncertain_life(
             *model.without_load(),
         ),
         seed=seed,
-        lives=lives.min(axis=0).ravel(),
+        lives=drawn.robots_life.ravel(),
+        intervals=sampler.intervals(drawn),
     )
 
 
@@ -387,6 +396,69 @@ def _inputs_of(
     return tuple(found)
 
 
+class Drawn(NamedTuple):
+    """What drawn worlds do to a robot: k joints with shafts, n flexible ones, m worlds.
+
+    Attributes:
+        lives: (k, m) rivets of the mix to failure.
+        used: (k, m) fatigue utilisation.
+        yielding: (k, m) largest stress, gravity and blows together, over the static strength in
+            shear; NaN where that is not known.
+        peak: (n, m) N m (N), largest magnitude of gravity and blows together.
+        geared: (n, m) torque over the reducer's limit that binds; NaN without a reducer.
+    """
+
+    lives: FloatArray
+    used: FloatArray
+    yielding: FloatArray
+    peak: FloatArray
+    geared: FloatArray
+
+    @classmethod
+    def joined(cls, parts: Sequence[Drawn], axis: int = 1) -> Drawn:
+        """Several of them as one.
+
+        Args:
+            parts: each with the same joints.
+            axis: of the worlds.
+        """
+        return cls(*(np.concatenate(column, axis=axis) for column in zip(*parts, strict=True)))
+
+    @property
+    def robots_life(self) -> FloatArray:
+        """(m,) of the weakest joint; infinite without a shaft."""
+        return np.asarray(self.lives.min(axis=0, initial=np.inf))
+
+    @property
+    def robots_use(self) -> FloatArray:
+        """(m,) of the most used shaft; without one, of the reducer."""
+        if len(self.used):
+            return np.asarray(self.used.max(axis=0))
+        return np.asarray(np.nanmax(self.geared, axis=0))
+
+    def holds(self, rivets: float) -> FloatArray:
+        """(m,) whether every part holds for a life.
+
+        Args:
+            rivets: the life, of the task's mix.
+        """
+        over = (self.lives < rivets).any(axis=0) | (self.yielding > 1.0).any(axis=0)
+        return np.asarray(~(over | (self.geared > 1.0).any(axis=0)))
+
+
+def interval(values: FloatArray) -> tuple[float, float]:
+    """P10 and P90 of drawn values.
+
+    Args:
+        values: any shape, infinite ones included.
+
+    Returns:
+        the two, each a value that was drawn.
+    """
+    low, high = np.quantile(values, [0.1, 0.9], method="inverted_cdf")
+    return float(low), float(high)
+
+
 @dataclass(frozen=True)
 class _Sampler:
     """Lives of the sampled worlds.
@@ -428,37 +500,72 @@ class _Sampler:
             return 256
         return 16_384 if self._plain and not self._rebuilt else 2_048 if self._plain else 512
 
-    def run(self, moved: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Rivets of the mix to failure, and utilisation, each (n_joints, m).
+    def run(self, moved: FloatArray, force: FloatArray | None = None) -> Drawn:
+        """What drawn worlds do.
 
         Args:
             moved: (m, inputs) normal scores, correlated.
+            force: (m,) further factors on the vibration of a linear model; 1 if not given.
         """
         rows = max(1, _BATCH // max(1, sum(len(op.poses) for op in self.task.operations)))
-        parts = [
-            self._batch(_Draw.of(self, moved[k : k + rows])) for k in range(0, len(moved), rows)
-        ]
-        spent = np.concatenate([part[0] for part in parts], axis=1) / self.task.rivets_per_pass
-        used = np.concatenate([part[1] for part in parts], axis=1)
-        with np.errstate(divide="ignore"):
-            return np.where(spent > 0.0, 1.0 / spent, np.inf), used
+        force = np.ones(len(moved)) if force is None else force
+        return Drawn.joined(
+            [
+                self._batch(_Draw.of(self, moved[k : k + rows], force[k : k + rows]))
+                for k in range(0, len(moved), rows)
+            ]
+        )
 
-    def _batch(self, draw: _Draw) -> tuple[FloatArray, FloatArray]:
-        """Damage of a pass and utilisation, (n_joints, m) each."""
-        spent, used = np.zeros((2, len(self.stress.joints), draw.count))
+    def _batch(self, draw: _Draw) -> Drawn:
+        k, n = len(self.stress.joints), len(self.model.robot.flexible_joints)
+        spent, used = np.zeros((2, k, draw.count))
+        peak, held = np.zeros((2, n, draw.count))
         plain = self._modal and self._plain
         for op, many in zip(self.task.operations, self._places, strict=True):
-            damaged, loaded = (
-                self._compiled(draw, op, many) if plain else self._one_by_one(draw, op)
-            )
-            spent += op.rivets * damaged.sum(axis=2)
-            np.maximum(used, loaded.max(axis=2), out=used)
-        return spent, used
+            found = self._compiled(draw, op, many) if plain else self._one_by_one(draw, op)
+            spent += op.rivets * found[0].sum(axis=2)
+            for most, values in zip((used, peak, held), found[1:], strict=True):
+                np.maximum(most, values.max(axis=2), out=most)
+        spent /= self.task.rivets_per_pass
+        with np.errstate(divide="ignore"):
+            lives = np.where(spent > 0.0, 1.0 / spent, np.inf)
+        strength = [c.yield_shear or c.ultimate_shear or np.nan for c in self.stress.curves]
+        per = stress_per_torque(self.stress.joints) / np.array(strength)
+        yielding = peak[self._columns] * per[:, None] * draw.thinner.T
+        # Each limit of a reducer is for one of the two, so their largest values give its share.
+        geared = np.full_like(peak, np.nan)
+        for row, joint in enumerate(self.model.robot.flexible_joints):
+            if joint.reducer is not None:
+                shares = joint.reducer.shares(peak[row], held[row])
+                geared[row] = np.max(list(shares.values()), axis=0)
+        return Drawn(lives, used, yielding, peak, geared)
+
+    @property
+    def _columns(self) -> IndexArray:
+        return np.array(self.stress.columns, dtype=np.int64)
+
+    def intervals(self, drawn: Drawn) -> dict[str, dict[str, tuple[float, float]]]:
+        """P10 and P90 of what each flexible joint's parts bear.
+
+        Args:
+            drawn: worlds, in one or more dimensions.
+        """
+        found: dict[str, dict[str, tuple[float, float]]] = {}
+        column = {int(j): row for row, j in enumerate(self.stress.columns)}
+        for j, joint in enumerate(self.model.robot.flexible_joints):
+            parts = {"peak_torque": drawn.peak[j], "reducer_utilisation": drawn.geared[j]}
+            if j in column:
+                parts["utilisation"] = drawn.used[column[j]]
+                parts["yield_utilisation"] = drawn.yielding[column[j]]
+            found[joint.name] = {
+                key: interval(values) for key, values in parts.items() if not np.isnan(values).any()
+            }
+        return found
 
     def _compiled(
         self, draw: _Draw, op: Operation, nominal: ManyPoses
-    ) -> tuple[FloatArray, FloatArray]:
-        """(n_joints, m, p) each, of one operation."""
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Damage and utilisation (k, m, p), peak torque and the torque at rest (n, m, p)."""
         from picchio.studies.rivet.damage_kernel import damages
 
         m, p = draw.count, len(op.poses)
@@ -470,6 +577,9 @@ class _Sampler:
         mass = np.concatenate([mass for mass, _ in matrices])
         jacobian = np.concatenate([jacobian for _, jacobian in matrices])
         springs = np.concatenate([world.stiffness for world in worlds])
+        static = -np.concatenate([world.gravity_torque() for world in worlds])
+        if op.excitation.preload:
+            static = static + op.excitation.preload * np.einsum("pdn,d->pn", jacobian, op.direction)
         ratio = np.array([world.damping_ratio for world in worlds])
         d, place = np.repeat(np.arange(m), p), np.tile(np.arange(p), m)
         world = d if self._rebuilt else np.zeros_like(d)
@@ -479,7 +589,8 @@ class _Sampler:
         for column, curve in zip(self.stress.columns, self.stress.curves, strict=True):
             curves[column] = curve
         factor = np.zeros((m, springs.shape[1]))
-        factor[:, self.stress.columns] = stress_per_torque(self.stress.joints) * draw.load
+        columns = self._columns
+        factor[:, columns] = stress_per_torque(self.stress.joints) * draw.load
         frequency, low, high, damaged = np.empty((4, m * p, springs.shape[1]))
         stiffness = springs[place] * draw.stiffness[d]
         damages(
@@ -487,25 +598,39 @@ class _Sampler:
             stiffness, ratio[world] * draw.damping[d], np.tile(op.direction, (len(mass), 1)),
             factor[d], *curve_tables(curves), frequency, low, high, damaged,
         )  # fmt: skip
-        columns = self.stress.columns
         allowable = np.array([curve.allowable for curve in self.stress.curves])
         loaded = 0.5 * (stiffness * (high - low) * factor[d])[:, columns] / allowable
         damaged = damaged[:, columns]
+        turned = stiffness * draw.vibration[d][:, None]
+        rest = static[place]
+        peak = np.maximum(np.abs(rest + turned * low), np.abs(rest + turned * high))
+        held = np.abs(rest)
         for row in np.flatnonzero(np.isnan(low[:, 0])):  # a mode that is not underdamped
-            pair = self._one(draw, int(d[row]), op, int(row) % p)
-            damaged[row], loaded[row] = np.array(pair).T
-        shape = (m, p, len(columns))
-        return damaged.reshape(shape).transpose(2, 0, 1), loaded.reshape(shape).transpose(2, 0, 1)
+            one = self._one(draw, int(d[row]), op, int(row) % p)
+            damaged[row], loaded[row], peak[row], held[row] = one
 
-    def _one_by_one(self, draw: _Draw, op: Operation) -> tuple[FloatArray, FloatArray]:
+        def shaped(values: FloatArray) -> FloatArray:
+            return np.asarray(values.reshape(m, p, -1).transpose(2, 0, 1))
+
+        return shaped(damaged), shaped(loaded), shaped(peak), shaped(held)
+
+    def _one_by_one(
+        self, draw: _Draw, op: Operation
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """As `_compiled`, for any model and any rule."""
-        found = np.array(
-            [[self._one(draw, d, op, i) for i in range(len(op.poses))] for d in range(draw.count)]
+        found = [
+            [self._one(draw, d, op, i) for i in range(len(op.poses))] for d in range(draw.count)
+        ]
+        damaged, loaded, peak, held = (
+            np.array([[one[part] for one in row] for row in found]).transpose(2, 0, 1)
+            for part in range(4)
         )
-        return found[..., 0].transpose(2, 0, 1), found[..., 1].transpose(2, 0, 1)
+        return damaged, loaded, peak, held
 
-    def _one(self, draw: _Draw, d: int, op: Operation, i: int) -> list[tuple[float, float]]:
-        """Damage and utilisation of every joint with a shaft, at one place of one world."""
+    def _one(
+        self, draw: _Draw, d: int, op: Operation, i: int
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Damage and utilisation (k,), peak torque and torque at rest (n,), at one place."""
         found = []
         loads = list(draw.loads(d, op, i))
         for k, (joint, column) in enumerate(
@@ -523,7 +648,12 @@ class _Sampler:
             )
             curve, rule = self.stress.curves[k], self.stress.mean_stress
             found.append((damage(load, curve, rule), utilisation(load, curve, rule)))
-        return found
+        damaged, loaded = np.array(found).reshape(-1, 2).T
+        peak = [
+            np.abs(static + draw.vibration[d] * stiffness * np.append(rest, 0.0)).max()
+            for rest, stiffness, static in loads
+        ]
+        return damaged, loaded, np.array(peak), np.abs([static for _, _, static in loads])
 
     @cached_property
     def static_torque(self) -> list[list[FloatArray]]:
@@ -537,13 +667,13 @@ class _Sampler:
         ]
 
     def without_effect(self) -> list[str]:
-        """The inputs that need another robot, and leave its lives as they are."""
+        """The inputs that need another robot, and leave its lives and torques as they are."""
         asked = [i for i, each in enumerate(self.inputs) if each.spread is not None]
         if not asked:
             return []
         moved = np.zeros((len(asked) + 1, len(self.inputs)))
         moved[np.arange(1, len(asked) + 1), asked] = 1.0
-        found = np.concatenate(self.run(moved))
+        found = np.nan_to_num(np.concatenate(self.run(moved)))
         same = (found == found[:, :1]).all(axis=0)
         return [self.inputs[i].name for k, i in enumerate(asked) if same[k + 1]]
 
@@ -556,7 +686,7 @@ class _Sampler:
                 continue
             moved = np.zeros((_SCAN, len(self.inputs)))
             moved[:, i] = score
-            scan = LifeScan(each.uncertain.at(score), self.run(moved)[0].min(axis=0))
+            scan = LifeScan(each.uncertain.at(score), self.run(moved).robots_life)
             if scan.turns:
                 found[each.name] = scan
         return found
@@ -571,6 +701,7 @@ class _Draw:
         stiffness: (m, n) factors on the flexible joints' stiffness.
         damping: (m, n) factors on their damping ratios.
         thinner: (m, k) factors on the stress of the joints that count, by their shafts' radii.
+        vibration: (m,) all factors on the torques of the vibration.
         load: (m, k) all factors on the stress of the vibration, strength included.
         width: (m,) factors on the blows' width.
         force: (m,) factors on the blows' force, where that is not a factor on the stress.
@@ -581,6 +712,7 @@ class _Draw:
     stiffness: FloatArray
     damping: FloatArray
     thinner: FloatArray
+    vibration: FloatArray
     load: FloatArray
     width: FloatArray
     force: FloatArray
@@ -592,8 +724,8 @@ class _Draw:
         return len(self.width)
 
     @classmethod
-    def of(cls, sampler: _Sampler, moved: FloatArray) -> _Draw:
-        """From normal scores (m, inputs)."""
+    def of(cls, sampler: _Sampler, moved: FloatArray, further: FloatArray) -> _Draw:
+        """From normal scores (m, inputs), and further factors (m,) on a linear vibration."""
         m, n = len(moved), len(sampler.model.robot.flexible_joints)
         of_joints = {key: np.ones((m, n)) for key in ("stiffness", "damping_ratio", "radius")}
         whole = {key: np.ones(m) for key in ("force", "width", "model", "strength")}
@@ -609,16 +741,16 @@ class _Draw:
             else:
                 whole[each.key] = values
         stress = sampler.stress
-        thinner = of_joints["radius"][:, stress.columns] ** -3.0
+        thinner = of_joints["radius"][:, sampler._columns] ** -3.0
         score = np.log(whole["strength"])
-        strength = np.stack([_strength(curve, score) for curve in stress.curves], axis=1)
-        load = whole["model"][:, None] * thinner / strength
+        strength = np.array([_strength(curve, score) for curve in stress.curves]).reshape(-1, m).T
         # Only of a linear model is the load proportional to the force.
-        force = whole["force"]
+        force, vibration = whole["force"], whole["model"] * further
         if not sampler.model.nonlinear:
-            load, force = load * force[:, None], np.ones(m)
-        return cls(sampler, of_joints["stiffness"], of_joints["damping_ratio"], thinner, load,
-                   whole["width"], force, others)  # fmt: skip
+            vibration, force = vibration * force, np.ones(m)
+        load = vibration[:, None] * thinner / strength
+        return cls(sampler, of_joints["stiffness"], of_joints["damping_ratio"], thinner, vibration,
+                   load, whole["width"], force, others)  # fmt: skip
 
     def robot(self, d: int) -> FlexibleRobot:
         """The robot of world d, but for stiffness, damping and radii."""

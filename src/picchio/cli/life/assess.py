@@ -283,7 +283,7 @@ def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
     reducers = [
         (j.name, j.reducer, j.reducer_governed_by or "-",
          *([_number(one.torque), _number(one.limit)] if (one := j.reducer_governing) else "--"),
-         _number(100 * j.reducer_utilisation))
+         j.told_percent("reducer_utilisation"))
         for j in found.joints
         if j.reducer
     ]  # fmt: skip
@@ -332,9 +332,9 @@ def _life_table(found: Assessment) -> FittedTable:
     if shafts:
         columns[">peak\nstress\nMPa"] = lambda j: _number(j.peak_shear_stress / 1e6)
         columns[">gravity\nstress\nMPa"] = lambda j: _number(j.gravity_shear_stress / 1e6)
-        columns[">utili-\nsation\n%"] = lambda j: _number(100 * j.utilisation)
+        columns[">utili-\nsation\n%"] = lambda j: j.told_percent("utilisation")
     if any(joint.reducer for joint in found.joints):
-        columns[">reducer\nused\n%"] = lambda j: _number(100 * j.reducer_utilisation)
+        columns[">reducer\nused\n%"] = lambda j: j.told_percent("reducer_utilisation")
     if shafts:
         columns[">damage\na rivet\n"] = lambda j: f"{j.damage_per_rivet:.4g}" if j.sn_curve else "-"
         columns[">rivets to\nfailure\n"] = lambda j: j.told_life if j.sn_curve else "unknown"

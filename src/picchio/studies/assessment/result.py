@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 # What an assessment found: the life of every joint, and where it goes.
 
 FORMAT = "picchio-assessment/1"
+# A utilisation below this is rounding, and is told as 0.
+_ROUNDING = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +125,8 @@ class JointLife:
         false_brinelling: indicators for its output bearing; None without a reducer.
         spread: the life as a distribution, where a value of the robot has a spread; None otherwise.
         estimated: a value is an estimate: `rivets_to_failure` is then the median.
+        intervals: P10 and P90 of "utilisation", "yield_utilisation", "reducer_utilisation" and
+            "peak_torque" (gravity and blows together), where a value of the robot has a spread.
     """
 
     name: str
@@ -151,18 +155,19 @@ class JointLife:
     false_brinelling: FalseBrinelling | None = None
     spread: LifeSpread | None = None
     estimated: bool = False
+    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
-        """The entry as plain values, its life's quantiles under "life" where it has some."""
-        own = {
-            key: value for key, value in vars(self).items() if key not in ("spread", "estimated")
-        }
+        """The entry as plain values, with "life" and intervals where a value has a spread."""
+        hidden = ("spread", "estimated", "intervals")
+        own = {key: value for key, value in vars(self).items() if key not in hidden}
+        own |= {f"{key}_interval": ends for key, ends in self.intervals.items()}
         return own if self.spread is None else own | {"life": self.spread.quantiles}
 
     @property
     def sure_life(self) -> float:
-        """The life that 90 % of the worlds exceed, where values are estimates; else `life`."""
-        return self.life if self.spread is None or not self.estimated else self.spread.p10
+        """The life that 90 % of the worlds exceed, where values have spreads; else `life`."""
+        return self.life if self.spread is None else self.spread.p10
 
     @property
     def told_life(self) -> str:
@@ -170,6 +175,23 @@ class JointLife:
         if self.spread is not None:
             return self.spread.told
         return format_count(self.rivets_to_failure)
+
+    def told_percent(self, key: str) -> str:
+        """A utilisation in per cent as people read it: an interval where a value has a spread.
+
+        Args:
+            key: such as "reducer_utilisation".
+
+        Returns:
+            such as "85.2" or "60.1 to 130"; "-" where it is not known.
+        """
+        value = getattr(self, key)
+        if math.isnan(value):
+            return "-"
+        low, high = self.intervals.get(key, (value, value))
+        if low == high:
+            return f"{100 * value:.4g}" if value > _ROUNDING else "0"
+        return f"{100 * low:.3g} to {100 * high:.3g}"
 
     @property
     def units(self) -> JointUnits:
@@ -185,6 +207,12 @@ class JointLife:
     def reducer_governing(self) -> TorqueLimit | None:
         """The reducer's limit that binds, with its torque; None without a reducer."""
         return self.reducer_limits[0] if self.reducer_limits else None
+
+    @property
+    def governing_key(self) -> str:
+        """Which of the two `governing_utilisation` is."""
+        geared = not self.utilisation >= self.reducer_utilisation and bool(self.reducer)
+        return "reducer_utilisation" if geared else "utilisation"
 
     @property
     def governing_utilisation(self) -> float:
@@ -337,10 +365,11 @@ class Assessment(TableResult):
 
     def _rows(self) -> list[dict[str, Any]]:
         left_out = ("damage_share", "reducer_limits", "reducer_warnings", "false_brinelling",
-                    "spread", "estimated")  # fmt: skip
+                    "spread", "estimated", "intervals")  # fmt: skip
         return [
             {key: value for key, value in vars(joint).items() if key not in left_out}
             | (joint.spread.quantiles if joint.spread is not None else {})
+            | {f"{key}_interval": ends for key, ends in joint.intervals.items()}
             for joint in self.joints
         ]
 
@@ -358,12 +387,12 @@ class Assessment(TableResult):
         if any(j.sn_curve for j in joints):
             table |= {
                 "peak stress [MPa]": [1e-6 * j.peak_shear_stress for j in joints],
-                "utilisation [%]": [100 * j.utilisation for j in joints],
+                "utilisation [%]": [j.told_percent("utilisation") for j in joints],
                 "damage a rivet": [j.damage_per_rivet for j in joints],
                 "rivets to failure": [j.told_life for j in joints],
             }
         if any(j.reducer for j in joints):
-            table["reducer used [%]"] = [100 * j.reducer_utilisation for j in joints]
+            table["reducer used [%]"] = [j.told_percent("reducer_utilisation") for j in joints]
             table["reducer's limit"] = [j.reducer_governed_by for j in joints]
         facts = {"method": self.method, "S-N curve": self.sn_curve or None}
         rows = zip(*table.values(), strict=True)

@@ -155,7 +155,8 @@ def assess(
         joints = tuple(replace(j, rate_sensitivity=rates[j.name][0]) for j in joints)
         doubts = (*doubts, *filter(None, (text for _, text in rates.values())))
     unsure = None
-    if robot.spreads and rule.needs == "rest" and miner is None and any(curves):
+    parts = any(curves) or any(reducers)
+    if robot.spreads and rule.needs == "rest" and miner is None and parts:
         if uncertainty is True:
             unsure = uncertain_life(
                 model, task, sn_curve=sn_curve, residue=residue, mean_stress=mean_stress,
@@ -328,6 +329,7 @@ def _joint_life(
 
 def _with_spread(joint: JointLife, unsure: UncertainLife, guess: bool) -> JointLife:
     """The joint with its life as a distribution; of estimates the median is its life."""
+    joint = replace(joint, intervals=unsure.intervals.get(joint.name, {}))
     spread = unsure.joints.get(joint.name)
     if spread is None:
         return joint

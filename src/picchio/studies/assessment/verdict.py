@@ -8,6 +8,10 @@ its first rivet). Otherwise, inputs that contradict each other, a joint of which
 or a limit that is kept only at exactly the stated rate of the blows, mean that it `cannot-be-told`.
 Otherwise a shaft with a finite life makes it `limited`, and only then it is `safe`.
 
+Where a value of the robot has a spread, a part is judged by what 90 % of the drawn cases bear: a
+shaft by the P10 of its life, a limit by the P10 of its margin. A limit that the stated values keep
+and more than 10 % of the cases exceed means that it `cannot-be-told`.
+
 The margin is allowable over actual of the governing part, so below 1 it fails. A finite life has
 none: its stress is above the endurance limit and that is no failure. It is held against a wanted
 life instead (`picchio.allowable`), which gives the factor by which the force may grow.
@@ -48,8 +52,9 @@ class Verdict:
         governed_by: shaft (fatigue), reducer (a limit of its catalogue), yield (the shaft's static
             strength), resonance or input.
         joint: that governs.
-        margin: allowable over actual of the governing part; below 1 it fails; NaN where there is
-            none: of a finite life, and where nothing can be told.
+        margin: allowable over actual of the governing part, at the stated values; below 1 it fails;
+            NaN where there is none: of a finite life, and where nothing can be told.
+        margin_interval: its P10 and P90 where a value of the robot has a spread; None otherwise.
         reasons: everything that lowers trust, a sentence each.
         operation: where the governing part fares worst.
         pose: index of the pose there, from 0.
@@ -66,6 +71,7 @@ class Verdict:
     pose: int
     limit: str
     headline: str
+    margin_interval: tuple[float, float] | None = None
 
 
 class _Part(NamedTuple):
@@ -77,6 +83,17 @@ class _Part(NamedTuple):
     limit: str
     operation: str
     pose: int
+    share: tuple[float, float] | None  # P10 and P90 of actual over allowable
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """Of the margin."""
+        return self.share and (_inverse(self.share[1]), _inverse(self.share[0]))
+
+    @property
+    def sure_margin(self) -> float:
+        """That 90 % of the cases exceed."""
+        return self.margin if self.interval is None else min(self.margin, self.interval[0])
 
     @property
     def name(self) -> str:
@@ -85,6 +102,10 @@ class _Part(NamedTuple):
 
     @property
     def used(self) -> str:
+        if self.share is not None:
+            low, high = (f"{100.0 * share:.3g}" for share in self.share)
+            if low != high:
+                return f"{low} to {high} % of its {self.limit}"
         return f"{100.0 / self.margin:.3g} % of its {self.limit}"
 
     @property
@@ -112,8 +133,9 @@ def judge(found: Assessment) -> Verdict:
         every doubt and every warning.
     """
     parts = [part for k, j in enumerate(found.joints) for part in _parts(k, j, found.operations)]
-    worst = sorted(parts, key=lambda part: part.margin)
-    over = [part for part in worst if part.margin < 1.0]
+    worst = sorted(parts, key=lambda part: part.sure_margin)
+    over = sorted((p for p in parts if p.margin < 1.0), key=lambda part: part.margin)
+    unsure = [part for part in worst if part.sure_margin < 1.0 <= part.margin]
     wearing = sorted((p for p in parts if _wears(p)), key=lambda part: part.joint.sure_life)
     contrary = [p for p in parts if p.joint.shaft_ratio < 1.0 - SHAFT_TOLERANCE]
     contrary.sort(key=lambda part: part.joint.shaft_ratio)
@@ -121,7 +143,8 @@ def judge(found: Assessment) -> Verdict:
     unknown = [j for j in found.joints if is_drive(j.name) and j.name not in told]
     unknown.sort(key=lambda joint: -joint.peak_deflection)
     near = [part for part in worst if part.margin_at_other_rates < 1.0]
-    reasons = [*map(_failure, over[1:]), *map(_wear, wearing), *_gaps(found), *found.doubts]
+    reasons = [*map(_failure, over[1:]), *map(_risk, unsure), *map(_wear, wearing), *_gaps(found)]
+    reasons += found.doubts
     reasons += found.warnings
 
     def made(status: Status, text: str, governor: Governor, joint: JointLife, part: _Part | None,
@@ -131,7 +154,10 @@ def judge(found: Assessment) -> Verdict:
         told = tuple(dict.fromkeys(line for line in reasons if line not in text))
         headline = f"{_SAID[status]}. {text}."
         limit = part.limit if part else ""
-        return Verdict(status, governor, joint.name, margin, told, operation, pose, limit, headline)
+        # Only of a part that is judged by its margin.
+        ends = part.interval if part and not math.isnan(margin) else None
+        return Verdict(status, governor, joint.name, margin, told, operation, pose, limit, headline,
+                       ends)  # fmt: skip
 
     if over:
         part = over[0]
@@ -143,6 +169,10 @@ def judge(found: Assessment) -> Verdict:
     if unknown:
         text = _unknown(unknown, [*wearing, *worst], whole=len(unknown) == len(found.joints))
         return made("cannot-be-told", text, "input", unknown[0], None)
+    if unsure:
+        part = unsure[0]
+        text = _risk(part)
+        return made("cannot-be-told", text, part.governor, part.joint, part, part.margin)
     if near:
         part = near[0]
         text = (
@@ -189,13 +219,17 @@ def _parts(k: int, joint: JointLife, operations: tuple[OperationResult, ...]) ->
         if math.isfinite(joint.sure_life):
             margin = joint.life if joint.life < 1.0 else math.inf
         place = joint.worst_operation, joint.worst_pose
-        yield _Part("shaft", joint, margin, "allowable", *place)
+        share = joint.intervals.get("utilisation") if math.isfinite(margin) else None
+        yield _Part("shaft", joint, margin, "allowable", *place, share)
     if math.isfinite(joint.yield_utilisation):
         place = largest("peak_total_stress")
-        yield _Part("yield", joint, _inverse(joint.yield_utilisation), "yield strength", *place)
+        share = joint.intervals.get("yield_utilisation")
+        margin = _inverse(joint.yield_utilisation)
+        yield _Part("yield", joint, margin, "yield strength", *place, share)
     if joint.reducer and math.isfinite(joint.reducer_utilisation):
         limit, place = joint.reducer_governed_by, largest("reducer_utilisation")
-        yield _Part("reducer", joint, _inverse(joint.reducer_utilisation), limit, *place)
+        share = joint.intervals.get("reducer_utilisation")
+        yield _Part("reducer", joint, _inverse(joint.reducer_utilisation), limit, *place, share)
 
 
 def _inverse(used: float) -> float:
@@ -210,15 +244,23 @@ def _failure(part: _Part) -> str:
     joint = part.joint
     if part.governor == "shaft":
         return f"The shaft of {joint.name} breaks in its first rivet"
+    some = f" (80 % of the drawn cases are at {part.used})" if " to " in part.used else ""
     if part.governor == "yield":
         stress = joint.peak_total_stress / 1e6
         return (
             f"Gravity and blows take the shaft of {joint.name} to {stress:.4g} MPa in shear, and "
-            f"it yields at {stress * part.margin:.4g} MPa: no fatigue life holds there"
+            f"it yields at {stress * part.margin:.4g} MPa{some}: no fatigue life holds there"
         )
     return (
         f"Gravity and blows take the {part.name} to {1.0 / part.margin:.3g} times its "
-        f"{part.limit}: no life can be promised there"
+        f"{part.limit}{some}: no life can be promised there"
+    )
+
+
+def _risk(part: _Part) -> str:
+    return (
+        f"The {part.name} keeps its {part.limit} at the stated values, but these are uncertain: it "
+        f"is at {part.used}, and 10 % of the cases are beyond that"
     )
 
 

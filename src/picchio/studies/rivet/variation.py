@@ -68,15 +68,19 @@ class ShaftStress:
         survival: float | None = None,
         residue: Residue = "half-cycles",
         mean_stress: Rule = "none",
+        *,
+        needed: bool = True,
     ) -> ShaftStress:
         """Of a robot; arguments as in `assess`, and `survival` to move the curves to.
+
+        `needed` refuses a robot of which no joint has a shaft.
 
         Raises:
             InputError: no joint with a shaft; a curve without scatter where a survival is given.
         """
         curves = curves_of(robot, sn_curve)
         columns = [j for j, curve in enumerate(curves) if curve is not None]
-        if not columns:
+        if needed and not columns:
             raise InputError(
                 "no joint has a shaft and an S-N curve", file=robot.source, key="shaft"
             )
