@@ -20,6 +20,7 @@ from picchio.diagnosis.motion.conclude.during_blows import (
     motion_life,
 )
 from picchio.diagnosis.motion.diagnosis import diagnose_motion
+from picchio.diagnosis.percussion.conclude.causes import fitted_correlation
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis, diagnose_percussion
 from picchio.diagnosis.percussion.search.candidates import not_looked_for
 from picchio.diagnosis.result import Diagnosis
@@ -111,8 +112,12 @@ def diagnose(
             hit = diagnose_percussion(loaded, records, **options)
             answer = replace(hit.diagnosis, details={"percussion": hit})
         effects = hit.extended.hypothesis.effects
+        known = fitted_correlation(hit.extended) if answer.causes else None
+        moves = answer.details.get("motion")
+        if known is not None and moves is not None:
+            known = known.beside(moves.correlation)
         answer = replace(
-            answer, not_looked_for=not_looked_for(hit.problem),
+            answer, correlation=known, not_looked_for=not_looked_for(hit.problem),
             life=_percussion_life(hit, answer, work),
         )  # fmt: skip
     files = [*loaded.files, *records.files]

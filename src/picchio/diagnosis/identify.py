@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.tables import Tolerance
+from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.processes import one_thread
 from picchio.core.results import TableResult
-from picchio.core.toml import StrictModel
+from picchio.core.toml import StrictModel, validate
 from picchio.diagnosis.diagnose import diagnose
 from picchio.diagnosis.result import Cause, Diagnosis, Value, unit_of
 from picchio.model.effects.registry import effect_class
+from picchio.model.effects.structure.joint_stiffness import JointStiffness
+from picchio.model.effects.structure.modal_damping import ModalDamping
 from picchio.robot.annotations.sidecar import FORMAT as SIDECAR
+from picchio.robot.annotations.sidecar import Sidecar, spreads_of
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
 from picchio.robot.loading.load import load_robot
@@ -80,6 +85,7 @@ class Identification(TableResult):
         diagnosis: what the numbers are from.
         source: where the data are from, such as the campaign's name.
         joints: every flexible joint.
+        tolerance: how well the campaign takes the nominal values to be known.
     """
 
     INDEX = "joint"
@@ -89,20 +95,22 @@ class Identification(TableResult):
     diagnosis: Diagnosis
     source: str
     joints: tuple[IdentifiedJoint, ...]
+    tolerance: Tolerance
 
     def sidecar_text(self) -> str:
         """The robot's sidecar with the values that were found in it, for `--flex`.
 
-        Stiffnesses, rotor inertias (of joints whose gear ratio is known) and the tool's mass are
-        put in with their uncertainty; everything else of the joints stays as it was. What a
-        sidecar has no place for (friction, ripple, delays) stands in comments.
+        Stiffnesses, damping ratios, rotor inertias (of joints whose gear ratio is known) and the
+        tool's mass are put in with their standard deviations, and `[posterior]` says how these
+        hang together; everything else of the joints stays as it was. What a sidecar has no place
+        for (friction, ripple, delays) stands in comments.
 
         Raises:
             InputError: no cause was found.
         """
         import tomlkit
 
-        table, remarks = _sidecar(self.robot, self.diagnosis, self.source)
+        table, remarks = _sidecar(self.robot, self.diagnosis, self.source, self.tolerance)
         made = self.diagnosis.extra["provenance"]
         document = tomlkit.document()
         said = f"Written by picchio {made['picchio']}; verdict: {self.diagnosis.verdict}."
@@ -193,7 +201,7 @@ def identification(campaign: Campaign, found: Diagnosis) -> Identification:
         )
         for joint in robot.flexible_joints
     )
-    return Identification(robot, found, source, joints)
+    return Identification(robot, found, source, joints, tolerance)
 
 
 def _is_of(cause: Cause, tolerance: str) -> bool:
@@ -222,25 +230,39 @@ def _stiffness_of(
 def _damping_of(
     robot: FlexibleRobot, joint: Joint, found: Diagnosis, tolerance: Tolerance
 ) -> Identified:
-    ratio = joint.damping_ratio
+    value = _damping(robot, joint, found)
+    if value is None:
+        why = "no record shows the robot vibrate: the nominal value and its tolerance"
+        ratio = joint.damping_ratio
+        return Identified.of(ratio, ratio * tolerance.damping_ratio, False, why)
+    if any(_is_of(cause, "damping_ratio") for cause in found.causes):
+        why = "the robot's modal damping differs from the nominal one, by one factor"
+        return Identified.of(value.value, value.std, True, why)
+    told = _tells(value, tolerance.damping_ratio)
+    why = "one factor for all modes, fitted within the tolerance"
+    return Identified.of(value.value, value.std, told, why)
+
+
+def _damping(robot: FlexibleRobot, joint: Joint, found: Diagnosis) -> Value | None:
+    """A joint's damping ratio by the fit, which has one factor for all modes; None without it."""
     for cause in found.causes:
         if _is_of(cause, "damping_ratio"):
-            scale = cause.parameters["scale"]
-            why = "the robot's modal damping differs from the nominal one, by one factor"
-            return Identified.of(scale.value * ratio, scale.std * ratio, True, why)
+            scale, ratio = cause.parameters["scale"], joint.damping_ratio
+            return Value(scale.value * ratio, scale.std * ratio, "1")
     fitted = found.nuisances.get("damping_ratio")
     if fitted is None or not fitted.value > 0.0:
-        why = "no record shows the robot vibrate: the nominal value and its tolerance"
-        return Identified.of(ratio, ratio * tolerance.damping_ratio, False, why)
-    share = fitted.std / fitted.value
-    told = share < _TOLD * tolerance.damping_ratio
-    why = "one factor for all modes, fitted within the tolerance"
-    value = fitted.value * ratio / float(np.mean(robot.damping_ratio))
-    return Identified.of(value, share * value, told, why)
+        return None
+    share = joint.damping_ratio / float(np.mean(robot.damping_ratio))
+    return Value(fitted.value * share, fitted.std * share, "1")
+
+
+def _tells(value: Value, tolerance: float) -> bool:
+    """Whether the records tell a value, beside the tolerance of its nominal value."""
+    return value.std < _TOLD * tolerance * value.value
 
 
 def _sidecar(
-    robot: FlexibleRobot, diagnosis: Diagnosis, source: str
+    robot: FlexibleRobot, diagnosis: Diagnosis, source: str, tolerance: Tolerance
 ) -> tuple[dict[str, Any], list[str]]:
     """The sidecar with the values found, and remarks on what has no place in it."""
     if not diagnosis.causes:
@@ -252,6 +274,7 @@ def _sidecar(
     left_out = {"source"} if robot.tool.mass > 0.0 else {"source", "com", "inertia"}
     tool = robot.tool.model_dump(mode="json", exclude=left_out, exclude_none=True)
     ratios = {joint.name: abs(joint.gear_ratio or 0.0) for joint in robot.flexible_joints}
+    told: dict[str, tuple[str, str, str]] = {}  # a value's name -> what it was fitted as
     for cause in diagnosis.causes:
         key = effect_class(cause.effect).sidecar
         if key == "stiffness" and cause.target in joints:
@@ -262,26 +285,67 @@ def _sidecar(
                 entry.setdefault("damping_ratio_spread", ESTIMATED)
             entry |= {"source": _said(source, "stiffness", value)}
             _tell(entry, "stiffness", value)
+            told[f"stiffness.{cause.target}"] = (cause.effect, cause.target, "scale")
         elif key == "rotor_inertia" and (ratio := ratios.get(cause.target)):
             value = cause.parameters["inertia"]
             inertia = Value(max(value.value, 0.0) / ratio**2, value.std / ratio**2, "kg*m^2")
             _tell(joints[cause.target], "rotor_inertia", inertia)
+            told[f"rotor_inertia.{cause.target}"] = (cause.effect, cause.target, "inertia")
             remarks.append(_remark(cause) + f" (written as rotor_inertia, over {ratio:g}^2)")
         elif key == "mass" and tool["mass"] + cause.parameters["mass"].value >= 0.0:
             value = cause.parameters["mass"]
             _tell(tool, "mass", Value(tool["mass"] + value.value, value.std, "kg"))
+            told["mass.tool"] = (cause.effect, cause.target, "mass")
             tool["source"] = _said(source, "mass", value)
-        else:
+        elif key != "damping_ratio":
             remarks.append(_remark(cause))
     for name, value in diagnosis.nuisances.items():
-        if name.startswith("stiffness.") and name.partition(".")[2] in joints:
-            entry = joints[name.partition(".")[2]]
+        owner = name.partition(".")[2]
+        # What was said of a value is not replaced by the tolerance.
+        kept = name in robot.spreads and not _tells(value, tolerance.stiffness)
+        if name.startswith("stiffness.") and owner in joints and not kept:
+            entry = joints[owner]
             if "stiffness" in entry:
                 entry |= {"source": _said(source, "stiffness", value)}
                 _tell(entry, "stiffness", value)
-        else:
+                told[name] = (JointStiffness.name, owner, "scale")
+        elif name != "damping_ratio":
             remarks.append(f"{name} = {_number(value)}")
-    return {**table, "joint": joints, "tool": tool, **_standing(robot)}, remarks
+    fitted = any(_is_of(cause, "damping_ratio") for cause in diagnosis.causes)
+    for joint in robot.flexible_joints:
+        found, entry = _damping(robot, joint, diagnosis), joints[joint.name]
+        if found is None or not (fitted or _tells(found, tolerance.damping_ratio)):
+            continue
+        said = _said(source, "damping_ratio", found)
+        entry["source"] = f"{entry['source']}; {said}" if "source" in entry else said
+        _tell(entry, "damping_ratio", found)
+        told[f"damping_ratio.{joint.name}"] = (ModalDamping.name, "robot", "scale")
+    table |= {"joint": joints, "tool": tool, **_standing(robot)}
+    known = spreads_of(validate(table, Sidecar, format=SIDECAR))
+    posterior = _posterior(robot, diagnosis, told, [spread.name for spread in known])
+    return {**table, **posterior}, remarks
+
+
+def _posterior(
+    robot: FlexibleRobot,
+    diagnosis: Diagnosis,
+    told: Mapping[str, tuple[str, str, str]],
+    known: Collection[str],
+) -> dict[str, Any]:
+    """How the sidecar's values hang together: those found and, of the others, as was known."""
+    parts: list[tuple[list[str], FloatArray]] = []
+    if diagnosis.correlation is not None:
+        parts.append((list(told), diagnosis.correlation.among(list(told.values()))))
+    others = [name for name in known if name not in told]
+    before = robot.posterior.among(others) if robot.posterior is not None else None
+    if before is not None:
+        parts.append((list(before.names), np.array(before.correlation)))
+    parts = [(names, matrix) for names, matrix in parts if (matrix != np.eye(len(names))).any()]
+    if not parts:
+        return {}
+    matrix = block_diag(*(matrix for _, matrix in parts))
+    names = [name for names, _ in parts for name in names]
+    return {"posterior": {"names": names, "correlation": matrix.tolist()}}
 
 
 def _joint(robot: FlexibleRobot, joint: Joint) -> dict[str, Any]:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
+from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.results import Result
 from picchio.model.effects.effect import Effect
@@ -85,6 +88,60 @@ class Cause:
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""
         return asdict(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Correlation:
+    """How numbers that were fitted to the same data hang together.
+
+    Attributes:
+        names: (effect, target, parameter) of each.
+        matrix: (k, k), 1, of the parameters; of positive ones it is that of their logarithms.
+    """
+
+    names: tuple[tuple[str, str, str], ...]
+    matrix: FloatArray
+
+    @classmethod
+    def of(cls, names: Sequence[tuple[str, str, str]], covariance: FloatArray) -> Correlation:
+        """From a covariance matrix; of numbers of one name the first counts.
+
+        Args:
+            names: (effect, target, parameter) of each.
+            covariance: (k, k), in any units.
+        """
+        std = np.sqrt(np.maximum(covariance.diagonal(), 0.0))
+        kept = [k for k, name in enumerate(names) if std[k] > 0.0 and name not in names[:k]]
+        found = covariance[np.ix_(kept, kept)] / np.outer(std[kept], std[kept])
+        found = np.clip(0.5 * (found + found.T), -1.0, 1.0)
+        np.fill_diagonal(found, 1.0)
+        return cls(tuple(names[k] for k in kept), found)
+
+    def beside(self, other: Correlation) -> Correlation:
+        """With the numbers that only other data tell, as independent of these.
+
+        Args:
+            other: by those data.
+        """
+        more = [name for name in other.names if name not in self.names]
+        names = (*self.names, *more)
+        matrix = self.among(names)
+        matrix[len(self.names) :, len(self.names) :] = other.among(more)
+        return Correlation(names, matrix)
+
+    def among(self, names: Sequence[tuple[str, str, str]]) -> FloatArray:
+        """The correlation matrix of some numbers, (n, n); the same number twice is one.
+
+        Args:
+            names: n of them; one that is not known here is independent of the others.
+        """
+        index = {name: k for k, name in enumerate(self.names)}
+        at = [(m, index[name]) for m, name in enumerate(names) if name in index]
+        found = np.eye(len(names))
+        if at:
+            rows, own = (list(part) for part in zip(*at, strict=True))
+            found[np.ix_(rows, rows)] = self.matrix[np.ix_(own, own)]
+        return found
 
 
 @dataclass(frozen=True)
@@ -199,6 +256,7 @@ class Diagnosis(Result):
     kinds: Mapping[str, Any] = field(default_factory=dict)
     shared: tuple[Mapping[str, Any], ...] = ()
     model: Model | None = None
+    correlation: Correlation | None = None
     extra: Mapping[str, Any] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
 

@@ -10,7 +10,7 @@ from picchio.campaign.campaign import Campaign
 from picchio.core.errors import InputError
 from picchio.core.processes import one_thread
 from picchio.diagnosis.motion.conclude.holdout import judge, judged_groups, table
-from picchio.diagnosis.motion.conclude.values import nuisances, parameters
+from picchio.diagnosis.motion.conclude.values import correlation, nuisances, parameters
 from picchio.diagnosis.motion.criteria.holdout import validate
 from picchio.diagnosis.motion.criteria.score import Scorer, necessity
 from picchio.diagnosis.motion.data.noise import noise_levels
@@ -161,6 +161,7 @@ def _conclude(search: _Search, found: Fit) -> Diagnosis:
         next_measurement=next_measurement(system, found, noise, rivals)
         if verdict not in ("nothing-wrong", "named") else None,
         scores=tuple(row for step in search.steps for row in step.scores),
+        correlation=correlation(found),
         details=_details(search, found, outer, causes),
     )  # fmt: skip
 

@@ -145,7 +145,8 @@ class Effect(ABC):
         tolerance: the key of `[tolerance]` that says how far its `scale` may be from 1 without
             being a cause; empty where nothing is tolerated.
         sidecar: the key of a sidecar that its value belongs to: "stiffness" or "rotor_inertia" of
-            a joint, "mass" of the tool; empty where a sidecar has no place for it.
+            a joint, "damping_ratio" of all, "mass" of the tool; empty where a sidecar has no place
+            for it.
         urdf: attribute of URDF's <dynamics> -> the parameter that it states.
         needs: the effect without which, at the same target, this one has no meaning.
         usual: where effects explain a motion equally well, the smallest comes first.

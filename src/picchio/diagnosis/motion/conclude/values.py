@@ -8,7 +8,7 @@ import numpy as np
 
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit
-from picchio.diagnosis.result import Value, unit_of
+from picchio.diagnosis.result import Correlation, Value, unit_of
 from picchio.model.effects.effect import Effect
 from picchio.robot.units import SLIDING
 
@@ -49,6 +49,15 @@ def parameters(system: System, current: Fit, effect: Effect) -> dict[str, Value]
         spread = math.hypot(cosine.value * cosine.std, sine.value * sine.std) / max(size, 1e-300)
         found["amplitude"] = Value(size, spread, cosine.unit)
     return found
+
+
+def correlation(current: Fit) -> Correlation:
+    """How the parameters of a fit's effects hang together, stated frictions included."""
+    kept = [k for k, c in enumerate(current.coordinates) if c.index >= 0]
+    acting = [(current.state.every[c.index], c.name) for c in current.coordinates if c.index >= 0]
+    sign = np.array([-1.0 if name in effect.inverse else 1.0 for effect, name in acting])
+    names = [(effect.name, effect.target, name) for effect, name in acting]
+    return Correlation.of(names, current.covariance[np.ix_(kept, kept)] * np.outer(sign, sign))
 
 
 def nuisances(system: System, current: Fit) -> dict[str, Value]:

@@ -29,7 +29,7 @@ class Fit:
         residual: (rows,) measured less predicted.
         columns: (rows, k) derivatives by the coordinates.
         coordinates: the k that were varied.
-        std: (k,) standard deviations, for autocorrelated residuals.
+        covariance: (k, k), for autocorrelated residuals.
         level: group -> RMS of its residual.
         correlation: group -> samples that tell as much as one independent sample does.
     """
@@ -38,9 +38,14 @@ class Fit:
     residual: FloatArray
     columns: FloatArray
     coordinates: list[Coordinate]
-    std: FloatArray
+    covariance: FloatArray
     level: dict[Group, float]
     correlation: dict[Group, float]
+
+    @property
+    def std(self) -> FloatArray:
+        """(k,) standard deviations."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
 
 
 def fit(system: System, state: State, *, rounds: int = _ROUNDS) -> Fit:
@@ -87,9 +92,9 @@ def finish(system: System, state: State) -> Fit:
     weighted = columns * row_weights(system, spread)[:, None]
     normal = weighted.T @ weighted + np.diag([c.precision for c in coordinates])
     scale = np.sqrt(np.maximum(np.diag(normal), _TINY))
-    covariance = np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True)
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale
-    return Fit(state, residual, columns, coordinates, std, level, correlation)
+    size = np.outer(scale, scale)
+    covariance = np.linalg.pinv(normal / size, hermitian=True) / size
+    return Fit(state, residual, columns, coordinates, covariance, level, correlation)
 
 
 def jacobian(

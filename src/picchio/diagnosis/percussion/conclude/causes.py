@@ -19,7 +19,7 @@ from picchio.diagnosis.percussion.fit.drawn import width_spread
 from picchio.diagnosis.percussion.fit.least_squares import Fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.state import EXACT, Search, Trial
-from picchio.diagnosis.result import Cause, Value, unit_of
+from picchio.diagnosis.result import Cause, Correlation, Value, unit_of
 from picchio.model.effects.effect import CHANNEL_UNIT, Effect
 from picchio.robot.flexible_robot import FlexibleRobot
 
@@ -119,6 +119,14 @@ def reported_covariance(whole: Fit) -> FloatArray:
 def fitted_spread(whole: Fit) -> Uncertain:
     """How well all values of a fit are known, for the life."""
     return _uncertain(whole.hypothesis, reported_covariance(whole))
+
+
+def fitted_correlation(whole: Fit) -> Correlation:
+    """How all values of a fit hang together, nuisances included."""
+    effects = whole.hypothesis.effects
+    unknowns = [(effects[u.effect], u.name) for u in whole.hypothesis.unknowns()]
+    names = [(effect.name, effect.target, name) for effect, name in unknowns]
+    return Correlation.of(names, reported_covariance(whole))
 
 
 def nominal_spread(robot: FlexibleRobot, tolerance: Tolerance) -> Uncertain:

@@ -15,6 +15,7 @@ class ModalDamping(Effect):
     parameters = (factor("scale", 0.02, 50.0, "true damping over stated"),)
     meaning = "all modes are damped more or less than stated"
     tolerance = "damping_ratio"
+    sidecar = "damping_ratio"
     source = "Nie et al. 2016, eq. 11: zeta"
     tried = ({"scale": 1.5}, {"scale": 0.67})
 
