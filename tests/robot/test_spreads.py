@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -89,6 +90,53 @@ def test_annotations_carry_them(file: Path, tmp_path: Path) -> None:
         n: s.at(1.0) for n, s in theirs.spreads.items()
     }
     assert ours.posterior == theirs.posterior
+
+
+FLEXIBILITY = '<picchio:flexibility stiffness="2e5" {}/>'
+DAMPED = 'stiffness_std="1e4" damping_ratio="0.05"'
+
+
+@pytest.mark.parametrize(
+    ("before", "sidecar"),
+    [
+        # An estimate is one of its own source's values, and a spread of the value beside it.
+        (DAMPED, "stiffness = 3e5\nestimated = true"),
+        (DAMPED, "stiffness = 3e5"),
+        ('damping_ratio="0.05" estimated="true"', "stiffness = 3e5"),
+        ('damping_ratio="0.05" estimated="true"', "damping_ratio = 0.02"),
+        (DAMPED, "stiffness_curve = { k1 = 1e5, k2 = 2e5, k3 = 3e5, t1 = 10.0, t2 = 20.0 }"),
+    ],
+)
+def test_an_annotated_robot_is_the_one_with_the_sidecar(
+    tmp_path: Path, before: str, sidecar: str
+) -> None:
+    text = picchio.load_robot("fanuc_like_3dof").source.read_text()
+    urdf = tmp_path / "robot.urdf"
+    urdf.write_text(re.sub("<picchio:flexibility[^>]*>", FLEXIBILITY.format(before), text, count=1))
+    flex = tmp_path / "flex.toml"
+    flex.write_text(f'format = "picchio-sidecar/1"\n[joint.joint_1]\n{sidecar}\n')
+    apart = picchio.load_robot(urdf, flex=flex)
+    merged = picchio.load_robot(picchio.annotate(urdf, flex=flex).save(tmp_path / "one.urdf"))
+    told = [
+        {n: (s.value, s.size, s.estimated) for n, s in r.spreads.items()} for r in (apart, merged)
+    ]
+    assert told[0] == told[1]
+    assert apart.stiffness.tolist() == merged.stiffness.tolist()
+
+
+def test_a_name_with_a_blank_hangs_together(file: Path, tmp_path: Path) -> None:
+    urdf, flex = tmp_path / "robot.urdf", tmp_path / "flex.toml"
+    source = picchio.load_robot("fanuc_like_3dof").source
+    urdf.write_text(source.read_text().replace("joint_1", "joint 1's"))
+    text = file.read_text().replace("joint.joint_1]", 'joint."joint 1\'s"]')
+    flex.write_text(text.replace("stiffness.joint_1", "stiffness.joint 1's"))
+    saved = picchio.annotate(urdf, flex=flex).save(tmp_path / "one.urdf")
+    posterior = picchio.load_robot(saved).posterior
+    assert posterior == picchio.load_robot(urdf, flex=flex).posterior
+    assert posterior.names[0] == "stiffness.joint 1's"
+    saved.write_text(saved.read_text().replace("mass.tool", "mass.tool'"))
+    with pytest.raises(InputError, match="picchio:posterior names"):
+        picchio.load_robot(saved)
 
 
 def test_a_drawn_robot_is_the_one_with_these_values(file: Path, tmp_path: Path) -> None:

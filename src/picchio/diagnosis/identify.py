@@ -364,6 +364,10 @@ def _joint(robot: FlexibleRobot, joint: Joint) -> dict[str, Any]:
     for spread in robot.spreads.values():
         if spread.table == "joint" and spread.owner == joint.name and len(spread.path) == 1:
             found |= {} if spread.estimated else {f"{spread.path[0]}_spread": math.exp(spread.size)}
+    if joint.estimated:  # not of values that are no estimates, whatever source they are from
+        sure = [key for key in ("stiffness", "damping_ratio") if key in found
+                and f"{key}.{joint.name}" not in robot.spreads]  # fmt: skip
+        found |= {f"{key}_spread": 1.0 for key in sure}
     origin = robot.origins.get(f"{joint.name}.stiffness")
     if origin:
         found["source"] = origin

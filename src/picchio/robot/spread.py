@@ -44,7 +44,7 @@ def with_spreads(table: type[T]) -> type[T]:
         fields[f"{name}_std"] = (NotNegative | None, None)
         told += (
             f"\n    {name}_spread: 1, a factor that {name} is uncertain by: one standard deviation "
-            f"of its logarithm is ln of it."
+            f"of its logarithm is ln of it; at 1 it has no spread of its own."
             f"\n    {name}_std: {_unit(told, name)}, one standard deviation of {name}{each}."
         )
     if "estimated" not in table.model_fields:
@@ -97,15 +97,29 @@ def value_of(key: str) -> str:
     return key.removesuffix("_spread").removesuffix("_std")
 
 
-def overlaid(weaker: Mapping[str, Any], stronger: Mapping[str, Any]) -> dict[str, Any]:
+def overlaid(
+    table: type[StrictModel], weaker: Mapping[str, Any], stronger: Mapping[str, Any]
+) -> dict[str, Any]:
     """A table's values with those of a stronger source over them.
 
+    Where only one source's values are estimates, the other's get a spread of 1: none.
+
     Args:
+        table: the record.
         weaker: by key; a spread whose value the stronger source gives is dropped.
         stronger: by key.
     """
     told = {value_of(key) for key in stronger}
-    return {k: v for k, v in weaker.items() if value_of(k) not in told} | dict(stronger)
+    kept = {k: v for k, v in weaker.items() if value_of(k) not in told or k == "estimated"}
+    merged = kept | dict(stronger)
+    guess = [source for source in (kept, stronger) if source.get("estimated")]
+    if len(guess) != 1:
+        return merged
+    numbers = [key for key in numbers_of(table) if key in merged]
+    for key in numbers:
+        if key not in guess[0] and not {f"{key}_spread", f"{key}_std"} & merged.keys():
+            merged[f"{key}_spread"] = 1.0
+    return merged | {"estimated": any(key in guess[0] for key in numbers)}
 
 
 @dataclass(frozen=True)
@@ -206,6 +220,8 @@ def spreads_in(
         if value is None:
             raise InputError(f"is the spread of {key}, which is not given", key=where,
                              value=factor if std is None else std)  # fmt: skip
+        if factor == 1.0:
+            continue
         number = tuple(value) if isinstance(value, tuple | list) else float(value)
         zero = not any(number) if isinstance(number, tuple) else number == 0.0
         if zero and std is None:

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from shlex import quote
 from typing import Any
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
@@ -17,9 +18,11 @@ from xml.sax.saxutils import quoteattr
 from lxml import etree
 
 from picchio.core.errors import InputError
+from picchio.core.toml import StrictModel
 from picchio.robot.annotations.flexibility import EXCLUDED, Source, check_names
 from picchio.robot.annotations.inline import IN, IN_ROBOT, read_annotations
 from picchio.robot.annotations.sidecar import Sidecar, given
+from picchio.robot.spread import overlaid, value_of
 from picchio.robot.urdf.check import read_tree
 from picchio.robot.urdf.xml import NAMESPACE, parse_urdf, read_urdf_bytes
 
@@ -178,15 +181,13 @@ def annotate(urdf: str | Path, sidecar: Sidecar) -> bytes:
     for kind, elements in IN.items():
         old = getattr(before, kind)
         for name, entry in getattr(sidecar, kind).items():
-            merged = {**given(old.get(name)), **given(entry)}
-            for key in given(entry):
-                merged.pop(EXCLUDED.get(key, ""), None)
+            merged = _merged(old.get(name), entry)
             type(entry).model_validate(merged)
             expected[kind, name] = merged
             edits += _replace(places, (kind, name), _elements(prefix, elements, merged))
     for tag in IN_ROBOT:
-        values = {**given(getattr(before, tag)), **given(getattr(sidecar, tag))}
-        if given(getattr(sidecar, tag)):
+        if (stated := getattr(sidecar, tag)) is not None and given(stated):
+            values = _merged(getattr(before, tag), stated)
             expected["robot", tag] = values
             edits += _replace(
                 places, ("robot", tag), [_element(prefix, tag, values, IN_ROBOT[tag])]
@@ -194,6 +195,17 @@ def annotate(urdf: str | Path, sidecar: Sidecar) -> bytes:
     result = _apply(content, edits)
     _read_back(result, path, root, expected)
     return result
+
+
+def _merged(old: StrictModel | None, new: StrictModel) -> dict[str, Any]:
+    """A table's values with a sidecar's over them, as loading both would have them."""
+    weaker, stronger = given(old), given(new)
+    excluded = {EXCLUDED[key] for key in stronger if key in EXCLUDED}
+    weaker = {key: value for key, value in weaker.items() if value_of(key) not in excluded}
+    for record, values in ((old, weaker), (new, stronger)):
+        if not getattr(record, "flexible", True):  # an estimate is a statement about a stiffness
+            values.pop("estimated", None)
+    return overlaid(type(new), weaker, stronger)
 
 
 def _read_back(
@@ -252,7 +264,7 @@ def _text(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, tuple):
-        return " ".join(_text(part) for part in value)
+        return " ".join(quote(x) if isinstance(x, str) else _text(x) for x in value)
     return repr(value) if isinstance(value, float) else str(value)
 
 

@@ -62,9 +62,11 @@ def strongest(sources: Sequence[Source], table: str) -> tuple[dict[str, Any], di
     values: dict[str, Any] = {}
     origins: dict[str, str] = {}
     for source in reversed(sources):
-        found = given(getattr(source.content, table))
+        if (record := getattr(source.content, table)) is None:
+            continue
+        found = given(record)
         note = found.pop("source", None)
-        values = overlaid(values, found)
+        values = overlaid(type(record), values, found)
         origins |= {f"{table}.{key}": source.origin(note) for key in found}
     return values, origins
 

@@ -9,6 +9,7 @@ The prefix is bound to `urn:picchio:1`; another version is refused by name.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -143,9 +144,9 @@ def _convert(text: str, kind: Any, key: str) -> Any:
         if text not in ("true", "false"):
             raise InputError("is neither true nor false", key=key, value=text)
         return text == "true"
-    if kind == tuple[str, ...]:
-        return text.split()
     try:
+        if kind == tuple[str, ...]:
+            return shlex.split(text)  # a name with a blank stands in quotes
         return to_number(text) if kind is float else [to_number(part) for part in text.split()]
     except ValueError as error:
         raise InputError(str(error), key=key, value=text) from None

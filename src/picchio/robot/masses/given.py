@@ -43,7 +43,7 @@ def give_masses(
         for name, entry in source.content.link.items():
             stated = given(entry)
             note = stated.pop("source", None)
-            values[name] = overlaid(values.get(name, {}), stated)
+            values[name] = overlaid(LinkEntry, values.get(name, {}), stated)
             origins |= {f"link.{name}.{key}": source.origin(note) for key in stated}
     links = dict(tree.links)
     spread, where = strongest(sources, "links")

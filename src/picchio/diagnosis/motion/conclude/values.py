@@ -52,7 +52,14 @@ def parameters(system: System, current: Fit, effect: Effect) -> dict[str, Value]
 
 
 def correlation(current: Fit) -> Correlation:
-    """How the parameters of a fit's effects hang together, stated frictions included."""
+    """How the parameters of a fit's effects hang together, stated frictions included.
+
+    Args:
+        current: the fit.
+
+    Returns:
+        correlation coefficients by effect, target and parameter.
+    """
     kept = [k for k, c in enumerate(current.coordinates) if c.index >= 0]
     acting = [(current.state.every[c.index], c.name) for c in current.coordinates if c.index >= 0]
     sign = np.array([-1.0 if name in effect.inverse else 1.0 for effect, name in acting])

@@ -122,7 +122,14 @@ def fitted_spread(whole: Fit) -> Uncertain:
 
 
 def fitted_correlation(whole: Fit) -> Correlation:
-    """How all values of a fit hang together, nuisances included."""
+    """How all values of a fit hang together, nuisances included.
+
+    Args:
+        whole: the fit to all records.
+
+    Returns:
+        correlation coefficients by effect, target and parameter.
+    """
     effects = whole.hypothesis.effects
     unknowns = [(effects[u.effect], u.name) for u in whole.hypothesis.unknowns()]
     names = [(effect.name, effect.target, name) for effect, name in unknowns]
