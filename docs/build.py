@@ -24,6 +24,7 @@ GUIDES = {
     "diagnosis": "Diagnosis",
     "motion": "Motion records",
     "placement": "Placement",
+    "priors": "Drive priors",
     "paper": "The paper, reproduced",
     "performance": "Performance",
     "blind_trial": "The blind trial",

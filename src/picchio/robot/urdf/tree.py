@@ -53,7 +53,7 @@ class Mimic:
 
 @dataclass(frozen=True)
 class UrdfJoint:
-    """A joint as the URDF has it: m, rad, N m or N; limits are infinite where it has none."""
+    """A joint as the URDF has it: m, rad, N m or N, s; limits are infinite where it has none."""
 
     name: str
     type: str
@@ -65,6 +65,7 @@ class UrdfJoint:
     lower: float
     upper: float
     effort: float
+    velocity: float
     mimic: Mimic | None
 
     @property
@@ -206,25 +207,25 @@ def _joint(element: etree._Element, name: str) -> UrdfJoint:
                      _mimic(element) if kind in MOVABLE else None)  # fmt: skip
 
 
-def _limits(element: etree._Element, kind: str) -> tuple[float, float, float]:
+def _limits(element: etree._Element, kind: str) -> tuple[float, float, float, float]:
     unlimited = float("inf")
     found = children(element, "limit")
     if kind not in MOVABLE or (kind == "continuous" and not found):
-        return -unlimited, unlimited, unlimited
+        return -unlimited, unlimited, unlimited, unlimited
     if not found:
         raise InputError(f"a {kind} joint needs <limit lower= upper= effort= velocity=>, "
                          "it has none")  # fmt: skip
-    _number(found[0], "velocity", infinite=True)
+    velocity = _number(found[0], "velocity", infinite=True)
     effort = _number(found[0], "effort", infinite=True)
     if effort < 0:
         raise InputError("the effort limit is negative", value=effort)
     if kind == "continuous":
-        return -unlimited, unlimited, effort
+        return -unlimited, unlimited, effort, velocity
     lower = _number(found[0], "lower", default=0.0, infinite=True)
     upper = _number(found[0], "upper", default=0.0, infinite=True)
     if lower > upper:
         raise InputError("the lower limit is above the upper limit", value=(lower, upper))
-    return lower, upper, effort
+    return lower, upper, effort, velocity
 
 
 def _mimic(element: etree._Element) -> Mimic | None:

@@ -1,0 +1,135 @@
+"""What a URDF says of each drive: the inertia and the weight that it moves, levers, limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from picchio.core.errors import InputError
+
+if TYPE_CHECKING:
+    from picchio.robot.flexible_robot import FlexibleRobot
+
+Array = NDArray[np.float64]
+
+QUANTITIES = (
+    "inertia",
+    "wrist_inertia",
+    "gravity_torque",
+    "lever",
+    "effort",
+    "speed",
+    "payload",
+)
+"""The predictors, in the order of the columns; `meaning` has them in words."""
+
+meaning = {
+    "inertia": "the inertia it carries when the arm is stretched",
+    "wrist_inertia": "the inertia that the URDF gives its wrist",
+    "gravity_torque": "the arm's own weight that it holds when stretched",
+    "lever": "the tool's distance from its axis",
+    "effort": "its effort limit",
+    "speed": "its speed limit",
+    "payload": "the robot's payload",
+}
+
+_POSES, _SEED = 400, 0
+_WRIST = 3  # axes of a wrist: the last ones of an arm that has more than twice as many or as many
+_NOTHING = 1e-6  # below this share of the robot's largest, a torque or lever is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Predictors:
+    """What is known of n joints, from the base to the tool.
+
+    Attributes:
+        names: of the joints.
+        values: (n, 7) natural logarithms in the order of `QUANTITIES`: kg m^2, kg m^2, N m, m,
+            N m, rad/s, kg; NaN where not known.
+        place: (n, 2) zeros and ones: the first joint, a joint of the wrist.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    place: Array
+
+
+def places(joints: int) -> Array:
+    """The places of an arm's joints in its chain, (n, 2): the first joint, those of the wrist.
+
+    The last three of six joints or more are a wrist's.
+
+    Args:
+        joints: n, from the base to the tool.
+    """
+    index = np.arange(joints)
+    wrist = (index >= joints - _WRIST) & (joints >= 2 * _WRIST)
+    return np.stack([index == 0, wrist], axis=1).astype(float)
+
+
+def predictors(
+    robot: FlexibleRobot, payload: float | None = None, reach: float | None = None
+) -> Predictors:
+    """What a loaded robot says of the rotary joints that move its tool.
+
+    Inertia is the largest diagonal entry of the mass matrix, gravity's torque and the tool's
+    distance from the axis the largest magnitudes, over 400 poses within the limits (within half a
+    turn where there are none). Of a wrist, gravity's torque is left out: what a URDF has there
+    depends on the tool that it leaves out. A limit of zero is one that the file does not know.
+    The payload is the robot's: it stands with the first joint, once.
+
+    Args:
+        robot: it may be rigid.
+        payload: kg, the robot's rated payload.
+        reach: m, the tool's largest distance from the first axis, where the URDF's is not right:
+            all levers scale with it.
+
+    Returns:
+        the joints' logarithms.
+
+    Raises:
+        InputError: no rotary joint moves the tool; payload or reach not positive.
+    """
+    for key, value in (("payload", payload), ("reach", reach)):
+        if value is not None and not (np.isfinite(value) and value > 0.0):
+            raise InputError("must be positive", key=key, value=value)
+    rigid, frame = robot.rigid, robot.rigid.frame(robot.tool_point)
+    lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
+    rng = np.random.default_rng(_SEED)
+    poses = lower + (upper - lower) * rng.random((_POSES, rigid.nv))
+    inertia, gravity, lever, turn = (np.zeros(rigid.nv) for _ in range(4))
+    for pose in poses:
+        jacobian = rigid.jacobian(pose, frame)
+        inertia = np.maximum(inertia, np.diag(rigid.mass_matrix(pose)))
+        gravity = np.maximum(gravity, np.abs(rigid.gravity_torque(pose)))
+        lever = np.maximum(lever, np.linalg.norm(jacobian[:3], axis=0))
+        turn = np.maximum(turn, np.linalg.norm(jacobian[3:], axis=0))
+    chain = np.flatnonzero(turn > 0.5)  # a rotary joint turns the tool by as much as itself
+    if not len(chain):
+        raise InputError("no rotary joint moves the tool, and no other kind of drive was measured",
+                         key="tool", value=robot.tool_frame)  # fmt: skip
+    names = tuple(rigid.joint_names[k] for k in chain)
+    joints = [robot.tree.joints[name] for name in names]
+    place = places(len(names))
+    wrist = place[:, 1] > 0.0
+    lever = lever[chain] * (1.0 if reach is None else reach / lever[chain].max())
+    columns = np.stack(
+        [
+            np.where(wrist, 0.0, inertia[chain]),
+            np.where(wrist, inertia[chain], 0.0),
+            np.where(wrist | (gravity[chain] < _NOTHING * gravity.max()), 0.0, gravity[chain]),
+            np.where(lever < _NOTHING * lever.max(), 0.0, lever),
+            [joint.effort for joint in joints],
+            [joint.velocity for joint in joints],
+            place[:, 0] * (payload or 0.0),
+        ],
+        axis=1,
+    )
+    known = (columns > 0.0) & np.isfinite(columns)
+    values = np.full(columns.shape, np.nan)
+    values[known] = np.log(columns[known])
+    return Predictors(names, values, place)
