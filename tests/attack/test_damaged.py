@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import random
 import shutil
 import socket
@@ -18,6 +20,7 @@ from picchio.core.errors import InputError
 from picchio.robot.urdf.shapes import load_parts
 from picchio.studies.maps import run
 from picchio.studies.maps.places import surface
+from picchio.studies.maps.result import WorkspaceMap
 from picchio.studies.maps.stored import open_map
 from picchio.visuals.plots.workspace import best_branch
 
@@ -80,7 +83,23 @@ def test_a_damaged_map_is_refused_or_read(name, maps, tmp_path):
                 best_branch(found, "joint_1")
         except InputError:
             refused += 1
+        with contextlib.suppress(InputError), WorkspaceMap(open_map(target), target) as mapped:
+            json.dumps(mapped.to_dict(), allow_nan=False)
+            mapped._repr_html_()
     assert refused > 5
+
+
+def test_a_map_of_impossible_values_is_refused(maps):
+    with open_map(maps / "m.nc") as found:
+        for name, changed in {
+            "limiting_joint": found.assign(limiting_joint=found["limiting_joint"] - 9),
+            "peak_deflection": found.assign(peak_deflection=found["peak_deflection"] * np.nan),
+            "worst_direction": found.drop_vars("worst_direction"),
+            "hits": found.assign_attrs(hits="many"),
+            "joint_kinds": found.assign_attrs(joint_kinds=["revolute"]),
+        }.items():
+            with pytest.raises(InputError, match=name):
+                WorkspaceMap(changed, maps / "m.nc").to_dict()
 
 
 @pytest.mark.parametrize("name", ["m.nc", "m.zarr"])

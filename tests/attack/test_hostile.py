@@ -33,6 +33,17 @@ width = 0.004
 [[sensor]]
 channels = "accelerometer.tool"
 """
+TASK = """format = "picchio-task/1"
+[[operation]]
+name = "a"
+direction = [1.0, 0.0, 0.0]
+poses = [[0.0, 0.5, -0.8]]
+[excitation]
+kind = "pulse_train"
+force = 300.0
+period = 0.04
+width = 0.004
+"""
 CAMPAIGN = """format = "picchio-campaign/1"
 robot = "fanuc_like_3dof"
 [[record]]
@@ -77,6 +88,14 @@ def plan(key, value, *words):
     line = next(line for line in PLAN.splitlines() if line.startswith(f"{key} ="))
     text = PLAN.replace(line, f"{key} = {value}")
     return Case(f"simulate {ARM} --plan p.toml --to c", ("p.toml", key, *words), {"p.toml": text})
+
+
+def blows(key, value):
+    text = TASK + f"{key} = {value}\n" if key == "preload" else "".join(
+        f"{key} = {value}\n" if line.startswith(f"{key} =") else line
+        for line in TASK.splitlines(keepends=True)
+    )  # fmt: skip
+    return Case(f"assess {ARM} --task t.toml", ("t.toml", f"excitation.{key}"), {"t.toml": text})
 
 
 def imported(table, *words, mapping=MAPPING):
@@ -188,6 +207,20 @@ CASES = {
         f"envelope {ARM} --pose=0,0,0 --flex s.toml", "s.toml", "gun.recoil_stiffness",
         s_toml=SIDECAR + "[gun]\nmass = 1.0\nrecoil_stiffness = 1e-320\n",
     ),
+    "plan-sensor": typed(
+        f"simulate {ARM} --plan p.toml --to c", "p.toml", "sensor_gain.target", "'deflection'",
+        "valid: accelerometer.tool",
+        p_toml=PLAN + '[[effect]]\neffect = "sensor_gain"\ntarget = "deflection"\n'
+        "parameters = { gain = 1.2 }\n",
+    ),
+    "xacro": typed("assess no/such.urdf.xacro", "no/such.urdf.xacro: no such file"),
+    **{f"excitation-{key}-{value}": blows(key, value) for key, value in (
+        ("period", "1e308"), ("width", "1e-320"), ("force", "1e308"), ("preload", "-1e308"),
+    )},
+    **{f"gun-{value}": typed(
+        f"envelope {ARM} --pose=0,0,0 --flex s.toml", "s.toml", "gun.mass", "kg",
+        s_toml=SIDECAR + f"[gun]\nmass = {value}\n",
+    ) for value in ("1e308", "1e-320", "1e12")},
     # what is empty
     "sn-curve": Case(f"assess {ARM} --sn-curve  --json -", ("--sn-curve: is empty",)),
     "sn-curve=": typed(f"assess {ARM} --sn-curve=", "--sn-curve: is empty"),

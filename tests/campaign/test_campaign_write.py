@@ -47,7 +47,7 @@ def test_a_copy_says_the_same(campaign, tmp_path):
         campaign = copy
 
 
-def test_parquet_units_types_and_empty_values(tmp_path, campaign):
+def test_parquet_units_types_and_empty_values(tmp_path, campaign, monkeypatch):
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -72,6 +72,11 @@ def test_parquet_units_types_and_empty_values(tmp_path, campaign):
             InputError, match=rf"r02\.parquet.*position\.joint_1.*{message}|{message}"
         ):
             load_campaign(folder).check_samples()
+    write(**{"time [s]": time, "position.joint_1 [rad]": time})
+    monkeypatch.setattr("picchio.campaign.parquet_source.memory_size", lambda: 1000.0)
+    with pytest.raises(InputError, match=r"r01\.parquet.*row 1: its row group needs"):
+        load_campaign(folder).check_samples()
+    monkeypatch.undo()
     (folder / "r02.parquet").write_bytes(b"time [s]\n0\n")
     with pytest.raises(InputError, match=r"r02\.parquet.*Parquet"):
         load_campaign(folder)

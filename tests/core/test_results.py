@@ -1,6 +1,7 @@
 """What all results share: plain data, one line of text, a table with units."""
 
 import json
+import tracemalloc
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from picchio.core.results import Result, TableResult, plain
+from picchio.core.results import Result, TableResult, json_pieces, plain
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,3 +70,21 @@ def test_what_a_result_must_say_cannot_be_left_out() -> None:
         Result().to_dict()
     with pytest.raises(NotImplementedError):
         repr(Result())
+
+
+def test_arrays_are_written_as_they_are() -> None:
+    given = {
+        "a": np.array([[1.5, np.nan], [2.0, np.inf]]),
+        "b": [np.array([["x"]]), np.eye(3)[None]],
+        "c": np.array([0.1, np.nan]),
+        "d": np.zeros((0, 3)),
+    }
+    text = "".join(json_pieces(plain(given, arrays=True)))
+    assert text == json.dumps(plain(given), indent=2)
+    large = {"poses": np.random.default_rng(0).random((50_000, 12))}
+    tracemalloc.start()
+    for _ in json_pieces(plain(large, arrays=True)):
+        pass
+    needed = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert needed < 2.0 * large["poses"].nbytes

@@ -239,3 +239,12 @@ def test_a_killed_dask_worker_costs_nothing_but_time(tmp_path, robot):
         found.close()
         assert killed
     same(tmp_path / "alone.nc", tmp_path / "cluster.nc")
+
+
+def test_long_bursts_tell_their_progress(tmp_path, robot):
+    told = []
+    compute_map(
+        robot, places.joint_grid(robot, [1, 10, 10]), BLOWS, tmp_path / "m.nc", hits=3000,
+        direction=(1.0, 0.0, 0.0), workers=0, progress=lambda done, total: told.append(done),
+    ).close()  # fmt: skip
+    assert told == [0, 66, 100]

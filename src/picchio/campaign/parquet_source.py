@@ -11,6 +11,7 @@ import numpy as np
 from picchio.campaign.channels import Channel
 from picchio.campaign.source import Block, Column, FileSource, Samples
 from picchio.core.errors import InputError
+from picchio.core.processes import memory_size
 
 
 def _pyarrow() -> tuple[Any, Any]:
@@ -64,12 +65,25 @@ class ParquetSource(FileSource):
             try:
                 # Over all groups at once pyarrow (26) keeps what it has read.
                 for group in range(file.num_row_groups):
+                    self._require_room(file.metadata.row_group(group), headers, first)
                     for batch in file.iter_batches(size, row_groups=[group], columns=headers):
                         yield first, self._converted(wanted, batch, first)
                         first += batch.num_rows
             except (arrow.ArrowException, OSError) as error:
                 reason = str(error).partition("\n")[0]
                 raise self.error(f"cannot be read: {reason}", sample=first) from None
+
+    def _require_room(self, group: Any, headers: list[str], first: int) -> None:
+        """Refuse a row group that needs more than half of the memory, before it is read."""
+        chunks = [group.column(k) for k in range(group.num_columns)]
+        needed = sum(c.total_uncompressed_size for c in chunks if c.path_in_schema in headers)
+        if needed > memory_size() / 2:
+            raise self.error(
+                f"its row group needs {needed / 1e9:.3g} GB of memory, this machine has "
+                f"{memory_size() / 1e9:.3g} GB",
+                sample=first,
+                hint="write it with smaller row groups (row_group_size)",
+            )
 
     def _converted(self, columns: list[Column], batch: Any, first: int) -> dict[str, Any]:
         found = {}

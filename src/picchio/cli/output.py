@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 import os
 import re
 import shlex
@@ -18,6 +17,7 @@ from picchio.cli.layout import FittedTable, Row
 from picchio.cli.waiting import waiting
 from picchio.core.errors import InputError, OutputError
 from picchio.core.files import atomic_write, is_stream
+from picchio.core.results import json_pieces
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -218,22 +218,24 @@ def deliver(
     """Write a result as JSON where that is asked for; show it, unless stdout holds the JSON.
 
     Args:
-        content: of the result, `to_dict()`.
+        content: of the result, `to_dict()`; arrays may stand in it.
         target: the file of `--json`; "-" for stdout, None where there is none.
         show: prints the result for people.
     """
     waiting.end()
     if target is not None:
         # In pieces: a task of many poses makes more text than its numbers take in memory.
-        pieces = itertools.chain(
-            json.JSONEncoder(indent=2, allow_nan=False).iterencode(content), ["\n"]
-        )
+        pieces = itertools.chain(json_pieces(content), ["\n"])
         if target == "-":
             sys.stdout.writelines(pieces)
             return
         with atomic_write(target) as stream:
             stream.writelines(pieces)
     show()
+
+
+# What follows the steps of a command.
+_AFTER = "preparing the results"
 
 
 @contextmanager
@@ -247,11 +249,11 @@ def progress(description: str) -> Iterator[Callable[[int, int], None]]:
         a function to call with (done, total).
     """
     yield lambda done, total: waiting.say(description, done, total)
-    waiting.say("working")
+    waiting.say(_AFTER)
 
 
 @contextmanager
-def telling(what: str = "working") -> Iterator[Callable[[str], None]]:
+def telling(what: str) -> Iterator[Callable[[str], None]]:
     """Tell what is being done, in the command's bar.
 
     Args:
@@ -262,4 +264,4 @@ def telling(what: str = "working") -> Iterator[Callable[[str], None]]:
     """
     waiting.say(what)
     yield waiting.say
-    waiting.say("working")
+    waiting.say(_AFTER)

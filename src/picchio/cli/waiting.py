@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
 PATIENCE = 2.0  # s
-_WORKING = "working (a first run compiles for a minute)"
+_FIRST = "reading the inputs (a first run compiles for a minute)"
 
 
 class Waiting:
@@ -23,13 +23,13 @@ class Waiting:
         self._timer: threading.Timer | None = None
         self._bar: Progress | None = None
         self._task: TaskID | None = None
-        self._state: tuple[str, int, int | None] = (_WORKING, 0, None)
+        self._state: tuple[str, int, int | None] = (_FIRST, 0, None)
 
     @contextmanager
     def watched(self) -> Iterator[None]:
         """Within the block a bar appears once two seconds have passed."""
         if sys.stderr.isatty():
-            self._state = (_WORKING, 0, None)
+            self._state = (_FIRST, 0, None)
             self._timer = threading.Timer(PATIENCE, self._show)
             self._timer.daemon = True
             self._timer.start()

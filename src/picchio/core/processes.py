@@ -19,6 +19,18 @@ _BEGIN = "import sys; sys.path[:] = sys.argv.pop(1).split({sep!r}); "
 _LIMIT = "import resource; resource.setrlimit(resource.RLIMIT_AS, ({memory}, {memory})); "
 
 
+def memory_size() -> float:
+    """How much memory this machine has.
+
+    Returns:
+        bytes; infinite where the system does not say.
+    """
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, OSError, ValueError):
+        return float("inf")
+
+
 def search_path() -> list[str]:
     """The folders that a child process imports from: ours, without the current folder."""
     here = os.path.realpath(os.curdir)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from os import PathLike
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -13,13 +14,20 @@ if TYPE_CHECKING:
     import xarray
 
 
-def plain(value: Any) -> Any:
+def plain(value: Any, *, arrays: bool = False) -> Any:
     """The same structure as `json.dumps` takes it.
 
     Arrays and tuples become lists, paths become text, keys become text, records what their
     `to_dict` or `model_dump` gives or else their fields; numbers that JSON cannot hold (NaN,
     infinity) become None.
+
+    Args:
+        value: anything of these.
+        arrays: leave arrays of more than one dimension as they are: as lists they take ten times
+            the memory. `json_pieces` writes them a row at a time.
     """
+    if arrays and getattr(value, "ndim", 0) > 1:
+        return value
     if hasattr(value, "tolist"):
         value = value.tolist()
     elif hasattr(value, "to_dict"):
@@ -29,14 +37,22 @@ def plain(value: Any) -> Any:
     elif dataclasses.is_dataclass(value):
         value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
     if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items()}
+        return {str(key): plain(entry, arrays=arrays) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(entry) for entry in value]
+        return [plain(entry, arrays=arrays) for entry in value]
     if isinstance(value, PathLike):
         return str(value)
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+def json_pieces(value: Any) -> Iterator[str]:
+    """The JSON text of a value that `plain` has made, in pieces; arrays a row at a time."""
+    encoder = json.JSONEncoder(
+        indent=2, allow_nan=False, default=lambda a: list(a) if a.ndim > 1 else plain(a)
+    )
+    return encoder.iterencode(value)
 
 
 class Result:
@@ -63,12 +79,15 @@ class Result:
         """What matters, in a few words."""
         raise NotImplementedError
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self, *, arrays: bool = False) -> dict[str, Any]:
         """What `--json` prints: numbers, text, lists and dictionaries, as `json.dumps` takes them.
 
         A number without end, or one that does not exist, is None.
+
+        Args:
+            arrays: leave arrays of more than one dimension as they are, for little memory.
         """
-        return {key: plain(value) for key, value in self._content().items()}
+        return {key: plain(value, arrays=arrays) for key, value in self._content().items()}
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self._headline()}>"

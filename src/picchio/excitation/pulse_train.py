@@ -11,6 +11,10 @@ from picchio.core.errors import InputError
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
 
+# Far beyond any tool on either side; further out the arithmetic overflows.
+HIGHEST = 1e9  # N
+SHORTEST, LONGEST = 1e-9, 1e6  # s
+
 
 @dataclass(frozen=True)
 class Train(Excitation):
@@ -24,8 +28,8 @@ class Train(Excitation):
         preload: N, steady feed force.
 
     Raises:
-        InputError: a number that is not finite, a period or width that is not positive, a
-            width that is not less than the period.
+        InputError: a number that is not finite or absurdly large or small, a period or width that
+            is not positive, a width that is not less than the period.
     """
 
     words: ClassVar[str]
@@ -40,8 +44,14 @@ class Train(Excitation):
             value = getattr(self, key)
             if not np.isfinite(value):
                 raise InputError("must be a finite number", key=key, value=value)
-            if key in ("period", "width") and value <= 0.0:
-                raise InputError("must be positive", key=key, value=value)
+            if key in ("period", "width"):
+                if value <= 0.0:
+                    raise InputError("must be positive", key=key, value=value)
+                if not SHORTEST <= value <= LONGEST:
+                    raise InputError(f"must lie between {SHORTEST:g} and {LONGEST:g} s", key=key,
+                                     value=value)  # fmt: skip
+            elif abs(value) > HIGHEST:
+                raise InputError(f"must be at most {HIGHEST:g} N", key=key, value=value)
         if self.width >= self.period:
             raise InputError(
                 f"the blow must be shorter than its period ({self.period:g} s)",

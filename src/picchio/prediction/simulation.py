@@ -121,6 +121,7 @@ def simulate(
         names = [f"r{index + 1:0{digits}d}.{suffix}" for index in range(asked.count)]
         warn_beyond_limits(loaded, [loaded.pose(p) for p in asked.poses], "the plan")  # type: ignore[arg-type]
         every = [*(table.build(loaded) for table in asked.effect), *effects]
+        _refuse_unread(every, asked, loaded)
         model = Model(loaded, gravity_stiffness).with_effects(_drawn(asked, every, names))
         table: dict[str, Any] = {
             "robot": robot_name or (loaded.name if robot is loaded else str(robot)),
@@ -138,6 +139,19 @@ def simulate(
     if to is not None:
         made = made.save(to, overwrite=overwrite)
     return Simulation(made, asked, loaded.name, provenance(files, seed=asked.seed))
+
+
+def _refuse_unread(effects: Sequence[Effect], plan: Plan, robot: FlexibleRobot) -> None:
+    """Raise for an effect on sensors that the plan has not."""
+    groups = list(dict.fromkeys(channel.group for channel, _ in _channels(robot, plan)))
+    for effect in effects:
+        if effect.target_kind == "channel group" and effect.target not in groups:
+            raise InputError(
+                "no sensor of the plan reads this channel group",
+                key=f"{effect.name}.target",
+                value=effect.target,
+                choices=groups,
+            )
 
 
 def _drawn(plan: Plan, effects: Sequence[Effect], names: Sequence[str]) -> list[Effect]:

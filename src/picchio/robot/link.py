@@ -19,6 +19,16 @@ def _can_be(six: tuple[float, ...]) -> tuple[float, ...]:
     return six
 
 
+LIGHTEST, HEAVIEST = 1e-6, 1e6  # kg: beyond any part of a robot on either side
+
+
+def _in_kilograms(value: float) -> float:
+    if value != 0.0 and not LIGHTEST <= value <= HEAVIEST:
+        raise ValueError(f"is neither 0 nor within {LIGHTEST:g} to {HEAVIEST:g} kg")
+    return value
+
+
+Mass = Annotated[NotNegative, AfterValidator(_in_kilograms)]
 SixInertias = Annotated[
     tuple[Finite, ...], Field(min_length=6, max_length=6), AfterValidator(_can_be)
 ]
@@ -38,7 +48,7 @@ class LinkEntry(StrictModel):
         estimated: true if the values were not measured.
     """
 
-    mass: NotNegative | None = None
+    mass: Mass | None = None
     com: FiniteVector | None = None
     inertia: SixInertias | None = None
     source: str | None = None

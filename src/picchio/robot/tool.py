@@ -6,9 +6,9 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from picchio.core.toml import Finite, FiniteVector, NotNegative, StrictModel
+from picchio.core.toml import Finite, FiniteVector, StrictModel
 from picchio.robot.joint import DampingRatio, Stiffness
-from picchio.robot.link import SixInertias
+from picchio.robot.link import Mass, SixInertias
 from picchio.robot.spread import with_spreads
 
 
@@ -30,7 +30,7 @@ class Tool(StrictModel):
     frame: str = ""
     xyz: FiniteVector = (0.0, 0.0, 0.0)
     axis: FiniteVector = (0.0, 0.0, 1.0)
-    mass: NotNegative = 0.0
+    mass: Mass = 0.0
     com: FiniteVector = (0.0, 0.0, 0.0)
     inertia: SixInertias = (0.0,) * 6
     source: str | None = None
@@ -63,7 +63,7 @@ class Gun(StrictModel):
         source: where the values come from.
     """
 
-    mass: NotNegative
+    mass: Mass
     recoil_stiffness: Stiffness | None = None
     damping_ratio: DampingRatio = 0.0
     feed_force: Finite = 0.0

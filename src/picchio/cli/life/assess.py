@@ -31,6 +31,7 @@ from picchio.cli.output import (
     progress,
     styled,
     table,
+    telling,
     write_report,
 )
 from picchio.core.errors import InputError
@@ -213,15 +214,19 @@ def assess(
             progress=tick,
             **options,
         )
-    content = found.to_dict()
-    terms = method_terms(loaded, work, found) if compare_methods or report is not None else ()
+    content = found.to_dict(arrays=True)
+    terms: tuple[Term, ...] = ()
+    if compare_methods or report is not None:
+        with telling("comparing the methods"):
+            terms = method_terms(loaded, work, found)
     if terms:
         content["method_terms"] = plain(terms)
     allowed = None
     if for_life is not None:
-        allowed = picchio.allowable(
-            loaded, work, for_life, survival=survival, reducers=reducers or (), **options
-        )
+        with telling("what this life allows"):
+            allowed = picchio.allowable(
+                loaded, work, for_life, survival=survival, reducers=reducers or (), **options
+            )
         content |= allowed.to_dict()
     cover = None
     if report is not None:

@@ -100,7 +100,7 @@ def map_(
         typer.Option(
             metavar="N",
             min=1,
-            help="Places computed and kept at a time; 4096 if not given, 64 with --damage.",
+            help="Places computed and kept at a time; 4096 if not given, fewer for slow ones.",
         ),
     ] = None,
     restart: Annotated[

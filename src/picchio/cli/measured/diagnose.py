@@ -94,7 +94,7 @@ def diagnose(
         robot, flex=flex, tool=tool, reducers=reducers or (), allow_rigid=moves
     )
     check_targets((json, report, model, plan), [*loaded.files, *campaign.files, task])
-    with telling() as say:
+    with telling("reading the data") as say:
         found = picchio.diagnose(
             robot,
             campaign,

@@ -59,7 +59,7 @@ def identify(
     files = [*loaded.files, *campaign.files]
     check_targets([out], files)
     check_targets([json], [*files, out])
-    with telling() as say:
+    with telling("reading the data") as say:
         found = picchio.identify(loaded, campaign, progress=say)
     write_text(out, found.sidecar_text())
     verdict, causes = found.diagnosis.verdict, found.diagnosis.causes

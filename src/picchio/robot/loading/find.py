@@ -50,7 +50,7 @@ def find_robot(robot: str | Path) -> FoundRobot:
     except OSError as error:  # such as a name too long for the system
         raise InputError(f"cannot be read: {error.strerror}", key="ROBOT", value=text) from None
     # A name never ends like a URDF and holds no separator unless it is a known one.
-    if path.suffix in (".urdf", ".xml", ".toml") or is_file:
+    if path.suffix in (".urdf", ".xacro", ".xml", ".toml") or is_file:
         if not is_file and not is_folder:
             raise InputError("no such file", file=path)
         return _with_neighbours(path)

@@ -7,10 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
+from picchio.core.errors import InputError
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
 from picchio.robot.units import column, units_of
+from picchio.studies.maps.stored import attribute_of, values_of
 from picchio.vibration.closed_form.response import described
 
 if TYPE_CHECKING:
@@ -25,9 +28,29 @@ def joint_kinds(found: xarray.Dataset) -> list[str]:
 
     Args:
         found: the map.
+
+    Raises:
+        InputError: a damaged map.
     """
-    turning = ["revolute"] * found.sizes["joint"]  # older maps do not say
-    return [str(kind) for kind in np.atleast_1d(found.attrs.get("joint_kinds", turning))]
+    joints = len(values_of(found, "joint", 1))
+    if "joint_kinds" not in found.attrs:
+        return ["revolute"] * joints  # older maps do not say
+    kinds: list[str] = attribute_of(found, "joint_kinds", list)
+    if len(kinds) != joints or not {"revolute", "prismatic"}.issuperset(kinds):
+        raise _damaged(found, "joint_kinds")
+    return kinds
+
+
+def _count(found: xarray.Dataset) -> int:
+    """How many poses a map has, at least one."""
+    if "peak_deflection" not in found or found["peak_deflection"].size == 0:
+        raise _damaged(found, "peak_deflection")
+    return int(found["peak_deflection"].shape[0])
+
+
+def _damaged(found: xarray.Dataset, name: str) -> InputError:
+    return InputError("is a damaged map: values that cannot be",
+                      file=found.encoding.get("source"), key=name)  # fmt: skip
 
 
 def response_of(dataset: xarray.Dataset) -> str:
@@ -35,8 +58,11 @@ def response_of(dataset: xarray.Dataset) -> str:
 
     Args:
         dataset: of a map.
+
+    Raises:
+        InputError: a damaged map.
     """
-    return described(int(dataset.attrs.get("hits", 0)) or None)
+    return described(attribute_of(dataset, "hits", int) or None)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -73,8 +99,8 @@ class WorkspaceMap(TableResult):
         return pandas.DataFrame(self._content()["joints"]).set_index("name")
 
     def _headline(self) -> str:
-        attrs = self.dataset.attrs
-        return f"{attrs['robot']!r}: {self.dataset.sizes['point']} poses in {self.path}"
+        robot = attribute_of(self.dataset, "robot")
+        return f"{robot!r}: {_count(self.dataset)} poses in {self.path}"
 
     def _repr_html_(self) -> str:
         content = self._content()
@@ -99,47 +125,57 @@ class WorkspaceMap(TableResult):
     def _content(self) -> dict[str, Any]:
         """The largest values of every joint and where they are, read a slice at a time."""
         found = self.dataset
-        count = int(found.sizes["point"])
-        names = [str(name) for name in found["joint"].values]
+        names = [str(name) for name in values_of(found, "joint", 1)]
         best: list[dict[str, Any]] = [
             {"name": name, "kind": kind, "peak_deflection": -1.0}
             for name, kind in zip(names, joint_kinds(found), strict=True)
         ]
         limits = np.zeros(len(names), dtype=int)
+        count = _count(found)
+
+        def read(name: str, rows: slice) -> NDArray[Any]:
+            values = values_of(found, name, 2, rows)
+            if values.shape[1] != len(names):
+                raise _damaged(found, name)
+            return values
+
         for first in range(0, count, _SLICE):
-            part = found.isel(point=slice(first, first + _SLICE))
-            peaks = part["peak_deflection"].values
-            limits += np.bincount(part["limiting_joint"].values, minlength=len(names))
+            rows = slice(first, first + _SLICE)
+            peaks = read("peak_deflection", rows)
+            limiting = values_of(found, "limiting_joint", 1, rows)
+            if np.isnan(peaks).any() or not np.isin(limiting, np.arange(len(names))).all():
+                raise _damaged(found, "peak_deflection" if np.isnan(peaks).any() else
+                               "limiting_joint")  # fmt: skip
+            limits += np.bincount(limiting.astype(int), minlength=len(names))
             for j, entry in enumerate(best):
                 k = int(peaks[:, j].argmax())
                 if peaks[k, j] > entry["peak_deflection"]:
-                    row = part.isel(point=k)
+                    row = slice(first + k, first + k + 1)
                     entry |= {
                         "peak_deflection": float(peaks[k, j]),
-                        "peak_torque": float(row["peak_torque"].values[j]),
-                        "peak_shear_stress": float(row["peak_shear_stress"].values[j]),
-                        "position": row["position"].values,
-                        "pose": row["pose"].values,
-                        "worst_direction": row["worst_direction"].values[j],
+                        "peak_torque": float(read("peak_torque", row)[0, j]),
+                        "peak_shear_stress": float(read("peak_shear_stress", row)[0, j]),
+                        "position": values_of(found, "position", 2, row)[0],
+                        "pose": values_of(found, "pose", 2, row)[0],
+                        "worst_direction": values_of(found, "worst_direction", 3, row)[0, j],
                     }
-            if "damage_per_rivet" in part:
-                for entry, damage in zip(best, part["damage_per_rivet"].values.T, strict=True):
+            if "damage_per_rivet" in found:
+                for entry, damage in zip(best, read("damage_per_rivet", rows).T, strict=True):
                     if np.isfinite(damage).any():
                         largest = float(damage[np.isfinite(damage)].max())
                         entry["damage_per_rivet"] = max(entry.get("damage_per_rivet", 0.0), largest)
         for entry, poses in zip(best, limits, strict=True):
             entry["limits_poses"] = int(poses)
-        attrs = found.attrs
         return {
             "format": "picchio-map/1",
-            "robot": attrs["robot"],
+            "robot": attribute_of(found, "robot"),
             "file": self.path,
-            "excitation": attrs["excitation"],
-            "direction": attrs["direction"],
-            "hits": int(attrs["hits"]) or None,
+            "excitation": attribute_of(found, "excitation"),
+            "direction": attribute_of(found, "direction"),
+            "hits": attribute_of(found, "hits", int) or None,
             "response": response_of(found),
-            "hits_of_damage": int(attrs["hits_of_damage"]) or None,
+            "hits_of_damage": attribute_of(found, "hits_of_damage", int) or None,
             "poses": count,
             "joints": best,
-            "notes": [str(note) for note in np.atleast_1d(attrs["notes"]) if str(note)],
+            "notes": [note for note in attribute_of(found, "notes", list) if note],
         }

@@ -35,7 +35,9 @@ from picchio.studies.maps.stored import open_map
 from picchio.studies.rivet.pose import need_springs
 from picchio.vibration.closed_form.response import described, unit_vector
 
-CHUNK, CHUNK_WITH_DAMAGE = 4096, 64
+CHUNK, SMALL_CHUNK = 4096, 64
+# A burst of so many hits at as many poses takes about a second.
+_HITS = 200_000
 MOST_PLACES = 10**10
 ENDINGS = (".nc", ".zarr")
 # Fewer places than this are not worth starting workers for.
@@ -75,7 +77,8 @@ def workspace_map(
         hits: of a burst from rest; None for the steady state.
         damage: count the damage of a rivet of so many hits, too, from rest with its ring-down; for
             the worst direction it is searched, which takes many times as long.
-        chunk: places at a time; 4096 if not given, 64 where damage is counted, which takes longer.
+        chunk: places at a time; 4096 if not given, down to 64 where a place takes long: with
+            damage, many hits, or a model that is integrated in time.
         workers: processes; up to one, this process does the work itself. As many as cores, and
             none for small maps, if not given.
         scheduler: address of a dask scheduler to use instead.
@@ -105,7 +108,8 @@ def workspace_map(
 
         branch_words(robot, branch)
     if chunk is None:
-        chunk = CHUNK if damage is None else CHUNK_WITH_DAMAGE
+        slow = damage is not None or model.nonlinear
+        chunk = SMALL_CHUNK if slow else min(CHUNK, max(SMALL_CHUNK, _HITS // (hits or 1)))
     if chunk < 1:
         raise InputError("must be at least 1", key="chunk", value=chunk)
     if workers is not None and not 0 <= workers <= MOST_WORKERS:

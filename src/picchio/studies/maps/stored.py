@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from picchio.core.errors import InputError
@@ -47,13 +48,16 @@ def open_map(path: str | Path) -> xarray.Dataset:
     return found
 
 
-def values_of(found: xarray.Dataset, name: str, dimensions: int) -> NDArray[Any]:
+def values_of(
+    found: xarray.Dataset, name: str, dimensions: int, rows: slice = slice(None)
+) -> NDArray[Any]:
     """The values of a map's variable.
 
     Args:
         found: the map.
         name: of the variable.
         dimensions: how many it has.
+        rows: which of them; all if not given.
 
     Returns:
         an array of numbers; of "joint", the names.
@@ -69,7 +73,7 @@ def values_of(found: xarray.Dataset, name: str, dimensions: int) -> NDArray[Any]
         raise InputError("is a damaged map: a variable is larger than the file can hold", file=file,
                          key=name, value=found[name].shape)  # fmt: skip
     try:
-        values = found[name].values
+        values = found[name][rows].values
     except MemoryError:
         raise
     except Exception as error:
@@ -77,6 +81,27 @@ def values_of(found: xarray.Dataset, name: str, dimensions: int) -> NDArray[Any]
     if name != "joint" and values.dtype.kind not in "fiu":
         raise InputError("is no map: a variable holds no numbers", file=file, key=name)
     return values
+
+
+def attribute_of(found: xarray.Dataset, name: str, kind: type = str) -> Any:
+    """What a map says of itself.
+
+    Args:
+        found: the map.
+        name: of the attribute.
+        kind: what it is: str, int, or list of texts.
+
+    Raises:
+        InputError: the file does not say it, or not so.
+    """
+    value = found.attrs.get(name)
+    try:
+        if value is None:
+            raise ValueError(name)
+        return [str(one) for one in np.atleast_1d(value)] if kind is list else kind(value)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError("is no map: an attribute is missing or of another kind",
+                         file=found.encoding.get("source"), key=name) from None  # fmt: skip
 
 
 def _size(path: Path) -> int:
