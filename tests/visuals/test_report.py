@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from types import SimpleNamespace
@@ -113,6 +114,25 @@ def test_without_shafts_no_life_is_told(ur10: SimpleNamespace) -> None:
     assert not tree.xpath("//b[text()='bold']")
 
 
+def test_a_life_that_turns_along_a_stiffness_is_drawn(arm: SimpleNamespace) -> None:
+    robot = picchio.load_robot(
+        "fanuc_like_3dof", values={"joint_3": {"stiffness": 1e5, "estimated": True}}
+    )
+    work = [
+        replace(op, excitation=op.excitation.scaled(force=8.0), poses=op.poses[:2])
+        for op in arm.task.operations
+    ]
+    task = replace(arm.task, operations=tuple(work))
+    # As `assess` draws it by itself: without total shares.
+    doubt = picchio.uncertain_life(robot, task, samples=256, totals=False)
+    assert list(doubt.scans) == ["stiffness.joint_3"]
+    page = assessment_report(arm.assessment, arm.robot, arm.task, spread=doubt)
+    tree = lxml_html.fromstring(page)
+    assert "against a factor on stiffness.joint_3" in page
+    said = text_of(tree, "//section[.//*[@id='doubt']]")
+    assert "stiffness.joint_3" in said and "a factor of 2 (estimate)" in said
+
+
 def test_the_papers_method_has_an_end(arm: SimpleNamespace) -> None:
     found = picchio.assess(arm.robot, arm.task, method="paper")
     page = assessment_report(found, arm.robot, arm.task)
@@ -155,15 +175,18 @@ def test_a_scene_is_folded_in(arm: SimpleNamespace) -> None:
 
 
 def test_backwards_doubt_and_terms_have_their_place(arm: SimpleNamespace) -> None:
+    from picchio.fatigue.uncertain_lives import LifeSpread, Uncertain
     from picchio.studies.assessment.method_comparison import Term
     from picchio.studies.backwards import Allowable
     from picchio.studies.uncertainty import UncertainLife
 
-    spread = SimpleNamespace(p10=1.5e5, p50=2.5e6, p90=float("inf"), endless=0.25, shares={},
-                             totals={"stiffness": 0.61}, samples=640)  # fmt: skip
-    doubt = UncertainLife(
-        {"joint_2": spread}, spread, {"stiffness": None}, {}, (), {}, ("drawn so",), 7
-    )
+    spread = LifeSpread(
+        p10=1.5e5, p50=2.5e6, p90=float("inf"), endless=0.25, shares={"stiffness": 0.5},
+        totals={"stiffness": 0.61}, samples=640,
+        sampling=dict.fromkeys(("p10", "p50", "p90"), (1.2e5, 1.2e5)),
+    )  # fmt: skip
+    doubt = UncertainLife({"joint_2": spread}, spread, {"stiffness": Uncertain(1.0, 0.05)}, {}, (),
+                          {}, ("drawn so",), 7)  # fmt: skip
     page = assessment_report(
         arm.assessment, arm.robot, arm.task, spread=doubt,
         allowed=[Allowable("joint_2", 1e6, 0.99, 3.25, 0.0123, None, float("inf"))],

@@ -226,11 +226,27 @@ def _estimates(robot: FlexibleRobot) -> list[str]:
     """What of the robot is an estimate or a default, one line a source."""
     said: dict[str, list[str]] = {}
     for joint in robot.flexible_joints:
-        if joint.estimated:
+        known = {
+            word: robot.spreads.get(f"{key}.{joint.name}")
+            for word, key in (("stiffness", "stiffness"), ("damping", "damping_ratio"))
+        }
+        # A stiffness that was said to be an estimate is one whatever spread it was given.
+        guesses = {
+            word: math.exp(spread.size)
+            for word, spread in known.items()
+            if spread and (spread.estimated or (joint.estimated and word == "stiffness"))
+        }
+        if guesses:
             source = robot.origins.get(f"{joint.name}.stiffness", "marked as an estimate")
-            said.setdefault(
-                f"stiffness and damping are estimates, not measurements ({source})", []
-            ).append(joint.name)
+            what = "are estimates, not measurements" if guesses.keys() == known.keys() else (
+                "is an estimate, not a measurement"
+            )  # fmt: skip
+            text = (
+                f"{' and '.join(guesses)} {what}: taken to be within a factor of "
+                f"{max(guesses.values()):.3g} (one standard deviation), and what follows is rough "
+                f"({source})"
+            )
+            said.setdefault(text, []).append(joint.name)
         keys = (f"{joint.name}.stiffness", f"{joint.name}.stiffness_curve")
         if joint.reducer and any(robot.origins.get(k, "").startswith(ITS_REDUCER) for k in keys):
             text = (

@@ -6,10 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter, LogLocator
 
+from picchio.fatigue.miner import format_count
 from picchio.robot.units import labelled
 from picchio.studies.assessment.result import Assessment
-from picchio.studies.uncertainty import UncertainLife
+from picchio.studies.uncertainty import LifeScan, UncertainLife
 from picchio.visuals.plots.style import (
     BLUE,
     COLOURS,
@@ -180,4 +182,38 @@ def plot_life_spread(spread: UncertainLife, ax: Axes | None = None) -> Axes:
         if life.endless > 0.0:
             ax.annotate(f"{100 * life.endless:.0f} % infinite", (0.99, y - 0.28), ha="right",
                         xycoords=("axes fraction", "data"), fontsize=8, color=MUTED)  # fmt: skip
+    return ax
+
+
+@styled
+def plot_life_scan(name: str, scan: LifeScan, ax: Axes | None = None) -> Axes:
+    """The robot's life (rivets) against a factor on one stiffness; it breaks where it has no end.
+
+    Args:
+        name: of the stiffness, such as "stiffness.joint_2".
+        scan: the lives along it.
+        ax: where to draw.
+    """
+    ax = axes_or_new(ax, height=2.7)
+    ax.set(
+        xlabel=f"factor on {name} [\N{EN DASH}]", ylabel="rivets to failure [\N{EN DASH}]",
+        title=f"Life along {name}", xscale="log", yscale="log",
+    )  # fmt: skip
+    life = np.where(np.isfinite(scan.life), scan.life, np.nan)
+    ax.plot(scan.factor, life, color=VERMILION)
+    turns = [k for k in scan.turning_points() if np.isfinite(scan.life[k])]
+    ax.plot(scan.factor[turns], scan.life[turns], "o", color=VERMILION, markersize=5)
+    ax.axvline(1.0, color=MUTED, linewidth=0.8, linestyle=":")
+    ax.annotate("as stated", (1.0, 0.98), xycoords=("data", "axes fraction"), ha="left", va="top",
+                xytext=(4, 0), textcoords="offset points", fontsize=8, color=MUTED)  # fmt: skip
+    low, high = scan.factor[0], scan.factor[-1]
+    usual = (0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 10.0) if high > 2.0 else (0.8, 0.9, 1.0, 1.1, 1.25)
+    ticks = [tick for tick in usual if low <= tick <= high]
+    ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    ax.minorticks_off()
+    ax.margins(y=0.1)
+    low, high = ax.get_ylim()
+    if high < 50.0 * low:  # less than two decades have too few ticks
+        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: format_count(value)))
     return ax

@@ -22,7 +22,12 @@ from picchio.studies.tasks import Task
 from picchio.studies.uncertainty import UncertainLife
 from picchio.visuals.plots.force import plot_force_spectrum, plot_force_train
 from picchio.visuals.plots.frequency import plot_mode_shapes
-from picchio.visuals.plots.life import plot_damage, plot_life_spread, plot_utilisation
+from picchio.visuals.plots.life import (
+    plot_damage,
+    plot_life_scan,
+    plot_life_spread,
+    plot_utilisation,
+)
 from picchio.visuals.plots.polar import plot_polar_envelope
 from picchio.visuals.plots.response import plot_response, response_times
 from picchio.visuals.plots.sn import plot_sn_curve
@@ -70,6 +75,13 @@ def _figures(
             "Lives that 90, 50 and 10 percent of the possible worlds exceed, by joint",
             "From P10 to P90, the dot is the median; what was varied stands below.",
             main=True)  # fmt: skip
+        for name, scan in spread.scans.items():
+            add(plot_life_scan(name, scan, blank_figure(height=2.7)),
+                f"Life of the robot against a factor on {name}: it falls and rises again",
+                f"A larger {name} does not always make the life longer, nor shorter: the blows "
+                "excite a mode. Everything else is as stated; where the line breaks, the life has "
+                "no end.",
+                main=True)  # fmt: skip
     if worst.rest is not None:
         peak = worst.rest.peaks(operation.direction)[worst.index].value
         add(
@@ -226,6 +238,7 @@ def assessment_report(
         allowed=list(allowed),
         answer=answer,
         spread=spread,
+        varied=sorted(spread.inputs, key=lambda n: -spread.robot.shares[n]) if spread else [],
         spread_rows=[*spread.joints.items(), ("robot", spread.robot)] if spread else [],
         terms=list(terms),
         shafts=any(joint.sn_curve for joint in assessment.joints),
