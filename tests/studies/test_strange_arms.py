@@ -16,13 +16,24 @@ from picchio.studies.maps.places import joint_grid
 
 G = 79.3e9  # Pa, steel
 # Of example-robot-data, none of them in robots/: name, and the tool's frame where it must be named.
-FOUND: dict[str, str | None] = {"ur3_robot": None, "so100": None}
+FOUND = {
+    "ur3_robot": None,
+    "ur3_gripper": "ee_link",
+    "so100": None,
+    "so101": "gripper_frame_link",
+    "hextilt_flying_arm_5": None,
+    "anymal-kinova": None,
+    "baxter": "left_gripper",
+    "pr2": "r_gripper_tool_frame",
+}
 # Generated: of each joint its kind and axis.
 MADE = {
     "scara": [("revolute", "0 0 1"), ("revolute", "0 0 1"), ("prismatic", "0 0 1"),
               ("revolute", "0 0 1")],
     "gantry": [("prismatic", "1 0 0"), ("prismatic", "0 1 0"), ("prismatic", "0 0 1")],
     "one": [("continuous", "0 1 0")],
+    "eight": [("revolute", axis) for axis in ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0",
+                                              "1 0 0", "0 1 0", "1 0 0")],
 }  # fmt: skip
 JOINT = """<joint name="j{k}" type="{kind}"><parent link="l{k}"/><child link="l{next}"/>
 <origin xyz="0.3 0 0.1" rpy="0.1 0 0"/><axis xyz="{axis}"/>
@@ -81,6 +92,7 @@ def test_the_whole_way(name, tmp_path):
         {
             "format": "picchio-task/1",
             "excitation": blows,
+            "hits_per_rivet": 4,
             "operation": [
                 {"name": "push", "direction": [1.0, 0.3, -1.0],
                  "poses": [pose.tolist(), (0.9 * pose).tolist()]},
