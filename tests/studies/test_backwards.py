@@ -263,3 +263,33 @@ def test_a_shaft_that_cannot_be_gives_no_yes(robot: FlexibleRobot) -> None:
     found = allowable(made, make_task(robot), 1e6)
     assert found.met and not found.yes
     assert found.answer.startswith("Cannot be told: the shaft of joint_1")
+
+
+SLOPED = SNCurve(name="sloped", strength=60e6, cycles=1e6, slopes=(5.0,), yield_shear=400e6)
+
+
+@pytest.mark.filterwarnings("ignore::picchio.PicchioWarning")
+def test_an_estimate_gives_intervals_and_no_plain_yes(robot: FlexibleRobot) -> None:
+    guess = load_robot("fanuc_like_3dof", values={"joint_2": {"stiffness": 1e5, "estimated": True}})
+    task = make_task(guess, hits=2)
+    stated = allowable(robot, task, 1e6, sn_curve=SLOPED)
+    assert stated.held is None and "force_interval" not in stated.to_dict()["allowable"]
+    most = stated.rivets
+    assert most is not None
+    for factor, met, start in ((0.02, True, "Yes: "), (0.98, None, "Cannot be told: ")):
+        found = allowable(guess, task, factor * most, sn_curve=SLOPED)
+        told = found.to_dict()["allowable"]
+        assert (told["met"], found.yes) == (met, met is True)
+        assert found.answer.startswith(start) and " of the drawn cases" in found.answer
+        assert (told["held_share"] >= 0.9) == (met is True)
+        low, high = told["rivets_interval"]
+        assert low < most < high and (low >= factor * most) == (met is True)
+        low, high = told["force_interval"]
+        assert low < found.force < high
+        assert " N in 80 % of the drawn cases" in found.answer
+        # The end that 90 % of the cases bear is a yes when it is fed back; a little more is not.
+        if met is None:
+            for force, fine in ((0.999 * low, True), (1.02 * low, False)):
+                again = allowable(guess, make_task(guess, force, hits=2), factor * most,
+                                  sn_curve=SLOPED)  # fmt: skip
+                assert again.yes == fine

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -31,9 +31,12 @@ from picchio.robot.joint import Joint, is_drive
 from picchio.studies.assessment.verdict import SHAFT_TOLERANCE, Status, softer
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.pose import JointLoad, need_springs
-from picchio.studies.rivet.variation import VariedRivet, rivets_of
+from picchio.studies.rivet.variation import ShaftStress, VariedRivet, rivets_of
 from picchio.studies.tasks import Task
+from picchio.studies.uncertainty import Cases, interval
 
+SURE = 0.9
+"""Share of the drawn cases that must hold for a yes."""
 _MOST_HITS = 1 << 10
 # A value given lies this far on the safe side, relative, so that rounding does not undo it.
 _GUARD = 1e-11
@@ -107,6 +110,10 @@ class AllowableLoads(TableResult):
         hits: blows a rivet may take; as in `Allowable`.
         contrary: why the answer cannot be told whatever the parts bear; "" where it can.
         steel: the S-N curve for the radius where a joint has no shaft.
+        held: share of the drawn cases in which every part holds, where a value of the robot has a
+            spread; None otherwise. A yes needs `SURE` of them.
+        intervals: P10 and P90 in these cases: of "force", N, "hits" and "rivets" (None: no end),
+            and of each joint's "peak_torque" and "reducer"; empty without spreads.
     """
 
     INDEX = "joint"
@@ -121,6 +128,8 @@ class AllowableLoads(TableResult):
     hits: int | None = None
     contrary: str = ""
     steel: str = DEFAULT_SN_CURVE
+    held: float | None = None
+    intervals: Mapping[str, Any] = field(default_factory=dict)
 
     def __iter__(self) -> Iterator[Allowable]:
         return iter(self.joints)
@@ -133,9 +142,16 @@ class AllowableLoads(TableResult):
 
     @property
     def met(self) -> bool | None:
-        """Whether every part, as given, holds; None where a joint has none and no other fails."""
+        """Whether every part, as given, holds; None where a joint has none and no other fails.
+
+        With spreads also None where it holds in too few of the drawn cases for a yes, and False
+        where it holds in too few for a doubt.
+        """
         told = [joint.met for joint in self.joints]
-        return False if False in told else None if None in told else True
+        held = 1.0 if self.held is None else self.held
+        if False in told or held <= 1.0 - SURE:
+            return False
+        return None if None in told or held < SURE else True
 
     @property
     def yes(self) -> bool:
@@ -159,6 +175,14 @@ class AllowableLoads(TableResult):
         first = self.joints[0]
         sure = "" if first.survival is None else f" at {100 * first.survival:.6g} %"
         wanted = f"{format_count(first.rivets)} rivets{sure}"
+        stated = all(joint.met for joint in self.joints) and not self.contrary
+        if self.held is not None and self.held < SURE and stated:
+            start = "No" if self.met is False else "Cannot be told"
+            return (
+                f"{start}: at the stated values every part survives {wanted}, but these are "
+                f"uncertain and {100 * self.held:.3g} % of the drawn cases do; a yes needs "
+                f"{100 * SURE:g} %. {self._force()}"
+            )
         if self.met is False:
             worst = min(self.joints, key=lambda joint: (joint.met is not False, joint.force_factor))
             return f"No: {worst.failing}, so {wanted} cannot be promised. {self._force()}"
@@ -173,7 +197,8 @@ class AllowableLoads(TableResult):
                 f"of at least this radius ({self.steel}) and a reducer with at least this repeated "
                 f"peak torque: {needs}."
             )
-        return f"Yes: every part that is given survives {wanted}. {self._force()}"
+        sure = "" if self.held is None else f", in {100 * self.held:.3g} % of the drawn cases"
+        return f"Yes: every part that is given survives {wanted}{sure}. {self._force()}"
 
     def _force(self) -> str:
         if math.isinf(self.force_factor):
@@ -184,9 +209,12 @@ class AllowableLoads(TableResult):
             )
         least = min(self.joints, key=lambda joint: joint.force_factor)
         part = "reducer" if least.governed_by == "reducer" else "shaft"
+        if (ends := self.intervals.get("force")) is not None:
+            return f"The force may be {told_ends(ends)} N in 80 % of the drawn cases."
+        start = "The" if self.held is None else "At the stated values, which are uncertain, the"
         return (
-            f"The force may be {self.force_factor:.4g} times as large, {self.force:.4g} N, by the "
-            f"{part} of {least.joint}."
+            f"{start} force may be {self.force_factor:.4g} times as large, {self.force:.4g} N, by "
+            f"the {part} of {least.joint}."
         )
 
     def _rows(self) -> list[dict[str, Any]]:
@@ -212,6 +240,8 @@ class AllowableLoads(TableResult):
                 "radius": {joint.joint: joint.radius for joint in self.joints},
                 "reducer": {joint.joint: joint.reducer for joint in self.joints},
                 "peak_torque": {joint.joint: joint.peak_torque for joint in self.joints},
+                **({} if self.held is None else {"held_share": self.held}),
+                **{f"{key}_interval": ends for key, ends in self.intervals.items()},
             },
         }
 
@@ -228,6 +258,22 @@ class AllowableLoads(TableResult):
                    "least radius [mm]", "least reducer")  # fmt: skip
         facts = {"target life [rivets]": self.joints[0].rivets, "survival": self.joints[0].survival}
         return sheet("Allowable loads", facts, columns, rows, self.answer)
+
+
+def told_ends(ends: tuple[float | None, float | None]) -> str:
+    """An interval as people read it.
+
+    Args:
+        ends: P10 and P90; None or inf is no end.
+
+    Returns:
+        such as "320 to 610", "320 to no end" or "no end".
+    """
+    low, high = (
+        "no end" if end is None or math.isinf(end) else f"{float(f'{end:.3g}'):,.10g}"
+        for end in ends
+    )
+    return low if low == high else f"{low} to {high}"
 
 
 @one_thread()
@@ -262,6 +308,10 @@ def allowable(
         gravity_balanced: as in `assess`.
         reducers: catalogues beside the shipped ones, to choose from.
 
+    Where a value of the robot has a spread (`FlexibleRobot.spreads`), a yes needs every part to
+    hold in 90 % of the drawn cases, too: values, blows and the model's error vary as in
+    `uncertain_life`, and the specimens' strength stays at the survival asked for.
+
     Returns:
         yes or no, and what each joint allows: the force and the radius hold to 1e-9, from the safe
         side; of hits, rivets and reducer the value given holds and the next one does not.
@@ -290,14 +340,21 @@ def allowable(
     joints = tuple(search.joint(k) for k, part in enumerate(parts) if is_drive(part.joint.name))
     factor = search.force_of_all(min(joint.force_factor for joint in joints))
     strongest = max(operation.excitation.peak_force for operation in task.operations)
+    held: float | None = None
+    intervals: dict[str, Any] = {}
+    notes = [*model.without_load(), *search.notes(joints)]
+    if model.robot.spreads and any(part.curve or part.reducer for part in parts):
+        held, intervals = search.drawn(factor, strongest, notes)
     return AllowableLoads(
         joints,
-        (*model.without_load(), *search.notes(joints)),
+        tuple(notes),
         force_factor=factor,
         force=factor * strongest if strongest else math.inf,
         hits=search.hits_of_all(joints),
         contrary="; ".join(part.contrary for part in parts if part.contrary),
         steel=steel.name,
+        held=held,
+        intervals=intervals,
     )
 
 
@@ -593,17 +650,9 @@ class _Backwards:
         def holds(hits: int) -> bool:
             return self.score(k, self.load(k, hits=hits)) <= 0.0
 
-        low, high = 0, stated.pop()
         if not self.nonlinear and holds(_MOST_HITS):  # the usual end, without the way there
             return None
-        while holds(high):
-            if high >= _MOST_HITS:
-                return None
-            low, high = high, min(2 * high, _MOST_HITS)
-        while high - low > 1:
-            middle = (low + high) // 2
-            low, high = (middle, high) if holds(middle) else (low, middle)
-        return low
+        return most_holding(holds, stated.pop())
 
     def hits_of_all(self, joints: tuple[Allowable, ...]) -> int | None:
         """The most blows at which every joint holds."""
@@ -613,6 +662,54 @@ class _Backwards:
         ):
             most -= 1
         return most
+
+    def drawn(
+        self, factor: float, strongest: float, notes: list[str]
+    ) -> tuple[float, dict[str, Any]]:
+        """The share of the drawn cases that hold, and the intervals of what is allowed."""
+        known = [(j, part, part.curve) for j, part in enumerate(self.parts) if part.curve]
+        stress = ShaftStress(
+            [part.joint for _, part, _ in known],
+            [j for j, _, _ in known],
+            [dataclasses.replace(curve, scatter=0.0) for _, _, curve in known if curve],
+            self.parts[0].residue,
+            self.parts[0].mean_stress,
+        )
+        cases = Cases(self.model, self.task, stress)
+        holds = cases.drawn.holds(self.rivets)
+        lives = np.where(cases.drawn.holds(0.0), cases.drawn.robots_life, 0.0)
+        found: dict[str, Any] = {
+            "rivets": tuple(None if math.isinf(n) else math.floor(n) for n in interval(lives))
+        }
+        torques = {name: each["peak_torque"] for name, each in cases.intervals.items()}
+        found["peak_torque"] = torques
+        if cases.cheap and strongest:
+            near = factor if 0.0 < factor < math.inf else 1.0
+            factors = cases.force_factor(self.rivets, near)
+            found["force"] = tuple(end * strongest for end in interval(factors))
+            if len({operation.hits_per_rivet for operation in self.task.operations}) == 1:
+                found["hits"] = self._hits_held(cases)
+        else:
+            notes.append(
+                "the allowable force and hits are at the stated values, which are uncertain: their "
+                "intervals would take too long with this model or rule"
+            )
+        return float(holds.mean()), found
+
+    def _hits_held(self, cases: Cases) -> tuple[int | None, int | None]:
+        """The most hits at which 90 and 10 % of some of the cases hold; None beyond 1024."""
+
+        @cache
+        def share(hits: int) -> float:
+            blows = [dataclasses.replace(op, hits_per_rivet=hits) for op in self.task.operations]
+            drawn = cases.at(dataclasses.replace(self.task, operations=tuple(blows)))
+            return float(drawn.holds(self.rivets).mean())
+
+        start = self.task.operations[0].hits_per_rivet
+        return (
+            most_holding(lambda hits: share(hits) >= SURE, start),
+            most_holding(lambda hits: share(hits) >= 1.0 - SURE, start),
+        )
 
     def notes(self, joints: tuple[Allowable, ...]) -> Iterator[str]:
         """What an answer leaves out."""
@@ -626,6 +723,27 @@ class _Backwards:
         none = [j.joint for j in joints if j.reducer is None and not math.isnan(j.radius)]
         if none:
             yield f"no reducer of the catalogues bears the torque in {', '.join(none)}"
+
+
+def most_holding(holds: Callable[[int], bool], start: int) -> int | None:
+    """The largest number that holds.
+
+    Args:
+        holds: falls once as the number grows.
+        start: to begin with.
+
+    Returns:
+        0 if none does; None where more than 1024 do.
+    """
+    low, high = 0, start
+    while holds(high):
+        if high >= _MOST_HITS:
+            return None
+        low, high = high, min(2 * high, _MOST_HITS)
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
 
 
 def _log(ratio: float) -> float:

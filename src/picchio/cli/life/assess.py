@@ -402,6 +402,8 @@ def _terms_table(terms: tuple[Term, ...]) -> FittedTable:
 
 def _show_allowable(found: AllowableLoads, task: Task, life: Assessment) -> None:
     """Print what a target life allows."""
+    from picchio.studies.backwards import told_ends
+
     out = console()
     load, torques = column(
         [life.joint(j.joint).units.load for j in found], [_number(j.peak_torque) for j in found]
@@ -426,11 +428,15 @@ def _show_allowable(found: AllowableLoads, task: Task, life: Assessment) -> None
         "smallest\nreducer": lambda j: j.reducer or "-",
     }
     sure = "" if found[0].survival is None else f", survival {found[0].survival:g}"
+    sure += "" if found.held is None else ", at the stated values"
     out.print(table(
         columns, ([cell(joint) for cell in columns.values()] for joint in found),
         title=f"What a life of {format_count(found[0].rivets)} rivets{sure} allows",
     ))  # fmt: skip
-    if math.isfinite(found.force_factor):
+    for key, ends in found.intervals.items():
+        if not isinstance(ends, dict):
+            out.print(f"In 80 % of the drawn cases the most {_MOST[key]}: {told_ends(ends)}.")
+    if found.held is None and math.isfinite(found.force_factor):
         forces = ", ".join(
             f"{op.name} {found.force_factor * op.excitation.peak_force:.4g} N"
             for op in task.operations
@@ -439,6 +445,9 @@ def _show_allowable(found: AllowableLoads, task: Task, life: Assessment) -> None
     for line in found.notes:
         out.print(f"  - {line}", style="dim")
     out.print()
+
+
+_MOST = {"force": "force of the blows, N", "hits": "hits a rivet", "rivets": "rivets"}
 
 
 def _number(value: float) -> str:
