@@ -15,6 +15,7 @@ FloatArray: TypeAlias = npt.NDArray[Any]
 ComplexArray: TypeAlias = npt.NDArray[Any]
 IndexArray: TypeAlias = npt.NDArray[Any]
 BoolArray: TypeAlias = npt.NDArray[Any]
+TextArray: TypeAlias = npt.NDArray[Any]
 Vector: TypeAlias = tuple[float, float, float]
 
 

@@ -29,8 +29,8 @@ def give_masses(
         root: of the URDF, for the links' shapes.
 
     Returns:
-        the tree; origins such as `{"link.forearm.mass": "flex.toml: weighed"}`; the masses'
-        spreads.
+        the tree, the origin of each value by its name ("link.forearm.mass"), and the spreads of
+        the masses.
 
     Raises:
         InputError: a mass without a centre of mass, an impossible inertia, a total

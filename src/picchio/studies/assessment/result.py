@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from picchio.core.arrays import FloatArray
+from picchio.core.arrays import FloatArray, TextArray
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
 from picchio.fatigue.miner import format_count as format_count
@@ -84,7 +83,7 @@ class OperationResult:
     reducer_utilisation: FloatArray
     reducer_torque: FloatArray
     reducer_limit: FloatArray
-    reducer_governed_by: NDArray[np.str_]
+    reducer_governed_by: TextArray
     damage_per_rivet: FloatArray
     swing: FloatArray
     swing_cycles: FloatArray
