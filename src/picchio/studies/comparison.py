@@ -35,7 +35,8 @@ _PROSE = {"name", "source", "assumptions", "unverified", "warning"}
 _FIGURES = {
     "status", "governed_by", "joint", "margin", "rivets_to_failure", "peak_deflection",
     "peak_torque", "peak_shear_stress", "utilisation", "yield_utilisation", "reducer_utilisation",
-    "reducer_governed_by", "damage_per_rivet", "p10", "p50", "p90",
+    "reducer_governed_by", "damage_per_rivet", "p10", "p50", "p90", "margin_interval",
+    "utilisation_interval", "yield_utilisation_interval", "reducer_utilisation_interval",
 }  # fmt: skip
 _UNITS = {
     **Assessment.UNITS, "stiffness": "N m/rad", "force": "N", "period": "s", "width": "s",
