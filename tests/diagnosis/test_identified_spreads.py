@@ -16,8 +16,11 @@ from picchio.diagnosis.result import Cause, Correlation, Value
 
 
 def test_what_was_found_has_its_standard_deviation(tmp_path: Path) -> None:
+    gun = tmp_path / "gun.toml"  # its spring is a joint that the URDF does not have
+    gun.write_text('format = "picchio-sidecar/1"\n[gun]\nmass = 1.5\nrecoil_stiffness = 3e4\n')
     robot = picchio.load_robot(
         "fanuc_like_3dof",
+        flex=gun,
         values={
             "joint_1": {"stiffness": 2.4e5, "stiffness_spread": 1.5},
             "joint_2": {"stiffness": 1e5, "damping_ratio": 0.03, "estimated": True},
@@ -49,6 +52,7 @@ def test_what_was_found_has_its_standard_deviation(tmp_path: Path) -> None:
     file = tmp_path / "flex.toml"
     file.write_text(tomlkit.dumps(table))
     known = picchio.load_robot("fanuc_like_3dof", flex=file)
+    assert known.gun == robot.gun
     spreads = known.spreads
     assert spreads["stiffness.joint_2"].value == pytest.approx(9e4)
     assert spreads["stiffness.joint_2"].size == pytest.approx(0.02 / 0.9, rel=1e-3)

@@ -26,7 +26,7 @@ from picchio.model.effects.structure.modal_damping import ModalDamping
 from picchio.robot.annotations.sidecar import FORMAT as SIDECAR
 from picchio.robot.annotations.sidecar import Sidecar, spreads_of
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.robot.joint import Joint
+from picchio.robot.joint import Joint, is_drive
 from picchio.robot.loading.load import load_robot
 from picchio.robot.spread import ESTIMATED
 from picchio.robot.tool import Mounting
@@ -200,6 +200,7 @@ def identification(campaign: Campaign, found: Diagnosis) -> Identification:
             _damping_of(robot, joint, found, tolerance),
         )
         for joint in robot.flexible_joints
+        if is_drive(joint.name)
     )
     return Identification(robot, found, source, joints, tolerance)
 
@@ -267,13 +268,14 @@ def _sidecar(
     """The sidecar with the values found, and remarks on what has no place in it."""
     if not diagnosis.causes:
         raise InputError(f"the diagnosis is {diagnosis.verdict!r}: there is nothing to write")
-    joints = {joint.name: _joint(robot, joint) for joint in robot.flexible_joints}
+    drives = [joint for joint in robot.flexible_joints if is_drive(joint.name)]
+    joints = {joint.name: _joint(robot, joint) for joint in drives}
     table: dict[str, Any] = {"format": SIDECAR, "description": f"{robot.name}, identified"}
     remarks: list[str] = []
     # Without a mass there is neither its centre nor an inertia.
     left_out = {"source"} if robot.tool.mass > 0.0 else {"source", "com", "inertia"}
     tool = robot.tool.model_dump(mode="json", exclude=left_out, exclude_none=True)
-    ratios = {joint.name: abs(joint.gear_ratio or 0.0) for joint in robot.flexible_joints}
+    ratios = {joint.name: abs(joint.gear_ratio or 0.0) for joint in drives}
     told: dict[str, tuple[str, str, str]] = {}  # a value's name -> what it was fitted as
     for cause in diagnosis.causes:
         key = effect_class(cause.effect).sidecar
@@ -312,7 +314,7 @@ def _sidecar(
         elif name != "damping_ratio":
             remarks.append(f"{name} = {_number(value)}")
     fitted = any(_is_of(cause, "damping_ratio") for cause in diagnosis.causes)
-    for joint in robot.flexible_joints:
+    for joint in drives:
         found, entry = _damping(robot, joint, diagnosis), joints[joint.name]
         if found is None or not (fitted or _tells(found, tolerance.damping_ratio)):
             continue
