@@ -315,7 +315,8 @@ def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
         out.print(_terms_table(terms))
     out.print("How this was computed", style="dim")
     for line in found.assumptions:
-        out.print(f"  - {line}", style="dim")
+        if line not in told.reasons:
+            out.print(f"  - {line}", style="dim")
 
 
 def _life_table(found: Assessment) -> FittedTable:
