@@ -12,6 +12,9 @@ from pathlib import Path
 
 import pytest
 
+# pytest-xdist gives its workers a width of 80 columns; tests that want one set it.
+os.environ.pop("COLUMNS", None)
+
 ROOT = Path(__file__).resolve().parent.parent
 NO_DATA = "no measured data here: "
 _skipped: list[str] = []

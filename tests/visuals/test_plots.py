@@ -241,6 +241,7 @@ def workspace():
     return xarray.Dataset(
         {"position": (("point", "xyz"), position), "peak_deflection": (("point", "joint"), peak)},
         coords={"joint": ["a", "b"]},
+        attrs={"hits": 0},
     )
 
 

@@ -49,7 +49,7 @@ def test_an_assessment_shows_verdict_and_lives(arm: SimpleNamespace) -> None:
 
 def test_without_shafts_there_are_torques_only(ur10: SimpleNamespace) -> None:
     *_, joints = tables(ur10.assessment)
-    assert joints[0] == ["joint", "peak deflection [mrad, mm]", "peak torque [N m, N]"]
+    assert joints[0] == ["joint", "peak deflection [mrad]", "peak torque [N m]"]
     told = [float(c) for c in column(joints, "peak torque")]
     np.testing.assert_allclose(told, [j.peak_torque for j in ur10.assessment.joints], rtol=1e-3)
 

@@ -201,6 +201,7 @@ def surface(path: str | Path, *, spacing: float) -> Listed:
         raise InputError(
             f"{area / spacing**2:.3g} points on this surface of {area:.4g} m^2; at most "
             f"{_MOST_ON_SURFACE}",
+            file=path,
             key="spacing",
             value=spacing,
         )
