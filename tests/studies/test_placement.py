@@ -11,6 +11,7 @@ import picchio
 from picchio.core.errors import InputError, PicchioWarning
 from picchio.robot.drives.reducer import load_reducer
 from picchio.studies.placement.run import place
+from picchio.studies.placement.sureness import moved
 from picchio.studies.placement.work import Work
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.poses import damage_at
@@ -168,6 +169,33 @@ def test_never_worse_and_poses_alone(arm, panel):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
+def test_the_gain_of_uncertain_values_is_surer_than_either_life(arm, panel):
+    assert place(arm, panel, move=[0.0] * 4, placements=1, sn_curve="nie-2016").sure is None
+    soft = picchio.load_robot("fanuc_like_3dof", values={"joint_2": {"stiffness": 1e5,
+                              "damping_ratio": 0.03, "estimated": True}})  # fmt: skip
+    options = {"move": [0.1, 0.1, 0.1, 0.0], "placements": 4}
+    found = place(soft, panel, sn_curve="nie-2016", **options)
+    there = picchio.assess(soft, moved(panel, Work.of(soft, panel), found.best.spot),
+                           sn_curve="nie-2016", uncertainty=False, steady_check=False)  # fmt: skip
+    assert there.rivets_to_failure == pytest.approx(found.best.rivets_to_failure, rel=1e-9)
+    sure = found.sure
+    for lives in (sure.start, sure.best):
+        # Force, strength and the model's error are the same at both places, and cancel.
+        assert sure.life[1] / sure.life[0] < lives[2] / lives[0]
+    assert sure.life[0] < found.gain.life < sure.life[1]
+    assert 0.5 < sure.better_share <= 1.0
+    told = found.to_dict()
+    assert told["gain"]["life_interval"] == list(sure.life)
+    assert told["best"]["life"]["p10"] == sure.best[0]
+    assert str(sure.cases) in found._repr_html_()
+    bare = [dataclasses.replace(joint, shaft=None) for joint in soft.flexible_joints]
+    torques = place(dataclasses.replace(soft, flexible_joints=tuple(bare)), panel, **options)
+    low, high = torques.sure.utilisation
+    assert torques.by_effort and torques.sure.life is None
+    assert low < torques.gain.utilisation < high
+
+
 def test_margin_leaves_room_and_off_tells_what_is_lost(arm, panel):
     found = place(arm, panel, move=[0.3, 0.3, 0.3, 0.3], placements=40, margin=0.05)
     assert all(off.reached for off in found.off)

@@ -865,13 +865,14 @@ class Cases:
         """As of `UncertainLife`."""
         return self._sampler.intervals(self.drawn)
 
-    def at(self, task: Task) -> Drawn:
-        """What every fourth of the cases does at another task, with the same model.
+    def at(self, task: Task, every: int = 4) -> Drawn:
+        """What some of the cases do at another task, with the same model.
 
         Args:
             task: with blows that state a width where the first one's do.
+            every: so-manyth case; 1 for all.
         """
-        return replace(self._sampler, task=task).run(self._moved[::4])
+        return replace(self._sampler, task=task).run(self._moved[::every])
 
     def force_factor(self, rivets: float, near: float) -> FloatArray:
         """(m,) the largest factor on the force at which every part holds, of a linear model.

@@ -150,10 +150,13 @@ def _show(found: Placement, off: float) -> None:
     ]
     heads = ("joint", ">rivets,\nnow", ">utilisation,\nnow, %", ">rivets,\nbest",
              ">utilisation,\nbest, %")  # fmt: skip
-    out.print(table(heads, rows))
+    title = "At the stated values, which are uncertain" if found.sure else None
+    out.print(table(heads, rows, title=title))
     out.print(_gain(found))
     if found.moved and found.explained():
         out.print(found.explained())
+    if found.sure:
+        out.print(found.sure.words())
     out.print(_cost_of_off(found, off))
     if found.by_effort:
         out.print("Utilisation: torque over the URDF's effort limit; no shaft or reducer is known.")

@@ -11,6 +11,7 @@ from picchio.core.arrays import FloatArray
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
 from picchio.studies.placement.search import Spot
+from picchio.studies.placement.sureness import Sureness
 
 FORMAT = "picchio-placement/1"
 
@@ -152,6 +153,7 @@ class Placement(TableResult):
         poses_alone: the best poses found with the work where it is now; None where none of them
             is within the limits.
         best: the best place found.
+        sure: how sure the gain is; None where no value of the robot has a spread.
         off: what it costs to be beside it.
         centre: (3,) m, of the work now; it turns about the vertical through it.
         placements: how many were tried all over.
@@ -168,6 +170,7 @@ class Placement(TableResult):
     start_valid: bool
     poses_alone: Standing | None
     best: Standing
+    sure: Sureness | None
     off: tuple[Off, ...]
     centre: FloatArray
     placements: int
@@ -230,7 +233,8 @@ class Placement(TableResult):
         columns = ("joint", "rivets, now", "utilisation [%]", "rivets, best", "utilisation [%]")
         facts = {"work moved by [m, rad]": self.best.spot.move}
         title = f"Placement of the work of {self.robot}"
-        return sheet(title, facts, columns, rows, self.explained())
+        told = [self.explained(), self.sure.words() if self.sure else ""]
+        return sheet(title, facts, columns, rows, " ".join(filter(None, told)))
 
     def _headline(self) -> str:
         if not self.moved:
@@ -255,7 +259,7 @@ class Placement(TableResult):
         ]
 
     def _content(self) -> dict[str, Any]:
-        return {
+        content: dict[str, Any] = {
             "format": FORMAT,
             "robot": self.robot,
             "ranked_by": "effort" if self.by_effort else "life, then utilisation",
@@ -273,3 +277,6 @@ class Placement(TableResult):
             "assumptions": list(self.assumptions),
             "provenance": dict(self.provenance),
         }
+        for part, told in (self.sure.to_dict() if self.sure else {}).items():
+            content[part] |= told
+        return content

@@ -28,6 +28,7 @@ from picchio.studies.placement.reach import Candidates
 from picchio.studies.placement.result import JointUse, Off, Placement, Standing
 from picchio.studies.placement.search import ROUNDS, SHIFTS, Search, Spot, descend
 from picchio.studies.placement.self_collision import SelfCollision
+from picchio.studies.placement.sureness import sureness
 from picchio.studies.placement.work import Work
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.pose import need_springs
@@ -137,6 +138,7 @@ def place(
         start_valid=valid,
         poses_alone=alone,
         best=then,
+        sure=sureness(loads, work, start, then.spot),
         off=_beside(search, then.spot, off),
         centre=work.centre,
         placements=search.tried,
