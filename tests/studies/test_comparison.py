@@ -64,6 +64,15 @@ def test_robots_whose_joints_have_other_names(folder):
     assert all(math.isnan(row.ratios[1]) for row in found.results)
 
 
+def test_an_estimate_is_no_lone_number():
+    """In place of its life stands the interval; a stated one stays as it is."""
+    life = {"p10": 2e3, "p50": 4e4, "p90": None}
+    guess = {"format": "picchio-x/1", "rivets_to_failure": 4e4, "estimated": True, "life": life}
+    sure = {"format": "picchio-x/1", "rivets_to_failure": 5e4}
+    rows = {row.key: row.shown for row in picchio.compare(guess, sure).results}
+    assert rows["rivets_to_failure"] == ("2,000 to no end", "50,000")
+
+
 def test_a_slide_has_the_units_of_a_slide():
     sides = [{"format": "picchio-x/1", "joints": [
         {"name": "rail", "kind": "prismatic", "peak_deflection": x, "peak_torque": x},

@@ -374,6 +374,9 @@ def _shown(key: str, side: Mapping[str, Any], first: Any) -> str:
     """A value as people read it; of a long list, how much of it is not as in the first."""
     value = side.get(key)
     before, _, last = key.rpartition(".")
+    if last == "rivets_to_failure" and side.get(key.replace(last, "estimated")):
+        ends = [_shown(key.replace(last, f"life.{end}"), side, None) for end in ("p10", "p90")]
+        return " to ".join(ends)  # an estimate is no lone number
     if last in ("rivets_to_failure", "p10", "p50", "p90"):
         # Null is a life without end, if there is a shaft at all.
         known = key in side and side.get(f"{before}.sn_curve", "?") != ""
