@@ -36,7 +36,9 @@ def tables(monkeypatch):
             stream = io.StringIO()
             Console(file=stream, width=width).print(table)
             text = stream.getvalue()
-            assert "…" not in text
+            # Nothing is cut; what a cell quotes may have an ellipsis of its own.
+            own = sum(cell.plain.count("…") for row in table.rows for cell in row.cells)
+            assert text.count("…") <= own, text
             assert max(len(line.rstrip()) for line in text.splitlines()) <= width, text
             # Numbers, names and units stand there whole.
             words = {
