@@ -108,7 +108,7 @@ def test_both_sides_of_a_thin_sheet_and_what_is_no_surface(tmp_path):
     for name, spacing in (("sheet.stl", 0.0), ("none.stl", 0.1)):
         with pytest.raises(InputError):
             places.surface(tmp_path / name, spacing=spacing)
-    with pytest.raises(InputError, match=r"^spacing: .*points.*at most 100000.*1e-06"):
+    with pytest.raises(InputError, match=r"sheet.stl: spacing: .*points.*at most 100000.*1e-06"):
         places.surface(tmp_path / "sheet.stl", spacing=1e-6)
     (tmp_path / "text.stl").write_text("no mesh")
     with pytest.raises(InputError, match=r"text\.stl"):
