@@ -29,7 +29,8 @@ from picchio.fatigue.uncertain_lives import QUANTILES
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.rivet.damage_kernel import history_damage, swing
 from picchio.studies.tasks import Task, task_from_dict
-from picchio.studies.uncertainty import DEFAULT_INPUTS, UncertainLife
+from picchio.studies.uncertainty.inputs import DEFAULT_INPUTS
+from picchio.studies.uncertainty.result import UncertainLife
 
 CACHE = Path(__file__).parents[1] / "tests" / "studies" / "plain_monte_carlo.json"
 DRAWS = 100_000

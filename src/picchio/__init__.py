@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from picchio.studies.placement.run import place as place
     from picchio.studies.tasks import load_task as load_task
     from picchio.studies.tasks import task_from_dict as task_from_dict
-    from picchio.studies.uncertainty import uncertain_life as uncertain_life
+    from picchio.studies.uncertainty.run import uncertain_life as uncertain_life
     from picchio.vibration.closed_form.modes import modal_analysis as modal_analysis
     from picchio.vibration.closed_form.response import response_from_rest as response_from_rest
     from picchio.vibration.closed_form.response import steady_state as steady_state
@@ -73,7 +73,7 @@ _HOME = {
     "reproduce": "paper.run",
     "robots": "robot.loading.catalogue",
     "simulate": "prediction.simulation",
-    "uncertain_life": "studies.uncertainty",
+    "uncertain_life": "studies.uncertainty.run",
     "view": "visuals.view",
     "workspace_map": "studies.maps.run",
     # What they work on, from files and from Python.

@@ -21,7 +21,9 @@ from picchio.robot.varied import robot_with
 from picchio.studies.assessment.run import assess
 from picchio.studies.rivet.variation import ShaftStress
 from picchio.studies.tasks import Task, task_from_dict
-from picchio.studies.uncertainty import DEFAULT_INPUTS, _inputs_of, _Sampler, uncertain_life
+from picchio.studies.uncertainty.inputs import DEFAULT_INPUTS, inputs_of
+from picchio.studies.uncertainty.run import uncertain_life
+from picchio.studies.uncertainty.sampler import Sampler
 
 STRAIGHT = SNCurve(name="straight", strength=60e6, cycles=1e6, slopes=(5.0,))
 STEEL = dataclasses.replace(
@@ -100,8 +102,8 @@ def test_any_model_is_varied_whole(robot: FlexibleRobot, task: Task, effect: str
     key, factor = ("damping_ratio", 40.0) if effect is None else ("stiffness", 0.7)
     model = Model(robot).with_effects(given)
     stress = ShaftStress.of(robot, STEEL)
-    inputs = _inputs_of(model, task, stress, {key: Uncertain(1.0, 1.0)}, [])
-    drawn = _Sampler(model, task, stress, inputs).run(np.array([[math.log(factor)]]))
+    inputs = inputs_of(model, task, stress, {key: Uncertain(1.0, 1.0)}, [])
+    drawn = Sampler(model, task, stress, inputs).run(np.array([[math.log(factor)]]))
     joints = tuple(
         dataclasses.replace(j, **{key: factor * getattr(j, key)}) for j in robot.flexible_joints
     )
@@ -230,6 +232,6 @@ def test_a_drawn_world_is_assess_on_the_changed_robot(
     np.testing.assert_allclose(found.lives[:3], lives, rtol=1e-4)
     model, stress = Model(robot), ShaftStress.of(robot, STEEL, mean_stress=rule)
     rows = Draws(len(spreads), 3).more().reshape(-1, len(spreads))[:3]
-    drawn = _Sampler(model, task, stress, _inputs_of(model, task, stress, {}, [])).run(rows)
+    drawn = Sampler(model, task, stress, inputs_of(model, task, stress, {}, [])).run(rows)
     np.testing.assert_allclose(drawn.yielding.T, yielding, rtol=1e-5)
     np.testing.assert_allclose(drawn.geared[1], geared, rtol=1e-5)

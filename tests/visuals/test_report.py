@@ -178,7 +178,7 @@ def test_backwards_doubt_and_terms_have_their_place(arm: SimpleNamespace) -> Non
     from picchio.fatigue.uncertain_lives import LifeSpread, Uncertain
     from picchio.studies.assessment.method_comparison import Term
     from picchio.studies.backwards import Allowable
-    from picchio.studies.uncertainty import UncertainLife
+    from picchio.studies.uncertainty.result import UncertainLife
 
     spread = LifeSpread(
         p10=1.5e5, p50=2.5e6, p90=float("inf"), endless=0.25, shares={"stiffness": 0.5},

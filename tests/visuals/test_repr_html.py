@@ -14,7 +14,7 @@ from picchio.core.html import MOST_ROWS, cell, sheet
 from picchio.fatigue.sn.fit import fit_sn
 from picchio.fatigue.sn.test_table import SNTests
 from picchio.studies.envelopes import envelope as envelope_of
-from picchio.studies.uncertainty import uncertain_life
+from picchio.studies.uncertainty.run import uncertain_life
 
 BLOWS = picchio.PulseTrain(300.0, 0.040, 0.004)
 

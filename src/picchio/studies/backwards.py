@@ -33,7 +33,8 @@ from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.pose import JointLoad, need_springs
 from picchio.studies.rivet.variation import ShaftStress, VariedRivet, rivets_of
 from picchio.studies.tasks import Task
-from picchio.studies.uncertainty import Cases, interval
+from picchio.studies.uncertainty.cases import Cases
+from picchio.studies.uncertainty.drawn import interval
 
 SURE = 0.9
 """Share of the drawn cases that must hold for a yes."""

@@ -197,7 +197,7 @@ def assess(
     }
     unsure = None
     if uncertainty:
-        from picchio.studies.uncertainty import default_inputs
+        from picchio.studies.uncertainty.inputs import default_inputs
 
         inputs = default_inputs(work) | asked
         with progress("samples") as tick:

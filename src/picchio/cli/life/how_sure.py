@@ -12,7 +12,7 @@ from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
     from picchio.fatigue.uncertain_lives import Uncertain
-    from picchio.studies.uncertainty import UncertainLife
+    from picchio.studies.uncertainty.result import UncertainLife
 
 
 def parse_spreads(given: Sequence[str]) -> dict[str, Uncertain]:

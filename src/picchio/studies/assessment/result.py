@@ -20,7 +20,7 @@ from picchio.studies.assessment.verdict import Verdict, judge
 
 if TYPE_CHECKING:
     from picchio.fatigue.uncertain_lives import LifeSpread
-    from picchio.studies.uncertainty import UncertainLife
+    from picchio.studies.uncertainty.result import UncertainLife
 
 # What an assessment found: the life of every joint, and where it goes.
 

@@ -37,7 +37,8 @@ from picchio.studies.assessment.result import Assessment, JointLife, OperationRe
 from picchio.studies.rivet.life_rules import LifeRule, PaperRule, RainflowRule, curves_of, peak
 from picchio.studies.rivet.pose import Rivet, need_springs
 from picchio.studies.tasks import Operation, Task
-from picchio.studies.uncertainty import UncertainLife, uncertain_life
+from picchio.studies.uncertainty.result import UncertainLife
+from picchio.studies.uncertainty.run import uncertain_life
 
 Method = Literal["rainflow", "paper"]
 METHODS: tuple[Method, ...] = ("rainflow", "paper")

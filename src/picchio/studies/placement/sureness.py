@@ -14,7 +14,8 @@ from picchio.studies.placement.search import Spot
 from picchio.studies.placement.work import Work
 from picchio.studies.rivet.variation import ShaftStress
 from picchio.studies.tasks import Task
-from picchio.studies.uncertainty import Cases, Drawn, interval
+from picchio.studies.uncertainty.cases import Cases
+from picchio.studies.uncertainty.drawn import Drawn, interval
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator
 from picchio.fatigue.miner import format_count
 from picchio.robot.units import labelled
 from picchio.studies.assessment.result import Assessment
-from picchio.studies.uncertainty import LifeScan, UncertainLife
+from picchio.studies.uncertainty.result import LifeScan, UncertainLife
 from picchio.visuals.plots.style import (
     BLUE,
     COLOURS,

@@ -19,7 +19,7 @@ from picchio.studies.backwards import Allowable, AllowableLoads
 from picchio.studies.comparison import listed
 from picchio.studies.envelopes import envelope
 from picchio.studies.tasks import Task
-from picchio.studies.uncertainty import UncertainLife
+from picchio.studies.uncertainty.result import UncertainLife
 from picchio.visuals.plots.force import plot_force_spectrum, plot_force_train
 from picchio.visuals.plots.frequency import plot_mode_shapes
 from picchio.visuals.plots.life import (
