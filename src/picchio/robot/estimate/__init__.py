@@ -1,0 +1,1 @@
+"""What nobody gave of a robot, estimated: as a sidecar in memory, and as a file to edit."""

@@ -1,0 +1,114 @@
+"""The sidecar that stands in where a robot has none: its probable drives, each with its spread.
+
+What is used in memory and what `picchio start` writes is this one record, its numbers rounded
+here, so that both give the same life.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from picchio.robot.annotations.sidecar import JointEntry, Sidecar, spreads_of
+from picchio.robot.drives.priors import DrivePriors, JointPrior, drive_priors
+from picchio.robot.spread import Posterior
+from picchio.robot.tool import Tool
+
+if TYPE_CHECKING:
+    from picchio.robot.drives.reducer import Reducer
+    from picchio.robot.flexible_robot import FlexibleRobot
+
+_DIGITS = 3
+_NEARLY = 0.99  # off the diagonal, where rounding left a matrix that no variables can have
+
+
+def estimated_sidecar(
+    robot: FlexibleRobot,
+    *,
+    payload: float | None = None,
+    reach: float | None = None,
+    drive_class: str | None = None,
+    reducers: Mapping[str, str | Reducer] | None = None,
+) -> Sidecar:
+    """A robot's probable drives, as a sidecar would have them.
+
+    Args:
+        robot: loaded; it may be rigid.
+        payload: kg, see `picchio.robot.drives.priors.drive_priors`; likewise the rest.
+        reach: m.
+        drive_class: of the drives.
+        reducers: by joint.
+
+    Returns:
+        every value with its spread, marked as an estimate; `source` says what it rests on.
+
+    Raises:
+        InputError: as `drive_priors`.
+    """
+    priors = drive_priors(
+        robot, payload=payload, reach=reach, drive_class=drive_class, reducers=reducers
+    )
+    return as_sidecar(robot, priors, reducers)
+
+
+def as_sidecar(
+    robot: FlexibleRobot,
+    priors: DrivePriors,
+    reducers: Mapping[str, str | Reducer] | None = None,
+) -> Sidecar:
+    """Drive priors as a sidecar.
+
+    Args:
+        robot: whose they are.
+        priors: the drives.
+        reducers: those given, by joint.
+    """
+    named = {
+        joint: one if isinstance(one, str) else one.name for joint, one in (reducers or {}).items()
+    }
+    joints = {one.name: _entry(one, named.get(one.name)) for one in priors.joints}
+    known = {spread.name for spread in spreads_of(Sidecar(joint=joints))}
+    posterior = priors.posterior().among(known)
+    return Sidecar(
+        robot=robot.name,
+        description=f"{robot.name}: drives estimated, none was measured",
+        joint=joints,
+        tool=Tool(frame=robot.tool_frame),
+        posterior=None if posterior is None else _rounded(posterior),
+    )
+
+
+def rounded(value: float) -> float:
+    """To three significant digits: an estimate has no more.
+
+    Args:
+        value: any.
+    """
+    return float(f"{value:.{_DIGITS}g}")
+
+
+def _entry(prior: JointPrior, reducer: str | None) -> JointEntry:
+    values: dict[str, Any] = {
+        "stiffness": rounded(prior.stiffness),
+        "stiffness_spread": rounded(prior.stiffness_spread),
+        "damping_ratio": rounded(prior.damping_ratio),
+        "damping_ratio_spread": rounded(prior.damping_ratio_spread),
+        "source": f"estimate: {'; '.join(prior.reasons)}",
+        "estimated": True,
+    }
+    if reducer is not None:
+        values["reducer"] = reducer
+    return JointEntry(**values)
+
+
+def _rounded(posterior: Posterior) -> Posterior:
+    """Correlations to three decimals, such as variables can have."""
+    exact = np.array(posterior.correlation)
+    matrix = exact.round(_DIGITS)
+    while np.linalg.eigvalsh(matrix)[0] < 0.0:
+        exact = _NEARLY * exact + (1.0 - _NEARLY) * np.eye(len(exact))
+        matrix = exact.round(_DIGITS)
+    rows = tuple(tuple(row) for row in (matrix + 0.0).tolist())
+    return Posterior(names=posterior.names, correlation=rows)
