@@ -64,6 +64,9 @@ def as_sidecar(
         robot: whose they are.
         priors: the drives.
         reducers: those given, by joint.
+
+    Returns:
+        the record, its numbers rounded.
     """
     named = {
         joint: one if isinstance(one, str) else one.name for joint, one in (reducers or {}).items()
@@ -85,6 +88,9 @@ def rounded(value: float) -> float:
 
     Args:
         value: any.
+
+    Returns:
+        the rounded value.
     """
     return float(f"{value:.{_DIGITS}g}")
 
