@@ -67,6 +67,9 @@ def test_every_shipped_curve_says_where_it_comes_from(name: str) -> None:
     if curve.warning == "":
         assert curve.survival is not None
         assert curve.ultimate_shear is not None
+        if curve.kind == "torque":  # the drive's limits stand in place of a yield point
+            assert curve.allowable < 1.0 < curve.ultimate_shear
+            return
         # A fatigue strength above the yield point at the knee would be no shaft steel's.
         assert curve.yield_shear is not None
         assert curve.allowable < curve.yield_shear < curve.ultimate_shear

@@ -83,10 +83,11 @@ def test_wrists_are_told_worse_and_errors_hang_together() -> None:
                for low, high in [joint.stiffness_range])  # fmt: skip
     correlation = np.array(found.posterior().correlation)
     assert correlation[0, 1] > 0.3
-    assert correlation[0, 6] == 0.0  # stiffness and damping
     names = found.posterior().names
     assert names[0] == "stiffness.joint_1"
-    assert root_of(names, found.posterior()).shape == (12, 12)
+    assert correlation[0, names.index("damping_ratio.joint_1")] == 0.0
+    assert correlation[0, names.index("strength.repeated_peak_torque.joint_1")] > 0.0
+    assert root_of(names, found.posterior()).shape == (18, 18)
     assert "ring at" in found.joints[0].reasons[1]
     assert json.dumps(found.to_dict())
     assert "wrist" in found._repr_html_()

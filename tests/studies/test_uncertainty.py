@@ -19,7 +19,7 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
 from picchio.robot.varied import robot_with
 from picchio.studies.assessment.run import assess
-from picchio.studies.rivet.variation import ShaftStress
+from picchio.studies.rivet.variation import WornParts
 from picchio.studies.tasks import Task, task_from_dict
 from picchio.studies.uncertainty.inputs import DEFAULT_INPUTS, inputs_of
 from picchio.studies.uncertainty.run import uncertain_life
@@ -101,7 +101,7 @@ def test_any_model_is_varied_whole(robot: FlexibleRobot, task: Task, effect: str
     }[effect]
     key, factor = ("damping_ratio", 40.0) if effect is None else ("stiffness", 0.7)
     model = Model(robot).with_effects(given)
-    stress = ShaftStress.of(robot, STEEL)
+    stress = WornParts.of(robot, STEEL)
     inputs = inputs_of(model, task, stress, {key: Uncertain(1.0, 1.0)}, [])
     drawn = Sampler(model, task, stress, inputs).run(np.array([[math.log(factor)]]))
     joints = tuple(
@@ -230,7 +230,7 @@ def test_a_drawn_world_is_assess_on_the_changed_robot(
         yielding.append([joint.yield_utilisation for joint in told.joints])
         geared.append(told.joints[1].reducer_utilisation)
     np.testing.assert_allclose(found.lives[:3], lives, rtol=1e-4)
-    model, stress = Model(robot), ShaftStress.of(robot, STEEL, mean_stress=rule)
+    model, stress = Model(robot), WornParts.of(robot, STEEL, mean_stress=rule)
     rows = Draws(len(spreads), 3).more().reshape(-1, len(spreads))[:3]
     drawn = Sampler(model, task, stress, inputs_of(model, task, stress, {}, [])).run(rows)
     np.testing.assert_allclose(drawn.yielding.T, yielding, rtol=1e-5)

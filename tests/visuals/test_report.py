@@ -12,7 +12,7 @@ import pytest
 from lxml import html as lxml_html
 
 import picchio
-from picchio.robot.drives.reducer import TorqueLimit
+from picchio.robot.ratings import TorqueLimit
 from picchio.visuals.report.assessment import assessment_report
 
 OUTSIDE = re.compile(

@@ -355,7 +355,7 @@ def _joint(robot: FlexibleRobot, joint: Joint) -> dict[str, Any]:
     found: dict[str, Any] = {"stiffness": joint.stiffness, "damping_ratio": joint.damping_ratio}
     if joint.stiffness_curve is not None:
         del found["stiffness"]
-    for key in ("stiffness_curve", "rotor_inertia", "gear_ratio", "shaft", "balancer"):
+    for key in ("stiffness_curve", "rotor_inertia", "gear_ratio", "shaft", "strength", "balancer"):
         if (value := getattr(joint, key)) is not None:
             model = isinstance(value, StrictModel)
             found[key] = value.model_dump(exclude_none=True) if model else value
@@ -365,7 +365,8 @@ def _joint(robot: FlexibleRobot, joint: Joint) -> dict[str, Any]:
         found["estimated"] = True
     for spread in robot.spreads.values():
         if spread.table == "joint" and spread.owner == joint.name and len(spread.path) == 1:
-            found |= {} if spread.estimated else {f"{spread.path[0]}_spread": math.exp(spread.size)}
+            usual = spread.estimated and math.isclose(spread.size, math.log(ESTIMATED))
+            found |= {} if usual else {f"{spread.path[0]}_spread": math.exp(spread.size)}
     if joint.estimated:  # not of values that are no estimates, whatever source they are from
         sure = [key for key in ("stiffness", "damping_ratio") if key in found
                 and f"{key}.{joint.name}" not in robot.spreads]  # fmt: skip

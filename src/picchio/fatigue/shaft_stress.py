@@ -13,17 +13,16 @@ from picchio.robot.joint import Joint, Shaft
 
 
 def stress_per_torque(joints: Iterable[Joint], without: float = math.nan) -> FloatArray:
-    """The shear stress of a unit torque: r / Jp of every joint's shaft.
+    """What a unit torque brings in the part of every joint that wears: `Joint.per_torque`.
 
     Args:
         joints: n of them.
-        without: the number for a joint without a shaft.
+        without: the number for a joint without such a part.
 
     Returns:
-        (n,) 1/m^3.
+        (n,) 1/m^3 of a shaft, r / Jp; 1/(N m) of a drive.
     """
-    shafts = [joint.shaft for joint in joints]
-    return np.array([s.radius / s.polar_moment if s else without for s in shafts])
+    return np.array([joint.per_torque if joint.worn else without for joint in joints])
 
 
 def shear_stress(torque: npt.ArrayLike, shaft: Shaft) -> FloatArray:

@@ -85,6 +85,22 @@ class ManyPoses:
             return np.zeros_like(self.stiffness)
         return self._held(self._rigid)
 
+    def static_torque(self, preload: float, along: FloatArray) -> FloatArray:
+        """(p, n) N m, through the springs before the first blow: feed force and gravity.
+
+        Args:
+            preload: N, the feed force.
+            along: (3,) or (p, 3), its direction as programmed.
+        """
+        static = -self.gravity_torque()
+        if not preload:
+            return static
+        jacobian = self.mass_and_jacobian()[1]
+        return np.asarray(
+            static
+            + preload * np.einsum("pdn,pd->pn", jacobian, np.broadcast_to(along, (len(static), 3)))
+        )
+
     def _held(self, rigid: RigidModel) -> FloatArray:
         robot, index = self._robot, self._robot.flexible_index
         held = np.array([rigid.gravity_torque(pose) for pose in self._poses])

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, model_validator
 
 from picchio.core.arrays import Vector
 from picchio.core.toml import Finite, FiniteVector, Name, NotNegative, Positive, StrictModel
+from picchio.robot.ratings import Ratings
 from picchio.robot.spread import with_spreads
 from picchio.robot.units import JointUnits, units_of
 
@@ -162,6 +163,29 @@ class Shaft(StrictModel):
         return self.shear_modulus * self.polar_moment / self.length
 
 
+@with_spreads
+class Strength(StrictModel, Ratings):
+    """What a drive bears, where its reducer is not known: an estimate of ratings and fatigue.
+
+    Attributes:
+        repeated_peak_torque: N m, limit of peaks that belong to the duty, of gravity and blows
+            together; the torque-life curve counts in shares of it.
+        rated_torque: N m, for which a life is stated at speed; for information, no limit at
+            standstill.
+        momentary_peak_torque: N m, limit for emergencies.
+        life_curve: name of a shipped torque-life curve, or a `picchio-sn-curve/1` file.
+        estimated: true if the values were not read from a catalogue: a factor of 2 where no
+            spread is given.
+    """
+
+    repeated_peak_torque: Positive
+    rated_torque: Positive | None = None
+    momentary_peak_torque: Positive | None = None
+    life_curve: Name | None = None
+    estimated: bool | None = None
+
+
+ESTIMATED_DRIVE = "drive (estimated)"
 # The spring on which a gun's body slides.
 RECOIL_JOINT = "gun_recoil"
 
@@ -186,6 +210,7 @@ class Joint:
         damping_ratio: modal, dimensionless.
         shaft: the shaft in the drive, where it is known.
         reducer: its reducer, where it is known.
+        strength: what the drive probably bears, where its reducer is not known.
         effort_limit: N m or N; infinite where there is none.
         lower: position limit, rad or m; -inf where there is none.
         upper: position limit, rad or m; inf where there is none.
@@ -202,6 +227,7 @@ class Joint:
     damping_ratio: float
     shaft: Shaft | None = None
     reducer: Reducer | None = None
+    strength: Strength | None = None
     effort_limit: float = math.inf
     lower: float = -math.inf
     upper: float = math.inf
@@ -215,3 +241,31 @@ class Joint:
     def units(self) -> JointUnits:
         """How its values are written."""
         return units_of(self.kind)
+
+    @property
+    def ratings(self) -> Reducer | Strength | None:
+        """What says how much torque its drive bears: the reducer, else an estimate."""
+        return self.reducer or self.strength
+
+    @property
+    def drive(self) -> str:
+        """What to call that."""
+        return f"reducer {self.reducer.name}" if self.reducer else ESTIMATED_DRIVE
+
+    @property
+    def worn(self) -> Shaft | Strength | None:
+        """The part whose fatigue is counted: its shaft, else the drive as a whole."""
+        return self.shaft or self.strength
+
+    @property
+    def per_torque(self) -> float:
+        """What a unit torque brings in that part; NaN without one.
+
+        1/m^3 in a shaft: shear stress, r / Jp. 1/(N m) in a drive: share of the torque for
+        repeated peaks.
+        """
+        if self.shaft is not None:
+            return self.shaft.radius / self.shaft.polar_moment
+        if self.strength is not None:
+            return 1.0 / self.strength.repeated_peak_torque
+        return math.nan

@@ -134,7 +134,7 @@ class Spread:
         size: one standard deviation: of the natural logarithm, or of the value if not `log`.
         log: whether the logarithm is normal; otherwise the value is.
         source: where it is from.
-        estimated: no spread was stated: the value is an estimate, and the factor is `ESTIMATED`.
+        estimated: the value is an estimate, within a factor of `ESTIMATED` if not said otherwise.
         component: which number of a vector varies; None for all of it.
     """
 
@@ -232,7 +232,7 @@ def spreads_in(
         place = (table, owner, (*path, key), number)
         if std is None:
             size = math.log(factor if factor is not None else ESTIMATED)
-            yield Spread(*place, size, True, source, factor is None)
+            yield Spread(*place, size, True, source, key in guessed)
         elif isinstance(number, tuple):
             for k in range(len(number)):
                 yield Spread(*place, float(std), False, source, component=k)

@@ -27,11 +27,11 @@ from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, load_sn_curve
 from picchio.model.model import Model
 from picchio.robot.drives.reducer import Reducer, all_reducers
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.robot.joint import Joint, is_drive
+from picchio.robot.joint import Joint, Strength, is_drive
 from picchio.studies.assessment.verdict import SHAFT_TOLERANCE, Status, softer
-from picchio.studies.rivet.life_rules import curves_of
+from picchio.studies.rivet.life_rules import RainflowRule, curves_of
 from picchio.studies.rivet.pose import JointLoad, need_springs
-from picchio.studies.rivet.variation import ShaftStress, VariedRivet, rivets_of
+from picchio.studies.rivet.variation import VariedRivet, WornParts, rivets_of
 from picchio.studies.tasks import Task
 from picchio.studies.uncertainty.cases import Cases
 from picchio.studies.uncertainty.drawn import interval
@@ -209,7 +209,7 @@ class AllowableLoads(TableResult):
                 "No force of the blows is small enough: gravity and feed force alone are too much."
             )
         least = min(self.joints, key=lambda joint: joint.force_factor)
-        part = "reducer" if least.governed_by == "reducer" else "shaft"
+        part = "drive" if least.governed_by == "reducer" else "shaft"
         if (ends := self.intervals.get("force")) is not None:
             return f"The force may be {told_ends(ends)} N in 80 % of the drawn cases."
         start = "The" if self.held is None else "At the stated values, which are uncertain, the"
@@ -336,7 +336,8 @@ def allowable(
         _Parts(joint, curve, steel, residue, mean_stress)
         for joint, curve in zip(model.robot.flexible_joints, curves, strict=True)
     ]
-    catalogue = all_reducers(reducers) | {p.reducer.name: p.reducer for p in parts if p.reducer}
+    named = [joint.reducer for joint in model.robot.flexible_joints if joint.reducer]
+    catalogue = all_reducers(reducers) | {reducer.name: reducer for reducer in named}
     search = _Backwards(model, task, rivets, survival, parts, sorted(catalogue.values(), key=_size))
     joints = tuple(search.joint(k) for k, part in enumerate(parts) if is_drive(part.joint.name))
     factor = search.force_of_all(min(joint.force_factor for joint in joints))
@@ -344,7 +345,7 @@ def allowable(
     held: float | None = None
     intervals: dict[str, Any] = {}
     notes = [*model.without_load(), *search.notes(joints)]
-    if model.robot.spreads and any(part.curve or part.reducer for part in parts):
+    if model.robot.spreads and any(part.curve or part.ratings for part in parts):
         held, intervals = search.drawn(factor, strongest, notes)
     return AllowableLoads(
         joints,
@@ -402,9 +403,10 @@ class _Load:
         keys = ("range", "mean", "low", "high")
         return dataclasses.replace(self, **{key: getattr(self, key) * factor for key in keys})
 
-    def stress(self, per: float) -> Cycles:
-        """The cycles of stress, Pa, where a torque brings `per` times as much."""
-        return Cycles.trusted(self.range * per, (self.mean + self.steady) * per, self.count)
+    def stress(self, per: float, curve: SNCurve) -> Cycles:
+        """The cycles that a curve counts, Pa or 1, where a torque brings `per` times as much."""
+        width = self.range * per * curve.raised_by(self.steady * per)
+        return Cycles.trusted(width, (self.mean + self.steady) * per, self.count)
 
     @property
     def swing(self) -> float:
@@ -434,8 +436,8 @@ class _Parts:
     mean_stress: Rule
 
     @property
-    def reducer(self) -> Reducer | None:
-        return self.joint.reducer
+    def ratings(self) -> Reducer | Strength | None:
+        return self.joint.ratings
 
     @property
     def contrary(self) -> str:
@@ -453,13 +455,14 @@ class _Parts:
 
     @property
     def per_torque(self) -> float:
-        """1/m^3, the stress of a unit torque."""
-        return 2.0 / (math.pi * self.radius**3)
+        """1/m^3, the stress of a unit torque; 1/(N m) of a drive."""
+        return self.joint.per_torque if self.joint.worn else 2.0 / (math.pi * self.radius**3)
 
     def spent(self, load: _Load, curve: SNCurve, factor: float = 1.0) -> float:
-        """Damage of the shaft in a pass, its stresses times a factor; inf at its strength."""
+        """Damage of what wears in a pass, its stresses times a factor; inf at its strength."""
+        rule = RainflowRule(self.residue, self.mean_stress).of(curve)[0]
         try:
-            return damage(load.stress(factor * self.per_torque), curve, self.mean_stress)
+            return damage(load.stress(factor * self.per_torque, curve), curve, rule)
         except InputError:  # mean and amplitude together are above the static strength
             return math.inf
 
@@ -468,12 +471,14 @@ class _Parts:
     ) -> dict[str, float]:
         """Of fatigue and of yield, the stresses times a factor."""
         per = factor * self.per_torque
-        strength = curve.yield_shear or curve.ultimate_shear or math.inf
         spent = self.spent(load, curve, factor)
-        scores = {"shaft": _log(spent / limit), "yield": _log(per * load.peak / strength)}
+        if curve.kind == "torque":
+            return {"drive": _log(spent / limit)}
+        strength = np.nan_to_num(curve.static_strength, nan=math.inf)
+        scores = {"shaft": _log(spent / limit), "yield": _log(per * load.peak / float(strength))}
         if spent == 0.0 or limit < spent < math.inf:
             # At an endurance limit the damage leaps; the stress does not.
-            used = _log(utilisation(load.stress(per), curve, self.mean_stress))
+            used = _log(utilisation(load.stress(per, curve), curve, self.mean_stress))
             if spent == 0.0:
                 scores["shaft"] = min(used, 0.0)
             elif used > 0.0:
@@ -483,8 +488,8 @@ class _Parts:
     def scores(self, load: _Load, limit: float) -> dict[str, float]:
         """Of every part that the joint has."""
         found = self.shaft_scores(load, self.curve, limit) if self.curve else {}
-        if self.reducer is not None:
-            shares = self.reducer.shares(load.peak, load.held)
+        if self.ratings is not None:
+            shares = self.ratings.shares(load.peak, load.held)
             found["reducer"] = _log(max(shares.values()))
         return found
 
@@ -500,15 +505,16 @@ class _Parts:
                 f"gravity and blows take the shaft of {name} to {math.exp(scores['yield']):.3g} "
                 "times its yield strength"
             )
-        if worst == "shaft":
+        if worst in ("shaft", "drive"):
             assert self.curve is not None
             life = per_pass / self.spent(load, self.curve)
-            return f"the shaft of {name} survives {format_count(life)} rivets"
-        assert self.reducer is not None
-        shares = self.reducer.shares(load.peak, load.held)
+            part = "shaft" if worst == "shaft" else self.joint.drive
+            return f"the {part} of {name} survives {format_count(life)} rivets"
+        assert self.ratings is not None
+        shares = self.ratings.shares(load.peak, load.held)
         most = max(shares, key=lambda key: shares[key])
         return (
-            f"gravity and blows take the reducer {self.reducer.name} of {name} to "
+            f"gravity and blows take the {self.joint.drive} of {name} to "
             f"{shares[most]:.3g} times its {most}"
         )
 
@@ -575,12 +581,12 @@ class _Backwards:
             rivets=self.rivets,
             survival=self.survival,
             force_factor=force,
-            radius=math.nan if slide and not curve else radius,
+            radius=math.nan if slide and part.joint.shaft is None else radius,
             hits=self._most_hits(k) if moved and has_part else None,
             life=self.task.rivets_per_pass / spent if spent else math.inf,
             met=not failing if has_part else None,
             most_rivets=self._most_rivets(k),
-            governed_by=governor,
+            governed_by="reducer" if governor == "drive" else governor,
             reducer=None if slide else self._reducer(load),
             peak_torque=load.peak,
             failing=failing,
@@ -614,6 +620,9 @@ class _Backwards:
     def _radius(self, k: int) -> float:
         """m, the least that bears the torques as they are."""
         part, load = self.parts[k], self.load(k)
+        if part.joint.shaft is None:
+            bare = dataclasses.replace(part.joint, strength=None)
+            part = dataclasses.replace(part, joint=bare, curve=None)
         curve = part.curve or part.steel
         # A thinner shaft raises every stress of the same torques.
         slimmer = largest_factor(
@@ -669,7 +678,7 @@ class _Backwards:
     ) -> tuple[float, dict[str, Any]]:
         """The share of the drawn cases that hold, and the intervals of what is allowed."""
         known = [(j, part, part.curve) for j, part in enumerate(self.parts) if part.curve]
-        stress = ShaftStress(
+        stress = WornParts(
             [part.joint for _, part, _ in known],
             [j for j, _, _ in known],
             [dataclasses.replace(curve, scatter=0.0) for _, _, curve in known if curve],
@@ -714,7 +723,7 @@ class _Backwards:
 
     def notes(self, joints: tuple[Allowable, ...]) -> Iterator[str]:
         """What an answer leaves out."""
-        names = [part.joint.name for part in self.parts if part.curve is None]
+        names = [part.joint.name for part in self.parts if part.joint.shaft is None]
         bare = [name for name in names if is_drive(name)]
         if bare:
             steel = self.parts[0].steel.name

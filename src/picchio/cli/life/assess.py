@@ -272,6 +272,9 @@ _ROUNDING = 1e-9
 def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
     """Print an assessment."""
     out = console()
+    if found.notice:
+        out.print(f"{found.notice}.", style="bold yellow")
+        out.print()
     passes = sum(len(op.poses) * op.rivets for op in found.operations)
     out.print(styled(found.robot, f" on {task.name}: {count_of(passes, 'rivet')} a pass"))
     for blows in dict.fromkeys(_blows(operation) for operation in found.operations):
@@ -284,7 +287,7 @@ def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
                     f"({x:.3g}, {y:.3g}, {z:.3g})"
                 )
     out.print()
-    out.print(_life_table(found))
+    out.print(_estimated_table(found) if found.notice else _life_table(found))
     reducers = [
         (j.name, j.reducer, j.reducer_governed_by or "-",
          *([_number(one.torque), _number(one.limit)] if (one := j.reducer_governing) else "--"),
@@ -353,6 +356,22 @@ def _life_table(found: Assessment) -> FittedTable:
     for row, joint in zip(made.rows, found.joints, strict=True):
         row.style = "bold" if joint.name == found.verdict.joint else None
     return made
+
+
+def _estimated_table(found: Assessment) -> FittedTable:
+    """The joints of a robot whose drives are estimates: intervals only."""
+    joints = found.joints
+    load, torques = column([j.units.load for j in joints], [j.told_interval("peak_torque")
+                                                            for j in joints])  # fmt: skip
+    rows = [
+        (j.name, torque, j.told_percent("reducer_utilisation"), j.told_percent("utilisation"),
+         j.told_life if j.worn else "unknown",
+         "-" if math.isnan(j.ends_first) else f"{100 * j.ends_first:.0f}")
+        for j, torque in zip(joints, torques, strict=True)
+    ]  # fmt: skip
+    heads = ("joint", f">peak\ntorque\n{load}", ">of its\nlimit\n%", ">fatigue:\nused\n%",
+             ">rivets to\nfailure\n", ">ends\nfirst\n%")  # fmt: skip
+    return table(heads, rows, title="The joints, P10 to P90 (gravity and blows together)")
 
 
 def _share_table(found: Assessment) -> FittedTable:

@@ -43,6 +43,40 @@ def parse_spreads(given: Sequence[str]) -> dict[str, Uncertain]:
     return found
 
 
+# Of many inputs, those that explain less than this share alone are only named.
+_MANY, _SMALL = 8, 0.02
+# Measurements that are listed.
+_BEST = 6
+
+
+def _show_measurements(found: UncertainLife) -> None:
+    """Print what to measure first."""
+    best = found.measure_first[:_BEST]
+    if not best:
+        return
+    out = console()
+    known = not math.isnan(best[0].interval_decades[0])
+    rows = []
+    for one in best:
+        left = f"{one.interval_decades[1]:.1f}" if known else f"{100 * one.kept:.0f}"
+        rows.append([one.words, left])
+    if known:
+        title = (
+            "What to measure first: the life's interval is now "
+            f"{best[0].interval_decades[0]:.1f} powers of ten wide"
+        )
+    else:
+        title = "What to measure first: what is left of the interval of the utilisation"
+    heads = ["to know", ">powers of\nten left" if known else ">left,\n%"]
+    out.print(table(heads, rows, title=title))
+    told: dict[str, str] = {}
+    for one in best:
+        if one.command is not None and one.command not in told.values():
+            told[one.what] = one.command
+    for what, command in told.items():
+        out.print(f"  {what}: {command}", style="dim")
+
+
 def show_spread(found: UncertainLife) -> None:
     """Print how sure the lives are.
 
@@ -51,7 +85,9 @@ def show_spread(found: UncertainLife) -> None:
     """
     out = console()
     rows = []
-    for name, spread in {**found.joints, "robot": found.robot}.items():
+    # Of estimates the joints' intervals stand in their table already.
+    joints = {} if found.estimated else found.joints
+    for name, spread in {**joints, "robot": found.robot}.items():
         if spread.p10 == spread.p90:
             rows.append([name, "P10 to P90", format_count(spread.p50), ""])
             continue
@@ -67,6 +103,8 @@ def show_spread(found: UncertainLife) -> None:
     ))  # fmt: skip
     robot = found.robot
     named = sorted(found.inputs, key=lambda name: -robot.shares[name])
+    small = [name for name in named if robot.shares[name] < _SMALL] if len(named) > _MANY else []
+    named = [name for name in named if name not in small]
     inputs = []
     for name in named:
         shares = [f"{100 * robot.shares[name]:.0f}"]
@@ -78,6 +116,9 @@ def show_spread(found: UncertainLife) -> None:
         ["what varies", "by", *heads, "from"], inputs,
         title="Where the doubt is from: shares of the variance",
     ))  # fmt: skip
+    if small:
+        out.print(f"Below {100 * _SMALL:g} % each: {', '.join(small)}.", style="dim")
+    _show_measurements(found)
     for name, scan in found.scans.items():
         lines = [
             [f"{scan.factor[k]:.3g}", format_count(float(f"{scan.life[k]:.3g}"))]

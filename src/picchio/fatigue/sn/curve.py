@@ -1,4 +1,7 @@
-"""S-N curves in shear.
+"""S-N curves in shear, and torque-life curves of whole drives.
+
+A torque-life curve (kind "torque") has a drive's torque amplitude over its limit for repeated peaks
+in place of a stress: where another curve has Pa, it has 1.
 
 A curve is straight lines in log amplitude over log cycles (Basquin), steepest first, with an
 endurance limit beyond the last knee or without one. The life of a scalar, of an array, and the
@@ -19,11 +22,14 @@ import numpy.typing as npt
 from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError
 
+Kind = Literal["shear", "torque"]
 MinerRule = Literal["original", "elementary", "haibach"]
 MINER_RULES: tuple[MinerRule, ...] = get_args(MinerRule)
 
 ALLOWABLE_CYCLES = 1e7
 """Where the allowable is read from a curve that has no endurance limit."""
+# A steady load this near to what breaks a drive alone is beyond its limits anyway.
+_MOST_STEADY = 0.95
 _POSITIVE = (
     "strength", "cycles", "slopes", "knees", "ultimate_shear", "yield_shear", "tensile_strength",
 )  # fmt: skip
@@ -52,7 +58,8 @@ class SNCurve:
         warning: why not to use it for real work, if there is a reason.
         unverified: which of its numbers nobody has held against a source, if any.
         assumptions: what was changed since, in words, to print with a result.
-        kind: always "shear".
+        kind: "shear", or "torque" (amplitudes are shares of a drive's torque for repeated peaks;
+            `ultimate_shear` is the share that a steady torque alone would have to reach).
 
     Raises:
         InputError: values that do not make a curve.
@@ -73,7 +80,7 @@ class SNCurve:
     warning: str = ""
     unverified: str = ""
     assumptions: tuple[str, ...] = ()
-    kind: Literal["shear"] = "shear"
+    kind: Kind = "shear"
     _knots: FloatArray = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -83,8 +90,9 @@ class SNCurve:
         object.__setattr__(self, "_knots", self._knot_amplitudes())
 
     def _check(self) -> None:
-        if self.kind != "shear":
-            raise InputError("must be a shear curve", key="kind", value=self.kind)
+        if self.kind not in get_args(Kind):
+            raise InputError("no such kind of curve", key="kind", value=self.kind,
+                             choices=get_args(Kind))  # fmt: skip
         if self.miner not in MINER_RULES:
             raise InputError("unknown rule", key="miner", value=self.miner, choices=MINER_RULES)
         for name in _POSITIVE:
@@ -116,6 +124,46 @@ class SNCurve:
         """Pa, the endurance limit, or the strength at 1e7 cycles where there is none."""
         limit = self.endurance_limit
         return float(self.amplitude(ALLOWABLE_CYCLES)) if limit is None else limit
+
+    def told(self, amplitude: float) -> str:
+        """An amplitude as people read it.
+
+        Args:
+            amplitude: Pa, or a share.
+        """
+        if self.kind == "shear":
+            return f"{amplitude / 1e6:.4g} MPa"
+        return f"{100.0 * amplitude:.4g} % of the torque for repeated peaks"
+
+    @property
+    def title(self) -> str:
+        """What kind of curve it is, in words."""
+        return "S-N curve" if self.kind == "shear" else "torque-life curve"
+
+    @property
+    def static_strength(self) -> float:
+        """Pa in shear, at which a shaft yields, or else breaks; NaN where not known.
+
+        A drive has limits of its own in its place.
+        """
+        if self.kind == "torque":
+            return math.nan
+        return self.yield_shear or self.ultimate_shear or math.nan
+
+    def raised_by(self, steady: npt.ArrayLike) -> FloatArray:
+        """What a steady load makes of every amplitude beside it: a factor.
+
+        1 in shear, where smooth shafts do not feel it; a rule for the mean stress may be asked for.
+        Teeth do: a drive's amplitudes are divided by 1 - T / T_u (Goodman), T_u from the 0.7 by
+        which ISO 6336-3 lowers a tooth's strength from pulsating to reversed loads.
+
+        Args:
+            steady: (...) Pa, or shares; either sign.
+        """
+        share = np.abs(np.asarray(steady, dtype=float))
+        if self.kind == "shear" or self.ultimate_shear is None:
+            return np.ones_like(share)
+        return np.asarray(1.0 / (1.0 - np.minimum(share / self.ultimate_shear, _MOST_STEADY)))
 
     def cycles_to_failure(self, amplitude: npt.ArrayLike) -> FloatArray:
         """Life at a stress amplitude.
@@ -215,14 +263,14 @@ class SNCurve:
         facts = {
             "slopes": self.slopes,
             "knees [cycles]": self.knees or None,
-            "endurance limit [MPa]": "none" if limit is None else 1e-6 * limit,
+            "endurance limit": "none" if limit is None else self.told(limit),
             "Miner below it": None if limit is None else self.miner,
             "survival": self.survival,
             "scatter of log10 strength": self.scatter,
             "source": self.source or None,
             "assumed": "; ".join(self.assumptions) or None,
         }
-        return sheet(f"S-N curve {self.name}, in shear", facts, note=self.warning)
+        return sheet(f"{self.title} {self.name}", facts, note=self.warning)
 
     def describe(self) -> str:
         """One line for a report: the curve's numbers and what was assumed."""
@@ -232,13 +280,13 @@ class SNCurve:
             "no endurance limit"
             if limit is None
             else (
-                f"endurance limit {limit / 1e6:.4g} MPa at {self.knees[-1]:.3g} cycles, "
+                f"endurance limit {self.told(limit)} at {self.knees[-1]:.3g} cycles, "
                 f"Miner {self.miner}"
             )
         )
         chance = "" if self.survival is None else f", survival {self.survival:g}"
         notes = "".join(f"; {note}" for note in self.assumptions)
-        return f"{self.name} (shear): slope {lines}, {end}{chance}{notes}"
+        return f"{self.name} ({self.kind}): slope {lines}, {end}{chance}{notes}"
 
     def to_dict(self) -> dict[str, Any]:
         """Its values and what follows from them, for JSON."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Literal
 
 from picchio.core.errors import InputError, warn_user
 from picchio.core.results import plain
 from picchio.core.toml import Positive, StrictModel, parse_toml
-from picchio.fatigue.sn.curve import MinerRule, SNCurve
+from picchio.fatigue.sn.curve import Kind, MinerRule, SNCurve
 
 DEFAULT_SN_CURVE = "42CrMo4-QT-shaft"
+DEFAULT_LIFE_CURVE = "drive-teeth"
 PAPER_SN_CURVE = "nie-2016"
 SN_FORMAT = "picchio-sn-curve/1"
 
@@ -22,7 +22,8 @@ class SNCurveFile(StrictModel):
 
     Attributes:
         name: of the curve.
-        kind: of stress; convert normal stresses to shear first.
+        kind: shear (convert normal stresses first), or torque: every Pa here is then 1, a share
+            of a drive's torque for repeated peaks.
         strength: Pa, shear amplitude, fully reversed, that is survived for `cycles` cycles.
         cycles: cycles, where on the curve `strength` is given.
         slopes: 1, k of N ~ amplitude^-k, one for each line, from few cycles to many.
@@ -42,7 +43,7 @@ class SNCurveFile(StrictModel):
     """
 
     name: str
-    kind: Literal["shear"]
+    kind: Kind
     strength: Positive
     cycles: Positive
     slopes: tuple[Positive, ...]
@@ -85,7 +86,7 @@ def load_sn_curve(name_or_path: str | Path, *, quiet: bool = False) -> SNCurve:
     except InputError as error:
         raise InputError(str(error), file=path) from None
     if curve.warning and not quiet:
-        warn_user(f"S-N curve {curve.name}: {curve.warning}")
+        warn_user(f"{curve.title} {curve.name}: {curve.warning}")
     return curve
 
 

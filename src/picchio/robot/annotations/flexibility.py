@@ -16,7 +16,7 @@ from picchio.core.errors import InputError
 from picchio.core.toml import StrictModel
 from picchio.robot.annotations.sidecar import JointEntry, Sidecar, given, spreads_within
 from picchio.robot.drives.reducer import Reducer, find_reducer
-from picchio.robot.joint import Joint
+from picchio.robot.joint import Joint, Strength
 from picchio.robot.spread import Spread, numbers_of, overlaid, spreads_in, value_of
 from picchio.robot.urdf.tree import MOVABLE, UrdfJoint, UrdfTree
 
@@ -24,6 +24,8 @@ DEFAULT_DAMPING_RATIO = 0.03
 # One of these excludes the other, wherever they stand.
 # The origin of a stiffness that a reducer's catalogue gives begins so.
 ITS_REDUCER = "the catalogue of its reducer"
+# The label of the source that stands in where no file says anything.
+ESTIMATE = "picchio's estimate"
 EXCLUDED = {"stiffness": "stiffness_curve", "stiffness_curve": "stiffness"}
 
 
@@ -183,6 +185,11 @@ def _resolve(
     except InputError as error:
         raise error.placed(**place) from None
     values["reducer"] = reducer
+    if (guess := values.get("strength")) is not None:  # its torques are known now, exactly
+        own = {key: getattr(reducer, key) for key in ("repeated_peak_torque", "rated_torque",
+                                                      "momentary_peak_torque")}  # fmt: skip
+        values["strength"] = Strength(**own, life_curve=guess.life_curve)
+        where["strength"] = f"{ITS_REDUCER} {reducer.name} ({reducer.source})"
     if "stiffness" in values or "stiffness_curve" in values:
         return
     if not reducer.spring:

@@ -1,9 +1,9 @@
 """The `picchio:` annotations of a URDF, read into the same records as a sidecar.
 
 In a `<joint>`: `<picchio:flexibility>`, `<picchio:shaft>`, `<picchio:stiffness_curve>`,
-`<picchio:balancer>`. In a `<link>`: `<picchio:inertial>`. In `<robot>`: `<picchio:tool>`,
-`<picchio:gun>`, `<picchio:links>`, `<picchio:base>`, `<picchio:posterior>` (the correlation's
-rows one after another).
+`<picchio:balancer>`, `<picchio:strength>`. In a `<link>`: `<picchio:inertial>`. In `<robot>`:
+`<picchio:tool>`, `<picchio:gun>`, `<picchio:links>`, `<picchio:base>`, `<picchio:posterior>` (the
+correlation's rows one after another).
 The prefix is bound to `urn:picchio:1`; another version is refused by name.
 """
 
@@ -19,7 +19,7 @@ from lxml import etree
 from picchio.core.errors import InputError
 from picchio.core.toml import StrictModel, leaf_types, validate
 from picchio.robot.annotations.sidecar import FORMAT, JointEntry, Sidecar
-from picchio.robot.joint import Balancer, Shaft, StiffnessCurve
+from picchio.robot.joint import Balancer, Shaft, StiffnessCurve, Strength
 from picchio.robot.link import LinkEntry, LinkMasses
 from picchio.robot.spread import Posterior
 from picchio.robot.tool import Gun, Mounting, Tool
@@ -34,12 +34,13 @@ def _attributes_of(table: type[StrictModel]) -> dict[str, Any]:
 
 
 # element: (the sidecar's key, None for the joint itself; its attributes)
-_WITHIN_A_JOINT = (Shaft, StiffnessCurve, Balancer)
+_WITHIN_A_JOINT = (Shaft, StiffnessCurve, Balancer, Strength)
 IN_JOINT: dict[str, tuple[str | None, dict[str, Any]]] = {
     "flexibility": (None, _attributes_of(JointEntry)),
     "shaft": ("shaft", _attributes_of(Shaft)),
     "stiffness_curve": ("stiffness_curve", _attributes_of(StiffnessCurve)),
     "balancer": ("balancer", _attributes_of(Balancer)),
+    "strength": ("strength", _attributes_of(Strength)),
 }
 IN_LINK: dict[str, tuple[str | None, dict[str, Any]]] = {
     "inertial": (None, _attributes_of(LinkEntry)),

@@ -15,6 +15,8 @@ source = "..."
 estimated = true             # not measured
 shaft = { radius = 0.01765, length = 0.0504, shear_modulus = 79.3e9, sn_curve = "..." }
 reducer = "RV-80E-121"       # alone, it brings its catalogue's stiffness
+# what the drive bears, where no reducer is known [N m]; a reducer and a shaft stand in its place:
+strength = { repeated_peak_torque = 1200.0, repeated_peak_torque_spread = 1.7, estimated = true }
 rotor_inertia = 1e-4         # kg m^2, on the motor's side
 gear_ratio = 121.0
 # a spring [N/m] between two points [m] in the joint's frame at position zero; it may also have
@@ -68,7 +70,7 @@ from typing import Any, Self
 from pydantic import Field, model_validator
 
 from picchio.core.toml import Finite, Name, NotNegative, StrictModel, parse_toml
-from picchio.robot.joint import Balancer, DampingRatio, Shaft, Stiffness, StiffnessCurve
+from picchio.robot.joint import Balancer, DampingRatio, Shaft, Stiffness, StiffnessCurve, Strength
 from picchio.robot.link import LinkEntry, LinkMasses
 from picchio.robot.spread import Posterior, Spread, spreads_in, with_spreads
 from picchio.robot.tool import Gun, Mounting, Tool
@@ -89,6 +91,8 @@ class JointEntry(StrictModel):
         shaft: the part whose fatigue is assessed.
         reducer: a catalogue name, such as "RV-80E-121"; its torque limits are checked, and its
             stiffness is the joint's where none is given.
+        strength: what the drive bears, where no reducer is known. A reducer's torques stand in
+            place of these, and a shaft's fatigue in place of the drive's.
         rotor_inertia: kg m^2, at the motor, before the gear.
         gear_ratio: 1, motor turns for one turn of the joint.
         balancer: a spring that carries part of the gravity torque.
@@ -102,6 +106,7 @@ class JointEntry(StrictModel):
     damping_ratio: DampingRatio | None = None
     shaft: Shaft | None = None
     reducer: Name | None = None
+    strength: Strength | None = None
     rotor_inertia: NotNegative | None = None
     gear_ratio: Finite | None = None
     balancer: Balancer | None = None

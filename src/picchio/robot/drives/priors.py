@@ -22,6 +22,7 @@ from picchio.robot.drives.facts import CLASSES, Fitted, catalogue_stiffness, fit
 from picchio.robot.drives.hierarchy import Group, predict
 from picchio.robot.drives.predictors import QUANTITIES, Predictors, meaning, predictors
 from picchio.robot.drives.reducer import Reducer, load_reducer
+from picchio.robot.drives.strength import peak_over_effort, rated_torque, torque_ratios
 from picchio.robot.spread import Posterior
 
 if TYPE_CHECKING:
@@ -45,7 +46,14 @@ class JointPrior:
         stiffness_range: N m/rad, the 5 and 95 % points.
         damping_ratio: 1, modal, the median.
         damping_ratio_spread: 1, a factor, likewise.
+        repeated_peak_torque: N m, the median: limit of peaks that belong to the duty.
+        repeated_peak_torque_spread: 1, a factor, likewise; 1 of a named reducer.
+        repeated_peak_torque_range: N m, the 5 and 95 % points.
+        rated_torque: N m, the median.
+        rated_torque_spread: 1, a factor, likewise.
+        momentary_peak_torque: N m, that goes with the median of the repeated one.
         reasons: in plain words, what the values rest on.
+        strength_reasons: the same of the torques.
         supported: whether drives of this kind were in the data.
     """
 
@@ -55,7 +63,14 @@ class JointPrior:
     stiffness_range: tuple[float, float]
     damping_ratio: float
     damping_ratio_spread: float
+    repeated_peak_torque: float
+    repeated_peak_torque_spread: float
+    repeated_peak_torque_range: tuple[float, float]
+    rated_torque: float
+    rated_torque_spread: float
+    momentary_peak_torque: float
     reasons: tuple[str, ...]
+    strength_reasons: tuple[str, ...]
     supported: bool
 
 
@@ -68,6 +83,8 @@ class DrivePriors(Result):
         joints: the drives, from the base to the tool.
         mean: (n,) of ln stiffness, N m/rad.
         covariance: (n, n) of ln stiffness.
+        torque_mean: (n,) of ln repeated-peak torque, N m.
+        torque_covariance: (2 n, 2 n) of ln stiffness and ln repeated-peak torque.
         damping_mean: (n,) of ln damping ratio.
         damping_covariance: (n, n) of ln damping ratio.
         drive_class: the class assumed, or None.
@@ -79,6 +96,8 @@ class DrivePriors(Result):
     joints: tuple[JointPrior, ...]
     mean: Array
     covariance: Array
+    torque_mean: Array
+    torque_covariance: Array
     damping_mean: Array
     damping_covariance: Array
     drive_class: str | None
@@ -88,16 +107,18 @@ class DrivePriors(Result):
     def posterior(self) -> Posterior:
         """How the logarithms hang together, as `[posterior]` of a sidecar has it."""
         n = len(self.joints)
-        matrix = np.eye(2 * n)
-        for start, cov in ((0, self.covariance), (n, self.damping_covariance)):
-            size = np.sqrt(np.diag(cov))
-            rows = slice(start, start + n)
-            matrix[rows, rows] = np.clip(cov / np.outer(size, size), -1.0, 1.0)
+        whole = np.zeros((3 * n, 3 * n))
+        whole[: 2 * n, : 2 * n] = self.torque_covariance
+        whole[2 * n :, 2 * n :] = self.damping_covariance
+        size = np.sqrt(np.diag(whole))
+        matrix = np.clip(whole / np.maximum(np.outer(size, size), 1e-300), -1.0, 1.0)
+        matrix = 0.5 * (matrix + matrix.T)
         np.fill_diagonal(matrix, 1.0)
-        names = [f"{key}.{joint.name}" for key in ("stiffness", "damping_ratio")
-                 for joint in self.joints]  # fmt: skip
-        even = tuple(tuple(row) for row in (0.5 * (matrix + matrix.T)).tolist())
-        return Posterior(names=tuple(names), correlation=even)
+        keys = ("stiffness", "strength.repeated_peak_torque", "damping_ratio")
+        names = [f"{key}.{joint.name}" for key in keys for joint in self.joints]
+        kept = np.flatnonzero(size > 0.0)  # a named reducer's torque has no spread
+        even = tuple(tuple(row) for row in matrix[np.ix_(kept, kept)].tolist())
+        return Posterior(names=tuple(names[k] for k in kept), correlation=even)
 
     def _content(self) -> Mapping[str, Any]:
         return {
@@ -173,13 +194,15 @@ def drive_priors(
     kind = drive_class or (kinds.pop() if len(kinds) == 1 else None)
     fit = fitted()
     group = group_of(found, kind=CLASSES.index(kind) if kind in CLASSES else None)
-    mixture = predict(fit.stiffness, group)
+    n = len(found.names)
+    mixture = predict(fit.stiffness, group, also=2 + QUANTITIES.index("effort"))
     for joint, one in named.items():
         stiffness = float(catalogue_stiffness(one) or 0.0)
         mixture = with_reducer(mixture, found.names.index(joint), stiffness, fit.shares)
-    mean, covariance = moments(mixture)
+    mixture = _with_strength(mixture, found, named, kind)
+    both, torque_covariance = moments(mixture)
+    mean, covariance = both[:n], torque_covariance[:n, :n]
     low, middle, high = np.exp(quantiles(mixture, (0.05, 0.5, 0.95)))
-    n = len(found.names)
     nothing = Group(np.full((n, 1), np.nan), np.zeros((n, 0)), np.zeros(n, dtype=np.intp))
     damping = predict(fit.damping, nothing)
     damping_mean, damping_covariance = moments(damping)
@@ -187,15 +210,24 @@ def drive_priors(
     spread = np.exp(np.sqrt(np.diag(covariance)))
     damping_spread = np.exp(np.sqrt(np.diag(damping_covariance)))
     share = fit.stiffness.share.mean(axis=0)
-    joints = tuple(
-        JointPrior(name, float(middle[k]), float(spread[k]), (float(low[k]), float(high[k])),
-                   float(damping_ratio[k]), float(damping_spread[k]),
-                   tuple(_reasons(found, k, float(middle[k]), kind, named.get(name), fit)),
-                   kind is None or kind in CLASSES)
-        for k, name in enumerate(found.names)
-    )  # fmt: skip
+    torque_spread = np.exp(np.sqrt(np.diag(torque_covariance)[n:]))
+    joints = []
+    for k, name in enumerate(found.names):
+        reducer, peak = named.get(name), float(middle[n + k])
+        rated, own = rated_torque(peak, kind, reducer)
+        joints.append(JointPrior(
+            name, float(middle[k]), float(spread[k]), (float(low[k]), float(high[k])),
+            float(damping_ratio[k]), float(damping_spread[k]),
+            peak, float(torque_spread[k]), (float(low[n + k]), float(high[n + k])),
+            rated, math.exp(math.hypot(math.log(own), math.log(torque_spread[k]))),
+            reducer.momentary_peak_torque if reducer
+            else peak * torque_ratios(kind).momentary_over_peak,
+            tuple(_reasons(found, k, float(middle[k]), kind, reducer, fit)),
+            tuple(_strength_reasons(found, k, kind, reducer)), kind is None or kind in CLASSES,
+        ))  # fmt: skip
     return DrivePriors(
-        robot.name, joints, mean, covariance, damping_mean, damping_covariance, kind,
+        robot.name, tuple(joints), mean, covariance, both[n:], torque_covariance, damping_mean,
+        damping_covariance, kind,
         {one: float(share[k]) for k, one in enumerate(CLASSES)} if kind is None else {kind: 1.0},
         {name: "no prismatic drive was measured" for name, joint in robot.tree.joints.items()
          if joint.type == "prismatic" and name in robot.joint_names},
@@ -225,7 +257,8 @@ def quantiles(mixture: Mixture, levels: tuple[float, ...]) -> Array:
         mixture: of normal parts.
         levels: the probabilities.
     """
-    means, sizes = mixture[1], np.sqrt(np.einsum("kii->ki", mixture[2]))
+    means = mixture[1]
+    sizes = np.sqrt(np.maximum(np.einsum("kii->ki", mixture[2]), 1e-24))
     low = np.tile((means - 12.0 * sizes).min(axis=0), (len(levels), 1))
     high = np.tile((means + 12.0 * sizes).max(axis=0), (len(levels), 1))
     for _ in range(60):
@@ -245,7 +278,7 @@ def probability_below(mixture: Mixture, points: Array) -> Array:
     from scipy.special import ndtr  # takes a while to load
 
     weights, means, covs = mixture
-    sizes = np.sqrt(np.einsum("kii->ki", covs))
+    sizes = np.maximum(np.sqrt(np.maximum(np.einsum("kii->ki", covs), 0.0)), 1e-12)
     found: Array = np.einsum("k,...kn->...n", weights, ndtr((points[..., None, :] - means) / sizes))
     return found
 
@@ -292,6 +325,42 @@ def with_reducer(
     changed = np.einsum("ki,kj->kij", column, column) * (variance - 1.0)[:, None, None]
     new = weights * total[kept]
     return new / new.sum(), means + column * middle[:, None], covs + changed
+
+
+def _with_strength(
+    mixture: Mixture, found: Predictors, named: Mapping[str, Reducer], kind: str | None
+) -> Mixture:
+    """A mixture of stiffness and effort limit as one of stiffness and repeated-peak torque."""
+    weights, means, covs = mixture
+    n = len(found.names)
+    middle, spread = peak_over_effort(n, kind)
+    means, covs = means.copy(), covs.copy()
+    means[:, n:] += middle
+    covs[:, n:, n:] += spread
+    for name, reducer in named.items():
+        k = n + found.names.index(name)
+        means[:, k] = math.log(reducer.repeated_peak_torque)
+        covs[:, k, :] = covs[:, :, k] = 0.0
+    return weights, means, covs
+
+
+def _strength_reasons(
+    found: Predictors, k: int, kind: str | None, reducer: Reducer | None
+) -> list[str]:
+    """What a joint's torques rest on."""
+    if reducer is not None:
+        return [f"the catalogue of its reducer {reducer.name}"]
+    effort = found.values[k, QUANTITIES.index("effort")]
+    ratio = torque_ratios(kind).peak_over_rated
+    told = (
+        f"from {meaning['effort']}, {math.exp(effort):.3g} N m"
+        if np.isfinite(effort)
+        else "no effort limit is known: it is foretold from what the joint moves and holds"
+    )
+    return [
+        f"{told}; effort limits are taken to lie between a reducer's rated torque and its limit "
+        f"for repeated peaks, which is {ratio:.2g} times as high in the catalogues"
+    ]
 
 
 def _reasons(

@@ -21,59 +21,23 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from difflib import SequenceMatcher
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Literal, Self, TypeVar
+from typing import Literal, Self
 
 from pydantic import model_validator
 
-from picchio.core.arrays import FloatArray, as_floats
 from picchio.core.errors import InputError
 from picchio.core.toml import Positive, StrictModel, parse_toml
 from picchio.robot.joint import Stiffness, StiffnessCurve
+from picchio.robot.ratings import Ratings, TorqueLimit
 
 Kind = Literal["strain-wave", "cycloidal"]
-Torque = TypeVar("Torque", float, FloatArray)
 
 REDUCER_FORMAT = "picchio-reducers/1"
 _RPM = 2.0 * math.pi / 60.0
-_EXCEEDED = {
-    "repeated peak torque": "the blows' peak torque exceeds the limit for repeated peaks",
-    "momentary peak torque": "the peak torque exceeds even the limit for emergencies",
-    "ratcheting torque": "the peak torque exceeds that at which teeth skip",
-    "average torque, held": "gravity's torque exceeds the limit for the average torque",
-}
-
-
-@dataclass(frozen=True)
-class TorqueLimit:
-    """A torque beside the limit that applies to it.
-
-    Attributes:
-        name: of the limit, such as "repeated peak torque".
-        torque: N m, largest magnitude that acts.
-        limit: N m, of the catalogue.
-    """
-
-    name: str
-    torque: float
-    limit: float
-
-    @property
-    def share(self) -> float:
-        """Torque over limit; above 1 is too much."""
-        return self.torque / self.limit
-
-    def to_dict(self) -> dict[str, str | float]:
-        """As JSON has it.
-
-        Returns:
-            name, torque [N m], limit [N m] and share.
-        """
-        return vars(self) | {"share": self.share}
 
 
 class OutputBearing(StrictModel):
@@ -130,7 +94,7 @@ class ReducerEntry(StrictModel):
         return self
 
 
-class Reducer(ReducerEntry):
+class Reducer(ReducerEntry, Ratings):
     """A reducer's ratings, those of its entry and those that its whole file shares.
 
     Attributes:
@@ -152,77 +116,12 @@ class Reducer(ReducerEntry):
         own = {"stiffness_curve": self.stiffness_curve, "stiffness": self.stiffness}
         return {key: value for key, value in own.items() if value is not None}
 
-    @property
-    def limits(self) -> dict[str, tuple[str, float]]:
-        """The limits that bind at standstill and are known: {name: ("peak" or "held", N m)}."""
-        known = {
-            "repeated peak torque": ("peak", self.repeated_peak_torque),
-            "momentary peak torque": ("peak", self.momentary_peak_torque),
-            "ratcheting torque": ("peak", self.ratcheting_torque),
-            "average torque, held": ("held", self.average_torque),
-        }
-        return {name: (which, limit) for name, (which, limit) in known.items() if limit is not None}
-
-    def shares(self, peak: Torque, held: Torque) -> dict[str, Torque]:
-        """Torque over limit, by limit.
-
-        Args:
-            peak: N m, largest magnitude: a number, or an array (...).
-            held: N m, magnitude of gravity's alone, likewise.
-
-        Returns:
-            {limit: share}, of the limits that are known.
-        """
-        torque = {"peak": peak, "held": held}
-        return {name: torque[which] / limit for name, (which, limit) in self.limits.items()}
-
-    def check_blows(self, peak_torque: float, holding_torque: float = 0.0) -> ReducerCheck:
-        """Check a joint that stands still under blows.
-
-        Args:
-            peak_torque: N m, the largest magnitude of gravity's and the vibration's torque
-                together.
-            holding_torque: N m, gravity's alone.
-
-        Returns:
-            torques beside their limits, and what is beyond its limit.
-
-        Raises:
-            InputError: torques that are not finite.
-        """
-        torque = {
-            "peak": abs(float(as_floats(peak_torque, "peak_torque"))),
-            "held": abs(float(as_floats(holding_torque, "holding_torque"))),
-        }
-        found = [TorqueLimit(name, torque[which], limit)
-                 for name, (which, limit) in self.limits.items()]  # fmt: skip
-        warnings = [
+    def _warnings(self, found: Iterable[TorqueLimit]) -> list[str]:
+        return [
             f"{self.name}: the catalogue life presumes turning; a joint that stands still under "
             "blows risks false brinelling, which no catalogue covers",
-            *(f"{self.name}: {_EXCEEDED[one.name]} ({one.share:.2f} times)"
-              for one in found if one.share > 1.0),
-        ]  # fmt: skip
-        # Of equal shares the first stands first: the sort is stable.
-        ranked = sorted(found, key=lambda one: -one.share)
-        return ReducerCheck(tuple(ranked), tuple(warnings))
-
-
-@dataclass(frozen=True)
-class ReducerCheck:
-    """Torques of a joint that stands still under blows, against its reducer's limits.
-
-    Attributes:
-        limits: every limit that applies, the one that governs first.
-        warnings: what the catalogue does not promise, and which limits are exceeded.
-    """
-
-    limits: tuple[TorqueLimit, ...]
-    warnings: tuple[str, ...]
-
-    @property
-    def governing(self) -> TorqueLimit:
-        """The limit that binds."""
-        return self.limits[0]
+            *(f"{self.name}: {text}" for text in super()._warnings(found)),
+        ]
 
 
 class ReducerFile(StrictModel):

@@ -13,7 +13,7 @@ from picchio.fatigue.miner import life
 from picchio.fatigue.shaft_stress import check_shaft
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.model import Model
-from picchio.robot.annotations.flexibility import ITS_REDUCER
+from picchio.robot.annotations.flexibility import ESTIMATE, ITS_REDUCER
 from picchio.robot.drives.reducer import Reducer
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import is_drive
@@ -29,7 +29,7 @@ _ROUNDING = 1e-12
 
 def warn_about_shafts(robot: FlexibleRobot) -> None:
     """Warn of joints without a shaft, and of shafts that do not fit their joint."""
-    bare = [j.name for j in robot.flexible_joints if j.shaft is None and is_drive(j.name)]
+    bare = [j.name for j in robot.flexible_joints if j.worn is None and is_drive(j.name)]
     if bare:
         warn_user(
             f"no shaft is given for {', '.join(bare)}: deflection and torque are given, stress "
@@ -99,7 +99,7 @@ def assumptions_of(
     unchecked = [
         joint.name
         for joint, reducer in zip(model.robot.flexible_joints, reducers, strict=True)
-        if reducer is None and is_drive(joint.name)
+        if reducer is None and joint.strength is None and is_drive(joint.name)
     ]
     lines = [
         f"gravity stiffness {'on' if model.gravity_stiffness else 'off'}",
@@ -113,7 +113,7 @@ def assumptions_of(
         *model.without_load(),
         *_estimates(model.robot),
         *(rule.assumptions() if described else ("each rivet starts from rest and rings down",)),
-        *(f"S-N curve {text}" for text in described),
+        *(f"{curve.title} {curve.describe()}" for curve in dict.fromkeys(c for c in curves if c)),
     ]
     if named:
         lines += [
@@ -211,7 +211,7 @@ def doubts_of(
     lines = [*_estimates(model.robot), *model.without_load()]
     for curve in dict.fromkeys(c for c in curves if c is not None):
         if curve.unverified:
-            lines.append(f"S-N curve {curve.name} is unverified: {curve.unverified}")
+            lines.append(f"{curve.title} {curve.name} is unverified: {curve.unverified}")
     ratios = [(check.peak_ratio, check.joint) for check in steady if check.peak_ratio > 1.0]
     if needs == "steady" and ratios:
         ratio, name = max(ratios)
@@ -222,10 +222,24 @@ def doubts_of(
     return tuple(lines)
 
 
+_ESTIMATED_KEYS = {
+    "stiffness": "the stiffness is",
+    "damping_ratio": "the damping is",
+    "strength": "what the drive bears is",
+}
+
+
 def _estimates(robot: FlexibleRobot) -> list[str]:
     """What of the robot is an estimate or a default, one line a source."""
     said: dict[str, list[str]] = {}
+    own: dict[str, list[str]] = {}
     for joint in robot.flexible_joints:
+        made = [key for key in _ESTIMATED_KEYS
+                if robot.origins.get(f"{joint.name}.{key}", "").startswith(ESTIMATE)]  # fmt: skip
+        for key in made:
+            own.setdefault(key, []).append(joint.name)
+        if "stiffness" in made:
+            continue
         known = {
             word: robot.spreads.get(f"{key}.{joint.name}")
             for word, key in (("stiffness", "stiffness"), ("damping", "damping_ratio"))
@@ -258,4 +272,15 @@ def _estimates(robot: FlexibleRobot) -> list[str]:
         if "default" in damping:
             text = f"damping ratio {joint.damping_ratio:g} is assumed ({damping})"
             said.setdefault(text, []).append(joint.name)
-    return [f"{', '.join(names)}: {text}" for text, names in said.items()]
+    lines = [f"{', '.join(names)}: {text}" for text, names in said.items()]
+    for key, names in own.items():
+        path = f"{key}.repeated_peak_torque" if key == "strength" else key
+        spreads = [math.exp(robot.spreads[f"{path}.{name}"].size) for name in names
+                   if f"{path}.{name}" in robot.spreads]  # fmt: skip
+        low, high = min(spreads, default=1.0), max(spreads, default=1.0)
+        within = f"{low:.2g}" if f"{low:.2g}" == f"{high:.2g}" else f"{low:.2g} to {high:.2g}"
+        lines.append(
+            f"{', '.join(names)}: {_ESTIMATED_KEYS[key]} estimated, within a factor of {within} "
+            "(one standard deviation; picchio start writes the reasons)"
+        )
+    return lines

@@ -14,7 +14,8 @@ from picchio.core.html import sheet
 from picchio.core.results import TableResult
 from picchio.fatigue.miner import format_count as format_count
 from picchio.fatigue.standstill import RISKS, FalseBrinelling
-from picchio.robot.drives.reducer import TorqueLimit
+from picchio.robot.annotations.flexibility import ESTIMATE
+from picchio.robot.ratings import TorqueLimit
 from picchio.robot.units import JointUnits, column, units_of
 from picchio.studies.assessment.verdict import Verdict, judge
 
@@ -102,13 +103,17 @@ class JointLife:
         peak_shear_stress: Pa, largest of the vibration; NaN without a shaft.
         gravity_shear_stress: Pa, largest magnitude.
         peak_total_stress: Pa, largest magnitude of gravity and vibration together, from rest.
-        utilisation: largest equivalent amplitude over the allowable; NaN without a shaft.
+        utilisation: largest equivalent amplitude over the allowable, of the shaft, or of the drive
+            where no shaft is known; NaN without either.
         reducer: its catalogue name; empty where it is not known.
         reducer_utilisation: largest torque, gravity and blows together, over the limit that binds;
-            NaN without a reducer.
+            NaN without a reducer or an estimate of what the drive bears.
         damage_per_rivet: mean over the rivets of the task's mix.
         rivets_to_failure: all rivets of the mix; infinite where the life has no end.
-        sn_curve: name of the curve; empty without a shaft.
+        sn_curve: name of the shaft's or the drive's curve; empty without either.
+        drive: what its torque limits are of: "reducer RV-80E-121", "drive (estimated)"; empty
+            without any.
+        worn: whose fatigue the life is: "shaft" or "drive"; empty without either.
         worst_operation: where the utilisation (or, without a shaft, the deflection) is largest.
         worst_pose: index of the pose there.
         damage_share: of each operation in this joint's damage; empty without damage.
@@ -126,6 +131,8 @@ class JointLife:
         estimated: a value is an estimate: `rivets_to_failure` is then the median.
         intervals: P10 and P90 of "utilisation", "yield_utilisation", "reducer_utilisation" and
             "peak_torque" (gravity and blows together), where a value of the robot has a spread.
+        ends_first: share of the drawn cases in which this joint ends the robot's life; NaN without
+            spreads.
     """
 
     name: str
@@ -145,6 +152,8 @@ class JointLife:
     worst_operation: str
     worst_pose: int
     damage_share: Mapping[str, float] = field(default_factory=dict)
+    drive: str = ""
+    worn: str = ""
     reducer_governed_by: str = ""
     reducer_limits: tuple[TorqueLimit, ...] = ()
     reducer_warnings: tuple[str, ...] = ()
@@ -155,12 +164,17 @@ class JointLife:
     spread: LifeSpread | None = None
     estimated: bool = False
     intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    ends_first: float = math.nan
 
     def to_dict(self) -> dict[str, Any]:
         """The entry as plain values, with "life" and intervals where a value has a spread."""
-        hidden = ("spread", "estimated", "intervals")
+        hidden = ("spread", "estimated", "intervals", "ends_first")
         own = {key: value for key, value in vars(self).items() if key not in hidden}
         own |= {f"{key}_interval": ends for key, ends in self.intervals.items()}
+        if not math.isnan(self.ends_first):
+            own["ends_first"] = self.ends_first
+        if self.estimated:
+            own["estimated"] = True
         return own if self.spread is None else own | {"life": self.spread.quantiles}
 
     @property
@@ -192,6 +206,18 @@ class JointLife:
             return f"{100 * value:.4g}" if value > _ROUNDING else "0"
         return f"{100 * low:.3g} to {100 * high:.3g}"
 
+    def told_interval(self, key: str) -> str:
+        """P10 to P90 of a value, its number where it has no spread.
+
+        Args:
+            key: such as "peak_torque".
+
+        Returns:
+            the text.
+        """
+        low, high = self.intervals.get(key, (getattr(self, key),) * 2)
+        return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
+
     @property
     def units(self) -> JointUnits:
         """How its values are written."""
@@ -210,7 +236,7 @@ class JointLife:
     @property
     def governing_key(self) -> str:
         """Which of the two `governing_utilisation` is."""
-        geared = not self.utilisation >= self.reducer_utilisation and bool(self.reducer)
+        geared = not self.utilisation >= self.reducer_utilisation and bool(self.drive)
         return "reducer_utilisation" if geared else "utilisation"
 
     @property
@@ -311,6 +337,20 @@ class Assessment(TableResult):
         return self.uncertainty is not None and bool(self.uncertainty.estimated)
 
     @property
+    def notice(self) -> str:
+        """What of the drives is an estimate of picchio's own, in words; "" where nothing is."""
+        made = {key.partition(".")[2] for key, text in self.origins.items()
+                if text.startswith(ESTIMATE)}  # fmt: skip
+        if not made & {"stiffness", "strength"}:
+            return ""
+        what = "stiffness, damping and strength" if "stiffness" in made else "strength"
+        return (
+            f"Estimated: no file gives the {what} of the drives of {self.robot}. What stands here "
+            "is what such a robot probably has, and every result is an interval that holds 80 % of "
+            "the cases"
+        )
+
+    @property
     def verdict(self) -> Verdict:
         """What it comes to: safe, limited, fails or cannot be told, by what, and how surely."""
         return judge(self)
@@ -407,6 +447,7 @@ class Assessment(TableResult):
                 "life": self.uncertainty.robot.quantiles,
                 "spread_shares": self.uncertainty.robot.shares,
                 "estimated": self.estimated,
+                "measure_first": self.uncertainty.measure_first,
                 "uncertainty": self.uncertainty.to_dict(),
             }
         ranked = self.false_brinelling

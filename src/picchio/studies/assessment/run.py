@@ -24,6 +24,7 @@ from picchio.model.model import Model
 from picchio.robot.drives.reducer import Reducer
 from picchio.robot.dynamics.pose import warn_beyond_limits
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.joint import Strength
 from picchio.studies.assessment.checks import (
     assumptions_of,
     doubts_of,
@@ -107,13 +108,13 @@ def assess(
     if sn_curve is None and method == "paper":
         sn_curve = PAPER_SN_CURVE
     with gathered() as said:
-        curves = curves_of(robot, sn_curve)
+        curves = curves_of(robot, sn_curve, drives=method == "rainflow")
         warn_about_shafts(robot)
         for operation in task.operations:
             warn_beyond_limits(robot, operation.poses, f"operation {operation.name!r}")
-        reducers = tuple(joint.reducer for joint in robot.flexible_joints)
+        ratings = tuple(joint.ratings for joint in robot.flexible_joints)
     paper_curve = load_sn_curve(PAPER_SN_CURVE, quiet=True)
-    job = _Job(model, rule, curves, reducers, paper_curve, steady_check)
+    job = _Job(model, rule, curves, ratings, paper_curve, steady_check)
     total = sum(len(operation.poses) for operation in task.operations)
     results, checks, torques = [], [], []
     done = 0
@@ -144,19 +145,21 @@ def assess(
         results = [_at_mean_stress(result, curves) for result in results]
     largest = np.max(torques, axis=0)
     joints = tuple(
-        _joint_life(j, robot, task, results, curves[j], reducers[j], largest[j])
+        _joint_life(j, robot, task, results, curves[j], ratings[j], largest[j])
         for j in range(len(curves))
     )
     with gathered() as more:
         warn_about_yield(joints)
     steady = steady_state_checks(joints, task, results, checks)
     doubts = doubts_of(model, curves, steady, rule.needs)
-    if steady_check:
+    # At a frequency that is an estimate, the drawn cases tell what a resonance does.
+    if steady_check and not any(joint.estimated for joint in robot.flexible_joints):
         rates = rate_sensitivity(model, task, joints, results, rule.needs)
         joints = tuple(replace(j, rate_sensitivity=rates[j.name][0]) for j in joints)
         doubts = (*doubts, *filter(None, (text for _, text in rates.values())))
     unsure = None
-    parts = any(curves) or any(reducers)
+    parts = any(curves) or any(ratings)
+    reducers = tuple(joint.reducer for joint in robot.flexible_joints)
     if robot.spreads and rule.needs == "rest" and miner is None and parts:
         if uncertainty is True:
             unsure = uncertain_life(
@@ -209,7 +212,7 @@ class _Job:
     model: Model
     rule: LifeRule
     curves: tuple[SNCurve | None, ...]
-    reducers: tuple[Reducer | None, ...]
+    ratings: tuple[Reducer | Strength | None, ...]
     paper_curve: SNCurve
     both: bool
 
@@ -235,18 +238,20 @@ class _Job:
         for j, (joint, load) in enumerate(zip(robot.flexible_joints, loads, strict=True)):
             if load.rest is not None:
                 out["swing"][j], out["swing_cycles"][j] = swings(load.rest)
-            reducer = self.reducers[j]
-            if reducer is not None and load.rest is not None:
+            ratings = self.ratings[j]
+            if ratings is not None and load.rest is not None:
                 torques = load.peak_torque_with_gravity, abs(load.stiffness * load.static)
                 out["reducer_torques"][j] = torques
-                limit = reducer.check_blows(*torques).governing
+                limit = ratings.check_blows(*torques).governing
                 governs[j], out["reducer_utilisation"][j] = limit.name, limit.share
                 out["reducer_torque"][j], out["reducer_limit"][j] = limit.torque, limit.limit
             curve = self.curves[j]
-            if joint.shaft is None or curve is None:
+            if curve is None:
                 continue
             for key, value in zip(columns, self.rule(joint, load, hits, curve), strict=True):
                 out[key][j] = value
+            if joint.shaft is None:
+                continue
             out["gravity_shear_stress"][j] = shear_stress(out["gravity_torque"][j], joint.shaft)
             if load.rest is not None:
                 out["peak_total_stress"][j] = shear_stress(
@@ -280,16 +285,18 @@ def _joint_life(
     task: Task,
     results: list[OperationResult],
     curve: SNCurve | None,
-    reducer: Reducer | None,
+    ratings: Reducer | Strength | None,
     torques: FloatArray,
 ) -> JointLife:
     joint = robot.flexible_joints[j]
-    strength = (curve.yield_shear or curve.ultimate_shear or math.nan) if curve else math.nan
+    strength = curve.static_strength if curve else math.nan
     # Each limit is for one of the two: their largest values give each limit's worst pose.
     check = brinelling = None
     warnings: tuple[str, ...] = ()
-    if reducer is not None and np.isfinite(torques[0]):
-        check = reducer.check_blows(*torques)
+    if ratings is not None and np.isfinite(torques[0]):
+        check = ratings.check_blows(*torques)
+        warnings = tuple(check.warnings)
+    if (reducer := joint.reducer) is not None and check is not None:
         cycles = [r.swing_cycles[:, j] * r.rivets for r in results]
         places = [r.poses[:, robot.flexible_index[j]] for r in results]
         swing = [r.swing[:, j] for r in results]
@@ -313,6 +320,8 @@ def _joint_life(
         kind=joint.kind,
         **largest,
         reducer=reducer.name if reducer is not None else "",
+        drive=joint.drive if ratings is not None else "",
+        worn="" if curve is None else "shaft" if curve.kind == "shear" else "drive",
         damage_per_rivet=per_rivet,
         rivets_to_failure=life(per_rivet) if curve is not None else math.nan,
         sn_curve=curve.name if curve is not None else "",
@@ -330,7 +339,11 @@ def _joint_life(
 
 def _with_spread(joint: JointLife, unsure: UncertainLife, guess: bool) -> JointLife:
     """The joint with its life as a distribution; of estimates the median is its life."""
-    joint = replace(joint, intervals=unsure.intervals.get(joint.name, {}))
+    joint = replace(
+        joint,
+        intervals=unsure.intervals.get(joint.name, {}),
+        ends_first=unsure.ends_first.get(joint.name, math.nan),
+    )
     spread = unsure.joints.get(joint.name)
     if spread is None:
         return joint
@@ -340,7 +353,7 @@ def _with_spread(joint: JointLife, unsure: UncertainLife, guess: bool) -> JointL
 
 def _limiting(joints: tuple[JointLife, ...]) -> JointLife | None:
     """The joint that ends the robot's life: the shortest, or else the most utilised part."""
-    known = [joint for joint in joints if joint.sn_curve or joint.reducer]
+    known = [joint for joint in joints if joint.sn_curve or joint.drive]
     if not known:
         return None
     return min(known, key=lambda j: (j.life, j.sure_life, -j.governing_utilisation))

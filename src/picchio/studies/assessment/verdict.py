@@ -97,8 +97,20 @@ class _Part(NamedTuple):
 
     @property
     def name(self) -> str:
-        what = f"reducer {self.joint.reducer}" if self.governor == "reducer" else "shaft"
+        what = self.joint.drive if self.governor == "reducer" else "shaft"
         return f"{what} of {self.joint.name}"
+
+    @property
+    def fatigue(self) -> bool:
+        """Whether its limit is that of many cycles."""
+        return self.limit == _ALLOWABLE
+
+    @property
+    def over(self) -> bool:
+        """Whether it is beyond its limit; where that is an estimate, in 90 % of the cases."""
+        guess = self.governor == "reducer" and not self.joint.reducer
+        surely = self.interval[1] if guess and self.interval else self.margin
+        return max(surely, self.margin) < 1.0
 
     @property
     def used(self) -> str:
@@ -118,7 +130,7 @@ class _Part(NamedTuple):
             "shaft": 1.0,
             "yield": joint.peak_shear_stress / joint.peak_total_stress,
             "reducer": joint.peak_torque / (joint.peak_torque + joint.gravity_torque),
-        }[self.governor]
+        }[self.governor if not self.fatigue else "shaft"]
         return self.margin / (1.0 + (growth - 1.0) * min(share, 1.0))
 
 
@@ -134,8 +146,8 @@ def judge(found: Assessment) -> Verdict:
     """
     parts = [part for k, j in enumerate(found.joints) for part in _parts(k, j, found.operations)]
     worst = sorted(parts, key=lambda part: part.sure_margin)
-    over = sorted((p for p in parts if p.margin < 1.0), key=lambda part: part.margin)
-    unsure = [part for part in worst if part.sure_margin < 1.0 <= part.margin]
+    over = sorted((p for p in parts if p.over), key=lambda part: part.margin)
+    unsure = [part for part in worst if part.sure_margin < 1.0 and not part.over]
     wearing = sorted((p for p in parts if _wears(p)), key=lambda part: part.joint.sure_life)
     contrary = [p for p in parts if p.joint.shaft_ratio < 1.0 - SHAFT_TOLERANCE]
     contrary.sort(key=lambda part: part.joint.shaft_ratio)
@@ -183,11 +195,12 @@ def judge(found: Assessment) -> Verdict:
         return made("cannot-be-told", text, "resonance", part.joint, part)
     if wearing:
         part = wearing[0]
-        return made("limited", _life(part), "shaft", part.joint, part)
+        return made("limited", _life(part), part.governor, part.joint, part)
     part = worst[0]
     return made("safe", _closest(worst), part.governor, part.joint, part, part.margin)
 
 
+_ALLOWABLE = "allowable"
 _SAID: dict[Status, str] = {
     "safe": "Safe", "limited": "Limited", "fails": "Fails", "cannot-be-told": "Cannot be told",
 }  # fmt: skip
@@ -220,13 +233,14 @@ def _parts(k: int, joint: JointLife, operations: tuple[OperationResult, ...]) ->
             margin = joint.life if joint.life < 1.0 else math.inf
         place = joint.worst_operation, joint.worst_pose
         share = joint.intervals.get("utilisation") if math.isfinite(margin) else None
-        yield _Part("shaft", joint, margin, "allowable", *place, share)
+        governor: Governor = "shaft" if joint.worn == "shaft" else "reducer"
+        yield _Part(governor, joint, margin, _ALLOWABLE, *place, share)
     if math.isfinite(joint.yield_utilisation):
         place = largest("peak_total_stress")
         share = joint.intervals.get("yield_utilisation")
         margin = _inverse(joint.yield_utilisation)
         yield _Part("yield", joint, margin, "yield strength", *place, share)
-    if joint.reducer and math.isfinite(joint.reducer_utilisation):
+    if joint.drive and math.isfinite(joint.reducer_utilisation):
         limit, place = joint.reducer_governed_by, largest("reducer_utilisation")
         share = joint.intervals.get("reducer_utilisation")
         yield _Part("reducer", joint, _inverse(joint.reducer_utilisation), limit, *place, share)
@@ -237,13 +251,13 @@ def _inverse(used: float) -> float:
 
 
 def _wears(part: _Part) -> bool:
-    return part.governor == "shaft" and part.joint.life >= 1.0 and part.joint.sure_life < math.inf
+    return part.fatigue and part.joint.life >= 1.0 and part.joint.sure_life < math.inf
 
 
 def _failure(part: _Part) -> str:
     joint = part.joint
-    if part.governor == "shaft":
-        return f"The shaft of {joint.name} breaks in its first rivet"
+    if part.fatigue:
+        return f"The {part.name} breaks in its first rivet"
     some = f" (80 % of the drawn cases are at {part.used})" if " to " in part.used else ""
     if part.governor == "yield":
         stress = joint.peak_total_stress / 1e6
@@ -258,8 +272,10 @@ def _failure(part: _Part) -> str:
 
 
 def _risk(part: _Part) -> str:
+    keeps = "keeps" if part.margin >= 1.0 else "exceeds"
+    values = "the most likely values" if part.joint.estimated else "the stated values"
     return (
-        f"The {part.name} keeps its {part.limit} at the stated values, but these are uncertain: it "
+        f"The {part.name} {keeps} its {part.limit} at {values}, but these are uncertain: it "
         f"is at {part.used}, and 10 % of the cases are beyond that"
     )
 
@@ -269,13 +285,13 @@ def _life(part: _Part) -> str:
 
 
 def _wear(part: _Part) -> str:
-    return f"the shaft of {part.joint.name} survives {part.joint.told_life} rivets"
+    return f"the {part.name} survives {part.joint.told_life} rivets"
 
 
 def _closest(worst: list[_Part]) -> str:
     first = worst[0]
     text = f"No part fails or wears; the {first.name} comes closest, at {first.used}"
-    fatigue = next((part for part in worst if part.governor == "shaft"), first)
+    fatigue = next((part for part in worst if part.fatigue), first)
     if fatigue is first:
         return text
     who = "it" if fatigue.name == first.name else f"the {fatigue.name}"
@@ -297,16 +313,16 @@ def _gaps(found: Assessment) -> Iterator[str]:
     for text, names in (
         (
             "no reducer is named for {}: it is not assessed",
-            [j.name for j in found.joints if is_drive(j.name) and not j.reducer],
+            [j.name for j in found.joints if is_drive(j.name) and not j.drive],
         ),
         (
             "the reducer of {} is not assessed: its vibration from rest has no end",
-            [j.name for j in found.joints if j.reducer and math.isnan(j.reducer_utilisation)],
+            [j.name for j in found.joints if j.drive and math.isnan(j.reducer_utilisation)],
         ),
         (
             "whether the shaft of {} yields is not assessed: the S-N curve gives no static "
             "strength, or the vibration from rest has no end",
-            [j.name for j in found.joints if j.sn_curve and math.isnan(j.yield_utilisation)],
+            [j.name for j in found.joints if j.worn == "shaft" and math.isnan(j.yield_utilisation)],
         ),
     ):
         if names:

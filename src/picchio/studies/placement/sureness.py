@@ -12,7 +12,7 @@ from picchio.fatigue.miner import format_count
 from picchio.studies.placement.loads import Loads
 from picchio.studies.placement.search import Spot
 from picchio.studies.placement.work import Work
-from picchio.studies.rivet.variation import ShaftStress
+from picchio.studies.rivet.variation import WornParts
 from picchio.studies.tasks import Task
 from picchio.studies.uncertainty.cases import Cases
 from picchio.studies.uncertainty.drawn import Drawn, interval
@@ -109,7 +109,7 @@ def sureness(loads: Loads, work: Work, start: Spot, best: Spot) -> Sureness | No
     if not robot.spreads:
         return None
     known = [(j, curve) for j, curve in enumerate(loads.curves) if curve is not None]
-    stress = ShaftStress(
+    stress = WornParts(
         [robot.flexible_joints[j] for j, _ in known], [j for j, _ in known],
         [curve for _, curve in known], "half-cycles", "none",
     )  # fmt: skip

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.miner import damage, peak_damage, utilisation
 from picchio.fatigue.shaft_stress import shear_stress, shear_stress_from_deflection
 from picchio.fatigue.sn.curve import MinerRule, SNCurve
-from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, load_sn_curve
+from picchio.fatigue.sn.library import DEFAULT_LIFE_CURVE, DEFAULT_SN_CURVE, load_sn_curve
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
 from picchio.studies.rivet.pose import JointLoad
@@ -51,15 +53,28 @@ class RainflowRule:
 
     def __call__(self, joint: Joint, load: JointLoad, hits: int, sn_curve: SNCurve) -> JointDamage:
         """Damage of one rivet; the hits are in the load already."""
-        assert joint.shaft is not None
         assert load.rest is not None
-        cycles = load.stress_cycles(joint, self.residue).shifted(load.static_stress(joint))
+        rule, miner = self.of(sn_curve)
+        steady = load.static_stress(joint)
+        cycles = load.stress_cycles(joint, self.residue, float(sn_curve.raised_by(steady)))
+        cycles = cycles.shifted(steady)
+        stress = math.nan
+        if joint.shaft is not None:
+            stress = peak(shear_stress(load.stiffness * load.rest, joint.shaft))
         return JointDamage(
             peak(load.rest),
-            peak(shear_stress(load.stiffness * load.rest, joint.shaft)),
-            utilisation(cycles, sn_curve, self.mean_stress),
-            damage(cycles, sn_curve, self.mean_stress, self.miner),
+            stress,
+            utilisation(cycles, sn_curve, rule),
+            damage(cycles, sn_curve, rule, miner),
         )
+
+    def of(self, sn_curve: SNCurve) -> tuple[Rule, MinerRule | None]:
+        """The rules that hold for a curve: a drive's is whole, with its own rule for the mean.
+
+        Args:
+            sn_curve: of a shaft or a drive.
+        """
+        return (self.mean_stress, self.miner) if sn_curve.kind == "shear" else ("none", None)
 
     def assumptions(self) -> tuple[str, ...]:
         """What the method takes for granted."""
@@ -106,27 +121,43 @@ damage (the joint has a shaft), and says what it takes for granted."""
 
 
 def curves_of(
-    robot: FlexibleRobot, override: str | SNCurve | None = None
+    robot: FlexibleRobot, override: str | SNCurve | None = None, *, drives: bool = True
 ) -> tuple[SNCurve | None, ...]:
-    """The S-N curve of every flexible joint; None for a joint without a shaft.
+    """The curve of every flexible joint: of its shaft, else of its drive; None without either.
 
     Args:
-        robot: whose shafts name their curves; one that names none has the default.
-        override: a curve, its name or its file, for all joints.
+        robot: whose shafts and drives name their curves; one that names none has the default.
+        override: a curve, its name or its file, for all shafts.
+        drives: False leaves out what is not a shaft.
 
     Raises:
-        InputError: an unknown name, or a file that is missing or wrong.
+        InputError: an unknown name, a curve of the wrong kind, or a file that is missing or wrong.
     """
     loaded: dict[str, SNCurve] = {}
+
+    def named(name: str, kind: str) -> SNCurve:
+        if name not in loaded:
+            loaded[name] = load_sn_curve(name)
+        return checked(loaded[name], kind)
+
+    def checked(curve: SNCurve, kind: str) -> SNCurve:
+        if curve.kind != kind:
+            raise InputError(f"is of the kind {curve.kind}, a {_BORNE_BY[kind]} needs {kind}",
+                             key="sn_curve", value=curve.name)  # fmt: skip
+        return curve
+
     curves: list[SNCurve | None] = []
     for joint in robot.flexible_joints:
-        if joint.shaft is None:
-            curves.append(None)
-        elif isinstance(override, SNCurve):
-            curves.append(override)
+        if joint.shaft is not None:
+            if isinstance(override, SNCurve):
+                curves.append(checked(override, "shear"))
+            else:
+                curves.append(named(override or joint.shaft.sn_curve or DEFAULT_SN_CURVE, "shear"))
+        elif joint.strength is not None and drives:
+            curves.append(named(joint.strength.life_curve or DEFAULT_LIFE_CURVE, "torque"))
         else:
-            name = joint.shaft.sn_curve or DEFAULT_SN_CURVE if override is None else override
-            if name not in loaded:
-                loaded[name] = load_sn_curve(name)
-            curves.append(loaded[name])
+            curves.append(None)
     return tuple(curves)
+
+
+_BORNE_BY = {"shear": "shaft", "torque": "drive"}

@@ -19,7 +19,6 @@ from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
 from picchio.fatigue.counting.counter import Residue, rainflow
 from picchio.fatigue.counting.cycles import Cycles
-from picchio.fatigue.shaft_stress import shear_stress
 from picchio.model.geometry import Geometry
 from picchio.model.linear_system import LinearSystem
 from picchio.model.model import Model
@@ -385,24 +384,24 @@ class JointLoad:
         return float(np.abs(self.stiffness * (self.static + self.rest)).max())
 
     def static_stress(self, joint: Joint) -> float:
-        """The shear stress before the first blow, Pa.
+        """What wears before the first blow: shear stress, Pa, or a drive's share of its torque.
 
         Args:
-            joint: with a shaft.
+            joint: with a shaft or a drive's strength.
         """
-        assert joint.shaft is not None
-        return float(shear_stress(self.stiffness * self.static, joint.shaft))
+        return self.stiffness * self.static * joint.per_torque
 
-    def stress_cycles(self, joint: Joint, residue: Residue) -> Cycles:
-        """The cycles of the vibration's shear stress about zero, Pa.
+    def stress_cycles(self, joint: Joint, residue: Residue, factor: float = 1.0) -> Cycles:
+        """The cycles about zero of the vibration's shear stress, Pa, or share of the torque.
 
         Args:
-            joint: with a shaft.
+            joint: with a shaft or a drive's strength.
             residue: how what rainflow leaves is counted.
+            factor: on all of them; see `SNCurve.raised_by`.
         """
-        assert joint.shaft is not None
         assert self.rest is not None
-        return rainflow(shear_stress(self.stiffness * self.rest, joint.shaft), residue=residue)
+        per = factor * joint.per_torque * self.stiffness
+        return rainflow(per * self.rest, residue=residue)
 
 
 class Rivet(ModelAtPose):

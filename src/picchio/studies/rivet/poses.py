@@ -89,10 +89,14 @@ def damage_at(
 
         factor = stress_per_torque(model.robot.flexible_joints, 0.0)
         mass, jacobian = many.mass_and_jacobian()
+        factors = np.tile(factor, (len(poses), 1))
+        if any(curve is not None and curve.kind == "torque" for curve in curves):
+            steady = factor * many.static_torque(excitation.preload, along)
+            factors = factors * raised(curves, steady)
         here = np.arange(len(poses))
         damages(
             *stacked([force]), mass, jacobian, np.zeros_like(here), here, many.stiffness,
-            np.tile(many.damping_ratio, (len(poses), 1)), along, np.tile(factor, (len(poses), 1)),
+            np.tile(many.damping_ratio, (len(poses), 1)), along, factors,
             *curve_tables(curves), found.natural_frequencies, found.lowest, found.highest,
             found.damage,
         )  # fmt: skip
@@ -116,6 +120,20 @@ def _exactly(rivet: Rivet, curves: Sequence[SNCurve | None], found: BatchDamage,
         curve = curves[j]
         if curve is not None:
             found.damage[s, j] = RainflowRule()(joint, load, hits, curve).damage
+
+
+def raised(curves: Sequence[SNCurve | None], steady: FloatArray) -> FloatArray:
+    """What steady loads make of the amplitudes beside them: see `SNCurve.raised_by`.
+
+    Args:
+        curves: of the n joints.
+        steady: (..., n) Pa of a shaft, share of its torque of a drive.
+    """
+    found = np.ones_like(steady)
+    for j, curve in enumerate(curves):
+        if curve is not None:
+            found[..., j] = curve.raised_by(steady[..., j])
+    return found
 
 
 def stacked(

@@ -1,13 +1,11 @@
-"""A rivet struck harder or more often, and how loads become the stress of shafts."""
+"""A rivet struck harder or more often, and how loads become the stress of what wears."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from picchio.core.errors import InputError
 from picchio.fatigue.counting.counter import Residue
-from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.model import Model
@@ -43,8 +41,8 @@ class VariedRivet(Rivet):
 
 
 @dataclass(frozen=True)
-class ShaftStress:
-    """How the joints that have a shaft and a curve turn their loads into stress cycles.
+class WornParts:
+    """How the joints that have a shaft or a drive, and its curve, turn loads into cycles.
 
     Attributes:
         joints: k of them.
@@ -70,32 +68,25 @@ class ShaftStress:
         mean_stress: Rule = "none",
         *,
         needed: bool = True,
-    ) -> ShaftStress:
+    ) -> WornParts:
         """Of a robot; arguments as in `assess`, and `survival` to move the curves to.
 
-        `needed` refuses a robot of which no joint has a shaft.
+        `needed` refuses a robot of which no joint has such a part.
 
         Raises:
-            InputError: no joint with a shaft; a curve without scatter where a survival is given.
+            InputError: no joint with one; a curve without scatter where a survival is given.
         """
         curves = curves_of(robot, sn_curve)
         columns = [j for j, curve in enumerate(curves) if curve is not None]
         if needed and not columns:
             raise InputError(
-                "no joint has a shaft and an S-N curve", file=robot.source, key="shaft"
+                "no joint has a shaft or a drive with a curve", file=robot.source, key="shaft"
             )
         used = [curve for curve in curves if curve is not None]
         if survival is not None:
             used = [curve.at_survival(survival) for curve in used]
         joints = [robot.flexible_joints[j] for j in columns]
         return cls(joints, columns, used, residue, mean_stress)
-
-    def cycles(self, loads: Sequence[JointLoad]) -> list[tuple[Cycles, float]]:
-        """Each joint's cycles of shear stress about zero, Pa, and its steady stress, Pa."""
-        return [
-            (loads[column].stress_cycles(joint, self.residue), loads[column].static_stress(joint))
-            for joint, column in zip(self.joints, self.columns, strict=True)
-        ]
 
 
 def rivets_of(model: Model, task: Task) -> list[tuple[VariedRivet, float]]:

@@ -13,7 +13,7 @@ from picchio.core.arrays import FloatArray
 from picchio.fatigue.uncertain_lives import Draws
 from picchio.model.model import Model
 from picchio.robot.spread import root_of
-from picchio.studies.rivet.variation import ShaftStress
+from picchio.studies.rivet.variation import WornParts
 from picchio.studies.tasks import Task
 from picchio.studies.uncertainty.drawn import Drawn
 from picchio.studies.uncertainty.sampler import Sampler
@@ -31,7 +31,7 @@ class Cases:
         stress: the joints with shafts; a curve without scatter does not vary.
     """
 
-    def __init__(self, model: Model, task: Task, stress: ShaftStress) -> None:
+    def __init__(self, model: Model, task: Task, stress: WornParts) -> None:
         self._sampler = Sampler.of(model, task, stress, None, [])
         names = [each.name for each in self._sampler.inputs]
         draws = Draws(len(names))

@@ -50,6 +50,22 @@ class Drawn(NamedTuple):
             return np.asarray(self.used.max(axis=0))
         return np.asarray(np.nanmax(self.geared, axis=0))
 
+    def ends(self, columns: Sequence[int]) -> FloatArray:
+        """(n,) the share of the worlds in which each flexible joint ends the robot's life.
+
+        The shortest life; where none has an end, the highest utilisation of its parts.
+
+        Args:
+            columns: of the k joints among the n flexible ones.
+        """
+        n, m = self.geared.shape
+        lives, used = np.full((n, m), np.inf), np.nan_to_num(self.geared, nan=-1.0)
+        lives[list(columns)] = self.lives
+        used[list(columns)] = np.maximum(used[list(columns)], self.used)
+        endless = np.isinf(lives).all(axis=0)
+        first = np.where(endless, used.argmax(axis=0), lives.argmin(axis=0))
+        return np.bincount(first, minlength=n) / m
+
     def holds(self, rivets: float) -> FloatArray:
         """(m,) whether every part holds for a life.
 

@@ -9,7 +9,7 @@ from picchio.core.errors import InputError
 from picchio.fatigue.uncertain_lives import Uncertain
 from picchio.model.model import Model
 from picchio.robot.spread import Spread
-from picchio.studies.rivet.variation import ShaftStress
+from picchio.studies.rivet.variation import WornParts
 from picchio.studies.tasks import Task
 
 # Relative, as the campaign's tolerances; the width and the model's error are judgements.
@@ -43,7 +43,7 @@ class Input:
         name: as results call it.
         uncertain: its distribution.
         source: where its spread is from.
-        key: "stiffness", "damping_ratio" or "radius" of joints, or what is varied as a whole.
+        key: one of `OF_JOINTS`, or what is varied as a whole.
         joints: the flexible joints whose key it is; empty for what has no joint.
         spread: a value that needs another robot; None otherwise.
         estimated: an estimate without a stated spread.
@@ -59,13 +59,18 @@ class Input:
 
 
 _OF_A_JOINT = {("stiffness",): "stiffness", ("damping_ratio",): "damping_ratio",
-               ("shaft", "radius"): "radius"}  # fmt: skip
+               ("shaft", "radius"): "radius",
+               ("strength", "repeated_peak_torque"): "bears"}  # fmt: skip
+OF_JOINTS = tuple(_OF_A_JOINT.values())
+"""What of a joint is varied by a factor, without another robot."""
+# What no life depends on; a drive's momentary peak goes with its repeated one.
+_IDLE = {("strength", "rated_torque"), ("strength", "momentary_peak_torque")}
 
 
 def inputs_of(
     model: Model,
     task: Task,
-    stress: ShaftStress,
+    stress: WornParts,
     given: Mapping[str, Uncertain] | None,
     notes: list[str],
 ) -> tuple[Input, ...]:
@@ -102,6 +107,8 @@ def inputs_of(
     taken: dict[str, set[int]] = {"stiffness": set(), "damping_ratio": set()}
     index = {joint.name: j for j, joint in enumerate(robot.flexible_joints)}
     for name, spread in own.items():
+        if spread.path in _IDLE:
+            continue
         shape = "lognormal" if spread.log else "absolute"
         middle = 1.0
         if not spread.log:

@@ -13,10 +13,14 @@ from picchio.core.html import sheet
 from picchio.core.results import TableResult
 from picchio.fatigue.miner import format_count
 from picchio.fatigue.uncertain_lives import LifeSpread, Uncertain
-from picchio.robot.spread import ESTIMATED
+from picchio.studies.uncertainty.measurements import Measurement
 
 # A life that falls and rises again by more than this along a stiffness is shown.
 _TURN = 0.02
+# A life known to no better than so many powers of ten is said to be hardly known.
+_WIDE = 2.0
+# Estimates named in a sentence.
+_FEW = 3
 
 
 @dataclass(frozen=True)
@@ -62,7 +66,7 @@ class UncertainLife(TableResult):
             "strength", ln is the specimens' standard normal score, which each curve's own scatter
             multiplies.
         sources: where each spread is from.
-        estimated: the inputs that are estimates without a stated spread.
+        estimated: the inputs that are estimates.
         scans: stiffnesses along which the life is not monotone (resonance): life against a factor.
         assumptions: what was taken for granted.
         seed: of the samples.
@@ -70,6 +74,8 @@ class UncertainLife(TableResult):
         intervals: of each flexible joint the P10 and P90 of what its parts bear: "utilisation",
             "yield_utilisation" and "reducer_utilisation", where it has such a part, and
             "peak_torque", N m (N of a slide), gravity and blows together.
+        ends_first: of each flexible joint the share of the samples in which it ends the life.
+        measure_first: what a measurement would leave of the interval, the best one first.
     """
 
     joints: dict[str, LifeSpread]
@@ -82,6 +88,8 @@ class UncertainLife(TableResult):
     seed: int
     lives: FloatArray = field(default_factory=lambda: np.empty(0))
     intervals: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict)
+    ends_first: dict[str, float] = field(default_factory=dict)
+    measure_first: tuple[Measurement, ...] = ()
 
     def spread_words(self, name: str) -> str:
         """How much an input varies, in words.
@@ -100,13 +108,29 @@ class UncertainLife(TableResult):
     def doubt(self) -> str:
         """Why the life is an interval, in a sentence."""
         most = max(self.robot.shares, key=lambda name: self.robot.shares[name])
-        guessed = ", ".join(self.estimated)
-        why = f" ({guessed}: estimated, a factor of {ESTIMATED:g})" if guessed else ""
-        return (
+        few = ", ".join(self.estimated[:_FEW])
+        more = len(self.estimated) - _FEW
+        guessed = few if more <= 0 else f"{few} and {more} more"
+        why = f" ({guessed}: estimated)" if guessed else ""
+        text = (
             f"values are uncertain{why}: rivets to failure are an interval that holds 80 % of the "
             f"cases; {most} matters most, {100 * self.robot.shares[most]:.0f} % of the variance of "
             "the logarithm of the utilisation"
         )
+        if self.decades > _WIDE:
+            text += (
+                f"; the interval is {self.decades:.2g} powers of ten wide: it tells which joint is "
+                "weakest, and hardly how long it lasts"
+            )
+        return text
+
+    @property
+    def decades(self) -> float:
+        """Width from P10 to P90 of the robot's life, powers of ten; NaN where it has no end."""
+        low, high = self.robot.p10, self.robot.p90
+        if not (low > 0.0 and high < math.inf):
+            return math.nan
+        return math.log10(high / low)
 
     def _repr_html_(self) -> str:
         rows = [

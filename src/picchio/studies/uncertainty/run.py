@@ -12,9 +12,10 @@ from picchio.fatigue.uncertain_lives import Draws, Uncertain, summarise
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.spread import root_of
-from picchio.studies.rivet.variation import ShaftStress
+from picchio.studies.rivet.variation import WornParts
 from picchio.studies.tasks import Task
 from picchio.studies.uncertainty.drawn import Drawn
+from picchio.studies.uncertainty.measurements import measure_first
 from picchio.studies.uncertainty.result import UncertainLife
 from picchio.studies.uncertainty.sampler import Sampler
 
@@ -79,7 +80,7 @@ def uncertain_life(
     """
     model = Model.of(robot, gravity_stiffness=gravity_stiffness, gravity_balanced=gravity_balanced)
     geared = any(joint.reducer for joint in model.robot.flexible_joints)
-    stress = ShaftStress.of(model.robot, sn_curve, None, residue, mean_stress, needed=not geared)
+    stress = WornParts.of(model.robot, sn_curve, None, residue, mean_stress, needed=not geared)
     notes: list[str] = []
     sampler = Sampler.of(model, task, stress, inputs, notes)
     names = [each.name for each in sampler.inputs]
@@ -112,6 +113,9 @@ def uncertain_life(
         for k, joint in enumerate(stress.joints)
         if (used[k] > 0).all() and (mixed is None or (mixed[k] > 0).all())
     }
+    every = draws.scores.reshape(-1, len(names)) @ root
+    flat = Drawn(*(part.reshape(len(part), len(every)) for part in drawn))
+    first = flat.ends(stress.columns)
     posterior = model.robot.posterior
     if posterior is not None and posterior.among(names) is not None:
         notes.append(
@@ -141,4 +145,11 @@ def uncertain_life(
         seed=seed,
         lives=drawn.robots_life.ravel(),
         intervals=sampler.intervals(drawn),
+        ends_first={
+            joint.name: float(share)
+            for joint, share in zip(model.robot.flexible_joints, first, strict=True)
+        },
+        measure_first=measure_first(
+            model.robot, sampler.inputs, every, flat.robots_life, flat.robots_use
+        ),
     )

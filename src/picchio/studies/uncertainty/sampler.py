@@ -14,7 +14,7 @@ from picchio.core.arrays import FloatArray, IndexArray
 from picchio.fatigue.counting.counter import rainflow
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.miner import damage, utilisation
-from picchio.fatigue.shaft_stress import shear_stress, stress_per_torque
+from picchio.fatigue.shaft_stress import stress_per_torque
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.uncertain_lives import Uncertain
 from picchio.model.effects.structure.joint_stiffness import JointStiffness
@@ -24,11 +24,11 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.spread import Spread
 from picchio.robot.varied import robot_with
 from picchio.studies.rivet.pose import Rivet
-from picchio.studies.rivet.poses import curve_tables, stacked
-from picchio.studies.rivet.variation import ShaftStress
+from picchio.studies.rivet.poses import curve_tables, raised, stacked
+from picchio.studies.rivet.variation import WornParts
 from picchio.studies.tasks import Operation, Task
 from picchio.studies.uncertainty.drawn import Drawn, interval
-from picchio.studies.uncertainty.inputs import Input, inputs_of
+from picchio.studies.uncertainty.inputs import OF_JOINTS, Input, inputs_of
 from picchio.studies.uncertainty.result import LifeScan
 
 # Rows of a batch; steps of a scan.
@@ -48,7 +48,7 @@ class Sampler:
 
     model: Model
     task: Task
-    stress: ShaftStress
+    stress: WornParts
     inputs: tuple[Input, ...]
 
     @classmethod
@@ -56,7 +56,7 @@ class Sampler:
         cls,
         model: Model,
         task: Task,
-        stress: ShaftStress,
+        stress: WornParts,
         given: Mapping[str, Uncertain] | None,
         notes: list[str],
     ) -> Sampler:
@@ -135,16 +135,20 @@ class Sampler:
         spent /= self.task.rivets_per_pass
         with np.errstate(divide="ignore"):
             lives = np.where(spent > 0.0, 1.0 / spent, np.inf)
-        strength = [c.yield_shear or c.ultimate_shear or np.nan for c in self.stress.curves]
+        strength = [curve.static_strength for curve in self.stress.curves]
         per = stress_per_torque(self.stress.joints) / np.array(strength)
         yielding = peak[self._columns] * per[:, None] * draw.thinner.T
         # Each limit of a reducer is for one of the two, so their largest values give its share.
         geared = np.full_like(peak, np.nan)
         for row, joint in enumerate(self.model.robot.flexible_joints):
-            if joint.reducer is not None:
-                shares = joint.reducer.shares(peak[row], held[row])
-                geared[row] = np.max(list(shares.values()), axis=0)
+            if joint.ratings is not None:
+                shares = joint.ratings.shares(peak[row], held[row])
+                geared[row] = np.max(list(shares.values()), axis=0) / draw.bears[:, row]
         return Drawn(lives, used, yielding, peak, geared)
+
+    @property
+    def _shafts_only(self) -> bool:
+        return all(curve.kind == "shear" for curve in self.stress.curves)
 
     @property
     def _columns(self) -> IndexArray:
@@ -187,9 +191,9 @@ class Sampler:
         mass = np.concatenate([mass for mass, _ in matrices])
         jacobian = np.concatenate([jacobian for _, jacobian in matrices])
         springs = np.concatenate([world.stiffness for world in worlds])
-        static = -np.concatenate([world.gravity_torque() for world in worlds])
-        if op.excitation.preload:
-            static = static + op.excitation.preload * np.einsum("pdn,d->pn", jacobian, op.direction)
+        static = np.concatenate(
+            [world.static_torque(op.excitation.preload, op.direction) for world in worlds]
+        )
         ratio = np.array([world.damping_ratio for world in worlds])
         d, place = np.repeat(np.arange(m), p), np.tile(np.arange(p), m)
         world = d if self._rebuilt else np.zeros_like(d)
@@ -198,18 +202,21 @@ class Sampler:
         curves: list[SNCurve | None] = [None] * springs.shape[1]
         for column, curve in zip(self.stress.columns, self.stress.curves, strict=True):
             curves[column] = curve
-        factor = np.zeros((m, springs.shape[1]))
-        columns = self._columns
-        factor[:, columns] = stress_per_torque(self.stress.joints) * draw.load
+        factor = np.zeros((m * p, springs.shape[1]))
+        columns, per = self._columns, stress_per_torque(self.stress.joints)
+        factor[:, columns] = (per * draw.load)[d]
+        if not self._shafts_only:
+            steady = static[place][:, columns] * (per * draw.thinner)[d]
+            factor[:, columns] *= raised(self.stress.curves, steady)
         frequency, low, high, damaged = np.empty((4, m * p, springs.shape[1]))
         stiffness = springs[place] * draw.stiffness[d]
         damages(
             *stacked(forces), mass, jacobian, d if len(forces) > 1 else np.zeros_like(d), place,
             stiffness, ratio[world] * draw.damping[d], np.tile(op.direction, (len(mass), 1)),
-            factor[d], *curve_tables(curves), frequency, low, high, damaged,
+            factor, *curve_tables(curves), frequency, low, high, damaged,
         )  # fmt: skip
         allowable = np.array([curve.allowable for curve in self.stress.curves])
-        loaded = 0.5 * (stiffness * (high - low) * factor[d])[:, columns] / allowable
+        loaded = 0.5 * (stiffness * (high - low) * factor)[:, columns] / allowable
         damaged = damaged[:, columns]
         turned = stiffness * draw.vibration[d][:, None]
         rest = static[place]
@@ -246,17 +253,16 @@ class Sampler:
         for k, (joint, column) in enumerate(
             zip(self.stress.joints, self.stress.columns, strict=True)
         ):
-            assert joint.shaft is not None
             rest, stiffness, static = loads[column]
-            cycles = rainflow(
-                shear_stress(stiffness * rest, joint.shaft), residue=self.stress.residue
-            )
-            factor = draw.load[d, k]
-            steady = float(shear_stress(static, joint.shaft)) * draw.thinner[d, k]
+            cycles = rainflow(joint.per_torque * stiffness * rest, residue=self.stress.residue)
+            curve = self.stress.curves[k]
+            # On both sides of the curve: as the kernel has it.
+            steady = joint.per_torque * static * draw.thinner[d, k]
+            factor = draw.load[d, k] * float(curve.raised_by(steady))
             load = Cycles.trusted(
                 factor * cycles.range, factor * cycles.mean + steady, cycles.count
             )
-            curve, rule = self.stress.curves[k], self.stress.mean_stress
+            rule = self.stress.mean_stress if curve.kind == "shear" else "none"
             found.append((damage(load, curve, rule), utilisation(load, curve, rule)))
         damaged, loaded = np.array(found).reshape(-1, 2).T
         peak = [
@@ -310,7 +316,9 @@ class _Draw:
         sampler: what they are drawn for.
         stiffness: (m, n) factors on the flexible joints' stiffness.
         damping: (m, n) factors on their damping ratios.
-        thinner: (m, k) factors on the stress of the joints that count, by their shafts' radii.
+        thinner: (m, k) factors on the stress of the joints that count, by their shafts' radii or
+            by what their drives bear.
+        bears: (m, n) factors on what the flexible joints' drives bear.
         vibration: (m,) all factors on the torques of the vibration.
         load: (m, k) all factors on the stress of the vibration, strength included.
         width: (m,) factors on the blows' width.
@@ -322,6 +330,7 @@ class _Draw:
     stiffness: FloatArray
     damping: FloatArray
     thinner: FloatArray
+    bears: FloatArray
     vibration: FloatArray
     load: FloatArray
     width: FloatArray
@@ -337,7 +346,7 @@ class _Draw:
     def of(cls, sampler: Sampler, moved: FloatArray, further: FloatArray) -> _Draw:
         """From normal scores (m, inputs), and further factors (m,) on a linear vibration."""
         m, n = len(moved), len(sampler.model.robot.flexible_joints)
-        of_joints = {key: np.ones((m, n)) for key in ("stiffness", "damping_ratio", "radius")}
+        of_joints = {key: np.ones((m, n)) for key in OF_JOINTS}
         whole = {key: np.ones(m) for key in ("force", "width", "model", "strength")}
         others = []
         for i, each in enumerate(sampler.inputs):
@@ -351,7 +360,11 @@ class _Draw:
             else:
                 whole[each.key] = values
         stress = sampler.stress
-        thinner = of_joints["radius"][:, sampler._columns] ** -3.0
+        shafts = np.array([joint.shaft is not None for joint in stress.joints], dtype=bool)
+        columns = sampler._columns
+        thinner = np.where(
+            shafts, of_joints["radius"][:, columns] ** -3.0, 1.0 / of_joints["bears"][:, columns]
+        )
         score = np.log(whole["strength"])
         strength = np.array([_strength(curve, score) for curve in stress.curves]).reshape(-1, m).T
         # Only of a linear model is the load proportional to the force.
@@ -359,8 +372,8 @@ class _Draw:
         if not sampler.model.nonlinear:
             vibration, force = vibration * force, np.ones(m)
         load = vibration[:, None] * thinner / strength
-        return cls(sampler, of_joints["stiffness"], of_joints["damping_ratio"], thinner, vibration,
-                   load, whole["width"], force, others)  # fmt: skip
+        return cls(sampler, of_joints["stiffness"], of_joints["damping_ratio"], thinner,
+                   of_joints["bears"], vibration, load, whole["width"], force, others)  # fmt: skip
 
     def robot(self, d: int) -> FlexibleRobot:
         """The robot of world d, but for stiffness, damping and radii."""
