@@ -22,7 +22,7 @@ DRIVES = {f"joint_{k}": {"strength": BEARS} for k in (1, 2, 3)}
 TASK = {
     "format": "picchio-task/1", "hits_per_rivet": 12,
     "excitation": {"kind": "pulse_train", "force": 12000.0, "period": 0.04, "width": 0.004},
-    "operation": [{"name": "up", "direction": [1, 1, 1], 
+    "operation": [{"name": "up", "direction": [1, 1, 1],
                    "poses": [[0.3, 0.9, -1.1], [0, 0.4, -0.7]]}],
 }  # fmt: skip
 FLEX = {f"joint_{k}": {"stiffness": s, "damping_ratio": 0.03} for k, s in

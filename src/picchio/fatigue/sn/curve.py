@@ -260,10 +260,11 @@ class SNCurve:
         from picchio.core.html import sheet
 
         limit = self.endurance_limit
+        unit, size = ("MPa", 1e-6) if self.kind == "shear" else ("1", 1.0)
         facts = {
             "slopes": self.slopes,
             "knees [cycles]": self.knees or None,
-            "endurance limit": "none" if limit is None else self.told(limit),
+            f"endurance limit [{unit}]": "none" if limit is None else size * limit,
             "Miner below it": None if limit is None else self.miner,
             "survival": self.survival,
             "scatter of log10 strength": self.scatter,

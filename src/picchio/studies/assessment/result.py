@@ -15,6 +15,7 @@ from picchio.core.results import TableResult
 from picchio.fatigue.miner import format_count as format_count
 from picchio.fatigue.standstill import RISKS, FalseBrinelling
 from picchio.robot.annotations.flexibility import ESTIMATE
+from picchio.robot.joint import ESTIMATED_DRIVE
 from picchio.robot.ratings import TorqueLimit
 from picchio.robot.units import JointUnits, column, units_of
 from picchio.studies.assessment.verdict import Verdict, judge
@@ -111,8 +112,7 @@ class JointLife:
         damage_per_rivet: mean over the rivets of the task's mix.
         rivets_to_failure: all rivets of the mix; infinite where the life has no end.
         sn_curve: name of the shaft's or the drive's curve; empty without either.
-        drive: what its torque limits are of: "reducer RV-80E-121", "drive (estimated)"; empty
-            without any.
+        estimated_drive: its torque limits are an estimate, since no reducer is named.
         worn: whose fatigue the life is: "shaft" or "drive"; empty without either.
         worst_operation: where the utilisation (or, without a shaft, the deflection) is largest.
         worst_pose: index of the pose there.
@@ -152,7 +152,7 @@ class JointLife:
     worst_operation: str
     worst_pose: int
     damage_share: Mapping[str, float] = field(default_factory=dict)
-    drive: str = ""
+    estimated_drive: bool = False
     worn: str = ""
     reducer_governed_by: str = ""
     reducer_limits: tuple[TorqueLimit, ...] = ()
@@ -217,6 +217,13 @@ class JointLife:
         """
         low, high = self.intervals.get(key, (getattr(self, key),) * 2)
         return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"
+
+    @property
+    def drive(self) -> str:
+        """What its torque limits are of; empty without any."""
+        if self.reducer:
+            return f"reducer {self.reducer}"
+        return ESTIMATED_DRIVE if self.estimated_drive else ""
 
     @property
     def units(self) -> JointUnits:

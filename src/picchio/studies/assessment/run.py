@@ -320,7 +320,7 @@ def _joint_life(
         kind=joint.kind,
         **largest,
         reducer=reducer.name if reducer is not None else "",
-        drive=joint.drive if ratings is not None else "",
+        estimated_drive=reducer is None and ratings is not None,
         worn="" if curve is None else "shaft" if curve.kind == "shear" else "drive",
         damage_per_rivet=per_rivet,
         rivets_to_failure=life(per_rivet) if curve is not None else math.nan,
