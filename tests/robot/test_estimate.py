@@ -25,6 +25,8 @@ def test_an_estimated_sidecar_is_the_priors_to_three_digits() -> None:
             value = getattr(entry, key)
             assert value == pytest.approx(getattr(prior, key), rel=5.1e-3)
             assert float(f"{value:.3g}") == value
+        for key in ("repeated_peak_torque", "repeated_peak_torque_spread", "rated_torque"):
+            assert getattr(entry.strength, key) == pytest.approx(getattr(prior, key), rel=5.1e-3)
     assert sidecar.tool is not None
     assert sidecar.tool.frame == robot.tool_frame
     exact, kept = priors.posterior(), sidecar.posterior
@@ -41,8 +43,12 @@ def test_a_robot_takes_an_estimated_sidecar_as_any_other() -> None:
     assert joint.estimated
     assert joint.reducer is not None
     assert joint.reducer.name == "CSG-25-100-2UH"
+    assert joint.strength is not None
+    assert joint.strength.repeated_peak_torque == joint.reducer.repeated_peak_torque
     sizes = {spread.name: spread.size for spread in spreads}
     factor = getattr(sidecar.joint["elbow_joint"], "stiffness_spread")  # noqa: B009  made by a decorator
+    assert "strength.repeated_peak_torque.elbow_joint" not in sizes
+    assert "strength.repeated_peak_torque.wrist_1_joint" in sizes
     assert sizes["stiffness.elbow_joint"] == pytest.approx(math.log(factor))
 
 

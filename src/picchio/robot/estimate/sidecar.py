@@ -13,6 +13,7 @@ import numpy as np
 
 from picchio.robot.annotations.sidecar import JointEntry, Sidecar, spreads_of
 from picchio.robot.drives.priors import DrivePriors, JointPrior, drive_priors
+from picchio.robot.joint import Strength
 from picchio.robot.spread import Posterior
 from picchio.robot.tool import Tool
 
@@ -96,12 +97,21 @@ def rounded(value: float) -> float:
 
 
 def _entry(prior: JointPrior, reducer: str | None) -> JointEntry:
+    bears = {"repeated_peak_torque": prior.repeated_peak_torque}
+    if prior.repeated_peak_torque_spread > 1.0:  # that of a named reducer is known
+        bears["repeated_peak_torque_spread"] = prior.repeated_peak_torque_spread
+    bears["rated_torque"] = prior.rated_torque
+    if prior.rated_torque_spread > 1.0:
+        bears["rated_torque_spread"] = prior.rated_torque_spread
+    bears["momentary_peak_torque"] = prior.momentary_peak_torque
     values: dict[str, Any] = {
         "stiffness": rounded(prior.stiffness),
         "stiffness_spread": rounded(prior.stiffness_spread),
         "damping_ratio": rounded(prior.damping_ratio),
         "damping_ratio_spread": rounded(prior.damping_ratio_spread),
-        "source": f"estimate: {'; '.join(prior.reasons)}",
+        "strength": Strength(**{key: rounded(value) for key, value in bears.items()}),
+        "source": f"estimate. Stiffness: {'; '.join(prior.reasons)}. "
+        f"Torques: {'; '.join(prior.strength_reasons)}.",
         "estimated": True,
     }
     if reducer is not None:
