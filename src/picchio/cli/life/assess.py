@@ -308,11 +308,13 @@ def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
     told = found.verdict
     out.print(told.headline, style="bold")
     for line in told.reasons:
-        out.print(f"  - {line}")
+        if line != found.notice:
+            out.print(f"  - {line}")
     out.print()
     if len(found.operations) > 1 and any(joint.damage_share for joint in found.joints):
         out.print(_share_table(found))
-    if found.steady_state:
+    # Of an estimated stiffness both are single cases.
+    if found.steady_state and not found.notice:
         out.print(_steady_table(found))
     if terms:
         out.print(_terms_table(terms))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from picchio.cli.output import console, table
 from picchio.core.errors import InputError
+from picchio.robot.annotations.flexibility import ESTIMATE
 from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
@@ -45,8 +46,8 @@ def parse_spreads(given: Sequence[str]) -> dict[str, Uncertain]:
 
 # Of many inputs, those that explain less than this share alone are only named.
 _MANY, _SMALL = 8, 0.02
-# Measurements that are listed.
-_BEST = 6
+# Measurements that are listed, and commands that use them.
+_BEST, _COMMANDS = 6, 2
 
 
 def _show_measurements(found: UncertainLife) -> None:
@@ -69,12 +70,10 @@ def _show_measurements(found: UncertainLife) -> None:
         title = "What to measure first: what is left of the interval of the utilisation"
     heads = ["to know", ">powers of\nten left" if known else ">left,\n%"]
     out.print(table(heads, rows, title=title))
-    told: dict[str, str] = {}
-    for one in best:
-        if one.command is not None and one.command not in told.values():
-            told[one.what] = one.command
-    for what, command in told.items():
-        out.print(f"  {what}: {command}", style="dim")
+    commands = dict.fromkeys(one.command for one in best if one.command is not None)
+    for command in list(commands)[:_COMMANDS]:
+        out.print(f"  {command}", style="dim")
+    out.print()
 
 
 def show_spread(found: UncertainLife) -> None:
@@ -96,12 +95,13 @@ def show_spread(found: UncertainLife) -> None:
             told = format_count(spread.rounded(key))
             rows.append([name, key.upper(), told, low if low == high else f"{low} to {high}"])
             name = ""
-    out.print(table(
-        ["", "", ">rivets", ">95 % of the sampling"], rows,
-        title=f"How sure the life is: rivets that 90, 50 and 10 % of {found.robot.samples} drawn "
-        "cases exceed",
-    ))  # fmt: skip
     robot = found.robot
+    if joints or robot.p10 != robot.p90:
+        out.print(table(
+            ["", "", ">rivets", ">95 % of the sampling"], rows,
+            title=f"How sure the life is: rivets that 90, 50 and 10 % of {robot.samples} drawn "
+            "cases exceed",
+        ))  # fmt: skip
     named = sorted(found.inputs, key=lambda name: -robot.shares[name])
     small = [name for name in named if robot.shares[name] < _SMALL] if len(named) > _MANY else []
     named = [name for name in named if name not in small]
@@ -110,7 +110,9 @@ def show_spread(found: UncertainLife) -> None:
         shares = [f"{100 * robot.shares[name]:.0f}"]
         if robot.totals:
             shares.append(f"{100 * robot.totals[name]:.0f}")
-        inputs.append([name, found.spread_words(name), *shares, found.sources[name]])
+        source = found.sources[name]
+        source = ESTIMATE if source.startswith(ESTIMATE) else source
+        inputs.append([name, found.spread_words(name), *shares, source])
     heads = [">alone,\n%", *([">with\nothers, %"] if robot.totals else [])]
     out.print(table(
         ["what varies", "by", *heads, "from"], inputs,

@@ -120,6 +120,23 @@ def flexible_joints(
     return joints, origins, spreads
 
 
+def estimate_notice(name: str, origins: Mapping[str, str]) -> str:
+    """What of a robot's drives is an estimate of picchio's own, in words; "" where nothing is.
+
+    Args:
+        name: of the robot.
+        origins: of its values.
+    """
+    made = {key.partition(".")[2] for key, text in origins.items() if text.startswith(ESTIMATE)}
+    if not made & {"stiffness", "strength"}:
+        return ""
+    what = "stiffness, damping and strength" if "stiffness" in made else "strength"
+    return (
+        f"Estimated: no file gives the {what} of the drives of {name}. What stands here is what "
+        "such a robot probably has, and every result is an interval that holds 80 % of the cases"
+    )
+
+
 def unused_entries(sources: Sequence[Source], joints: Iterable[str]) -> Iterator[str]:
     """What a sidecar or annotation says of joints that stay rigid, a sentence each.
 

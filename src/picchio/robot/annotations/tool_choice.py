@@ -137,13 +137,22 @@ def mounted_spreads(
 
 
 def choose_posterior(sources: Sequence[Source], spreads: Sequence[Spread]) -> Posterior | None:
-    """The correlations of the strongest source that has some, among the values that are its own.
+    """The correlations of the sources that have some, each among the values that are its own.
 
     Args:
         sources: the strongest first.
         spreads: of the robot as merged.
     """
+    found: list[Posterior] = []
     for source in sources:
         if (posterior := source.content.posterior) is not None:
-            return posterior.among({s.name for s in spreads if s.source.startswith(source.label)})
-    return None
+            own = {s.name for s in spreads if s.source.startswith(source.label)}
+            part = posterior.among(own - {name for one in found for name in one.names})
+            found += [part] if part is not None else []
+    if len(found) < 2:
+        return found[0] if found else None
+    from scipy.linalg import block_diag  # takes a while to load
+
+    whole = block_diag(*(part.correlation for part in found))
+    names = tuple(name for part in found for name in part.names)
+    return Posterior(names=names, correlation=tuple(map(tuple, whole.tolist())))

@@ -119,6 +119,7 @@ def _entry(prior: JointPrior, reducer: str | None) -> JointEntry:
     return JointEntry(**values)
 
 
+
 def _rounded(posterior: Posterior) -> Posterior:
     """Correlations to three decimals, such as variables can have."""
     exact = np.array(posterior.correlation)

@@ -11,10 +11,16 @@ from lxml import etree
 
 from picchio.core.errors import InputError, gathered, warn_user
 from picchio.core.toml import validate
-from picchio.robot.annotations.flexibility import Source, flexible_joints, unused_entries
+from picchio.robot.annotations.flexibility import (
+    ESTIMATE,
+    Source,
+    estimate_notice,
+    flexible_joints,
+    unused_entries,
+)
 from picchio.robot.annotations.inline import read_annotations
 from picchio.robot.annotations.other_tags import Srdf, find_srdf, read_drake
-from picchio.robot.annotations.sidecar import FORMAT, Sidecar, read_sidecar
+from picchio.robot.annotations.sidecar import FORMAT, JointEntry, Sidecar, read_sidecar
 from picchio.robot.annotations.tool_choice import (
     choose_gun,
     choose_mounting,
@@ -25,7 +31,7 @@ from picchio.robot.annotations.tool_choice import (
 from picchio.robot.drives.reducer import all_reducers
 from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.flexible_robot import FlexibleRobot
-from picchio.robot.joint import Joint
+from picchio.robot.joint import Joint, is_drive
 from picchio.robot.loading.find import FoundRobot, find_robot
 from picchio.robot.loading.saved_model import is_saved_model, read_saved_model
 from picchio.robot.masses.check import check_masses
@@ -45,8 +51,15 @@ def load_robot(
     values: Mapping[str, Mapping[str, object]] | None = None,
     reducers: str | Path | Sequence[str | Path] = (),
     allow_rigid: bool = False,
+    payload: float | None = None,
+    reach: float | None = None,
+    drive_class: str | None = None,
 ) -> FlexibleRobot:
     """Load a robot by name or path.
+
+    What no file gives of its drives is an estimate, from its masses, levers and limits: stiffness,
+    damping and strength where no joint has a stiffness, strength where a flexible joint has
+    neither a shaft nor a reducer. Its spreads make every life an interval.
 
     Args:
         robot: a name from `picchio robots`, a path to a URDF or to a robot's folder, a
@@ -57,7 +70,10 @@ def load_robot(
         values: values that win over every file, by joint and key, as in a sidecar:
             `{"joint_1": {"stiffness": 1e5}}`.
         reducers: catalogues of reducers `picchio-reducers/1`, stronger than the shipped ones.
-        allow_rigid: accept a robot none of whose joints is flexible.
+        allow_rigid: accept a robot none of whose joints is flexible, and estimate nothing.
+        payload: kg, the robot's rated one, for the estimate.
+        reach: m, likewise.
+        drive_class: strain-wave, cycloidal, planetary, direct or ball-screw, likewise.
 
     Returns:
         the robot, with the origin of every value.
@@ -74,9 +90,55 @@ def load_robot(
         return robot
     if isinstance(reducers, str | Path):
         reducers = (reducers,)
+    asked = (robot, flex, tool, values, reducers)
     with gathered() as said:
-        loaded = _load(robot, flex, tool, values, reducers, allow_rigid)
+        loaded = _load(*asked, None)
+    known = {"payload": payload, "reach": reach, "drive_class": drive_class}
+    guess = None if allow_rigid else _estimate(loaded, known)
+    if guess is not None:
+        with gathered() as said:
+            loaded = _load(*asked, Source(ESTIMATE, guess, strict=False))
+            if any(entry.flexible for entry in guess.joint.values()):
+                warn_user(estimate_notice(loaded.name, loaded.origins))
     return replace(loaded, warnings=tuple(said))
+
+
+def _estimate(robot: FlexibleRobot, known: Mapping[str, Any]) -> Sidecar | None:
+    """What no file gives of a robot's drives, estimated; None where nothing is missing.
+
+    Raises:
+        InputError: no joint is flexible, and nothing can be estimated.
+    """
+    from picchio.robot.estimate.sidecar import estimated_sidecar
+
+    drives = [joint for joint in robot.flexible_joints if is_drive(joint.name)]
+    if not drives:
+        try:
+            return estimated_sidecar(robot, **known)
+        except InputError as error:
+            if error.key in known:
+                raise
+            raise InputError(
+                f"no joint of this robot has a stiffness, and none can be estimated: {error}",
+                file=robot.source,
+                key="joint",
+                hint="give a sidecar (--flex FILE) with [joint.NAME] stiffness = ...; joints that "
+                f"can be flexible: {', '.join(robot.tree.movable()[:12]) or 'none'}",
+            ) from None
+    bare = {joint.name for joint in drives if joint.worn is None and joint.reducer is None}
+    if not bare:
+        return None
+    try:
+        whole = estimated_sidecar(robot, **known)
+    except InputError as error:
+        if error.key in known:
+            raise
+        return None  # the verdict says that nothing is known of what they bear
+    joints = {name: JointEntry(strength=entry.strength, source=entry.source)
+              for name, entry in whole.joint.items() if name in bare}  # fmt: skip
+    kept = {f"strength.repeated_peak_torque.{name}" for name in joints}
+    posterior = None if whole.posterior is None else whole.posterior.among(kept)
+    return Sidecar(joint=joints, posterior=posterior) if joints else None
 
 
 def _load(
@@ -85,13 +147,13 @@ def _load(
     tool: str | None,
     values: Mapping[str, Mapping[str, object]] | None,
     reducers: Sequence[str | Path],
-    allow_rigid: bool,
+    guess: Source | None,
 ) -> FlexibleRobot:
     if is_saved_model(robot):
         saved = read_saved_model(Path(robot))
         flex, tool = flex or saved.flex, tool or saved.tool
         try:
-            loaded = _load(saved.robot, flex, tool, values, reducers, allow_rigid)
+            loaded = _load(saved.robot, flex, tool, values, reducers, guess)
         except InputError as error:
             if error.key != "ROBOT":
                 raise
@@ -103,6 +165,8 @@ def _load(
     tree = read_tree(root, found.urdf)
     srdf = find_srdf(tree)
     sources, flex_file = _sources(root, found, flex, values, srdf)
+    if guess is not None:
+        sources.append(guess)
     joints, origins, spreads = flexible_joints(tree, sources, all_reducers(reducers))
     tree, mass_origins, mass_spreads = give_masses(tree, sources, root)
     spreads += mass_spreads
@@ -118,14 +182,6 @@ def _load(
     rigid = RigidModel(urdf, tree, mounting.gravity)
     if gun is not None and gun.recoil_stiffness is not None and recoil is not None:
         joints[recoil] = Joint(recoil, "prismatic", gun.recoil_stiffness, gun.damping_ratio)
-    if not joints and not allow_rigid:
-        raise InputError(
-            "no joint of this robot has a stiffness",
-            file=found.urdf,
-            key="joint",
-            hint="give a sidecar (--flex FILE) with [joint.NAME] stiffness = ...; joints that "
-            f"can be flexible: {', '.join(tree.movable()[:12]) or 'none'}",
-        )
     result = FlexibleRobot(
         name=found.name or tree.name,
         source=found.urdf,

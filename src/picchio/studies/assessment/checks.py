@@ -94,7 +94,6 @@ def assumptions_of(
     reducers: tuple[Reducer | None, ...],
 ) -> tuple[str, ...]:
     """Every assumption behind a result, estimates and defaults of the robot among them."""
-    described = [curve.describe() for curve in dict.fromkeys(c for c in curves if c is not None)]
     named = [r for r in dict.fromkeys(reducers) if r is not None]
     unchecked = [
         joint.name
@@ -112,7 +111,7 @@ def assumptions_of(
         *(f"the model has the effect {effect!r}" for effect in model.effects),
         *model.without_load(),
         *_estimates(model.robot),
-        *(rule.assumptions() if described else ("each rivet starts from rest and rings down",)),
+        *rule.assumptions({curve.kind for curve in curves if curve}),
         *(f"{curve.title} {curve.describe()}" for curve in dict.fromkeys(c for c in curves if c)),
     ]
     if named:
@@ -223,21 +222,21 @@ def doubts_of(
 
 
 _ESTIMATED_KEYS = {
-    "stiffness": "the stiffness is",
-    "damping_ratio": "the damping is",
-    "strength": "what the drive bears is",
+    "stiffness": "stiffness",
+    "damping_ratio": "damping",
+    "strength": "what the drive bears",
 }
 
 
 def _estimates(robot: FlexibleRobot) -> list[str]:
     """What of the robot is an estimate or a default, one line a source."""
     said: dict[str, list[str]] = {}
-    own: dict[str, list[str]] = {}
+    own: dict[tuple[str, ...], list[str]] = {}
     for joint in robot.flexible_joints:
-        made = [key for key in _ESTIMATED_KEYS
-                if robot.origins.get(f"{joint.name}.{key}", "").startswith(ESTIMATE)]  # fmt: skip
-        for key in made:
-            own.setdefault(key, []).append(joint.name)
+        origin = {key: robot.origins.get(f"{joint.name}.{key}", "") for key in _ESTIMATED_KEYS}
+        made = tuple(key for key, text in origin.items() if text.startswith(ESTIMATE))
+        if made:
+            own.setdefault(made, []).append(joint.name)
         if "stiffness" in made:
             continue
         known = {
@@ -273,14 +272,19 @@ def _estimates(robot: FlexibleRobot) -> list[str]:
             text = f"damping ratio {joint.damping_ratio:g} is assumed ({damping})"
             said.setdefault(text, []).append(joint.name)
     lines = [f"{', '.join(names)}: {text}" for text, names in said.items()]
-    for key, names in own.items():
-        path = f"{key}.repeated_peak_torque" if key == "strength" else key
-        spreads = [math.exp(robot.spreads[f"{path}.{name}"].size) for name in names
-                   if f"{path}.{name}" in robot.spreads]  # fmt: skip
-        low, high = min(spreads, default=1.0), max(spreads, default=1.0)
-        within = f"{low:.2g}" if f"{low:.2g}" == f"{high:.2g}" else f"{low:.2g} to {high:.2g}"
+    for guessed, names in own.items():
+        told = [f"{_ESTIMATED_KEYS[key]} within a factor of {_factors(robot, key, names)}"
+                for key in guessed]  # fmt: skip
         lines.append(
-            f"{', '.join(names)}: {_ESTIMATED_KEYS[key]} estimated, within a factor of {within} "
-            "(one standard deviation; picchio start writes the reasons)"
+            f"{', '.join(names)}: estimated from the URDF: {', '.join(told)} (one standard "
+            "deviation; picchio start writes the reasons)"
         )
     return lines
+
+
+def _factors(robot: FlexibleRobot, key: str, names: list[str]) -> str:
+    """By how much a value of some joints is uncertain, such as "1.8 to 2.4"."""
+    path = f"{key}.repeated_peak_torque" if key == "strength" else key
+    found = (robot.spreads.get(f"{path}.{name}") for name in names)
+    told = [f"{math.exp(size):.2g}" for size in sorted(one.size for one in found if one)]
+    return " to ".join(dict.fromkeys([told[0], told[-1]])) if told else "1"

@@ -14,7 +14,7 @@ from picchio.core.html import sheet
 from picchio.core.results import TableResult
 from picchio.fatigue.miner import format_count as format_count
 from picchio.fatigue.standstill import RISKS, FalseBrinelling
-from picchio.robot.annotations.flexibility import ESTIMATE
+from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.robot.joint import ESTIMATED_DRIVE
 from picchio.robot.ratings import TorqueLimit
 from picchio.robot.units import JointUnits, column, units_of
@@ -346,16 +346,7 @@ class Assessment(TableResult):
     @property
     def notice(self) -> str:
         """What of the drives is an estimate of picchio's own, in words; "" where nothing is."""
-        made = {key.partition(".")[2] for key, text in self.origins.items()
-                if text.startswith(ESTIMATE)}  # fmt: skip
-        if not made & {"stiffness", "strength"}:
-            return ""
-        what = "stiffness, damping and strength" if "stiffness" in made else "strength"
-        return (
-            f"Estimated: no file gives the {what} of the drives of {self.robot}. What stands here "
-            "is what such a robot probably has, and every result is an interval that holds 80 % of "
-            "the cases"
-        )
+        return estimate_notice(self.robot, self.origins)
 
     @property
     def verdict(self) -> Verdict:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -76,15 +77,25 @@ class RainflowRule:
         """
         return (self.mean_stress, self.miner) if sn_curve.kind == "shear" else ("none", None)
 
-    def assumptions(self) -> tuple[str, ...]:
-        """What the method takes for granted."""
-        return (
-            "each rivet starts from rest and rings down before the next",
-            "stress k x r / Jp at the surface of a solid round shaft",
-            f"cycles by rainflow (ASTM E1049), residue as {self.residue}",
-            f"mean stress (gravity, feed force): {self.mean_stress}",
-            "Miner's sum of 1 is failure",
-        )
+    def assumptions(self, kinds: Collection[str]) -> tuple[str, ...]:
+        """What the method takes for granted.
+
+        Args:
+            kinds: of the curves in use; none where nothing wears.
+        """
+        lines = ["each rivet starts from rest and rings down before the next"]
+        if "shear" in kinds:
+            lines.append("stress k x r / Jp at the surface of a solid round shaft")
+        if kinds:
+            lines.append(f"cycles by rainflow (ASTM E1049), residue as {self.residue}")
+        if "shear" in kinds:
+            lines.append(f"mean stress (gravity, feed force): {self.mean_stress}")
+        if "torque" in kinds:
+            lines.append(
+                "a drive whose reducer is not known: torque cycles as shares of its limit for "
+                "repeated peaks, raised by the steady torque (Goodman)"
+            )
+        return (*lines, "Miner's sum of 1 is failure") if kinds else tuple(lines)
 
 
 @dataclass(frozen=True)
@@ -102,8 +113,14 @@ class PaperRule:
             deflection, stress, stress / sn_curve.allowable, peak_damage(stress, hits, sn_curve)
         )
 
-    def assumptions(self) -> tuple[str, ...]:
-        """What the method takes for granted."""
+    def assumptions(self, kinds: Collection[str]) -> tuple[str, ...]:
+        """What the method takes for granted.
+
+        Args:
+            kinds: of the curves in use.
+        """
+        if not kinds:
+            return ("the steady state is reached at the first hit",)
         return (
             "the steady state is reached at the first hit",
             "stress G r x / l (paper eqs. 14-17)",
