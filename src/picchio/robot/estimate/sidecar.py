@@ -109,7 +109,10 @@ def _entry(prior: JointPrior, reducer: str | None) -> JointEntry:
         "stiffness_spread": rounded(prior.stiffness_spread),
         "damping_ratio": rounded(prior.damping_ratio),
         "damping_ratio_spread": rounded(prior.damping_ratio_spread),
-        "strength": Strength(**{key: rounded(value) for key, value in bears.items()}),
+        "strength": Strength(
+            **{key: rounded(value) for key, value in bears.items()},
+            estimated=prior.repeated_peak_torque_spread > 1.0,
+        ),
         "source": f"estimate. Stiffness: {'; '.join(prior.reasons)}. "
         f"Torques: {'; '.join(prior.strength_reasons)}.",
         "estimated": True,
@@ -117,7 +120,6 @@ def _entry(prior: JointPrior, reducer: str | None) -> JointEntry:
     if reducer is not None:
         values["reducer"] = reducer
     return JointEntry(**values)
-
 
 
 def _rounded(posterior: Posterior) -> Posterior:
