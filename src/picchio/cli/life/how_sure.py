@@ -102,6 +102,10 @@ def show_spread(found: UncertainLife) -> None:
             title=f"How sure the life is: rivets that 90, 50 and 10 % of {robot.samples} drawn "
             "cases exceed",
         ))  # fmt: skip
+    if found.utilisation:
+        ends = " to ".join(f"{100 * found.utilisation[key]:.3g}" for key in ("p10", "p90"))
+        middle = f"{100 * found.utilisation['p50']:.3g}"
+        out.print(f"Highest utilisation of the robot, P10 to P90: {ends} % (median {middle} %).\n")
     named = sorted(found.inputs, key=lambda name: -robot.shares[name])
     small = [name for name in named if robot.shares[name] < _SMALL] if len(named) > _MANY else []
     named = [name for name in named if name not in small]

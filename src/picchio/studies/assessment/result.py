@@ -443,6 +443,7 @@ class Assessment(TableResult):
         if self.uncertainty is not None:
             own |= {
                 "life": self.uncertainty.robot.quantiles,
+                "utilisation": self.uncertainty.utilisation,
                 "spread_shares": self.uncertainty.robot.shares,
                 "estimated": self.estimated,
                 "measure_first": self.uncertainty.measure_first,

@@ -74,6 +74,8 @@ class UncertainLife(TableResult):
         intervals: of each flexible joint the P10 and P90 of what its parts bear: "utilisation",
             "yield_utilisation" and "reducer_utilisation", where it has such a part, and
             "peak_torque", N m (N of a slide), gravity and blows together.
+        utilisation: P10, P50 and P90 of the robot's highest fatigue utilisation (of its limits,
+            where no part has a curve).
         ends_first: of each flexible joint the share of the samples in which it ends the life.
         measure_first: what a measurement would leave of the interval, the best one first.
     """
@@ -88,6 +90,7 @@ class UncertainLife(TableResult):
     seed: int
     lives: FloatArray = field(default_factory=lambda: np.empty(0))
     intervals: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict)
+    utilisation: dict[str, float] = field(default_factory=dict)
     ends_first: dict[str, float] = field(default_factory=dict)
     measure_first: tuple[Measurement, ...] = ()
 

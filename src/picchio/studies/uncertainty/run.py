@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+import numpy as np
+
 from picchio.core.processes import one_thread
 from picchio.fatigue.counting.counter import Residue
 from picchio.fatigue.mean_stress import Rule
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.fatigue.uncertain_lives import Draws, Uncertain, summarise
+from picchio.fatigue.uncertain_lives import QUANTILES, Draws, Uncertain, summarise
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.spread import root_of
@@ -145,6 +147,9 @@ def uncertain_life(
         seed=seed,
         lives=drawn.robots_life.ravel(),
         intervals=sampler.intervals(drawn),
+        utilisation={
+            name: float(np.quantile(flat.robots_use, level)) for name, level in QUANTILES.items()
+        },
         ends_first={
             joint.name: float(share)
             for joint, share in zip(model.robot.flexible_joints, first, strict=True)
