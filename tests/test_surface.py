@@ -23,7 +23,7 @@ from picchio.studies.maps.places import joint_grid
 FUNCTIONS = {
     "allowable", "annotate", "assess", "check", "compare", "diagnose", "effects", "envelope",
     "fit_sn", "formats", "identify", "import_record", "place", "report", "reproduce", "robots",
-    "simulate", "uncertain_life", "view", "workspace_map",
+    "simulate", "start", "uncertain_life", "view", "workspace_map",
 }  # fmt: skip
 SLOW = {"diagnose", "identify", "reproduce"}
 # What they return stands within the JSON of `picchio assess`.
@@ -135,6 +135,7 @@ def calls(folder: Path) -> dict[str, Any]:
         "reproduce": lambda: picchio.reproduce(worlds=8),
         "robots": lambda: picchio.robots(examples=False),
         "simulate": lambda: picchio.simulate("fanuc_like_3dof", folder / "plan.toml"),
+        "start": lambda: picchio.start("ur10", payload=10.0),
         "uncertain_life": lambda: picchio.uncertain_life(robot, task, samples=256),
         "view": lambda: picchio.view(robot, pose=POSE, excitation=BLOWS),
         "workspace_map": lambda: picchio.workspace_map(

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from picchio.studies.envelopes import envelope as envelope
     from picchio.studies.maps.run import workspace_map as workspace_map
     from picchio.studies.placement.run import place as place
+    from picchio.studies.start import start as start
     from picchio.studies.tasks import load_task as load_task
     from picchio.studies.tasks import task_from_dict as task_from_dict
     from picchio.studies.uncertainty.run import uncertain_life as uncertain_life
@@ -73,6 +74,7 @@ _HOME = {
     "reproduce": "paper.run",
     "robots": "robot.loading.catalogue",
     "simulate": "prediction.simulation",
+    "start": "studies.start",
     "uncertain_life": "studies.uncertainty.run",
     "view": "visuals.view",
     "workspace_map": "studies.maps.run",

@@ -79,6 +79,12 @@ def scene() -> Any:
     return made
 
 
+def started() -> Any:
+    made = picchio.start("fanuc_like_3dof", payload=25.0, seed=2)
+    made.save(force=True)
+    return made
+
+
 # Command line, and what the function returns; both write what they write where the other did.
 COMMANDS: dict[str, tuple[str, Any]] = {
     "annotate": ("annotate fanuc_like_3dof --out a.urdf", annotated),
@@ -131,6 +137,7 @@ COMMANDS: dict[str, tuple[str, Any]] = {
         "simulate fanuc_like_3dof --plan plan.toml --to made --seed 9",
         lambda: picchio.simulate("fanuc_like_3dof", "plan.toml", "made", seed=9, overwrite=True),
     ),
+    "start": ("start fanuc_like_3dof --payload 25 --seed 2", started),
     "view": (f"view fanuc_like_3dof --pose={POSE} --out a.html", scene),
 }
 

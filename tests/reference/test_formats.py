@@ -120,6 +120,7 @@ FAST = {
     "sn": "fit-sn tests.csv",
     "import": "import log.csv --mapping mapping.toml --to imported",
     "annotation": "annotate fanuc_like_3dof --flex {robots}/fanuc_like_3dof/flex.toml --out r.urdf",
+    "start": "start ur10 --force",
     "effects": "effects",
     "formats": "formats",
 }

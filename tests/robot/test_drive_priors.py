@@ -118,13 +118,22 @@ def test_a_reducer_weighs_a_normal_distribution_as_by_integration() -> None:
     assert found[1] == pytest.approx(0.2 / size**2 * (found[0] - mean))
 
 
+def test_a_reducer_without_a_stiffness_still_tells_the_torque() -> None:
+    robot = arm("fanuc_r2000ic")
+    named = drive_priors(robot, drive_class="cycloidal", reducers={"joint_2": "RV-80E-121"})
+    joint, alone = named.joints[1], drive_priors(robot, drive_class="cycloidal").joints[1]
+    assert joint.repeated_peak_torque == pytest.approx(1960.0, rel=0.01)  # 2.5 x 784 N m
+    assert joint.repeated_peak_torque_spread == pytest.approx(1.0, abs=1e-6)
+    assert not any("softer than" in reason for reason in joint.reasons)
+    assert joint.stiffness == pytest.approx(alone.stiffness, rel=0.5)
+
+
 @pytest.mark.parametrize(
     ("name", "given", "said"),
     [
         ("ur10", {"drive_class": "worm"}, "drive_class"),
         ("ur10", {"payload": -1.0}, "payload"),
         ("ur10", {"reducers": {"elbow": "CSG-25-100-2UH"}}, "reducers"),
-        ("ur10", {"reducers": {"elbow_joint": "RV-80E-121"}}, "no stiffness"),
         ("emps", {}, "no rotary joint"),
     ],
 )

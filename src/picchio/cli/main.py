@@ -18,7 +18,7 @@ import typer
 from picchio.cli.app import app
 
 # Importing its file adds a command, in the order of `picchio --help`.
-from picchio.cli.life import assess, compare, envelope, fit_sn, map, place, view  # noqa: F401
+from picchio.cli.life import assess, compare, envelope, fit_sn, map, place, start, view  # noqa: F401
 from picchio.cli.measured import check, diagnose, identify, import_, simulate  # noqa: F401
 from picchio.cli.output import begin, printable, say_warning, say_written
 from picchio.cli.reference import described, reproduce, robots  # noqa: F401
@@ -140,10 +140,11 @@ def _as_typed(error: PicchioError, given: Sequence[str]) -> PicchioError:
     """The error of a function's argument, told of the option that set it."""
     if not isinstance(error, InputError) or error.file is not None or error.key is None:
         return error
-    option = f"--{error.key.replace('_', '-')}"
     commands: Any = typer.main.get_command(app)
-    options = {name for p in commands.commands[given[0]].params for name in p.opts}
-    return error.placed(key=option) if option in options else error
+    params = commands.commands[given[0]].params
+    options = {p.name: p.opts[0] for p in params if p.opts[0].startswith("--")}
+    options |= {name.lstrip("-").replace("-", "_"): name for p in params for name in p.opts}
+    return error.placed(key=options.get(error.key, error.key))
 
 
 def _fail(problem: str, code: int = 2) -> int:

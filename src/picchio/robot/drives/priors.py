@@ -173,8 +173,8 @@ def drive_priors(
         the joint distribution.
 
     Raises:
-        InputError: an unknown class, joint or reducer; a reducer whose catalogue has no
-            stiffness; payload or reach not positive; no rotary joint moves the tool.
+        InputError: an unknown class, joint or reducer; a reducer far softer than its joint can be;
+            payload or reach not positive; no rotary joint moves the tool.
     """
     if drive_class is not None and drive_class not in KNOWN_CLASSES:
         raise InputError("no such class of drives", key="drive_class", value=drive_class,
@@ -184,12 +184,9 @@ def drive_priors(
         joint: one if isinstance(one, Reducer) else load_reducer(one)
         for joint, one in (reducers or {}).items()
     }
-    for joint, one in named.items():
+    for joint in named:
         if joint not in found.names:
             raise InputError("no such joint", key="reducers", value=joint, choices=found.names)
-        if catalogue_stiffness(one) is None:
-            raise InputError("its catalogue gives no stiffness", key=f"reducers.{joint}",
-                             value=one.name)  # fmt: skip
     kinds = {one.kind for one in named.values()}
     kind = drive_class or (kinds.pop() if len(kinds) == 1 else None)
     fit = fitted()
@@ -197,8 +194,8 @@ def drive_priors(
     n = len(found.names)
     mixture = predict(fit.stiffness, group, also=2 + QUANTITIES.index("effort"))
     for joint, one in named.items():
-        stiffness = float(catalogue_stiffness(one) or 0.0)
-        mixture = with_reducer(mixture, found.names.index(joint), stiffness, fit.shares)
+        if (stiffness := catalogue_stiffness(one)) is not None:
+            mixture = with_reducer(mixture, found.names.index(joint), stiffness, fit.shares)
     mixture = _with_strength(mixture, found, named, kind)
     both, torque_covariance = moments(mixture)
     mean, covariance = both[:n], torque_covariance[:n, :n]
@@ -391,11 +388,11 @@ def _reasons(
         )
     if found.place[k, 1]:
         said.append("a wrist: the inertias that URDFs give there tell little, hence the wide range")
-    if reducer is not None:
+    if reducer is not None and (own := catalogue_stiffness(reducer)) is not None:
         robots = len(fit.shares)
         many = "one robot" if robots == 1 else f"{robots} robots"
         said.append(
-            f"softer than its reducer {reducer.name} ({catalogue_stiffness(reducer):.3g} N m/rad); "
+            f"softer than its reducer {reducer.name} ({own:.3g} N m/rad); "
             f"in {many} that was measured a joint had "
             f"{', '.join(f'{share:.2f}' for share in fit.shares)} of it"
         )

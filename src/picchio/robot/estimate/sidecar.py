@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from picchio.robot.drives.reducer import Reducer
     from picchio.robot.flexible_robot import FlexibleRobot
 
+_TORQUES = ("repeated_peak_torque", "rated_torque", "momentary_peak_torque")
 _DIGITS = 3
 _NEARLY = 0.99  # off the diagonal, where rounding left a matrix that no variables can have
 
@@ -97,23 +98,18 @@ def rounded(value: float) -> float:
 
 
 def _entry(prior: JointPrior, reducer: str | None) -> JointEntry:
-    bears = {"repeated_peak_torque": prior.repeated_peak_torque}
-    if prior.repeated_peak_torque_spread > 1.0:  # that of a named reducer is known
-        bears["repeated_peak_torque_spread"] = prior.repeated_peak_torque_spread
-    bears["rated_torque"] = prior.rated_torque
-    if prior.rated_torque_spread > 1.0:
-        bears["rated_torque_spread"] = prior.rated_torque_spread
-    bears["momentary_peak_torque"] = prior.momentary_peak_torque
+    bears = {key: rounded(getattr(prior, key)) for key in _TORQUES}
+    for key in _TORQUES[:2]:
+        spread = rounded(getattr(prior, f"{key}_spread"))
+        if spread > 1.0:  # a named reducer's is known
+            bears[f"{key}_spread"] = spread
     values: dict[str, Any] = {
         "stiffness": rounded(prior.stiffness),
         "stiffness_spread": rounded(prior.stiffness_spread),
         "damping_ratio": rounded(prior.damping_ratio),
         "damping_ratio_spread": rounded(prior.damping_ratio_spread),
-        "strength": Strength(
-            **{key: rounded(value) for key, value in bears.items()},
-            estimated=prior.repeated_peak_torque_spread > 1.0,
-        ),
-        "source": f"estimate. Stiffness: {'; '.join(prior.reasons)}. "
+        "strength": Strength(**bears, estimated="repeated_peak_torque_spread" in bears),
+        "source": f"Stiffness: {'; '.join(prior.reasons)}. "
         f"Torques: {'; '.join(prior.strength_reasons)}.",
         "estimated": True,
     }

@@ -1,0 +1,125 @@
+"""`picchio start`: a sidecar of estimates and a first task, where only a URDF is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from picchio.cli.app import app
+from picchio.cli.options import JsonOption, ToolOption
+from picchio.cli.output import check_targets, console, count_of, deliver, styled, table
+from picchio.core.errors import InputError
+
+if TYPE_CHECKING:
+    from picchio.studies.start import Start
+
+_NAMED = 6  # rigid joints of one reason
+
+
+@app.command(epilog="Example: picchio start ur10 --payload 10 --class strain-wave")
+def start(
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="A URDF, or a name from `picchio robots`.")
+    ],
+    tool: ToolOption = None,
+    payload: Annotated[
+        float | None,
+        typer.Option(metavar="KG", help="Rated payload; narrows the estimates, bounds the blows."),
+    ] = None,
+    reach: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="Rated reach; what the URDF says if not given."),
+    ] = None,
+    drive_class: Annotated[
+        str | None,
+        typer.Option(
+            "--class",
+            metavar="CLASS",
+            help="Of the drives: strain-wave, cycloidal, planetary, direct or ball-screw.",
+        ),
+    ] = None,
+    reducers: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--reducer",
+            metavar="JOINT=NAME",
+            help="A joint's reducer, by its catalogue name; may be repeated.",
+        ),
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(metavar="N", min=0, help="Random seed of the task's poses.")
+    ] = 0,
+    out: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Where the two files go; it must exist.")
+    ] = Path(),
+    force: Annotated[bool, typer.Option("--force", help="Write over files that exist.")] = False,
+    json: JsonOption = None,
+) -> None:
+    """Estimate what nobody gave of a robot: a sidecar and a task, ready to be edited.
+
+    Stiffness, damping and strength of the drives come from the URDF's masses, levers and limits,
+    each with its spread and its reason.
+    """
+    import picchio
+
+    named: dict[str, str] = {}
+    for text in reducers or ():
+        joint, equals, name = (part.strip() for part in text.partition("="))
+        if not equals or not joint or not name:
+            raise InputError("must be JOINT=NAME", key="--reducer", value=text)
+        if joint in named:
+            raise InputError("the joint is given twice", key="--reducer", value=joint)
+        named[joint] = name
+    found = picchio.start(
+        robot, tool=tool, payload=payload, reach=reach, drive_class=drive_class, reducers=named,
+        seed=seed,
+    )  # fmt: skip
+    check_targets([*(out / name for name in found.names), json], found.inputs)
+    found.save(out, force=force)
+    deliver(found.to_dict(), json, lambda: _show(found, out))
+
+
+def _show(found: Start, out: Path) -> None:
+    from picchio.robot.estimate.template import likely, told_range
+
+    screen = console()
+    screen.print(
+        styled(found.robot, f": {count_of(len(found.sidecar.joint), 'drive')} estimated from "
+               "the URDF. Nothing was measured.")
+    )  # fmt: skip
+    rows = []
+    for name, entry in found.sidecar.joint.items():
+        values, bears = entry.model_dump(), entry.strength
+        peak = "-"
+        if bears is not None:
+            spread = bears.model_dump()["repeated_peak_torque_spread"]
+            torque = bears.repeated_peak_torque
+            peak = told_range(likely(torque, spread)) if spread else f"{torque:g}, {entry.reducer}"
+        rows.append((
+            name,
+            told_range(likely(values["stiffness"], values["stiffness_spread"])),
+            told_range(likely(100 * values["damping_ratio"], values["damping_ratio_spread"])),
+            peak,
+        ))  # fmt: skip
+    heads = ("joint", ">stiffness\nN m/rad", ">damping\n%", ">repeated peak\ntorque, N m")
+    screen.print(table(heads, rows, title="Where nine cases of ten lie"))
+    for reason, joints in found.rigid.items():
+        more = f" and {len(joints) - _NAMED} more" if len(joints) > _NAMED else ""
+        screen.print(f"  - Left rigid: {reason}: {', '.join(joints[:_NAMED])}{more}.")
+    if found.known:
+        every = len(found.known) == len(found.sidecar.joint)
+        screen.print(
+            f"  - Its own files have a stiffness of {'each' if every else ', '.join(found.known)}; "
+            "the sidecar has estimates in their place, and says what stood there."
+        )
+    blows = found.task["excitation"]
+    screen.print(
+        f"  - The task: {count_of(found.task['hits_per_rivet'], 'blow')} a rivet of "
+        f"{blows['force']:g} N, {1e3 * blows['width']:g} ms wide, every "
+        f"{1e3 * blows['period']:g} ms, along x, y and z at five poses drawn with seed "
+        f"{found.seed}."
+    )
+    screen.print("\nEdit both files where you know better. Then:")
+    screen.print(styled(f"  {found.next_command(out)}"), soft_wrap=True)  # in one line, to copy
