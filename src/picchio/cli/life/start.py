@@ -57,7 +57,7 @@ def start(
     force: Annotated[bool, typer.Option("--force", help="Write over files that exist.")] = False,
     json: JsonOption = None,
 ) -> None:
-    """Estimate what nobody gave of a robot: a sidecar and a task, ready to be edited.
+    """Write a robot's estimated drives and a first task, to be edited.
 
     Stiffness, damping and strength of the drives come from the URDF's masses, levers and limits,
     each with its spread and its reason.
