@@ -57,7 +57,7 @@ def start(
     force: Annotated[bool, typer.Option("--force", help="Write over files that exist.")] = False,
     json: JsonOption = None,
 ) -> None:
-    """Write a robot's estimated drives and a first task, to be edited.
+    """Write estimates of a robot's drives and a first task to edit.
 
     Stiffness, damping and strength of the drives come from the URDF's masses, levers and limits,
     each with its spread and its reason.

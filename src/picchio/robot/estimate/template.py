@@ -9,10 +9,10 @@ from typing import Any
 import tomlkit
 
 from picchio.core.toml import StrictModel
+from picchio.robot.annotations.flexibility import ESTIMATE
 from picchio.robot.annotations.sidecar import FORMAT, JointEntry, Sidecar, given
 from picchio.robot.spread import Posterior, value_of
 
-SOURCE = "picchio's estimate"
 WIDTH = 88
 NINE_IN_TEN = 1.645
 """Standard deviations either side of the middle that hold 90 % of a normal distribution."""
@@ -172,7 +172,7 @@ def _joint(name: str, entry: JointEntry) -> Iterator[str]:
     yield from _keys(
         {key: value for key, value in values.items() if key not in ("source", "strength")}
     )
-    yield f"source = {literal(SOURCE)}"
+    yield f"source = {literal(ESTIMATE)}"
     if entry.strength is not None:
         yield f"[joint.{_key(name)}.strength]"
         yield from _keys(given(entry.strength))
