@@ -47,6 +47,8 @@ def diagnose(
     tool: str | None = None,
     gravity_stiffness: bool = True,
     workers: int | None = None,
+    train: Collection[str] = (),
+    held_out: Collection[str] = (),
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """What the simulation of a robot gets wrong about measured records, and why.
@@ -64,6 +66,8 @@ def diagnose(
         gravity_stiffness: whether gravity's stiffness dg/dq counts beside the springs'.
         workers: processes for percussion records (Linux only); as many as cores if None. The
             result is the same.
+        train: names of motion records to fit to; chosen by how the joints move if not given.
+        held_out: names of motion records to judge by; all others that are not in `train`.
         progress: told what is being done.
 
     Returns:
@@ -77,6 +81,9 @@ def diagnose(
         effect_class(name)
     records = load_campaign(campaign)
     kinds = {record.kind for record in records}
+    if (train or held_out) and "motion" not in kinds:
+        raise InputError("names motion records, and there is none: of blows, whole poses are held "
+                         "out", key="train" if train else "held_out")  # fmt: skip
     # What a drive's torque tells needs no stiffness.
     loaded = load_robot(robot, flex=flex, tool=tool, allow_rigid=kinds == {"motion"})
     work: Task | None = None
@@ -88,14 +95,15 @@ def diagnose(
     notes = _FOUND
     if kinds == {"motion"}:
         found = diagnose_motion(
-            loaded, records, without=without,
+            loaded, records, without=without, train=train, held_out=held_out,
             progress=lambda done, total: say(f"motion records: {done} of {total}"),
         )  # fmt: skip
         acting, told = effects_during_blows(found), _motion_life(loaded, found, work)
         effects, notes = acting.effects, f"{_FOUND} in motion records{_left_out(acting)}"
         blows = {side: dict(joints) for side, joints in told.blows.items()}
         answer = replace(
-            found, life=told.life, life_note=told.why, extra={"blows": blows or None},
+            found, life=told.life, life_note=told.why,
+            extra={**found.extra, "blows": blows or None},
             details={"motion": found, "during_blows": acting, "motion_life": told},
         )  # fmt: skip
     else:
@@ -105,7 +113,7 @@ def diagnose(
         }  # fmt: skip
         hit: PercussionDiagnosis
         if "motion" in kinds:
-            answer = diagnose_mixed(loaded, records, **options)
+            answer = diagnose_mixed(loaded, records, train=train, held_out=held_out, **options)
             hit = answer.details["percussion"]
             notes += _left_out(answer.details["during_blows"])
         else:

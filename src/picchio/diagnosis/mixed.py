@@ -108,6 +108,8 @@ def diagnose_mixed(
     without: Collection[str] = (),
     gravity_stiffness: bool = True,
     workers: int | None = None,
+    train: Collection[str] = (),
+    held_out: Collection[str] = (),
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """What the simulation gets wrong about percussion and motion records of one robot.
@@ -118,6 +120,8 @@ def diagnose_mixed(
         without: names of effects that must not be considered.
         gravity_stiffness: whether gravity's change with the deflection counts in percussion.
         workers: processes for the percussion records; as many as cores where None.
+        train: names of motion records to fit to.
+        held_out: names of motion records to judge by.
         progress: told what is being done.
 
     Returns:
@@ -131,7 +135,7 @@ def diagnose_mixed(
 
     def searched(known: Sequence[Estimate] = ()) -> Diagnosis:
         return diagnose_motion(
-            robot, campaign, without=without, known=known,
+            robot, campaign, without=without, known=known, train=train, held_out=held_out,
             progress=lambda done, total: say(f"motion records: {done} of {total}"),
         )  # fmt: skip
 
@@ -431,6 +435,7 @@ def _concluded(
             for kind, found in (("percussion", blows), ("motion", motion))
         },
         shared=tuple(c.to_dict() for c in comparisons),
+        extra=dict(motion.extra),
         details={
             "percussion": percussion, "motion": motion, "motion_life": MotionLife(None, _TOGETHER),
             "during_blows": effects_during_blows(motion),

@@ -58,6 +58,14 @@ def diagnose(
             metavar="EFFECT", help="Leave an effect out, see `picchio effects`; may be repeated."
         ),
     ] = None,
+    train: Annotated[
+        list[str] | None,
+        typer.Option(metavar="RECORD", help="Motion record to fit to; may be repeated."),
+    ] = None,
+    held_out: Annotated[
+        list[str] | None,
+        typer.Option(metavar="RECORD", help="Motion record to judge by; may be repeated."),
+    ] = None,
     model: Annotated[
         Path | None,
         typer.Option(
@@ -103,6 +111,8 @@ def diagnose(
             flex=flex,
             tool=tool,
             gravity_stiffness=gravity_stiffness,
+            train=train or (),
+            held_out=held_out or (),
             progress=say,
         )
     if model is not None:
@@ -156,11 +166,15 @@ def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
     gain = found.gain
     if gain is not None:
         share = "" if gain.explained is None else f"; {100 * gain.explained:.1f} % explained"
+        where = f"On {count_of(len(gain.held_out_records), 'record')} held out"
+        if not gain.held_out_records:
+            where = "Nothing was held out; on what was fitted"
         out.print(
-            f"On {count_of(len(gain.held_out_records), 'record')} held out the residual falls from "
+            f"{where} the residual falls from "
             f"{100 * gain.baseline_nrmse:.3g} % to {100 * gain.extended_nrmse:.3g} % of the "
             f"signal; noise alone is {100 * gain.noise_floor_nrmse:.3g} %{share}."
         )
+    _show_channels(found.extra.get("channels") or ())
     for told in found.shared:
         if told["status"] in _STATUS:
             out.print(f"  {told['effect']} of {told['target']}: {_STATUS[told['status']]}")
@@ -178,6 +192,18 @@ def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
         out.print(f"Life: {found.life_note}.")
     if plan is not None and found.plan is None:
         out.print(f"Nothing to measure next that a plan could say: {plan} not written.")
+
+
+def _show_channels(told: Sequence[Mapping[str, Any]]) -> None:
+    """What is left in every channel of a motion, on records held out."""
+    if told:
+        rows = [
+            [row["channel"], *(f"{row[key]:.3g}" for key in ("before", "after", "noise")),
+             row["verdict"]]
+            for row in told
+        ]  # fmt: skip
+        columns = ("left in (RMS, SI)", ">before", ">after", ">noise", "verdict")
+        console().print(table(columns, rows, ruled=False, head_style="dim"))
 
 
 def _show_life(life: Mapping[str, Any]) -> None:

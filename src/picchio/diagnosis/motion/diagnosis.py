@@ -9,7 +9,13 @@ from typing import Any
 from picchio.campaign.campaign import Campaign
 from picchio.core.errors import InputError
 from picchio.core.processes import one_thread
-from picchio.diagnosis.motion.conclude.holdout import judge, judged_groups, table
+from picchio.diagnosis.motion.conclude.holdout import (
+    NOISE,
+    channels,
+    judge,
+    judged_groups,
+    table,
+)
 from picchio.diagnosis.motion.conclude.values import correlation, nuisances, parameters
 from picchio.diagnosis.motion.criteria.holdout import validate
 from picchio.diagnosis.motion.criteria.score import Scorer, necessity
@@ -28,7 +34,6 @@ from picchio.model.effects.registry import effect_class
 from picchio.prediction.motion.log import read_logs
 from picchio.robot.flexible_robot import FlexibleRobot
 
-_NOISE = 1.15  # residual over noise that counts as noise: noise is known to about a tenth
 _SURE = 0.9999
 Pair = tuple[str, str]
 
@@ -61,6 +66,8 @@ def diagnose_motion(
     *,
     without: Collection[str] = (),
     known: Sequence[Estimate] = (),
+    train: Collection[str] = (),
+    held_out: Collection[str] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> Diagnosis:
     """What the simulation gets wrong about a moving robot, why, and the gain of knowing it.
@@ -68,7 +75,7 @@ def diagnose_motion(
     Predicted are the drives' torques (inverse dynamics of the measured motion) and, of joints
     with two encoders, the link side's angle less the motor side's. Effects are added one by one
     while stretches of the training records that were not fitted to gain; then those that are not
-    needed are taken out; then, where two or more records are held out, those that lose there.
+    needed are taken out; then those that lose on records held out.
 
     Args:
         robot: the nominal robot.
@@ -76,6 +83,8 @@ def diagnose_motion(
         without: names of effects that must not be considered.
         known: causes that other records tell; the search starts from them, and takes out those
             that are not needed here.
+        train: names of records to fit to; see `split`.
+        held_out: names of records to judge by.
         progress: told (step, steps).
 
     Returns:
@@ -84,11 +93,11 @@ def diagnose_motion(
         and, of joints whose elasticity was found, how it compares with what is documented.
 
     Raises:
-        InputError: no motion record, a joint that the robot lacks, an unknown effect.
+        InputError: no motion record, a joint that the robot lacks, an unknown effect or record.
     """
     for name in without:
         effect_class(name)
-    inside, outside = split(read_logs(robot, campaign))
+    inside, outside = split(read_logs(robot, campaign), train, held_out)
     system = System(robot, inside)
     if not system.groups:
         raise InputError("the records hold no torque and no second encoder of a joint that moves",
@@ -101,7 +110,7 @@ def diagnose_motion(
     found, steps = select(system, informed, kinds, progress or (lambda done, total: None))
     dropped: list[tuple[Effect, dict[str, float]]] = []
     if outside:
-        found, dropped = validate(system, judge_on, found)
+        found, dropped = validate(system, judge_on, found, before.state)
         # What stood only beside a cause that is gone goes, too.
         found = eliminate(system, found) if dropped else found
     search = _Search(system, judge_on, before, kinds, steps, dropped)
@@ -129,8 +138,7 @@ def _conclude(search: _Search, found: Fit) -> Diagnosis:
     noise = noise_levels(system)
     outer = {**noise, **noise_levels(judge_on)} if judge_on is not system else noise
     groups = judged_groups(judge_on, found)
-    train = tuple(log.file for log in system.logs)
-    gain = judge(judge_on, before.state, found.state, outer, groups, train)
+    gain = judge(judge_on, before.state, found.state, outer, groups, system)
     scorer = Scorer(system, found)
     sure = []
     for index in range(len(found.state.effects)):
@@ -142,12 +150,21 @@ def _conclude(search: _Search, found: Fit) -> Diagnosis:
         Cause(effect.name, effect.target, confidence, parameters(system, found, effect))
         for effect, confidence in sorted(valued, key=lambda each: each[0].periodic)
     )
+    told = channels(table(judge_on, before.state, found.state, outer))
     verdict = _verdict(system, before, found, noise, gain)
+    silent = [row["channel"] for row in told if row["verdict"] == "unexplained"]
+    note = ""
+    if verdict == "unexplained" and causes and 2 * len(silent) < len(told):
+        # What one channel hides is no reason to doubt what explains the others.
+        verdict, note = "partial", f"most channels are explained; not {', '.join(silent)}"
+        causes = tuple(c for c in causes if _elsewhere(c, silent, told))
     # The search stopped where nothing more could be claimed: what helped a little then.
     leads = _leads(search, found.state)
     if verdict == "unexplained":
-        leads = tuple(dict.fromkeys([*_labels(found.state), *leads]))
         causes = ()
+    claimed = {(c.effect, c.target) for c in causes}
+    unclaimed = [pair for pair in _labels(found.state) if pair not in claimed]
+    leads = tuple(dict.fromkeys([*unclaimed, *leads]))
     sets = _alternatives(found.state, rivals) if causes else ()
     if verdict == "named" and sets:
         verdict = "ambiguous"
@@ -161,7 +178,9 @@ def _conclude(search: _Search, found: Fit) -> Diagnosis:
         next_measurement=next_measurement(system, found, noise, rivals)
         if verdict not in ("nothing-wrong", "named") else None,
         scores=tuple(row for step in search.steps for row in step.scores),
+        note=note,
         correlation=correlation(found),
+        extra={"channels": told if judge_on is not system else []},
         details=_details(search, found, outer, causes),
     )  # fmt: skip
 
@@ -172,15 +191,21 @@ def _verdict(system: System, before: Fit, found: Fit, noise: Mapping[Group, floa
         quiet = _quiet(before, noise, judged_groups(system, before))
         return "nothing-wrong" if quiet else "unexplained"
     if _quiet(found, noise, judged_groups(system, found)) and (
-        gain.extended_nrmse <= _NOISE * gain.noise_floor_nrmse
+        gain.extended_nrmse <= NOISE * gain.noise_floor_nrmse
     ):
         return "named"
     explained = gain.explained
     return "partial" if explained is not None and explained >= MOSTLY else "unexplained"
 
 
+def _elsewhere(cause: Cause, silent: Collection[str], told: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether a cause acts in a channel that is explained; what is no joint's acts in all."""
+    own = {row["channel"] for row in told if row["channel"].partition(".")[2] == cause.target}
+    return not own or not own <= set(silent)
+
+
 def _quiet(found: Fit, noise: Mapping[Group, float], groups: Sequence[Group]) -> bool:
-    return all(found.level[g] <= _NOISE * noise[g] for g in groups)
+    return all(found.level[g] <= NOISE * noise[g] for g in groups)
 
 
 def _labels(state: State) -> list[Pair]:

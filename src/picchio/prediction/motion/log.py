@@ -75,6 +75,9 @@ def read_log(robot: FlexibleRobot, record: Record) -> MotionLog:
         if joint not in robot.joint_names:
             raise InputError("the robot has no joint of this name", file=record.source.path,
                              key=name, value=joint, choices=robot.joint_names)  # fmt: skip
+        if channel.kind.motion == "torque" and np.ptp(read[name]) == 0.0:
+            warn_user(f"{record.file}: {name} is not used: it reads one value all along")
+            continue
         roles[channel.kind.motion][joint] = read[name]
     link, motor = roles["link"], roles["motor"]
     angle = {j: motor.get(j, link.get(j)) for j in robot.joint_names if j in motor or j in link}

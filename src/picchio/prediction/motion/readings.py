@@ -18,6 +18,7 @@ from picchio.robot.flexible_robot import FlexibleRobot
 
 _KEPT = 400
 _STILL = 0.01  # of the fastest
+_ROUNDED = 1e-9
 Part = tuple[str, str, FloatArray]
 Parts = list[Part]
 
@@ -328,9 +329,27 @@ def _still(log: MotionLog, band: Band, joint: str, velocity: FloatArray) -> floa
 
 
 def angle_noise(series: FloatArray) -> float:
-    """Standard deviation of an encoder's noise, from fourth differences, which motion lacks."""
+    """Standard deviation of a reading's noise, from fourth differences, which motion lacks.
+
+    At least what rounding to its resolution makes: a slow or silent reading repeats its steps, and
+    its differences are then nothing though its last digit is not known.
+    """
     if series.size < 16:
         return 0.0
     fourth = np.diff(series, 4)
     # Var of the fourth difference of white noise: 1 + 16 + 36 + 16 + 1 = 70.
-    return float(1.4826 * np.median(np.abs(fourth)) / np.sqrt(70.0))
+    noise = float(1.4826 * np.median(np.abs(fourth)) / np.sqrt(70.0))
+    return max(noise, resolution(series) / np.sqrt(12.0))
+
+
+def resolution(series: FloatArray) -> float:
+    """The step of a reading: the smallest between two of its values; 0 where it never changes.
+
+    Of a reading without steps it is tiny: noise then says more.
+    """
+    values = np.unique(series)
+    if values.size < 2:
+        return 0.0
+    steps = np.diff(values)
+    real = steps[steps > _ROUNDED * max(abs(values[0]), abs(values[-1]))]
+    return float(real.min()) if real.size else 0.0

@@ -171,7 +171,8 @@ def headline(diagnosis: Diagnosis) -> str:
     gain = diagnosis.gain
     effect = ""
     if gain is not None and diagnosis.causes:
-        seen = "held out" if gain.held_out_records != gain.train_records else "fitted"
+        fitted = gain.held_out_records in ((), gain.train_records)
+        seen = "fitted" if fitted else "held out"
         effect = (
             f" On records {seen} the error falls from {percent(gain.baseline_nrmse)} % of the "
             f"signal to {percent(gain.extended_nrmse)} %; noise alone leaves "

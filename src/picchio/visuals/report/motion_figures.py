@@ -274,7 +274,7 @@ class MotionFigures(Pictures):
     def held_out(self) -> list[Picture]:
         """Before and after in a record that neither model was fitted to."""
         gain = self.diagnosis.gain
-        if gain is None or not self.changed or gain.held_out_records == gain.train_records:
+        if gain is None or not self.changed or not gain.held_out_records:
             return []
         made = []
         for view in self._worst(_views(self.diagnosis, "held_out")):

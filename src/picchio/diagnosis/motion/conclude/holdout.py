@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import math
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -10,10 +12,11 @@ from picchio.core.arrays import FloatArray
 from picchio.diagnosis.motion.data.system import Group, System
 from picchio.diagnosis.motion.fit.least_squares import Fit
 from picchio.diagnosis.motion.fit.state import State
-from picchio.diagnosis.result import Gain
+from picchio.diagnosis.result import MOSTLY, Gain, Verdict
 from picchio.model.motion import RIPPLE
 
 _THERE = 0.05
+NOISE = 1.15  # residual over noise that counts as noise: noise is known to about a tenth
 
 
 def judged_groups(system: System, fitted: Fit) -> list[Group]:
@@ -41,9 +44,9 @@ def judge(
     after: State,
     noise: Mapping[Group, float],
     groups: Collection[Group],
-    train: tuple[str, ...],
+    train: System,
 ) -> Gain:
-    """Gain on a system.
+    """Gain on a system; held out is nothing where it is the one that was fitted to.
 
     Every channel's residual over its noise and the square root of its samples, all channels
     together, relative to the signal so weighted.
@@ -57,8 +60,8 @@ def judge(
             sums[3] += 1.0
     signal = max(sums[0], 1e-300)
     return Gain(
-        train_records=train,
-        held_out_records=tuple(log.file for log in system.logs),
+        train_records=tuple(log.file for log in train.logs),
+        held_out_records=() if system is train else tuple(log.file for log in system.logs),
         baseline_nrmse=float(np.sqrt(sums[1] / signal)),
         extended_nrmse=float(np.sqrt(sums[2] / signal)),
         noise_floor_nrmse=float(np.sqrt(sums[3] / signal)),
@@ -68,7 +71,7 @@ def judge(
 
 def table(
     system: System, before: State, after: State, noise: Mapping[Group, float]
-) -> list[dict[str, object]]:
+) -> list[dict[str, Any]]:
     """Record by record and channel by channel: RMS measured, left before, left after, noise."""
     left, less = residual_of(system, before), residual_of(system, after)
     rms = lambda x: float(np.sqrt(np.mean(x**2)))  # noqa: E731
@@ -80,6 +83,47 @@ def table(
             "baseline": rms(left[s.rows]),
             "extended": rms(less[s.rows]),
             "noise": noise[s.group],
+            "samples": s.samples.size,
         }
         for s in system.segments
     ]
+
+
+def channels(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Channel by channel, all records together: RMS left before and after, noise, verdict.
+
+    Args:
+        rows: of `table`.
+    """
+    found: dict[str, list[Mapping[str, Any]]] = {}
+    for row in rows:
+        if not row["channel"].startswith(RIPPLE):
+            found.setdefault(row["channel"], []).append(row)
+    made = []
+    for channel, parts in found.items():
+        before, after, noise = (
+            math.sqrt(sum(row[key] ** 2 * row["samples"] for row in parts)
+                      / sum(row["samples"] for row in parts))
+            for key in ("baseline", "extended", "noise")
+        )  # fmt: skip
+        made.append({
+            "channel": channel, "before": before, "after": after, "noise": noise,
+            "verdict": channel_verdict(before, after, noise),
+        })  # fmt: skip
+    return made
+
+
+def channel_verdict(before: float, after: float, noise: float) -> Verdict:
+    """What is said of one channel, in the words of a whole diagnosis.
+
+    Args:
+        before: RMS that the nominal model leaves.
+        after: what the extended model leaves.
+        noise: what noise alone leaves.
+    """
+    if before <= NOISE * noise:
+        return "nothing-wrong"
+    if after <= NOISE * noise:
+        return "named"
+    explained = (before**2 - after**2) / max(before**2 - noise**2, 1e-300)
+    return "partial" if explained >= MOSTLY else "unexplained"

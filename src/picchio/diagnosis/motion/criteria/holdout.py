@@ -1,11 +1,11 @@
-"""Causes must hold on every record that was not fitted to, where there are two or more."""
+"""Causes must hold on records that were not fitted to, in their own channels."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from picchio.diagnosis.motion.criteria.score import contribution
-from picchio.diagnosis.motion.data.system import System
+from picchio.diagnosis.motion.data.system import Group, System
 from picchio.diagnosis.motion.fit.least_squares import (
     Fit,
     difference,
@@ -13,27 +13,30 @@ from picchio.diagnosis.motion.fit.least_squares import (
     row_weights,
     stable_solve,
 )
+from picchio.diagnosis.motion.fit.state import State
 from picchio.model.effects.effect import Effect
+from picchio.model.motion import RIPPLE
 
 _LITTLE = 0.05
+_WORSE = 1.01  # error after over error before: less is no loss worth a cause
 
 
 def validate(
-    train: System, held_out: System, current: Fit
+    train: System, held_out: System, current: Fit, before: State
 ) -> tuple[Fit, list[tuple[Effect, dict[str, float]]]]:
-    """The fit without causes that lose on a record held out, and those causes.
+    """The fit without causes that lose on records held out, and those causes.
 
-    With one record held out nothing is tested here: it stays the judge that it is.
+    Where two or more records are held out, a cause has to gain on each. In any case no cause of
+    a joint stays while that joint's own channel is predicted worse than without any cause.
 
     Args:
         train: the equations fitted to.
         held_out: those of the records held out.
         current: the fit.
+        before: the nominal model's state.
     """
     dropped: list[tuple[Effect, dict[str, float]]] = []
-    if len(held_out.logs) < 2:
-        return current, dropped
-    while current.state.effects:
+    while len(held_out.logs) > 1 and current.state.effects:
         gains = _gains(train, held_out, current)
         failing = [
             i for i, found in enumerate(gains)
@@ -51,7 +54,50 @@ def validate(
             dropped.append((state.effects[i], gains[i]))
             state = state.without(i)
         current = fit(train, state, rounds=3)
+    while current.state.effects:
+        worse = _withdrawn(train, held_out, current, before)
+        if not worse:
+            break
+        state = current.state
+        for i, gain in sorted(worse.items(), reverse=True):
+            dropped.append((state.effects[i], gain))
+            state = state.without(i)
+        current = fit(train, state, rounds=3)
     return current, dropped
+
+
+def _withdrawn(
+    train: System, held_out: System, current: Fit, before: State
+) -> dict[int, dict[str, float]]:
+    """The worst effect of each joint whose channel is worse off: number -> its gains."""
+    groups = [g for g in worse_off(held_out, before, current.state) if g[0] != RIPPLE]
+    effects = current.state.effects
+    gone: dict[int, dict[str, float]] = {}
+    gains: list[dict[str, float]] = []
+    for joint in dict.fromkeys(joint for _, joint in groups):
+        own = [i for i, e in enumerate(effects) if e.target == joint and e.target_kind == "joint"]
+        if own:
+            gains = gains or _gains(train, held_out, current)
+            worst = min(own, key=lambda i: sum(gains[i].values()))
+            gone[worst] = gains[worst]
+    return gone
+
+
+def worse_off(system: System, before: State, after: State) -> list[Group]:
+    """The groups of a system that `after` predicts worse than `before` does.
+
+    Args:
+        system: the equations of records held out.
+        before: the nominal model's state.
+        after: with causes.
+    """
+    power = [
+        {g: sum(float(left[s.rows] @ left[s.rows]) for s in system.of(g)) for g in system.groups}
+        for left in (
+            system.measured - system.predict(state.every, state.scales) for state in (before, after)
+        )
+    ]
+    return [g for g in system.groups if power[1][g] > _WORSE**2 * power[0][g]]
 
 
 def _fails(gains: dict[str, float], ripple: bool) -> bool:

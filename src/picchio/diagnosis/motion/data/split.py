@@ -2,29 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from picchio.core.errors import InputError
 from picchio.prediction.motion.log import MotionLog
 
 _COVERED = 0.9
 _LEAST_SHARE = 3
 
 
-def split(logs: Sequence[MotionLog]) -> tuple[list[MotionLog], list[MotionLog]]:
+def split(
+    logs: Sequence[MotionLog], train: Collection[str] = (), held_out: Collection[str] = ()
+) -> tuple[list[MotionLog], list[MotionLog]]:
     """Training and held-out records.
 
-    Records in which the fewest joints move come first (so that joints are known one by one before
-    they move together), in the campaign's order. They are taken until every joint that ever moves
-    has moved and a third of the records is in. Then, as long as two records would be left, the
-    fastest is added while the others are faster by more than a tenth in some joint than what is
-    in: a model is not to be judged where it was never fitted. At least one record is held out where
-    there are two.
+    Those that are named, if any are: where one side is, the other is all the rest; what neither
+    side names is left aside.
+
+    Else records in which the fewest joints move come first (so that joints are known one by one
+    before they move together), in the campaign's order. They are taken until every joint that ever
+    moves has moved and a third of the records is in. Then, as long as two records would be left,
+    the fastest is added while the others are faster by more than a tenth in some joint than what
+    is in: a model is not to be judged where it was never fitted. At least one record is held out
+    where there are two.
 
     Args:
         logs: all motion records.
+        train: names of records to fit to.
+        held_out: names of records to judge by.
+
+    Raises:
+        InputError: a name that no record has, or that is on both sides; nothing left to fit to.
     """
+    if train or held_out:
+        return _named(logs, train, held_out)
     order = sorted(range(len(logs)), key=lambda i: (len(logs[i].moving), i))
     every = {joint for log in logs for joint in log.moving}
     inside: list[int] = []
@@ -51,6 +64,24 @@ def split(logs: Sequence[MotionLog]) -> tuple[list[MotionLog], list[MotionLog]]:
     return [logs[i] for i in sorted(inside)], [
         logs[i] for i in range(len(logs)) if i not in inside
     ]  # fmt: skip
+
+
+def _named(
+    logs: Sequence[MotionLog], train: Collection[str], held_out: Collection[str]
+) -> tuple[list[MotionLog], list[MotionLog]]:
+    files = [log.file for log in logs]
+    for key, names in (("train", train), ("held_out", held_out)):
+        for name in names:
+            if name not in files:
+                raise InputError("no motion record has this name", key=key, value=name,
+                                 choices=files)  # fmt: skip
+    if both := sorted(set(train) & set(held_out)):
+        raise InputError("a record cannot be fitted to and held out", key="held_out", value=both[0])
+    inside = [log for log in logs if (log.file in train if train else log.file not in held_out)]
+    outside = [log for log in logs if (log.file in held_out if held_out else log.file not in train)]
+    if not inside:
+        raise InputError("no record is left to fit to", key="held_out", value=", ".join(held_out))
+    return inside, outside
 
 
 def _speeds(log: MotionLog) -> dict[str, float]:
