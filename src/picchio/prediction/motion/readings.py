@@ -333,6 +333,12 @@ def angle_noise(series: FloatArray) -> float:
 
     At least what rounding to its resolution makes: a slow or silent reading repeats its steps, and
     its differences are then nothing though its last digit is not known.
+
+    Args:
+        series: (m,) of an encoder or a drive.
+
+    Returns:
+        in the unit of the series.
     """
     if series.size < 16:
         return 0.0
@@ -346,6 +352,9 @@ def resolution(series: FloatArray) -> float:
     """The step of a reading: the smallest between two of its values; 0 where it never changes.
 
     Of a reading without steps it is tiny: noise then says more.
+
+    Args:
+        series: (m,) of an encoder or a drive.
     """
     values = np.unique(series)
     if values.size < 2:

@@ -94,6 +94,9 @@ def channels(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
     Args:
         rows: of `table`.
+
+    Returns:
+        rows of "channel", "before", "after", "noise" and "verdict".
     """
     found: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
