@@ -10,7 +10,9 @@ import pytest
 
 import picchio
 from picchio.cli.main import run
+from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.robot.annotations.sidecar import Sidecar, read_sidecar
+from picchio.robot.loading.find import typed_name
 
 ARM = """<robot name="bare [arm]">
 <link name="base"/>
@@ -54,6 +56,20 @@ def test_the_files_say_what_is_in_memory(name: str, tmp_path: Path) -> None:
         math.log(spread)
     )
     assert picchio.load_task(task, robot).operations[0].excitation.peak_force == 29.4
+
+
+def test_a_robot_is_the_same_from_the_file_and_without_one(tmp_path: Path) -> None:
+    (tmp_path / "bare.urdf").write_text(ARM)
+    flex, _ = picchio.start(tmp_path / "bare.urdf", payload=3.0).save(tmp_path)
+    with pytest.warns(picchio.PicchioWarning, match="nobody measured the stiffness"):
+        without = picchio.load_robot(tmp_path / "bare.urdf", payload=3.0)
+    given = picchio.load_robot(tmp_path / "bare.urdf", flex=flex)
+    assert given.flexible_joints == without.flexible_joints
+    assert given.posterior == without.posterior
+    assert {name: (s.value, s.size) for name, s in given.spreads.items()} == {
+        name: (s.value, s.size) for name, s in without.spreads.items()
+    }
+    assert estimate_notice("x", given.origins) == estimate_notice("x", without.origins) != ""
 
 
 def test_what_is_written_reads_well(tmp_path: Path) -> None:
@@ -109,6 +125,16 @@ def test_what_a_user_may_add(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     for word in ("a payload of 165 kg", "a reach of 2.6 m", "cycloidal drives",
                  'reducer = "RV-80E-121"', "Its own files give it a stiffness"):  # fmt: skip
         assert word in " ".join(text.replace("\n#", " ").split()), word
+
+
+def test_a_robot_is_called_by_what_finds_it(tmp_path: Path) -> None:
+    for name in ("ur10", "fanuc_r2000ic"):
+        robot = picchio.load_robot(name, allow_rigid=True)
+        assert typed_name(robot.name, robot.source) == name
+    copy = tmp_path / "ur10.urdf"
+    copy.write_text(ARM.replace("bare [arm]", "ur10"))
+    robot = picchio.load_robot(copy, allow_rigid=True)
+    assert typed_name(robot.name, robot.source) == str(copy)
 
 
 @pytest.mark.parametrize(

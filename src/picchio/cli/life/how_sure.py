@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from picchio.cli.output import console, table
+from picchio.cli.output import console, styled, table
 from picchio.core.errors import InputError
-from picchio.robot.annotations.flexibility import ESTIMATE
+from picchio.robot.annotations.flexibility import ESTIMATE, is_estimate
 from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def _show_measurements(found: UncertainLife) -> None:
     out.print(table(heads, rows, title=title))
     commands = dict.fromkeys(one.command for one in best if one.command is not None)
     for command in list(commands)[:_COMMANDS]:
-        out.print(f"  {command}", style="dim")
+        out.print(styled(f"  {command}", style="dim"), soft_wrap=True)  # in one line, to copy
     out.print()
 
 
@@ -115,7 +115,7 @@ def show_spread(found: UncertainLife) -> None:
         if robot.totals:
             shares.append(f"{100 * robot.totals[name]:.0f}")
         source = found.sources[name]
-        source = ESTIMATE if source.startswith(ESTIMATE) else source
+        source = ESTIMATE if is_estimate(source) else source
         inputs.append([name, found.spread_words(name), *shares, source])
     heads = [">alone,\n%", *([">with\nothers, %"] if robot.totals else [])]
     out.print(table(

@@ -120,6 +120,15 @@ def flexible_joints(
     return joints, origins, spreads
 
 
+def is_estimate(origin: str) -> bool:
+    """Whether a value is picchio's own estimate, in memory or written by `picchio start`.
+
+    Args:
+        origin: of the value.
+    """
+    return ESTIMATE in origin
+
+
 def estimate_notice(name: str, origins: Mapping[str, str]) -> str:
     """What of a robot's drives is an estimate of picchio's own, in words; "" where nothing is.
 
@@ -127,12 +136,12 @@ def estimate_notice(name: str, origins: Mapping[str, str]) -> str:
         name: of the robot.
         origins: of its values.
     """
-    made = {key.partition(".")[2] for key, text in origins.items() if text.startswith(ESTIMATE)}
+    made = {key.partition(".")[2] for key, text in origins.items() if is_estimate(text)}
     if not made & {"stiffness", "strength"}:
         return ""
     what = "stiffness, damping and strength" if "stiffness" in made else "strength"
     return (
-        f"Estimated: no file gives the {what} of the drives of {name}. What stands here is what "
+        f"Estimated: nobody measured the {what} of the drives of {name}. What stands here is what "
         "such a robot probably has, and every result is an interval that holds 80 % of the cases"
     )
 

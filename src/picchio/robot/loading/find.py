@@ -146,3 +146,18 @@ def example_robot(name: str) -> Path | None:
     """A URDF of example-robot-data by its name, with or without "_robot" at its end."""
     robots = example_robots()
     return robots.get(name) or robots.get(f"{name}_robot")
+
+
+def typed_name(name: str, urdf: Path) -> str:
+    """What to type for a robot: its name where that finds it, else its URDF's path.
+
+    Args:
+        name: of the loaded robot.
+        urdf: its file.
+
+    Returns:
+        the word, not quoted.
+    """
+    known = shipped_robot(name)
+    found = known.urdf if known is not None else example_robot(name)
+    return name if found == urdf else str(urdf)

@@ -13,7 +13,7 @@ from picchio.fatigue.miner import life
 from picchio.fatigue.shaft_stress import check_shaft
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.model import Model
-from picchio.robot.annotations.flexibility import ESTIMATE, ITS_REDUCER
+from picchio.robot.annotations.flexibility import ITS_REDUCER, is_estimate
 from picchio.robot.drives.reducer import Reducer
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import is_drive
@@ -234,7 +234,7 @@ def _estimates(robot: FlexibleRobot) -> list[str]:
     own: dict[tuple[str, ...], list[str]] = {}
     for joint in robot.flexible_joints:
         origin = {key: robot.origins.get(f"{joint.name}.{key}", "") for key in _ESTIMATED_KEYS}
-        made = tuple(key for key, text in origin.items() if text.startswith(ESTIMATE))
+        made = tuple(key for key, text in origin.items() if is_estimate(text))
         if made:
             own.setdefault(made, []).append(joint.name)
         if "stiffness" in made:

@@ -13,12 +13,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from shlex import quote
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import is_drive
+from picchio.robot.loading.find import typed_name
 from picchio.studies.uncertainty.inputs import Input
 
 # Of a stiffness, a damping ratio and a force, relative, one standard deviation.
@@ -122,7 +124,7 @@ Candidate = tuple[str, str, str | None, list[int], float]
 def _candidates(robot: FlexibleRobot, inputs: Sequence[Input]) -> list[Candidate]:
     """What can be measured: name, words, command, inputs that it reads, error of the logarithm."""
     drives = [(j, joint) for j, joint in enumerate(robot.flexible_joints) if is_drive(joint.name)]
-    where = robot.source.name
+    where = quote(typed_name(robot.name, robot.source))
     identify = f"picchio identify {where} --data CAMPAIGN --out flex.toml"
 
     def of(key: str, j: int | None = None) -> list[int]:
@@ -131,7 +133,7 @@ def _candidates(robot: FlexibleRobot, inputs: Sequence[Input]) -> list[Candidate
                 and each.uncertain.spread > 0.0]  # fmt: skip
 
     def named(joints: list[str]) -> str:
-        told = " ".join(f"--reducer {name}=NAME" for name in joints)
+        told = " ".join(f"--reducer {quote(f'{name}=NAME')}" for name in joints)
         return f"picchio start {where} {told}"
 
     found: list[Candidate] = []
