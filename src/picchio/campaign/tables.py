@@ -104,17 +104,61 @@ class CampaignExcitation(ExcitationTable):
 
 
 class Tolerance(StrictModel):
-    """`[tolerance]`: standard deviations of the nominal values, relative to them.
+    """`[tolerance]`: standard deviations of the nominal values, all normal.
+
+    What is within them is known beforehand never to be exact: it is no cause of anything. Zero means
+    that a value is exact.
 
     Attributes:
-        stiffness: 1, of each joint.
+        stiffness: 1, of each joint; drawn once a campaign, as all where nothing else is said.
         damping_ratio: 1, of all modes together.
-        force: 1, of the blows, for the campaign.
+        damping_by_mode: 1, of each mode by itself; once a pose.
+        force: 1, of the blows.
+        link_mass: 1, of each link.
+        link_com: m, of each link's centre of mass along each axis.
+        link_inertia: 1, of each link's moments of inertia.
+        pose: rad or m, of each joint's zero.
+        pose_repeat: rad or m, of each joint; once a pose.
+        direction: rad, of the force; once a record.
+        tool_point: m, of where the force acts, along each axis.
+        sensor_angle: rad, about each axis of an accelerometer and the like.
+        sensor_position: m, of its place along each axis.
+        sensor_gain: 1, of each channel group.
+        blow_force: 1, from blow to blow.
+        blow_time: s, from blow to blow.
+        rise_time: s, of how long a blow's force takes to rise and to fall.
+        gravity_stiffness: 1, of gravity's change with the deflection.
+        static_force: 1, of a scale or load cell.
+        dial: m, of a dial gauge.
+        torque_gain: 1, of a drive's torque.
     """
 
     stiffness: NotNegative = 0.05
     damping_ratio: NotNegative = 0.20
+    damping_by_mode: NotNegative = 0.10
     force: NotNegative = 0.05
+    link_mass: NotNegative = 0.01
+    link_com: NotNegative = 0.002
+    link_inertia: NotNegative = 0.03
+    pose: NotNegative = 3.5e-4
+    pose_repeat: NotNegative = 1e-4
+    direction: NotNegative = 0.005
+    tool_point: NotNegative = 0.001
+    sensor_angle: NotNegative = 0.005
+    sensor_position: NotNegative = 0.002
+    sensor_gain: NotNegative = 0.01
+    blow_force: NotNegative = 0.01
+    blow_time: NotNegative = 2e-5
+    rise_time: NotNegative = 2e-4
+    gravity_stiffness: NotNegative = 0.05
+    static_force: NotNegative = 0.01
+    dial: NotNegative = 1e-5
+    torque_gain: NotNegative = 0.03
+
+    @classmethod
+    def zero(cls) -> Tolerance:
+        """Everything exact."""
+        return cls(**dict.fromkeys(cls.model_fields, 0.0))
 
 
 class RecordTable(StrictModel):
