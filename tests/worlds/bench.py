@@ -62,6 +62,9 @@ class Bench:
         points: (kind, joint whose body or None for the tool's, point in the body or None for the
             force's, N/m, N s/m, preload N, normal or None for the blows' direction).
         force_offset: (3,) m, tool frame.
+        sensor_offset: (3,) m, tool frame, of the accelerometer and its like.
+        by_mode: (n,) factors on the modes' damping ratios, the slowest first; None for one.
+        gravity_stiffness: relative, by which gravity changes too much with the deflection.
         floor: (x, y, z m/s^2, Hz, phase in (0, 2 pi], ramp's start s, ramp's length s); the phase 0
             stands for no floor vibration.
         sensors: channel group -> how it reads.
@@ -92,6 +95,9 @@ class Bench:
     elements: list = field(default_factory=list)
     points: list = field(default_factory=list)
     force_offset: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    sensor_offset: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    by_mode: np.ndarray | None = None
+    gravity_stiffness: float = 0.0
     floor: np.ndarray = field(default_factory=lambda: np.zeros(7))
     sensors: dict[str, Sensor] = field(default_factory=dict)
 
@@ -126,7 +132,26 @@ class Bench:
 
     def damping_matrix(self):
         """(n, n): modal, of mass and springs alone."""
-        return modal_damping(self.nominal_mass(), np.diag(self.springs), self.damping_ratio)
+        return modal_damping(
+            self.nominal_mass(), np.diag(self.springs), self.ratios(len(self.springs))
+        )
+
+    def ratios(self, count):
+        """Damping ratios of the slowest `count` modes: one number, or (count,)."""
+        if self.by_mode is None:
+            return self.damping_ratio
+        factors = np.ones(count)
+        factors[: self.by_mode.size] = self.by_mode
+        return self.damping_ratio * factors
+
+    def gravity_change(self):
+        """(bodies, bodies) N m/rad: gravity's torque at rest by the coordinates, by differences."""
+        at, step, columns = self.positions(), 1e-5, []
+        for i in range(at.size):
+            aside = step * np.eye(at.size)[i]
+            columns.append(rest(self.chain, at + aside)[1] - rest(self.chain, at - aside)[1])
+        change = np.array(columns) / (2.0 * step)
+        return 0.5 * (change + change.T)
 
     def system(self):
         """(arrays for `equations.rates`, outputs at rest, inner states, delayed, fastest).
@@ -171,9 +196,12 @@ class Bench:
             damp = damp + joints.T @ np.diag(self.dampers) @ joints
         if self.modal == "all":
             tied = full + self._tethers(work, total)
-            damp = damp + modal_damping(mass, tied, self.damping_ratio)
+            damp = damp + modal_damping(mass, tied, self.ratios(total))
         else:
             damp = damp + joints.T @ self.damping_matrix() @ joints
+
+        if self.gravity_stiffness:
+            stiff[:bodies, :bodies] += self.gravity_stiffness * self.gravity_change()
 
         elements, inner, delayed = np.zeros((len(self.elements), 9)), 0, -1
         for row, (kind, name, p0, p1) in zip(elements, self.elements, strict=True):
@@ -188,8 +216,8 @@ class Bench:
             if kind == equations.DELAYED:
                 delayed = at[j]
         tool = chain.tool + 1
-        off_t = chain.tool_offset
-        off_f = off_t + chain.tool_rotation @ self.force_offset
+        off_t = chain.tool_offset + chain.tool_rotation @ self.sensor_offset
+        off_f = chain.tool_offset + chain.tool_rotation @ self.force_offset
         points = np.zeros((len(self.points), 14))
         for row, (kind, name, local, stiffness, damping, preload, normal) in zip(
             points, self.points, strict=True

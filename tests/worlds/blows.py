@@ -23,6 +23,8 @@ class Blows:
         turn: (3,) rotation vector in the tool frame, rad.
         uneven: every other blow is harder by this, the rest weaker, relative.
         swing: (3,) rad per blow, a rotation vector in the world that grows blow by blow.
+        scatter, slip: (hits,) of the force, relative, and of the start, s: never exact.
+        rise: s, the force's way up and, after `width`, down; the height and the impulse stay.
     """
 
     force: float
@@ -37,23 +39,30 @@ class Blows:
     turn: np.ndarray = field(default_factory=lambda: np.zeros(3))
     uneven: float = 0.0
     swing: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    scatter: np.ndarray | None = None
+    slip: np.ndarray | None = None
+    rise: float = 0.0
 
     def table(self, direction, tool_turn):
-        """(blows, 7): start, width, height, blend, unit direction in the world."""
+        """(blows, 8): start, length, height, blend, unit direction in the world, rise."""
         along = tool_turn @ Rotation.from_rotvec(self.turn).as_matrix() @ tool_turn.T @ direction
-        rows = []
+        rows, length = [], self.width + self.rise
         for h in range(self.hits):
             if self.missed is not None and self.missed[h]:
                 continue
             start = h * self.period + (0.0 if self.late is None else self.late[h])
+            if self.slip is not None:
+                start += self.slip[h]
             size = (
                 self.force
                 * (1.0 + self.drift * h)
                 * (1.0 + (self.uneven if h % 2 else -self.uneven))
             )
+            if self.scatter is not None:
+                size *= 1.0 + self.scatter[h]
             here = Rotation.from_rotvec(h * self.swing).as_matrix() @ along
-            rows.append([start, self.width, size, self.blend, *here])
+            rows.append([start, length, size, self.blend, *here, self.rise])
             if self.rebound is not None:
                 ratio, delay = self.rebound
-                rows.append([start + delay, self.width, ratio * size, self.blend, *here])
-        return np.array(rows).reshape(-1, 7)
+                rows.append([start + delay, length, ratio * size, self.blend, *here, self.rise])
+        return np.array(rows).reshape(-1, 8)

@@ -9,9 +9,12 @@ import numpy as np
 
 from picchio.campaign.campaign import Campaign
 from picchio.campaign.record import Record
+from picchio.campaign.tables import Tolerance
 
 from . import plan as plans
 from . import robots
+from .bench import nominal_chain
+from .errors import ALWAYS, Errors
 from .world import (
     TOLERANCE,
     Nuisances,
@@ -31,6 +34,7 @@ __all__ = [
     "channels",
     "clean",
     "columns",
+    "errors_of",
     "groups_of",
     "make",
     "noise",
@@ -40,6 +44,8 @@ __all__ = [
     "quantities",
 ]
 
+# Of a world that is as in the files but for what was always drawn.
+_EXACT = Tolerance.zero().model_dump() | {key: TOLERANCE[key] for key in ALWAYS}
 _START = datetime(2026, 3, 2, 8, 0, tzinfo=UTC)
 
 
@@ -71,6 +77,8 @@ NOT_OF_THE_PLAN = (
     "modal",
     "strength",
     "causes",
+    "mismatch",
+    "only",
 )
 
 
@@ -85,6 +93,11 @@ def plain(truth):
     return {k: v for k, v in truth.items() if k not in ("world", "clean")}
 
 
+def errors_of(robot, seed, mismatch=1.0, only=None) -> Errors:
+    """What is not exact in the campaign that `make` makes for this seed."""
+    return Errors.draw(nominal_chain(robot), seed, mismatch, only)
+
+
 def make(
     robot="fanuc_like_3dof",
     seed=0,
@@ -97,6 +110,8 @@ def make(
     nuisances=None,
     engine="arm",
     modal="joints",
+    mismatch=0.0,
+    only=None,
     **options,
 ):
     """A campaign, and the truth about it.
@@ -114,22 +129,30 @@ def make(
         nuisances: factors; drawn where None.
         engine: "arm", or "mujoco" for the second world.
         modal: what the modal damping is made of, "joints" or "all"; see `Bench`.
+        mismatch: how many times its tolerance everything is off, 0 to 4. With 0 all is as in the
+            files but for stiffness, damping ratio and force, none of them beyond 1.9 standard
+            deviations, and the campaign says so; else all is normal, and it says nothing: the
+            format's tolerances hold.
+        only: keys of `[tolerance]` that are off, with a mismatch; all where None.
         **options: `strength`, and of `plan.make`: hits, period, width, sampling, force, offset, ...
 
     Returns:
-        (Campaign, dict): the truth has `causes`, `nuisances`, `noise`, `world`, `clean`.
+        (Campaign, dict): the truth has `causes`, `nuisances`, `errors`, `noise`, `world`, `clean`.
     """
     strength = options.pop("strength", "typical")
     plan = plan_of(robot, seed, records=records, **options)
     nominal = robots.load(robot)
     groups = groups_of(sensors, nominal)
     chosen = _chosen(causes, plan, groups, seed, strength)
-    if nuisances is None:
+    errors = errors_of(robot, seed, mismatch, only) if mismatch else None
+    if nuisances is None and errors is not None:
+        nuisances = Nuisances.of(errors)
+    elif nuisances is None:
         rng_nuisances = np.random.default_rng([seed, 2])
         nuisances = Nuisances.draw(len(nominal.joints), rng_nuisances)
         while not _told_apart(chosen, nuisances, nominal):
             nuisances = Nuisances.draw(len(nominal.joints), rng_nuisances)
-    world = _ENGINES[engine]()(plan, nuisances, chosen, seed, bandwidth, modal)
+    world = _ENGINES[engine]()(plan, nuisances, chosen, seed, bandwidth, modal, errors=errors)
     data = clean(world, groups)
     times = plan.times()
     levels = noise_levels(data, times, snr_db)
@@ -158,7 +181,13 @@ def make(
     table = {"kind": "pulse_train", "force": plan.force, "period": plan.period, "width": plan.width}
     if plan.hits is not None:
         table["hits"] = plan.hits
-    campaign = Campaign.from_records(taken, robot=robot, tool=nominal.tool, excitation=table)
+    campaign = Campaign.from_records(
+        taken,
+        robot=robot,
+        tool=nominal.tool,
+        excitation=table,
+        tolerance=None if mismatch else _EXACT,
+    )
     truth = {
         "robot": robot,
         "seed": seed,
@@ -171,6 +200,8 @@ def make(
             "damping_ratio": nuisances.damping_ratio,
             "force": nuisances.force,
         },
+        "mismatch": mismatch,
+        "errors": errors.numbers(nominal, plan, groups) if mismatch else {},
         "snr_db": snr_db,
         "noise": levels,
         "world": world,

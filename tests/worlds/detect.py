@@ -37,6 +37,7 @@ def detectability(world, groups, snr_db=40.0):
         world.bandwidth,
         world.modal,
         world.step,
+        world.errors,
     )
     after = clean(world, groups)
     times = world.plan.times()
@@ -115,9 +116,9 @@ def _moved(nuisances, by, sigma):
 
 
 @lru_cache(maxsize=2)
-def _healthy(plan, nuisances, groups, seed, bandwidth, modal, step):
+def _healthy(plan, nuisances, groups, seed, bandwidth, modal, step, errors):
     """Data without causes, the same with each nuisance moved, and the nuisances' tolerances."""
-    world = World(plan, nuisances, (), seed, bandwidth, modal, step)
+    world = World(plan, nuisances, (), seed, bandwidth, modal, step, errors)
     steps = list(_steps(nuisances))
     moved = [clean(replace(world, nuisances=near), groups) for near, _ in steps]
     return clean(world, groups), moved, [sigma for _, sigma in steps]

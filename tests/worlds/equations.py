@@ -64,9 +64,13 @@ def _element(row, x, v, z, mode, t, past_t, past_x, count):
 
 @njit(cache=True)
 def _blow(t, row):
-    """N, of a blow that is on at t."""
-    phase = min(max((t - row[0]) / row[1], 0.0), 1.0)
-    return row[2] * (1.0 - row[3] + row[3] * np.sin(np.pi * phase))
+    """N, of a blow that is on at t: a trapezium, or a half-sine in the middle of it."""
+    rise = row[7]
+    phase = min(max((t - row[0] - 0.5 * rise) / (row[1] - rise), 0.0), 1.0)
+    flat = 1.0
+    if rise > 0.0:
+        flat = max(min(1.0, (t - row[0]) / rise, (row[0] + row[1] - t) / rise), 0.0)
+    return row[2] * ((1.0 - row[3]) * flat + row[3] * np.sin(np.pi * phase))
 
 
 @njit(cache=True)

@@ -126,7 +126,7 @@ def simulate(system, stops, longest, inner, delayed):
 
     Args:
         system: the tuple that `equations.rates` takes.
-        stops: (m,) s, ascending; every edge of a blow is among them.
+        stops: (m,) s, ascending; every edge of a blow is among them, and every corner of its rise.
         longest: s, no step is longer.
         inner: how many inner states there are.
         delayed: the coordinate whose past is kept, or -1.

@@ -38,6 +38,8 @@ class MujocoWorld(World):
                 raise ValueError(f"{name}: MuJoCo's world cannot; it can {', '.join(EFFECTS)}")
         if self.plan.hits is None:
             raise ValueError("MuJoCo's world makes bursts only")
+        if self.errors is not None:
+            raise ValueError("MuJoCo's world is as in the files")
         bench = self.bench(index, shot)
         times = self.plan.times()
         stops, out = self._simulate(bench, times[-1] + 2.0 / self.plan.sampling)

@@ -6,12 +6,14 @@ from copy import deepcopy
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from . import equations, kernel, outside, robots
 from . import plan as plans
 from .bench import Bench, nominal_chain, rest
 from .blows import Blows
 from .effects import EFFECTS
+from .errors import Errors
 from .sensors import Sensor
 
 TOLERANCE = {"stiffness": 0.05, "damping_ratio": 0.20, "force": 0.05}
@@ -46,6 +48,11 @@ class Nuisances:
         stiffness = one(n, "stiffness")
         return cls(stiffness, float(one(1, "damping_ratio")[0]), float(one(1, "force")[0]))
 
+    @classmethod
+    def of(cls, errors):
+        """What errors say about them."""
+        return cls(1.0 + errors.stiffness, 1.0 + errors.damping_ratio, 1.0 + errors.force)
+
 
 @dataclass(frozen=True, eq=False)
 class World:
@@ -59,6 +66,8 @@ class World:
         bandwidth: Hz of the sensors; None for endless.
         modal: what the modal damping is made of, "joints" or "all"; see `Bench`.
         step: s, the longest; None to fit the fastest mode.
+        errors: what else is not as in the files; None for nothing. Its stiffness, damping ratio and
+            force are in `nuisances`.
     """
 
     plan: plans.Plan
@@ -68,18 +77,21 @@ class World:
     bandwidth: float | None = 5000.0
     modal: str = "joints"
     step: float | None = None
+    errors: Errors | None = None
 
     def bench(self, index, shot=None) -> Bench:
         """Record `index`'s set-up with the causes in it."""
         plan = self.plan
         shot = plan.shots[index] if shot is None else shot
         robot = robots.load(plan.robot)
-        chain = nominal_chain(robot.name)
-        _, torque, _ = rest(chain, shot.pose)
+        chain, pose = nominal_chain(robot.name), np.asarray(shot.pose, float)
+        if self.errors is not None:
+            chain, pose = self.errors.chain(chain), self.errors.true_pose(pose)
+        _, torque, _ = rest(chain, pose)
         hits = plan.hits or 275
         bench = Bench(
             robot=robot,
-            pose=np.asarray(shot.pose, float),
+            pose=pose,
             direction=np.asarray(shot.direction, float) / np.linalg.norm(shot.direction),
             blows=Blows(shot.force * self.nuisances.force, plan.period, plan.width, hits),
             chain=chain,
@@ -92,10 +104,34 @@ class World:
             index=index,
             chance=np.random.default_rng([self.seed, index, 77]),
         )
+        if self.errors is not None:
+            self._err(bench, shot)
         # a link is scaled before anything is hung on it
         for name, target, parameters in sorted(self.causes, key=lambda c: c[0] != "link_mass"):
             (EFFECTS.get(name) or outside.EFFECTS[name])(bench, target, parameters)
         return bench
+
+    def _err(self, bench, shot):
+        """Write what is not exact about a record into its bench, but for bodies and pose."""
+        errors, hits = self.errors, bench.blows.hits
+        bench.by_mode = 1.0 + errors.damping_by_mode(shot.pose)
+        bench.gravity_stiffness = errors.gravity_stiffness
+        bench.force_offset = bench.force_offset + errors.tool_point
+        bench.sensor_offset = bench.sensor_offset + errors.sensor_position
+        bench.direction = errors.true_direction(bench.index, shot)
+        bench.blows.scatter = errors.blow_force(bench.index, shot, hits)
+        bench.blows.slip = errors.blow_time(bench.index, shot, hits)
+        bench.blows.rise = errors.rise_time
+
+    def sensor(self, bench, group):
+        """How a channel group reads in a record."""
+        sensor = deepcopy(bench.sensors.get(group, Sensor()))
+        if self.errors is not None:
+            if group.partition(".")[0] in VECTORS:
+                askew = Rotation.from_rotvec(self.errors.sensor_angle(group)).as_matrix()
+                sensor.turn = askew.T @ sensor.turn
+            sensor.gain *= 1.0 + self.errors.sensor_gain(group)
+        return replace(sensor, bandwidth=self.bandwidth)
 
     def motion(self, bench, times, sensors=()):
         """The motion of one record: (stops, outputs on the intervals, less their rest values)."""
@@ -107,7 +143,12 @@ class World:
         reads = np.concatenate([s.instants(times) for s in sensors] or [times])
         start = bench.floor[5] if bench.floor[4] > 0.0 else 0.0
         end = reads.max() + 0.5 / self.plan.sampling
-        edges = np.concatenate([blows[:, 0], blows[:, 0] + blows[:, 1]])
+        edges = [blows[:, 0], blows[:, 0] + blows[:, 1]]
+        if bench.blows.rise > 0.0:  # corners, and where a half-sine begins and ends
+            rise = bench.blows.rise
+            edges += [edges[0] + rise, edges[1] - rise]
+            edges += [edges[0] + 0.5 * rise, edges[1] - 0.5 * rise] if blows[:, 3].any() else []
+        edges = np.concatenate(edges)
         stops = np.concatenate([[start, end], reads, edges])
         if any(sensor.mount is not None for sensor in sensors):
             # its ringing needs finer parabolas
@@ -122,10 +163,7 @@ class World:
         times, origin = self.plan.times(), 0.0
         if self.plan.hits is None:  # the last blows of a long train
             origin = (bench.blows.hits - 25) * bench.blows.period
-        sensors = {}
-        for group in groups:
-            sensor = deepcopy(bench.sensors.get(group, Sensor()))
-            sensors[group] = replace(sensor, bandwidth=self.bandwidth, origin=origin)
+        sensors = {group: replace(self.sensor(bench, group), origin=origin) for group in groups}
         stops, out = self.motion(bench, times, tuple(sensors.values()))
         if not np.isfinite(out).all():
             raise FloatingPointError(f"{self.plan.robot}, {self.causes}: the world blew up")
