@@ -7,14 +7,13 @@ model is MuJoCo's reading of the URDF, and each fault is put into that.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from . import equations
-from .sensors import Sensor
+from .bench import nominal_chain
 from .world import World, columns
 
 EFFECTS = (
@@ -38,8 +37,9 @@ class MujocoWorld(World):
                 raise ValueError(f"{name}: MuJoCo's world cannot; it can {', '.join(EFFECTS)}")
         if self.plan.hits is None:
             raise ValueError("MuJoCo's world makes bursts only")
-        if self.errors is not None:
-            raise ValueError("MuJoCo's world is as in the files")
+        off = self.errors.sigma if self.errors is not None else {}
+        if off.get("rise_time") or off.get("blow_time"):
+            raise ValueError("MuJoCo's world needs blows that begin and end on a step")
         bench = self.bench(index, shot)
         times = self.plan.times()
         stops, out = self._simulate(bench, times[-1] + 2.0 / self.plan.sampling)
@@ -48,15 +48,13 @@ class MujocoWorld(World):
             0.0, 2.0 * np.pi, len(groups)
         )
         for group, phase in zip(groups, phases, strict=True):
-            sensor = deepcopy(bench.sensors.get(group, Sensor()))
-            sensor = replace(sensor, bandwidth=self.bandwidth)
             signal = np.ascontiguousarray(out[:, :, columns(group)])
-            read[group] = sensor.read(stops, signal, times, phase)
+            read[group] = self.sensor(bench, group).read(stops, signal, times, phase)
         return read, bench
 
     def _simulate(self, bench, end):
         """(stops, outputs) as `World.motion` gives them."""
-        model, tool, joints, degrees = self._model(bench)
+        model, tool, seat, joints, degrees = self._model(bench)
         data = mujoco.MjData(model)
         step = 0.25 / self.plan.sampling
         while step > (self.step or 2.6e-4):
@@ -70,11 +68,13 @@ class MujocoWorld(World):
         mass = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, mass)
         mass = mass[np.ix_(degrees, degrees)]
-        damping = _modal(mass, bench.springs, bench.damping_ratio)
+        damping = _modal(mass, bench.springs, bench.ratios(len(joints)))
         if bench.dampers is not None:
             damping = damping + np.diag(bench.dampers)
         turn = data.site_xmat[tool].reshape(3, 3).copy()
-        place, still = data.site_xpos[tool].copy(), turn.T @ -model.opt.gravity
+        place, still = data.site_xpos[seat].copy(), turn.T @ -model.opt.gravity
+        weight = bench.gravity_stiffness * _gravity_change(model, rest, joints, degrees)
+        mujoco.mj_forward(model, data)
         blows = bench.blows.table(bench.direction, turn)
         first = np.rint(blows[:, 0] / step).astype(int)
         last = np.rint((blows[:, 0] + blows[:, 1]) / step).astype(int)
@@ -93,7 +93,7 @@ class MujocoWorld(World):
         def passive(model, data):
             x, v = data.qpos[joints] - bench.pose, data.qvel[degrees]
             torque = held.copy()
-            torque[degrees] -= bench.springs * x + damping @ v
+            torque[degrees] -= bench.springs * x + weight @ x + damping @ v
             for kind, at, joint, p0 in elements:
                 u, du = data.qpos[joint] - rest[joint], data.qvel[at]
                 torque[at] -= p0 * u**3 if kind == equations.CUBIC else p0 * abs(du) * du
@@ -111,12 +111,12 @@ class MujocoWorld(World):
             mujoco.mj_forward(model, data)
             mujoco.mj_rnePostConstraint(model, data)
             motion = np.zeros(6)
-            mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_SITE, tool, motion, 1)
+            mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_SITE, seat, motion, 1)
             row[0:3] = motion[3:] - still
-            row[3:6] = data.site_xmat[tool].reshape(3, 3) @ motion[3:] + model.opt.gravity
-            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_SITE, tool, motion, 0)
+            row[3:6] = data.site_xmat[seat].reshape(3, 3) @ motion[3:] + model.opt.gravity
+            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_SITE, seat, motion, 0)
             row[6:9] = motion[3:]
-            row[9:12] = data.site_xpos[tool] - place
+            row[9:12] = data.site_xpos[seat] - place
             row[13:] = data.qpos[joints] - bench.pose
 
         mujoco.set_mjcb_passive(passive)
@@ -140,7 +140,7 @@ class MujocoWorld(World):
         return step * np.arange(0, count + 1, 2), out
 
     def _model(self, bench):
-        """(model, tool site, qpos of the flexible joints, their degrees of freedom)."""
+        """(model, tool's and sensors' site, qpos of the flexible joints, degrees of freedom)."""
         robot = bench.robot
         tree = ET.parse(robot.urdf)
         for link in tree.getroot().iter("link"):
@@ -153,6 +153,9 @@ class MujocoWorld(World):
             spec.option.disableflags |= flag
         frame = spec.body(robot.tool)
         frame.add_site(name="picked")
+        frame.add_site(name="seat", pos=bench.sensor_offset)
+        if self.errors is not None:
+            _weigh(spec, robot, self.errors.chain(nominal_chain(robot.name)))
         for name, target, p in self.causes:
             if name == "payload":
                 child = frame.add_body(name="payload")
@@ -172,7 +175,7 @@ class MujocoWorld(World):
             raise ValueError(f"{robot.name}: MuJoCo's world wants every joint flexible")
         model.dof_damping[:] = 0.0
         model.dof_frictionloss[:] = 0.0
-        return model, model.site("picked").id, joints, degrees
+        return model, model.site("picked").id, model.site("seat").id, joints, degrees
 
 
 def _modal(mass, springs, ratio):
@@ -181,3 +184,39 @@ def _modal(mass, springs, ratio):
     root, inverse = (vectors * values**0.5) @ vectors.T, (vectors * values**-0.5) @ vectors.T
     squared, shapes = np.linalg.eigh(inverse @ np.diag(springs) @ inverse)
     return root @ (shapes * (2.0 * ratio * np.sqrt(squared))) @ shapes.T @ root
+
+
+def _weigh(spec, robot, chain):
+    """Each link, and what is fixed to it, as one body with the mass that it really has."""
+    moving = set(robot.links())
+    for i, name in enumerate(robot.links()):
+        waiting = [spec.body(name)]
+        for body in waiting:
+            body.mass, body.inertia, body.fullinertia = 0.0, [0.0] * 3, [np.nan] + [0.0] * 5
+            waiting += [child for child in body.bodies if child.name not in moving]
+        size, axes = np.linalg.eigh(chain.inertia[i])
+        axes = axes * np.sign(np.linalg.det(axes))
+        quaternion = np.zeros(4)
+        mujoco.mju_mat2Quat(quaternion, axes.ravel())
+        body = waiting[0]
+        body.mass, body.ipos, body.iquat, body.inertia = (
+            chain.mass[i],
+            chain.com[i],
+            quaternion,
+            size,
+        )
+        body.explicitinertial = True
+
+
+def _gravity_change(model, rest, joints, degrees):
+    """(n, n) N m/rad of gravity's torque by the joints, by MuJoCo's own."""
+    data, step, columns = mujoco.MjData(model), 1e-5, []
+    for at in joints:
+        torque = []
+        for aside in (step, -step):
+            data.qpos[:] = rest
+            data.qpos[at] += aside
+            mujoco.mj_forward(model, data)
+            torque.append(data.qfrc_bias[degrees].copy())
+        columns.append((torque[0] - torque[1]) / (2.0 * step))
+    return np.array(columns).T
