@@ -13,7 +13,7 @@ ranking: what a measurement leaves of the interval is computed anew by brute for
 drawn, the inputs conditioned on each, and fresh worlds run. Is the measurement that was ranked
 first within 10 % of the best one's narrowing? Aimed at: in 80 % of the cases.
 
-hidden: six robots whose stiffness was measured are assessed with and without it, on the default task.
+hidden: six robots whose stiffness was measured are assessed with and without it, on one task.
 
 This tests how what is uncertain is carried through; how true the priors are: drive_priors.py.
 """
@@ -73,12 +73,13 @@ def hard(task: Task, robot: FlexibleRobot) -> Task:
 
 
 def drawn(robot: FlexibleRobot, rng: np.random.Generator, folder: Path) -> tuple[Any, ...]:
-    """A robot drawn from the priors, and the factors on force, width and stress that are its own."""
+    """A robot drawn from the priors, and its own factors on force, width and stress."""
     priors = drive_priors(robot)
     draw = draw_of(priors, rng)
     curve = load_sn_curve(DEFAULT_LIFE_CURVE)
     assert curve.scatter is not None and curve.survival is not None
-    specimen = curve.at_survival(0.5).scaled(10.0 ** (curve.scatter * rng.standard_normal()), "drawn")
+    factor = 10.0 ** (curve.scatter * rng.standard_normal())
+    specimen = curve.at_survival(0.5).scaled(factor, "drawn")
     file = folder / "specimen.toml"
     write_sn_curve(replace(specimen, name="specimen"), file)
     joints: list[Joint] = []
@@ -104,7 +105,8 @@ def pick(mixture: Any, rng: np.random.Generator) -> np.ndarray:
     weights, means, covs = mixture
     k = rng.choice(len(weights), p=weights / weights.sum())
     sizes, vectors = np.linalg.eigh(covs[k])
-    return means[k] + vectors @ (np.sqrt(np.clip(sizes, 0.0, None)) * rng.standard_normal(len(sizes)))
+    scores = rng.standard_normal(len(sizes))
+    return means[k] + vectors @ (np.sqrt(np.clip(sizes, 0.0, None)) * scores)
 
 
 def exactly(robot: FlexibleRobot, task: Task, factors: dict[str, float]) -> picchio.Assessment:
@@ -188,8 +190,11 @@ def ranking(count: int, seed: int, readings: int = 24, worlds: int = 256) -> Non
             narrowing = {what: now - then for what, then in left.items()}
             first, best = life.measure_first[0].what, max(narrowing, key=lambda w: narrowing[w])
             good.append(narrowing[first] >= 0.9 * narrowing[best])
-            print(f"{name:20s} now {now:.2f}, ranked first {first} leaves {left[first]:.2f}, best "
-                  f"{best} leaves {left[best]:.2f}{'' if good[-1] else '   MISSED'}", flush=True)  # fmt: skip
+            print(
+                f"{name:20s} now {now:.2f}, ranked first {first} leaves {left[first]:.2f}, best "
+                f"{best} leaves {left[best]:.2f}{'' if good[-1] else '   MISSED'}",
+                flush=True,
+            )
     print(f"within 10 % of the best's narrowing: {100 * np.mean(good):.0f} % of {len(good)}")
 
 
@@ -215,7 +220,7 @@ def width(sampler: Sampler, moved: np.ndarray) -> float:
 
 
 def hidden() -> None:
-    print("| robot | joint | peak torque, N m: with its stiffness | estimated, P10 to P90 | factor |")
+    print("| robot | joint | peak torque, N m: true stiffness | estimated, P10 to P90 | factor |")
     print("|---|---|---|---|---|")
     lives, held, factors = [], [], []
     with tempfile.TemporaryDirectory() as text:
@@ -239,7 +244,9 @@ def hidden() -> None:
             lives.append((name, life, told))
     print(f"\npeak torque in the interval: {sum(held)} of {len(held)}; median factor of the "
           f"vibration's peak {math.exp(float(np.median(factors))):.2f}\n")  # fmt: skip
-    print("| robot | utilisation with its stiffness, P10 to P90 | estimated | life with it | estimated |")
+    print(
+        "| robot | utilisation, true stiffness, P10 to P90 | estimated | life, true | estimated |"
+    )
     print("|---|---|---|---|---|")
     for name, life, told in lives:
         ends = [f"{100 * one.utilisation['p10']:.2g} to {100 * one.utilisation['p90']:.2g} %"

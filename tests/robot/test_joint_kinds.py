@@ -142,7 +142,8 @@ def test_no_warning_for_a_shipped_robot(name):
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
         load_robot(name)
-    # example-robot-data's UR5 has wrists of 1.2 kg with the inertia of a body of 40 cm.
+    # example-robot-data's UR5 has wrists of 1.2 kg with the inertia of a body of 40 cm. Each is
+    # told once, though the robot is read a second time with the estimates in it.
     wrong = [f"link 'wrist_{n}_link'" for n in (1, 2, 3)] if name == "ur5" else []
     assert [link in str(w.message) for link, w in zip(wrong, seen, strict=True)] == [True] * len(
         wrong

@@ -83,10 +83,13 @@ def test_a_folders_own_sidecar(arm_text, sidecar_text, write):
     write("myarm/flex.toml", sidecar_text)
     for asked in (urdf, urdf.parent):
         assert load_robot(asked).flexible_names == ("a", "b", "c")
-    # Another name: a sidecar beside it is not taken unasked.
+    # Another name: a sidecar beside it is not taken unasked, so its drives are estimated.
     lone = write("myarm/other.urdf", arm_text)
-    with pytest.raises(InputError, match="no joint of this robot has a stiffness"):
-        load_robot(lone)
+    with pytest.warns(PicchioWarning, match="Estimated: nobody measured the stiffness"):
+        alone = load_robot(lone)
+    assert {alone.origins[f"{name}.stiffness"].partition(":")[0] for name in ("a", "b")} == {
+        "picchio's estimate"
+    }
     assert load_robot(lone, allow_rigid=True).flexible_joints == ()
     saved = lone.with_name("saved.toml")
     saved.write_text(f'format = "picchio-model/1"\nrobot = "{lone}"\n')

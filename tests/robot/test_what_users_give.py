@@ -131,7 +131,7 @@ def test_order_does_not_change_from_run_to_run(arm, write, sidecar_text):
     ]
     assert said[0] == said[1]
     names = list(load_robot(arm, flex=flex).origins)
-    assert names[:3] == ["a.stiffness", "a.damping_ratio", "b.stiffness"]
+    assert names[:4] == ["a.stiffness", "a.damping_ratio", "a.strength", "b.stiffness"]
     assert [name.split(".")[0] for name in names] == sorted(
         (name.split(".")[0] for name in names), key=["a", "b", "c", "tool", "base"].index
     )

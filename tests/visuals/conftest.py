@@ -36,16 +36,16 @@ def arm() -> SimpleNamespace:
 
 @pytest.fixture(scope="session")
 def ur10() -> SimpleNamespace:
-    """A robot without shafts."""
-    return _assessed("ur10")
+    """A robot without shafts, and nothing estimated in their place."""
+    return _assessed("ur10", allow_rigid=True)
 
 
-def _assessed(name: str) -> SimpleNamespace:
+def _assessed(name: str, **options: bool) -> SimpleNamespace:
     import warnings
 
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
-        robot = picchio.load_robot(name)
+        robot = picchio.load_robot(name, **options)
         task = picchio.load_task(robot.task_path, robot)
         found = picchio.assess(robot, task)
     return SimpleNamespace(

@@ -21,6 +21,7 @@ _LONGEST = 1500  # characters of a message, which may quote a damaged file
 # Modules whose lines are none of the user's; contextlib's are between decorated functions.
 _OURS = ("picchio", "contextlib")
 _listening: ContextVar[tuple[list[str], ...]] = ContextVar("_listening", default=())
+_holding: ContextVar[list[str] | None] = ContextVar("_holding", default=None)
 
 
 class PicchioError(Exception):
@@ -37,6 +38,9 @@ def warn_user(message: str) -> None:
     Args:
         message: a sentence without a full stop.
     """
+    if (kept := _holding.get()) is not None:
+        kept.append(message)
+        return
     for said in _listening.get():
         if message not in said:
             said.append(message)
@@ -58,15 +62,14 @@ def gathered() -> Iterator[list[str]]:
 
 
 @contextmanager
-def unheard() -> Iterator[None]:
-    """No warning of picchio meanwhile: what there is to say is said elsewhere."""
-    token = _listening.set(())
+def held_back() -> Iterator[list[str]]:
+    """Every warning of picchio meanwhile, none of them raised: the caller says what matters."""
+    kept: list[str] = []
+    token = _holding.set(kept)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PicchioWarning)
-            yield
+        yield kept
     finally:
-        _listening.reset(token)
+        _holding.reset(token)
 
 
 class OutputError(PicchioError):

@@ -132,7 +132,8 @@ def assess(
         bool,
         typer.Option(
             "--strict",
-            help="Exit with 3 unless the verdict is safe or, with --for-life, the answer is yes.",
+            help="Exit with 3 unless the verdict is safe, by drives that are not picchio's own "
+            "estimate, or, with --for-life, the answer is yes.",
         ),
     ] = False,
     report: ReportOption = None,
@@ -259,7 +260,7 @@ def assess(
             show_spread(unsure)
 
     deliver(content, json, show_all)
-    promised = found.verdict.status == "safe" if allowed is None else allowed.yes
+    promised = found.verdict.promised if allowed is None else allowed.yes
     if strict and not promised:
         raise typer.Exit(_NOT_SAFE)
 

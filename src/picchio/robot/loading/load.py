@@ -9,7 +9,7 @@ from typing import Any
 
 from lxml import etree
 
-from picchio.core.errors import InputError, gathered, warn_user
+from picchio.core.errors import InputError, gathered, held_back, warn_user
 from picchio.core.toml import validate
 from picchio.robot.annotations.flexibility import (
     ESTIMATE,
@@ -91,15 +91,18 @@ def load_robot(
     if isinstance(reducers, str | Path):
         reducers = (reducers,)
     asked = (robot, flex, tool, values, reducers)
-    with gathered() as said:
+    with held_back() as remarks:
         loaded = _load(*asked, None)
     known = {"payload": payload, "reach": reach, "drive_class": drive_class}
     guess = None if allow_rigid else _estimate(loaded, known)
     if guess is not None:
-        with gathered() as said:
+        with held_back() as remarks:  # the same again, and what the estimates bring
             loaded = _load(*asked, Source(ESTIMATE, guess, strict=False))
             if any(entry.flexible for entry in guess.joint.values()):
                 warn_user(estimate_notice(loaded.name, loaded.origins))
+    with gathered() as said:
+        for remark in remarks:
+            warn_user(remark)
     return replace(loaded, warnings=tuple(said))
 
 

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import unheard
+from picchio.core.errors import held_back
 from picchio.fatigue.miner import life
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import DEFAULT_SN_CURVE, PAPER_SN_CURVE, load_sn_curve
@@ -60,7 +60,7 @@ def compare_methods(
     """
     paper_curve = load_sn_curve(PAPER_SN_CURVE, quiet=True)
     told = partial(assess, robot, task, uncertainty=False)
-    with unheard():  # what assess has to say, it says to whoever asked for the assessment itself
+    with held_back():  # what assess has to say, it says to whoever asked for the assessment itself
         paper = told(method="paper")
         counted = told(sn_curve=paper_curve)
         real = told(sn_curve=sn_curve, miner="elementary")

@@ -10,7 +10,8 @@ Otherwise a shaft with a finite life makes it `limited`, and only then it is `sa
 
 Where a value of the robot has a spread, a part is judged by what 90 % of the drawn cases bear: a
 shaft by the P10 of its life, a limit by the P10 of its margin. A limit that the stated values keep
-and more than 10 % of the cases exceed means that it `cannot-be-told`.
+and more than 10 % of the cases exceed means that it `cannot-be-told`. What stands on picchio's own
+estimate of the drives is never promised: it is "probably safe", and `--strict` does not pass it.
 
 The margin is allowable over actual of the governing part, so below 1 it fails. A finite life has
 none: its stress is above the endurance limit and that is no failure. It is held against a wanted
@@ -60,6 +61,7 @@ class Verdict:
         pose: index of the pose there, from 0.
         limit: that the governing part is nearest to, in words.
         headline: the verdict as sentences.
+        estimated: it rests on what drives like these probably bear, which nobody measured.
     """
 
     status: Status
@@ -72,6 +74,12 @@ class Verdict:
     limit: str
     headline: str
     margin_interval: tuple[float, float] | None = None
+    estimated: bool = False
+
+    @property
+    def promised(self) -> bool:
+        """Whether it is safe by values that somebody stands for."""
+        return self.status == "safe" and not self.estimated
 
 
 class _Part(NamedTuple):
@@ -154,6 +162,7 @@ def judge(found: Assessment) -> Verdict:
     told = {part.joint.name for part in parts}
     unknown = [j for j in found.joints if is_drive(j.name) and j.name not in told]
     unknown.sort(key=lambda joint: -joint.peak_deflection)
+    guess = bool(found.notice)
     near = [part for part in worst if part.margin_at_other_rates < 1.0]
     reasons = [*map(_failure, over[1:]), *map(_risk, unsure), *map(_wear, wearing), *_gaps(found)]
     reasons += found.doubts
@@ -164,12 +173,13 @@ def judge(found: Assessment) -> Verdict:
         operation, pose = (part.operation, part.pose) if part else (
             joint.worst_operation, joint.worst_pose)  # fmt: skip
         told = tuple(dict.fromkeys(line for line in reasons if line not in text))
-        headline = f"{_SAID[status]}. {text}."
+        word = "Probably safe" if guess and status == "safe" else _SAID[status]
+        headline = f"{word}. {text}."
         limit = part.limit if part else ""
         # Only of a part that is judged by its margin.
         ends = part.interval if part and not math.isnan(margin) else None
         return Verdict(status, governor, joint.name, margin, told, operation, pose, limit, headline,
-                       ends)  # fmt: skip
+                       ends, guess)  # fmt: skip
 
     if over:
         part = over[0]

@@ -150,9 +150,9 @@ def joint_grid(robot: FlexibleRobot, counts: int | list[int]) -> Grid:
     nv = len(robot.joint_names)
     each = [counts] * nv if isinstance(counts, int) else list(counts)
     if len(each) != nv or min(each) < 1:
-        raise InputError(f"must be one positive number or {nv}", key="joint-grid", value=counts)
+        raise InputError(f"must be one positive number or {nv}", key="joint_grid", value=counts)
     if max(each) > _MOST_STEPS:
-        raise InputError(f"at most {_MOST_STEPS} a joint", key="joint-grid", value=counts)
+        raise InputError(f"at most {_MOST_STEPS} a joint", key="joint_grid", value=counts)
     axes = []
     for low, high, count in zip(robot.lower, robot.upper, each, strict=True):
         if not np.isfinite([low, high]).all():

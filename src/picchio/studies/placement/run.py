@@ -173,13 +173,13 @@ def _periods(task: Task, wanted: tuple[float, float] | None) -> tuple[float, flo
     low, high = (float(p) for p in wanted)
     if not (0.0 < low <= high < math.inf):
         raise InputError(
-            "must be two positive periods in s, the shorter first", key="period-range", value=wanted
+            "must be two positive periods in s, the shorter first", key="period_range", value=wanted
         )
     for operation in task.operations:
         try:
             operation.excitation.with_period(low)  # refuses blows longer than that
         except InputError as error:
-            raise InputError(error.problem, key="period-range", value=low) from None
+            raise InputError(error.problem, key="period_range", value=low) from None
     return low, high
 
 
