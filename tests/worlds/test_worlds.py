@@ -61,7 +61,9 @@ def test_another_seed_is_another_campaign():
     assert first["nuisances"] != second["nuisances"]
 
 
-@pytest.mark.parametrize("name", ["fanuc_like_3dof", "ur10", "kinova_gen3", "kuka_iiwa14"])
+@pytest.mark.parametrize(
+    "name", ["fanuc_like_3dof", "fanuc_r2000ic", "ur10", "kinova_gen3", "kuka_iiwa14"]
+)
 def test_plans_spread_and_stay_within_limits(name):
     robot = robots.load(name)
     plan = plans.make(name, np.random.default_rng(9))
@@ -172,6 +174,16 @@ def test_what_nuisances_imitate_is_not_detectable():
     assert gain("payload", "tool", {"mass": 1e-4}) < 10.0
     assert gain("payload", "tool", {"mass": 3.0}) > 100.0
     assert gain("joint_stiffness", "joint_2", {"scale": 1.3}) > 100.0
+
+
+@pytest.mark.parametrize("name", ["fanuc_like_3dof", "fanuc_r2000ic", "ur10", "kinova_gen3"])
+def test_blows_give_a_few_milliradians(name):
+    """What a real tool does: more would be another problem, less would drown."""
+    for seed in range(2):
+        size = draw.sizes(plans.make(name, np.random.default_rng(seed), 9))
+        print(f"{name}: {1e3 * size.most.max():.2f} mrad")
+        assert 3e-4 < size.most.max() < 6e-3
+        assert size.active(0.3)
 
 
 def test_seven_joints_draw_what_shows():
