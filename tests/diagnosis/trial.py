@@ -84,7 +84,9 @@ def make(case, salt=0):
     robot = picchio.load_robot(case["robot"])
     accelerometer = f"accelerometer.{robot.tool_frame}"
     weak = case["kind"] == "weak"
-    wrong = {"mismatch": float(case.get("mismatch", 0.0)), "only": case.get("only")}
+    wrong = {}
+    if "mismatch" in case:
+        wrong = {"mismatch": float(case["mismatch"]), "only": case.get("only")}
     if case["kind"] == "sets":
         target, records = SETS[case["effect"]]
         return worlds.make(

@@ -13,7 +13,10 @@ from .effects import EFFECTS
 from .errors import STATED
 from .world import World, groups_of
 
-KINDS = {"null": 0, "single": 1, "pair": 2, "triple": 3, "outside": 1}
+KINDS = {
+    "null": 0, "single": 1, "pair": 2, "triple": 3, "outside": 1,
+    "filter": 1, "rubbing": 1, "hum": 2,
+}  # fmt: skip
 _TRIES = 50
 
 
@@ -21,7 +24,9 @@ def causes(kind, seed, robot="fanuc_like_3dof", effect=None, strength="typical",
     """Causes for `campaign.make(robot, seed, ...)` with the same options.
 
     Args:
-        kind: one of `KINDS`.
+        kind: one of `KINDS`: "filter" is a high-pass of 1 to 3 Hz, digital or analogue, of first or
+            second order; "rubbing" is little dry friction (2 to 8 N m at blows of 300 N), ideal or
+            smoothed; "hum" is mains hum beside another cause.
         seed: of the campaign.
         robot: its name.
         effect: the first cause's, such as when each is to have its share; drawn where None.
@@ -40,8 +45,15 @@ def causes(kind, seed, robot="fanuc_like_3dof", effect=None, strength="typical",
     own = {k: v for k, v in options.items() if k not in campaign.NOT_OF_THE_PLAN}
     plan = campaign.plan_of(robot, seed, **own)
     least = LEAST if strength == "typical" and errors is not None else 0.0
-    names = list(outside.EFFECTS if kind == "outside" else EFFECTS)
+    # the published seeds draw from those outside effects that there were then
+    beyond = outside.EFFECTS if "mismatch" in options else outside.FIRST
+    names = list(beyond if kind == "outside" else EFFECTS)
     rng = np.random.default_rng([seed, 5])
+    if kind == "filter":
+        return [_filter(rng, groups)]
+    if kind == "rubbing":
+        return [_rubbing(rng, nominal, draw.sizes(plan))]
+    effect = "mains_hum" if kind == "hum" else effect
     out, taken = [], set()
     while len(out) < KINDS[kind]:
         name = effect if effect is not None and not out else str(rng.choice(names))
@@ -65,6 +77,24 @@ def causes(kind, seed, robot="fanuc_like_3dof", effect=None, strength="typical",
         taken.add(place)
         out.append((name, target, parameters))
     return out
+
+
+def _filter(rng, groups):
+    """A high-pass as data loggers have it."""
+    known = [g for g in groups if g.startswith("acceler")] or [g for g in groups if g != "force"]
+    return "sensor_highpass", str(rng.choice(known)), {
+        "frequency": float(rng.uniform(1.0, 3.0)),
+        "order": float(rng.integers(1, 3)),
+        "digital": float(rng.integers(0, 2)),
+    }  # fmt: skip
+
+
+def _rubbing(rng, robot, size):
+    """Dry friction that is small beside what the blows do."""
+    parameters = {"torque": float(rng.uniform(2.0, 8.0)) * robot.force / 300.0}
+    if rng.uniform() < 0.5:
+        parameters["smoothing"] = 5e-4
+    return "coulomb_friction", str(rng.choice(size.active(0.3))), parameters
 
 
 # Standard deviations of its tolerance that a typical cause is off at the least.
