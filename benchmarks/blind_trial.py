@@ -102,12 +102,12 @@ def wrong_cases(robots, kinds, seeds, times, sensors=None, keys=None, snr=40):
                     yield {**head, "mismatch": size, **more}
 
 
-def one(case, salt, method="diagnose"):
+def one(case, salt, method="diagnose", workers=1):
     """A row of the table; a case that fails is a wrong case, not the end."""
     import trial
 
     try:
-        return trial.run(case, salt, method=method)
+        return trial.run(case, salt, method=method, workers=workers)
     except Exception as error:
         return {
             "case": trial.name_of(case), "robot": case["robot"], "kind": case["kind"],
@@ -153,6 +153,7 @@ def main():
     parser.add_argument("--only", help="cases whose name holds one of these, by commas")
     parser.add_argument("--most", type=int, default=10**9, help="stop after so many new cases")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="cases at once")
+    parser.add_argument("--workers", type=int, default=1, help="processes of each diagnosis")
     parser.add_argument("--fresh", action="store_true", help="seeds never used before")
     parser.add_argument("--development", action="store_true", help="the seeds used while building")
     parser.add_argument("--method", default="diagnose", help="or: score-test, plain-bic")
@@ -199,7 +200,7 @@ def main():
             given.out.open("a") as stream,
             ProcessPoolExecutor(given.jobs, get_context("spawn")) as pool,
         ):
-            running = [pool.submit(one, case, salt, given.method) for case in todo]
+            running = [pool.submit(one, case, salt, given.method, given.workers) for case in todo]
             for number, future in enumerate(as_completed(running), 1):
                 row = future.result() | {"salt": salt, "commit": commit}
                 stream.write(json.dumps(row) + "\n")

@@ -28,6 +28,9 @@ SAME = (
     {"joint_stiffness", "servo_compliance"},  # a motor without inertia that yields
     {"sensor_axes", "sensor_misalignment"},
 )
+# Outside effects that the catalogue has had since, by the names that it has for them: then they are
+# causes like others. Those of the same name need no entry.
+KNOWN_AS: dict[str, str] = {}
 # A tolerance -> the effects that a cause is called when it is exceeded, beside its own name.
 CALLED = {
     "stiffness": {"joint_stiffness"},
@@ -96,8 +99,8 @@ def judge(case, truth, row):
     """
     groups, first = tuple(truth["noise"]), next(iter(truth["nuisances"]["stiffness"]))
     known = catalogue()
-    hidden = [(c["effect"], c["target"]) for c in truth["causes"] if c["effect"] in known]
-    hidden = [(effect, target) for effect, target in hidden if case["kind"] != "left-out"]
+    causes = [(KNOWN_AS.get(c["effect"], c["effect"]), c["target"]) for c in truth["causes"]]
+    hidden = [cause for cause in causes if cause[0] in known and case["kind"] != "left-out"]
     beyond = errors.beyond(truth["errors"], EXCEEDED)
     false = [
         list(cause)
