@@ -297,3 +297,15 @@ def test_typical_causes_are_far_beyond_what_is_never_exact():
             assert cases.in_tolerances(found[0], drawn, robot) >= 5.0
     assert cases.in_tolerances(("tool_offset", "tool", {"x": 0.0, "y": 0.03, "z": 0.04})) == 50.0
     assert cases.in_tolerances(("payload", "tool", {"mass": 3.0})) is None
+
+
+def test_errors_of_size_zero_are_none():
+    """The way that errors take through the world adds nothing of its own."""
+    plan = campaign.plan_of("ur10", 1, records=1, hits=2, ring=0.05)
+    nothing = errors.Errors.draw(nominal_chain("ur10"), 1, 0.0)
+    groups = ("accelerometer.tool0", "deflection")
+    nominal = campaign.Nuisances.none(6)
+    one = campaign.clean(campaign.World(plan, nominal), groups)[0]
+    other = campaign.clean(campaign.World(plan, nominal, errors=nothing), groups)[0]
+    for group in groups:
+        assert np.abs(one[group] - other[group]).max() < 1e-9 * np.abs(one[group]).max()
