@@ -12,6 +12,14 @@ it goes, keyed by the case and the seeds' salt: run it again and it goes on wher
     python benchmarks/blind_trial.py --out trial.jsonl --summary --since b3ad859  # later code only
     python benchmarks/blind_trial.py --out trial.jsonl --summary --page docs/blind_trial.md
     python benchmarks/blind_trial.py --out trial.jsonl --against docs/blind_trial_plain_bic.jsonl
+
+Worlds that are a little wrong everywhere, by so many times the tolerances that the campaigns state:
+
+    python benchmarks/blind_trial.py --out wrong.jsonl --mismatch 1 --seeds 0:20 \\
+        --robots fanuc_like_3dof,ur10 --kinds null,single,pair,outside,left-out
+    python benchmarks/blind_trial.py --out curve.jsonl --mismatch 0,0.5,1,2,4 --kinds single
+    python benchmarks/blind_trial.py --out poses.jsonl --mismatch 1 --errors pose,pose_repeat
+    python benchmarks/blind_trial.py --out wrong.jsonl --mismatch 1 --summary
 """
 
 from __future__ import annotations
@@ -73,17 +81,41 @@ def cases(draws):
                 yield {"robot": robot, "kind": "single", "snr": 40, "draw": 3 * draw + n}
 
 
-def one(case, salt, method="diagnose"):
+def wrong_cases(robots, kinds, seeds, times, sensors=None, keys=None, snr=40):
+    """Cases in worlds that are a little wrong, seed by seed.
+
+    Args:
+        robots, kinds: names.
+        seeds: numbers of the draws.
+        times: how many times its tolerance everything is off.
+        sensors: that are read; accelerometer and deflections where None.
+        keys: of what is off; everything where None.
+        snr: dB.
+    """
+    more = {"sensors": sensors} if sensors else {}
+    more |= {"only": keys} if keys else {}
+    for draw in seeds:
+        for kind in kinds:
+            for robot in robots:
+                for size in times:
+                    head = {"robot": robot, "kind": kind, "snr": snr, "draw": draw}
+                    yield {**head, "mismatch": size, **more}
+
+
+def one(case, salt, method="diagnose", workers=1):
     """A row of the table; a case that fails is a wrong case, not the end."""
     import trial
 
     try:
-        return trial.run(case, salt, method=method)
+        return trial.run(case, salt, method=method, workers=workers)
     except Exception as error:
         return {
             "case": trial.name_of(case), "robot": case["robot"], "kind": case["kind"],
             "snr": case["snr"], "truth": [], "verdict": f"failed: {error}",
             "claimed": [], "right": False, "errors": {},
+            **({"mismatch": case["mismatch"], "outcome": "undecided",
+                "sensors": "accelerometer" if case.get("sensors") else "all"}
+               if "mismatch" in case else {}),
         }  # fmt: skip
 
 
@@ -98,6 +130,22 @@ def since(rows, commit):
     return [row for row in rows if any(full.startswith(row["commit"]) for full in later)]
 
 
+def words(text):
+    """Words by commas."""
+    return [word for word in text.split(",") if word]
+
+
+def numbers(text):
+    """Numbers by commas."""
+    return [float(word) for word in words(text)]
+
+
+def span(text):
+    """a:b as a range."""
+    first, last = text.split(":")
+    return range(int(first), int(last))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True, help="one line of JSON a case")
@@ -105,6 +153,7 @@ def main():
     parser.add_argument("--only", help="cases whose name holds one of these, by commas")
     parser.add_argument("--most", type=int, default=10**9, help="stop after so many new cases")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="cases at once")
+    parser.add_argument("--workers", type=int, default=1, help="processes of each diagnosis")
     parser.add_argument("--fresh", action="store_true", help="seeds never used before")
     parser.add_argument("--development", action="store_true", help="the seeds used while building")
     parser.add_argument("--method", default="diagnose", help="or: score-test, plain-bic")
@@ -112,6 +161,14 @@ def main():
     parser.add_argument("--since", metavar="COMMIT", help="tables of rows since this change only")
     parser.add_argument("--against", type=Path, help="a simpler method's rows: compare")
     parser.add_argument("--page", type=Path, help="a page whose tables to bring up to date")
+    wrong = parser.add_argument_group("worlds that are a little wrong everywhere")
+    wrong.add_argument("--mismatch", type=numbers, help="times the tolerances, by commas")
+    wrong.add_argument("--robots", type=words, default=[ARM], help="by commas")
+    wrong.add_argument("--kinds", type=words, default=["null", "single"], help="by commas")
+    wrong.add_argument("--seeds", type=span, default=range(10), help="draws a:b, without b")
+    wrong.add_argument("--sensors", type=words, help="such as accelerometer; else with deflections")
+    wrong.add_argument("--errors", type=words, help="keys of [tolerance] that are off; else all")
+    wrong.add_argument("--snr", type=int, default=40, help="dB")
     given = parser.parse_args()
     rows = []
     if given.out.exists():
@@ -130,7 +187,10 @@ def main():
 
         done = {row["case"] for row in rows}
         todo = []
-        for case in cases(given.draws):
+        for case in cases(given.draws) if given.mismatch is None else wrong_cases(
+            given.robots, given.kinds, given.seeds, given.mismatch, given.sensors, given.errors,
+            given.snr,
+        ):  # fmt: skip
             name = trial.name_of(case)
             wanted = not given.only or any(part in name for part in given.only.split(","))
             if name not in done and wanted:
@@ -140,7 +200,7 @@ def main():
             given.out.open("a") as stream,
             ProcessPoolExecutor(given.jobs, get_context("spawn")) as pool,
         ):
-            running = [pool.submit(one, case, salt, given.method) for case in todo]
+            running = [pool.submit(one, case, salt, given.method, given.workers) for case in todo]
             for number, future in enumerate(as_completed(running), 1):
                 row = future.result() | {"salt": salt, "commit": commit}
                 stream.write(json.dumps(row) + "\n")
@@ -150,6 +210,9 @@ def main():
                 print(f"{number}/{len(todo)}", *note, file=sys.stderr)
     import trial_tables
 
+    if given.mismatch is not None:
+        trial_tables.mismatch_summary(since(rows, given.since) if given.since else rows)
+        return
     if given.against:
         trial_tables.print_against(rows, trial_tables.read_rows(given.against))
         return

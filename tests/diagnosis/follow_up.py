@@ -55,6 +55,7 @@ def taken(ask, campaign, truth, seed):
         [*campaign.records, record],
         robot=table.robot, tool=table.tool,
         excitation=table.excitation.model_dump(exclude_none=True),
+        tolerance=table.tolerance.model_dump(),
     )  # fmt: skip
 
 

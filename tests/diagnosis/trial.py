@@ -17,6 +17,7 @@ if TESTS not in sys.path:
 
 import burst  # noqa: E402
 import follow_up  # noqa: E402
+import outcomes  # noqa: E402
 import removed  # noqa: E402
 from ablations import METHODS  # noqa: E402
 
@@ -35,12 +36,6 @@ CLASSES = (
     {"joint_stiffness", "servo_compliance"},  # a servo's motor without inertia is a softer joint
     {"sensor_axes", "sensor_misalignment"},  # axes that are swapped are turned
 )
-# Springs one above the other about one axis, of which no sensor at the tool tells one; the first
-# joint's bearing yields as the floor under it tilts.
-IN_SERIES = (
-    {("base_compliance", "rz"), ("servo_compliance", "joint_1"), ("joint_stiffness", "joint_1")},
-    {("transverse_compliance", "joint_1"), ("base_compliance", "rx"), ("base_compliance", "ry")},
-)
 # What few records cannot tell from something else: (target, records) of an accelerometer alone.
 SETS = {
     "force_amplitude": ("tool", 3),
@@ -57,7 +52,7 @@ SETS = {
 
 def class_of(effect, target=""):
     """An effect and what cannot be told from it: its class."""
-    for pairs in IN_SERIES:
+    for pairs in outcomes.in_series():
         if (effect, target) in pairs:
             return {name for name, _ in pairs}
     return next((kind for kind in CLASSES if effect in kind), {effect})
@@ -65,27 +60,38 @@ def class_of(effect, target=""):
 
 def name_of(case):
     """What a case is called: it is its own seed, too."""
-    parts = (case["robot"], case["kind"], case.get("effect") or "", case["snr"], case["draw"])
+    parts = [case["robot"], case["kind"], case.get("effect") or "", case["snr"], case["draw"]]
+    if "mismatch" in case:
+        parts.append(f"{case['mismatch']:g} times wrong")
+        parts += ["+".join(case[key]) for key in ("only", "sensors") if case.get(key)]
     return "/".join(str(part) for part in parts)
 
 
 def seed_of(case, salt=0):
     # The cause is left out of the catalogue, not of the data, which are those of the single.
     same = {**case, "kind": "single"} if case["kind"] == "left-out" else case
+    # The same errors, ever larger, of the same robot under the same causes.
+    same = {key: value for key, value in same.items() if key != "mismatch"}
     return zlib.crc32(f"{name_of(same)}/{salt}".encode()) % 2**31
 
 
 def make(case, salt=0):
-    """(campaign, truth) of a case: robot, kind, effect, snr, draw, strength."""
+    """(campaign, truth) of a case: robot, kind, effect, snr, draw, sensors, records, and so on.
+
+    With a `mismatch` everything is off, by so many times its tolerance; or what `only` names.
+    """
     seed = seed_of(case, salt)
     robot = picchio.load_robot(case["robot"])
     accelerometer = f"accelerometer.{robot.tool_frame}"
     weak = case["kind"] == "weak"
+    wrong = {}
+    if "mismatch" in case:
+        wrong = {"mismatch": float(case["mismatch"]), "only": case.get("only")}
     if case["kind"] == "sets":
         target, records = SETS[case["effect"]]
         return worlds.make(
             robot=case["robot"], seed=seed, causes=[(case["effect"], target, None)],
-            sensors=(accelerometer,), records=records, snr_db=float(case["snr"]),
+            sensors=(accelerometer,), records=records, snr_db=float(case["snr"]), **wrong,
         )  # fmt: skip
     few = case["kind"] in ("few", "few-null")
     alone = weak or few
@@ -93,6 +99,7 @@ def make(case, salt=0):
     kind = {"weak": "single", "left-out": "single", "few": "single", "few-null": "null"}
     kind = kind.get(case["kind"], case["kind"])
     options = {"sensors": tuple(sensors), "records": case.get("records", 3 if few else 18)}
+    options |= wrong
     if case["kind"] == "mixed":  # a catalogued cause, and a little of what no catalogue has
         rest = {"robot": case["robot"], **options}
         causes = cases.causes("single", seed, effect=case.get("effect"), **rest)
@@ -111,8 +118,10 @@ def make(case, salt=0):
     )
 
 
-def run(case, salt=0, without=(), method="diagnose"):
+def run(case, salt=0, without=(), method="diagnose", workers=1):
     """Make, diagnose and judge one case: a flat dictionary.
+
+    `outcomes` says what a verdict is worth in a world that is a little wrong everywhere; see there.
 
     A "weak" case that its own world's simulator says cannot be seen is not diagnosed. In a
     "left-out" case the catalogue lacks the true cause and its class.
@@ -130,15 +139,18 @@ def run(case, salt=0, without=(), method="diagnose"):
     robot = picchio.load_robot(case["robot"])
     began, spent = time.monotonic(), time.process_time()
     if method == "diagnose":
-        found = diagnose_percussion(robot, campaign, without=without, workers=1)
+        found = diagnose_percussion(robot, campaign, without=without, workers=workers)
         result = judge(case, truth, found)
         if case["kind"] in ("few", "sets") and found.diagnosis.verdict == "ambiguous":
             result["follow_up"] = follow(robot, case, campaign, truth, found, seed_of(case, salt))
         if truth["causes"] and result["right"]:
             result["burst"] = burst.errors(found, truth, seed_of(case, salt))
-            result["removed"] = removed.share(found, truth)
+            if not case.get("mismatch"):  # else what the true causes remove is not all
+                result["removed"] = removed.share(found, truth)
     else:
         result = judge_labels(case, truth, METHODS[method](robot, campaign, without))
+    if "mismatch" in case:
+        result |= outcomes.judge(case, truth, result)
     result["seconds"] = round(time.monotonic() - began, 1)
     result["cpu_seconds"] = round(time.process_time() - spent, 1)
     return result
@@ -179,7 +191,7 @@ def judge(case, truth, found):
                 continue
             if not isinstance(value, (int, float)) or not value:
                 continue
-            true_value = float(value) * _within(cause, own, truth)
+            true_value = outcomes.true_value(cause, own, truth)
             got = match[0].parameters[own]
             errors[f"{cause['effect']}.{own}"] = [
                 got.value / true_value - 1.0,
@@ -219,21 +231,13 @@ def judge_labels(case, truth, labels):
 
 
 def _head(case):
-    return {
+    head = {
         "case": name_of(case),
         "robot": case["robot"],
         "kind": case["kind"],
         "snr": case["snr"],
     }
-
-
-def _within(cause, parameter, truth):
-    """A nuisance that is a cause was drawn within its tolerance on top."""
-    if parameter != "scale":
-        return 1.0
-    drawn = truth["nuisances"]
-    if cause["effect"] == "joint_stiffness":
-        return drawn["stiffness"][cause["target"]]
-    return {"modal_damping": drawn["damping_ratio"], "force_amplitude": drawn["force"]}.get(
-        cause["effect"], 1.0
-    )
+    if "mismatch" in case:
+        sensors = "accelerometer" if case.get("sensors") else "all"
+        head |= {"mismatch": case["mismatch"], "sensors": sensors}
+    return head

@@ -279,6 +279,44 @@ def print_against(rows, others):
         )
 
 
+def print_mismatch(rows):
+    """Worlds that are a little wrong everywhere: verdicts, intervals and times by kind."""
+    kinds = defaultdict(list)
+    for row in rows:
+        if "mismatch" in row and not _aside(row):
+            kinds[(row["robot"], row["kind"], row["mismatch"], row["sensors"])].append(row)
+    print(
+        f"{'robot':<18}{'kind':<10}{'times':>6} {'sensors':<14}{'n':>4}{'right':>7}{'wrong':>7}"
+        f"{'undecided':>11}{'alarms':>8}{'named':>7}{'in 90 %':>9}{'in 95 %':>9}{'seconds':>9}"
+    )
+    for (robot, kind, times, sensors), found in sorted(kinds.items()):
+        count = Counter(row.get("outcome", "undecided") for row in found)
+        nulls = kind in ("null", "few-null")
+        alarms = sum(row["verdict"] != "nothing-wrong" for row in found) if nulls else "-"
+        named = sum(row["verdict"] == "named" for row in found)
+        pulls = [e[1] for row in found for e in row["errors"].values() if math.isfinite(e[1])]
+        inside = [f"{sum(p <= z for p in pulls)}/{len(pulls)}" for z in (1.645, 1.960)]
+        seconds = sorted(row["seconds"] for row in found if "seconds" in row)
+        median = f"{quantile(seconds, 0.5):.1f}" if seconds else "-"
+        print(
+            f"{robot:<18}{kind:<10}{times:>6g} {sensors:<14}{len(found):>4}{count['right']:>7}"
+            f"{count['wrong']:>7}{count['undecided']:>11}{alarms:>8}{named:>7}"
+            f"{inside[0]:>9}{inside[1]:>9}{median:>9}"
+        )
+
+
+def mismatch_summary(rows):
+    """Everything about worlds that are a little wrong: the table, bursts, what was said."""
+    rows = [row for row in rows if "mismatch" in row]
+    print_mismatch(rows)
+    told = [row for row in rows if not _aside(row)]
+    print_bursts(told)
+    for row in told:
+        if row.get("outcome", "undecided") != "right":
+            said = [row["verdict"], row["claimed"], row.get("leads", [])]
+            print(row.get("outcome", "undecided") + ":", row["case"], row["truth"], "->", *said)
+
+
 def _foretold(follow_up):
     """Whether the measurement was said to tell all apart, at least if it comes out one way."""
     if "told" in follow_up:

@@ -237,6 +237,10 @@ class Bench:
         rest_values[:3] = tool_turn.T @ -GRAVITY
         rest_values[9:12] = place[tool] + turn[tool] @ off_t
         fastest = float(np.sqrt(max(eigh(full, mass, eigvals_only=True)[-1], 1.0)))
+        for kind, name, p0, p1 in self.elements:
+            if kind == equations.SMOOTHED:  # a stiff damper as long as the joint hardly moves
+                light = np.linalg.inv(mass)[at[self.joint(name)], at[self.joint(name)]]
+                fastest = max(fastest, 0.5 * p0 / p1 * light)
         system = (
             chain.arrays(), GRAVITY,
             (tool, np.ascontiguousarray(chain.tool_rotation), off_t.copy(), off_f.copy()),

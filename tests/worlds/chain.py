@@ -77,6 +77,56 @@ class Chain:
             tool=self.tool + 1 if self.tool >= at else self.tool,
         )
 
+    def end_of(self, body):
+        """(3,) m, body's axes: where the next body begins, or the tool is; else twice the CoM."""
+        children = np.flatnonzero(self.parent == body + 1)
+        ends = [self.offset[i] for i in children] or [self.tool_offset]
+        end = max(ends, key=np.linalg.norm)
+        return end if np.linalg.norm(end) > 1e-6 else 2.0 * self.com[body]
+
+    def split(self, body, name, share, angle):
+        """A hinge across a body, `share` of the way to its end: what lies beyond is a new body.
+
+        Each half has half the mass, the halves' CoMs stand apart along the body, and together they
+        are the old body. The hinge's axis is across the body, at `angle` (rad) from one such way.
+        """
+        end = self.end_of(body)
+        along = end / np.linalg.norm(end)
+        one, other = np.linalg.svd(along[None])[2][1:]
+        mass, com, inertia = self.mass[body], self.com[body], self.inertia[body]
+        spread = 0.5 * np.trace(inertia) * np.eye(3) - inertia  # second moments of the mass
+        apart = np.zeros(3)
+        if mass > 0.0 and along @ spread @ along > 0.0:
+            apart = 0.8 * spread @ along / np.sqrt(mass * (along @ spread @ along))
+        half = 0.5 * (inertia - mass * (apart @ apart * np.eye(3) - np.outer(apart, apart)))
+        at, root = body + 1, share * end
+        masses, coms, inertias = self.mass.copy(), self.com.copy(), self.inertia.copy()
+        masses[body], coms[body], inertias[body] = 0.5 * mass, com - apart, half
+        beyond = self.parent == body + 1
+        offset = self.offset.copy()
+        offset[beyond] -= root
+
+        def put(array, value):
+            return np.insert(array, at, value, axis=0)
+
+        parent = np.where(self.parent > body, self.parent + 1, self.parent)
+        carries = self.tool == body
+        return replace(
+            self,
+            names=(*self.names[:at], name, *self.names[at:]),
+            parent=put(parent, body + 1),
+            rotation=put(self.rotation, np.eye(3)),
+            offset=put(offset, root),
+            prismatic=put(self.prismatic, False),
+            axis=put(self.axis, np.cos(angle) * one + np.sin(angle) * other),
+            mass=put(masses, 0.5 * mass),
+            com=put(coms, com + apart - root),
+            inertia=put(inertias, half),
+            spin=put(self.spin, 0.0),
+            tool=self.tool + 1 if self.tool >= body else self.tool,
+            tool_offset=self.tool_offset - root if carries else self.tool_offset,
+        )
+
     def on_moving_base(self, name, axis, prismatic):
         """The robot's base on a further coordinate along or about a world axis through its root."""
         mass, com, inertia = self.base

@@ -120,7 +120,11 @@ def hysteresis(bench: Bench, joint, p):
 
 @effect
 def coulomb_friction(bench: Bench, joint, p):
-    bench.elements.append((equations.COULOMB, joint, p["torque"], 0.0))
+    """The ideal law; with `smoothing` (rad/s) torque tanh(v / smoothing), as some simulators do."""
+    if p.get("smoothing"):
+        bench.elements.append((equations.SMOOTHED, joint, p["torque"], p["smoothing"]))
+    else:
+        bench.elements.append((equations.COULOMB, joint, p["torque"], 0.0))
 
 
 @effect
@@ -225,7 +229,10 @@ def clock_drift(bench: Bench, group, p):
 
 @effect
 def sensor_highpass(bench: Bench, group, p):
-    bench.sensor(group).highpass = p["frequency"]
+    """Of first order and analogue; or Butterworth of `order` 2; or `digital`, as p says."""
+    sensor = bench.sensor(group)
+    sensor.highpass, sensor.order = p["frequency"], int(p.get("order", 1))
+    sensor.digital = bool(p.get("digital", 0.0))
 
 
 @effect

@@ -9,6 +9,7 @@ from .arm import dynamics, jacobian_column, kinematics, push
 
 # Elements between coordinate a and coordinate b (-1: the ground): column 0 of their table.
 BACKLASH, CUBIC, HYSTERESIS, COULOMB, QUADRATIC_DAMPER, BILINEAR, QUADRATIC, DELAYED = range(8)
+SMOOTHED = 8
 # Elements between a point of a body and the world: column 0 of theirs.
 TETHER, CONTACT = range(2)
 OUTPUTS = 13  # accelerometer, acceleration, velocity, displacement (3 each), force; then joints
@@ -59,6 +60,8 @@ def _element(row, x, v, z, mode, t, past_t, past_x, count):
         return p0 * max(u, 0.0), 0.0
     if kind == 6:
         return p0 * u * abs(u), 0.0
+    if kind == 8:  # friction, linear in the speed far below p1
+        return p0 * np.tanh(du / p1), 0.0
     return p0 * _history(t - p1, past_t, past_x, count), 0.0
 
 

@@ -13,6 +13,9 @@ from numba import njit
 from .arm import workspace
 from .equations import COULOMB, OUTPUTS, rates
 
+# Raise it when `equations` or `arm` change: numba's cache looks at this file alone.
+_REVISION = 2
+
 _SLACK = 1e-9  # of the friction torque, before what sticks lets go
 _EVENTS = 64  # at most so many in a step
 

@@ -11,6 +11,12 @@ from . import equations
 from .bench import Bench
 
 EFFECTS: dict = {}
+# Those that the published seeds draw from.
+FIRST = (
+    "tuned_mass", "coupled_joints", "quadratic_damping", "loose_bolt", "gyroscopic_spindle",
+    "swinging_direction", "softening_quadratic", "delayed_feedback", "second_touch",
+    "nonlinear_sensor", "floor_vibration", "uneven_blows", "fading_gain", "cross_talk",
+)  # fmt: skip
 
 
 def effect(function):
@@ -123,6 +129,22 @@ def cross_talk(bench: Bench, group, p):
     bench.sensor(group).turn = leak @ bench.sensor(group).turn
 
 
+@effect
+def mid_link_bending(bench: Bench, link, p):
+    """A link yields half-way along: N m/rad, N m s/rad, about an axis across it at `angle`, rad."""
+    body, name = bench.body(link), f"{link}.bend"
+    bench.chain = bench.chain.split(body, name, 0.5, p["angle"])
+    bench.soft[name] = p["stiffness"], p["damping"]
+
+
+@effect
+def counterbalance(bench: Bench, joint, p):
+    """A spring hangs on a joint: `stiffness` N m/rad by the cosine of how far it has turned."""
+    n, i = len(bench.springs), bench.joint(joint)
+    bench.coupling = np.zeros((n, n)) if bench.coupling is None else bench.coupling
+    bench.coupling[i, i] += p["stiffness"] * np.cos(bench.pose[i] - p["angle"])
+
+
 def draw(name, rng, size, groups, joints, factor=1.0):
     """(target, parameters) of an outside effect.
 
@@ -190,4 +212,11 @@ def draw(name, rng, size, groups, joints, factor=1.0):
         first, second = rng.choice(list("xyz"), 2, replace=False)
         share = sign * between(0.1, 0.2)
         return str(rng.choice(vectors)), {"into": str(first), "from": str(second), "share": share}
+    if name == "mid_link_bending":
+        link = list(size.links)[j]
+        stiffness = float(k * rng.uniform(2.0, 4.0) / factor)
+        damping = float(0.06 * np.sqrt(stiffness * size.inertia[j]))
+        return link, {"stiffness": stiffness, "damping": damping, "angle": float(rng.uniform(0, 3))}
+    if name == "counterbalance":
+        return joint, {"stiffness": between(0.25, 0.4) * k, "angle": float(rng.uniform(-0.5, 0.5))}
     raise KeyError(name)

@@ -14,7 +14,13 @@ import pinocchio as pin
 ROBOTS = Path(__file__).resolve().parents[2] / "robots"
 
 # Newtons that give a few mrad at the most; the shipped example tasks' levels, or near them.
-FORCE = {"fanuc_like_3dof": 300.0, "ur10": 50.0, "kinova_gen3": 30.0, "kuka_iiwa14": 60.0}
+FORCE = {
+    "fanuc_like_3dof": 300.0,
+    "fanuc_r2000ic": 600.0,
+    "ur10": 50.0,
+    "kinova_gen3": 30.0,
+    "kuka_iiwa14": 60.0,
+}
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numba import njit
 from scipy.linalg import expm
+from scipy.signal import butter, sosfilt
 
 # e^-s (1 + s + s^2/2 + s^3/6), s = (f / f0)^2, is down by 3 dB at this f / f0.
 _THREE_DB = 1.6607
@@ -24,7 +25,8 @@ class Sensor:
         mount: (Hz, damping ratio) of the mount's resonance.
         turn: (3, 3), reading = turn @ motion.
         gain: factor.
-        highpass, lowpass: Hz, first order.
+        highpass, lowpass: Hz, first order; the high-pass of `order` 2 is Butterworth's. `digital`:
+            by the bilinear transform, of what has been sampled.
         delay, rate: the sample stamped t is of t (1 + rate) - delay.
         limit: clipped to +- this, in the channel's unit.
         square: reading + square * reading^2, per channel's unit.
@@ -38,6 +40,8 @@ class Sensor:
     turn: np.ndarray = field(default_factory=lambda: np.eye(3))
     gain: float = 1.0
     highpass: float | None = None
+    order: int = 1
+    digital: bool = False
     lowpass: float | None = None
     delay: float = 0.0
     rate: float = 0.0
@@ -75,7 +79,16 @@ class Sensor:
         if signal.shape[2] == 3 and not np.array_equal(self.turn, np.eye(3)):
             signal = signal @ self.turn.T
         signal = self.gain * signal
-        if self.highpass is not None:
+        if self.highpass is not None and self.digital:
+            pass
+        elif self.highpass is not None and self.order == 2:
+            w = 2.0 * np.pi * self.highpass
+            signal = _filtered(
+                lengths, signal,
+                np.array([[0.0, 1.0], [-w * w, -np.sqrt(2.0) * w]]),
+                np.array([0.0, 1.0]), np.array([-w * w, -np.sqrt(2.0) * w]), 1.0,
+            )  # fmt: skip
+        elif self.highpass is not None:
             w = 2.0 * np.pi * self.highpass
             one = np.array([1.0])
             signal = _filtered(lengths, signal, np.array([[-w]]), one, np.array([-w]), 1.0)
@@ -91,6 +104,9 @@ class Sensor:
             nodes, weights = np.polynomial.legendre.leggauss(16)
             rate = np.pi * self.bandwidth / _THREE_DB
             out = _smoothed(stops, signal, instants, rate, nodes, weights)
+        if self.highpass is not None and self.digital:
+            rate = (times.size - 1) / (times[-1] - times[0])
+            out = sosfilt(butter(self.order, self.highpass, "high", fs=rate, output="sos"), out, 0)
         if self.square:
             out = out + self.square * out**2
         if self.fade:

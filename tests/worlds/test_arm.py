@@ -133,6 +133,37 @@ def test_a_hinge_is_a_joint_in_the_chain(joint, tmp_path):
     compare(model, chain)
 
 
+@pytest.mark.parametrize(("name", "body"), [("fanuc_like_3dof", 2), ("fanuc_r2000ic", 1)])
+def test_a_body_that_bends_is_two_with_a_hinge(name, body):
+    """Held straight it is the old one; bent it is pinocchio's model with two bodies."""
+    robot, whole = robots.load(name), nominal_chain(name)
+    chain = whole.split(body, "bend", 0.5, 0.7)
+    q = np.random.default_rng(4).uniform(-1, 1, len(whole.names))
+    straight = np.insert(q, body + 1, 0.0)
+    rows = np.delete(np.arange(len(straight)), body + 1)
+    mass, gravity, work = rest(chain, straight)
+    old_mass, old_gravity, old_work = rest(whole, q)
+    assert np.allclose(mass[np.ix_(rows, rows)], old_mass, rtol=1e-10, atol=1e-10)
+    assert np.allclose(gravity[rows], old_gravity, rtol=1e-10, atol=1e-10)
+    tools = [
+        w[1][c.tool + 1] + w[0][c.tool + 1] @ c.tool_offset
+        for w, c in ((work, chain), (old_work, whole))
+    ]
+    assert np.allclose(tools[0], tools[1], atol=1e-12)
+    for i in (body, body + 1):
+        moments = np.linalg.eigvalsh(chain.inertia[i])
+        assert moments.min() > 0.0 and 2.0 * moments.max() < moments.sum() * (1.0 + 1e-9)
+    model = pin.Model()
+    for i, joint in enumerate(chain.names):
+        place = pin.SE3(chain.rotation[i], chain.offset[i])
+        kind = pin.JointModelRevoluteUnaligned(chain.axis[i])
+        new = model.addJoint(int(chain.parent[i]), kind, place, joint)
+        own = pin.Inertia(chain.mass[i], chain.com[i], chain.inertia[i])
+        model.appendBodyToJoint(new, own, pin.SE3.Identity())
+    compare(model, chain)
+    assert robot.joints == tuple(n for n in chain.names if n != "bend")
+
+
 def compare(model, chain):
     rng, n = np.random.default_rng(3), len(chain.names)
     order = [chain.names.index(name) if name in chain.names else chain.names.index("base")

@@ -58,8 +58,11 @@ ZERO = {
     "uneven_blows": {"share": 0.0},
     "fading_gain": {"rate": 0.0},
     "cross_talk": {"into": "x", "from": "y", "share": 0.0},
+    "counterbalance": {"stiffness": 0.0, "angle": 0.0},
 }
-COMPLIANCES = ("servo_compliance", "base_compliance", "transverse_compliance")
+COMPLIANCES = (
+    "servo_compliance", "base_compliance", "transverse_compliance", "mid_link_bending",
+)  # fmt: skip
 ALL = [*effects.EFFECTS, *outside.EFFECTS]
 OF_SENSORS = ("sensor_gain", "sensor_axes", "sensor_misalignment", "sensor_delay", "clock_drift",
               "sensor_highpass", "sensor_lowpass", "sensor_clipping", "mount_resonance",
@@ -98,6 +101,7 @@ def typical(effect, plan, seed=23):
 
 
 def test_the_catalogue_is_the_contracts():
+    assert tuple(outside.EFFECTS)[: len(outside.FIRST)] == outside.FIRST
     assert len(effects.EFFECTS) == 37 and len(outside.EFFECTS) >= 10
     assert set(ALL) == {*ZERO, *COMPLIANCES}
 
@@ -111,7 +115,7 @@ def test_size_zero_is_the_healthy_arm(effect, plan, nuisances, healthy):
         # twenty times as stiff: a fifth of what the typical one does, or less, in the slow
         # channels; at the very jump of the force a mass behind a spring moves freely all the same
         typically = changes(stacked(plan, nuisances, ((effect, target, p),)), healthy)
-        factor = {"stiffness": 20.0, "rotor_inertia": 0.05, "damping": 4.0}
+        factor = {"stiffness": 20.0, "rotor_inertia": 0.05, "damping": 4.0, "angle": 1.0}
         p, bound = {k: v * factor[k] for k, v in p.items()}, 0.2 * typically["deflection"]
     else:
         p = ZERO[effect]

@@ -8,6 +8,7 @@ from scipy.linalg import eigh
 
 from worlds import campaign, equations, robots
 from worlds import plan as plans
+from worlds.bench import nominal_chain, rest
 
 NAME = "fanuc_like_3dof"
 SPRINGS = np.array([2.4e5, 1e5, 1e5])
@@ -157,6 +158,68 @@ def test_friction_slides_and_sticks(plan, model):
     assert 0.02 < still[5:].mean() < 0.9  # it sticks now and then
     matters(plan, "coulomb_friction", "joint_2", p, known, times)
     agree(known, found, 1e-3)
+
+
+@pytest.mark.parametrize("torque", [4.0, 60.0])
+def test_friction_that_is_smoothed(plan, model, torque):
+    ref = Reference(model, plan.shots[1])
+    p = {"torque": torque, "smoothing": 5e-4}
+
+    def extra(x, v, z):
+        return np.array([0.0, -torque * np.tanh(v[1] / 5e-4), 0.0]), np.zeros(0)
+
+    times, known = ref.run(extra=extra, method="LSODA", tolerance=1e-9)
+    agree(known, of_world(plan, "coulomb_friction", "joint_2", p, times), 1e-5)
+
+
+def test_a_link_that_bends_half_way(plan):
+    """Against pinocchio's model of the two halves, hinge and all."""
+
+    shot = plan.shots[1]
+    p = {"stiffness": 2e5, "damping": 60.0, "angle": 0.8}
+    chain = nominal_chain(NAME).split(1, "bend", 0.5, 0.8)
+    model = pin.Model()
+    for i, name in enumerate(chain.names):
+        kind = pin.JointModelRevoluteUnaligned(chain.axis[i])
+        place = pin.SE3(chain.rotation[i], chain.offset[i])
+        new = model.addJoint(int(chain.parent[i]), kind, place, name)
+        own = pin.Inertia(chain.mass[i], chain.com[i], chain.inertia[i])
+        model.appendBodyToJoint(new, own, pin.SE3.Identity())
+    tool = pin.Frame("tool", new, pin.SE3(chain.tool_rotation, chain.tool_offset),
+                     pin.FrameType.OP_FRAME)  # fmt: skip
+    tool = model.addFrame(tool)
+    data = model.createData()
+    pose = np.insert(shot.pose, 2, 0.0)
+    gravity = pin.computeGeneralizedGravity(model, data, pose).copy()
+    springs = np.insert(SPRINGS, 2, p["stiffness"])
+    joints = [0, 1, 3]
+    mass = rest(nominal_chain(NAME), shot.pose)[0]
+    squared, shapes = eigh(np.diag(SPRINGS), mass)
+    damping = np.zeros((4, 4))
+    damping[np.ix_(joints, joints)] = (
+        mass @ shapes @ np.diag(0.06 * np.sqrt(squared)) @ shapes.T @ mass
+    )
+    damping[2, 2] = p["damping"]
+    local = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+    def rate(_, y, force):
+        x, v = y[:4], y[4:]
+        torque = gravity - springs * x - damping @ v
+        jacobian = pin.computeFrameJacobian(model, data, pose + x, tool, local)[:3]
+        torque = torque + jacobian.T @ shot.direction * force
+        return np.concatenate([v, pin.aba(model, data, pose + x, v, torque)])
+
+    y, out, times = np.zeros(8), [], []
+    for a, b, force in ((0.0, 0.004, shot.force), (0.004, 0.04, 0.0)):
+        at = np.linspace(a, b, round((b - a) / 0.001) + 1)
+        done = solve_ivp(rate, (a, b), y, "DOP853", at, args=(force,), rtol=1e-9, atol=1e-13)
+        y = done.y[:, -1]
+        times.append(at[:-1])
+        out.append(done.y[joints, :-1])
+    times, known = np.concatenate(times), np.concatenate(out, axis=1)
+    found = of_world(plan, "mid_link_bending", "link_2", p, times)
+    matters(plan, "mid_link_bending", "link_2", p, known, times)
+    agree(known, found, 1e-5)
 
 
 def test_workpiece_contact_lets_go(plan, model):

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
 from picchio.campaign.tables import Tolerance
-from worlds import campaign, errors, robots
+from worlds import campaign, cases, errors, robots
 from worlds.bench import nominal_chain, rest
 
 SHORT = {"records": 3, "hits": 3, "ring": 0.05, "quiet": 0.02}
@@ -284,3 +284,28 @@ def test_what_was_drawn_too_far_out_is_told():
     assert found[1][2] == pytest.approx(6.0)
     _, truth = campaign.make(seed=1, mismatch=1.0, **SHORT)
     assert json.loads(json.dumps(campaign.plain(truth))) == campaign.plain(truth)
+
+
+def test_typical_causes_are_far_beyond_what_is_never_exact():
+    robot = robots.load("fanuc_like_3dof")
+    for effect in ("joint_stiffness", "modal_damping", "force_amplitude", "sensor_gain"):
+        for seed in range(12):
+            options = {"effect": effect, "mismatch": 1.0, **SHORT}
+            found = cases.causes("single", seed, **options)
+            assert found == cases.causes("single", seed, **options)
+            drawn = campaign.errors_of("fanuc_like_3dof", seed)
+            assert cases.in_tolerances(found[0], drawn, robot) >= 5.0
+    assert cases.in_tolerances(("tool_offset", "tool", {"x": 0.0, "y": 0.03, "z": 0.04})) == 50.0
+    assert cases.in_tolerances(("payload", "tool", {"mass": 3.0})) is None
+
+
+def test_errors_of_size_zero_are_none():
+    """The way that errors take through the world adds nothing of its own."""
+    plan = campaign.plan_of("ur10", 1, records=1, hits=2, ring=0.05)
+    nothing = errors.Errors.draw(nominal_chain("ur10"), 1, 0.0)
+    groups = ("accelerometer.tool0", "deflection")
+    nominal = campaign.Nuisances.none(6)
+    one = campaign.clean(campaign.World(plan, nominal), groups)[0]
+    other = campaign.clean(campaign.World(plan, nominal, errors=nothing), groups)[0]
+    for group in groups:
+        assert np.abs(one[group] - other[group]).max() < 1e-9 * np.abs(one[group]).max()

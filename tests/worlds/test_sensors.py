@@ -26,6 +26,13 @@ def tone(t):
     ("sensor", "system"),
     [
         (Sensor(highpass=1.5), ([1.0, 0.0], [1.0, 2 * np.pi * 1.5])),
+        (
+            Sensor(highpass=2.0, order=2),
+            (
+                [1.0, 0.0, 0.0],
+                [1.0, np.sqrt(2.0) * 2 * np.pi * 2.0, (2 * np.pi * 2.0) ** 2],
+            ),
+        ),
         (Sensor(lowpass=40.0), ([2 * np.pi * 40.0], [1.0, 2 * np.pi * 40.0])),
         (
             Sensor(mount=(90.0, 0.05)),
@@ -42,6 +49,18 @@ def test_filters_are_the_contracts(sensor, system):
     known = dsp.lsim(system, tone(fine), fine)[1][::40]
     found = sensor.read(STOPS, sampled(tone), TIMES, 0.0)[:, 0]
     assert np.abs(found - known[: found.size]).max() < 2e-4 * np.abs(known).max()
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_digital_high_pass_is_the_bilinear_transform_of_the_samples(order):
+    """Near the analogue one as long as the samples are dense, and not the same."""
+    plain = Sensor().read(STOPS, sampled(tone), TIMES, 0.0)[:, 0]
+    found = Sensor(highpass=2.0, order=order, digital=True)
+    found = found.read(STOPS, sampled(tone), TIMES, 0.0)[:, 0]
+    known = dsp.lfilter(*dsp.butter(order, 2.0, "high", fs=1.0 / STEP), plain)
+    assert np.abs(found - known).max() < 1e-9
+    analogue = Sensor(highpass=2.0, order=order).read(STOPS, sampled(tone), TIMES, 0.0)[:, 0]
+    assert 1e-4 < np.abs(found - analogue).max() / np.abs(analogue).max() < 0.02
 
 
 def test_the_sensors_band_is_flat_where_the_arm_is():

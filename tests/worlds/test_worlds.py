@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from picchio.campaign.campaign import load_campaign
-from worlds import campaign, cases, detect, draw, effects, robots
+from worlds import campaign, cases, detect, draw, effects, outside, robots
 from worlds import plan as plans
 
 HERE = Path(__file__).resolve().parent
@@ -61,7 +61,9 @@ def test_another_seed_is_another_campaign():
     assert first["nuisances"] != second["nuisances"]
 
 
-@pytest.mark.parametrize("name", ["fanuc_like_3dof", "ur10", "kinova_gen3", "kuka_iiwa14"])
+@pytest.mark.parametrize(
+    "name", ["fanuc_like_3dof", "fanuc_r2000ic", "ur10", "kinova_gen3", "kuka_iiwa14"]
+)
 def test_plans_spread_and_stay_within_limits(name):
     robot = robots.load(name)
     plan = plans.make(name, np.random.default_rng(9))
@@ -174,6 +176,16 @@ def test_what_nuisances_imitate_is_not_detectable():
     assert gain("joint_stiffness", "joint_2", {"scale": 1.3}) > 100.0
 
 
+@pytest.mark.parametrize("name", ["fanuc_like_3dof", "fanuc_r2000ic", "ur10", "kinova_gen3"])
+def test_blows_give_a_few_milliradians(name):
+    """What a real tool does: more would be another problem, less would drown."""
+    for seed in range(2):
+        size = draw.sizes(plans.make(name, np.random.default_rng(seed), 9))
+        print(f"{name}: {1e3 * size.most.max():.2f} mrad")
+        assert 3e-4 < size.most.max() < 6e-3
+        assert size.active(0.3)
+
+
 def test_seven_joints_draw_what_shows():
     size = draw.sizes(plans.make("kinova_gen3", np.random.default_rng(2), 3, hits=4, ring=0.2))
     assert "joint_7" not in size.active(0.3)  # the tool stands on its axis
@@ -181,7 +193,7 @@ def test_seven_joints_draw_what_shows():
 
 
 def test_cases_are_drawn_by_their_seed_and_keep_their_causes_apart():
-    for kind, count in (("null", 0), ("single", 1), ("pair", 2), ("triple", 3), ("outside", 1)):
+    for kind, count in cases.KINDS.items():
         for seed in range(3):
             found = cases.causes(kind, seed, **SHORT)
             assert found == cases.causes(kind, seed, **SHORT) and len(found) == count
@@ -202,3 +214,21 @@ def test_the_truth_is_json():
 
     _, truth = campaign.make(seed=1, causes=cases.causes("triple", 1, **SHORT), **SHORT)
     assert json.loads(json.dumps(campaign.plain(truth))) == campaign.plain(truth)
+
+
+def test_filters_and_friction_are_drawn_of_every_sort():
+    found = [cases.causes("filter", seed, **SHORT)[0] for seed in range(16)]
+    assert {name for name, _, _ in found} == {"sensor_highpass"}
+    assert {(p["order"], p["digital"]) for _, _, p in found} == {
+        (1.0, 0.0), (1.0, 1.0), (2.0, 0.0), (2.0, 1.0)
+    }  # fmt: skip
+    rubbing = [cases.causes("rubbing", seed, **SHORT)[0] for seed in range(8)]
+    assert all(2.0 <= p["torque"] <= 8.0 for _, _, p in rubbing)
+    assert {p.get("smoothing") for _, _, p in rubbing} == {None, 5e-4}
+    hum = cases.causes("hum", 3, **SHORT)
+    assert hum[0][0] == "mains_hum" and hum[1][0] != "mains_hum"
+    # what came later is drawn where the world may be wrong, not by the published seeds
+    later = set(outside.EFFECTS) - set(outside.FIRST)
+    drawn = {cases.causes("outside", seed, mismatch=1.0, **SHORT)[0][0] for seed in range(60)}
+    before = {cases.causes("outside", seed, **SHORT)[0][0] for seed in range(60)}
+    assert later <= drawn and not later & before and len(drawn) >= 8

@@ -17,7 +17,8 @@ from .errors import Errors
 from .sensors import Sensor
 
 TOLERANCE = {"stiffness": 0.05, "damping_ratio": 0.20, "force": 0.05}
-_KINKS = (equations.BACKLASH, equations.BILINEAR, equations.HYSTERESIS, equations.COULOMB)
+_KINKS = (equations.BACKLASH, equations.BILINEAR, equations.HYSTERESIS, equations.COULOMB,
+          equations.SMOOTHED)  # fmt: skip
 VECTORS = ("accelerometer", "acceleration", "velocity", "displacement")
 
 
