@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from picchio.core.errors import InputError
-
-if TYPE_CHECKING:
-    from picchio.robot.flexible_robot import FlexibleRobot
 
 RobotArgument = Annotated[
     str,
@@ -46,7 +43,22 @@ TaskOption = Annotated[
     typer.Option(
         metavar="FILE",
         help="What the robot does (TOML, see `picchio formats task`); its example task if not "
-        "given.",
+        "given, else one that is printed first.",
+    ),
+]
+PayloadOption = Annotated[
+    float | None,
+    typer.Option(metavar="KG", help="Rated payload; narrows the estimates, bounds the blows."),
+]
+ReachOption = Annotated[
+    float | None, typer.Option(metavar="M", help="Rated reach; what the URDF says if not given.")
+]
+ClassOption = Annotated[
+    str | None,
+    typer.Option(
+        "--class",
+        metavar="CLASS",
+        help="Of the drives: strain-wave, cycloidal, planetary, direct or ball-screw.",
     ),
 ]
 SNCurveOption = Annotated[
@@ -145,19 +157,3 @@ def _is_number(text: str) -> bool:
 
 
 POSE_HELP = "Joint positions, rad or m: Q1,Q2,..., or NAME=VALUE,... (the rest at zero), or a name."
-
-
-def task_file(robot: FlexibleRobot, task: Path | None) -> Path:
-    """The task that was given, or else the robot's example.
-
-    Raises:
-        InputError: neither.
-    """
-    path = task or robot.task_path
-    if path is None:
-        raise InputError(
-            f"{robot.name} has no example task of its own",
-            key="--task",
-            hint="give one: a TOML file of the format picchio-task/1",
-        )
-    return path

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from picchio.core.toml import StrictModel
 from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint
-from picchio.robot.spread import Number, Spread
+from picchio.robot.spread import Number, Spread, root_of
 from picchio.robot.urdf.normalised import normalise
 from picchio.robot.urdf.tree import Inertial
+
+# Of a joint, what its vibration depends on.
+_SPRINGS = ("stiffness", "damping_ratio")
 
 
 def robot_with(robot: FlexibleRobot, values: Iterable[tuple[Spread, Number]]) -> FlexibleRobot:
@@ -52,6 +57,25 @@ def robot_with(robot: FlexibleRobot, values: Iterable[tuple[Spread, Number]]) ->
                     "tool_point": point}  # fmt: skip
     names = [joint.name for joint in robot.flexible_joints]
     return replace(robot, flexible_joints=tuple(joints[name] for name in names), **changes)
+
+
+def drawn_robots(robot: FlexibleRobot, count: int, seed: int = 0) -> Iterator[FlexibleRobot]:
+    """Robots whose joints' values are drawn from their spreads, correlated as the posterior says.
+
+    Args:
+        robot: whose values have spreads; what its drives bear stays as it is.
+        count: how many.
+        seed: of the draws.
+
+    Yields:
+        each, its values known exactly.
+    """
+    spreads = [one for one in robot.spreads.values()
+               if one.table == "joint" and one.path[0] in _SPRINGS]  # fmt: skip
+    root = root_of([one.name for one in spreads], robot.posterior)
+    for row in np.random.default_rng(seed).standard_normal((count, len(spreads))) @ root:
+        values = [(one, one.at(float(score))) for one, score in zip(spreads, row, strict=True)]
+        yield robot_with(robot, values)
 
 
 def _weighed(body: Inertial | None, spread: Spread, value: Any) -> Inertial:

@@ -23,7 +23,7 @@ from picchio.robot.loading.load import load_robot
 from picchio.robot.units import units_of
 from picchio.studies.assessment.result import Assessment, format_count
 from picchio.studies.assessment.run import assess
-from picchio.studies.tasks import load_task
+from picchio.studies.default_task import task_of
 
 FORMAT = "picchio-comparison/1"
 _SAME = 1e-9  # relative: what differs by less is rounding
@@ -187,7 +187,8 @@ def compare(
     Args:
         *items: at least two: results of picchio or the JSON files of them, all of one format; or
             names and files of robots, saved models, tasks and sidecars, which are assessed.
-        task: for robots, models and sidecars; each robot's example task if not given.
+        task: for robots, models and sidecars; each robot's example task if not given, else
+                an assumed one.
         robot: for tasks and sidecars.
         flex: sidecar of `robot`.
         tool: the frame that carries the tool.
@@ -257,11 +258,7 @@ def _content_of(
     if base is None:
         raise InputError("needs the robot that it is for", file=path, hint="name one with --robot")
     loaded = load_robot(base, flex=side, tool=tool)
-    work = work or loaded.task_path
-    if work is None:
-        raise InputError(f"{loaded.name} has no example task of its own", key="task",
-                         hint="give one")  # fmt: skip
-    return str(item), assess(loaded, load_task(work, loaded)).to_dict()
+    return str(item), assess(loaded, task_of(loaded, work)).to_dict()
 
 
 def _known(content: Mapping[str, Any], path: Path | None) -> Mapping[str, Any]:

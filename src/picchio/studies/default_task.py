@@ -7,8 +7,9 @@ the same robot and seed give the same poses on every machine, in a few hundredth
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,10 +20,10 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.ik.chain import Chain, tool_chain
-from picchio.studies.tasks import FORMAT, Task, task_from_dict
+from picchio.studies.tasks import ASSUMED_BLOWS, FORMAT, Task, load_task, task_from_dict
 
 POSES = 5
-FORCE, WIDTH, PERIOD, HITS = 300.0, 0.004, 0.040, 12  # N, s, s, 1: the blows of Nie et al. (2016)
+FORCE, HITS = ASSUMED_BLOWS.force or 0.0, 12  # N, 1
 GRAVITY = 9.81  # m/s^2, of a payload's weight
 
 _DRAWN = 4000
@@ -53,12 +54,42 @@ def default_task(robot: FlexibleRobot, *, payload: float | None = None, seed: in
         seed: of the poses.
 
     Returns:
-        the task, which says nothing of where it is from.
+        the task; its note says what it is.
 
     Raises:
         InputError: no joint moves the tool; the payload is not positive.
     """
-    return task_from_dict(default_task_content(robot, payload=payload, seed=seed), robot)
+    content = default_task_content(robot, payload=payload, seed=seed)
+    force = content["excitation"]["force"]
+    why = "" if force == FORCE else ", the weight of the payload"
+    return replace(
+        task_from_dict(content, robot),
+        note=f"No task was given, so one is assumed: {HITS} blows a rivet of {force:g} N{why}, "
+        f"along x, y and z, at {POSES} poses drawn with seed {seed}; picchio start writes it as a "
+        "file to edit",
+    )
+
+
+def task_of(
+    robot: FlexibleRobot, task: Task | str | Path | None = None, *, payload: float | None = None
+) -> Task:
+    """The task that was given, else the robot's example, else `default_task`.
+
+    Args:
+        robot: that does it.
+        task: one, or its file.
+        payload: kg, rated, where it is known; it bounds the default task's blows.
+
+    Returns:
+        the task.
+
+    Raises:
+        InputError: as `load_task` and `default_task`.
+    """
+    if isinstance(task, Task):
+        return task
+    path = task or robot.task_path
+    return default_task(robot, payload=payload) if path is None else load_task(path, robot)
 
 
 def default_task_content(
@@ -85,10 +116,8 @@ def default_task_content(
         "format": FORMAT,
         "hits_per_rivet": HITS,
         "excitation": {
-            "kind": "pulse_train",
+            **ASSUMED_BLOWS.given(),
             "force": float(f"{weight:.3g}"),
-            "period": PERIOD,
-            "width": WIDTH,
         },
         "operation": [
             {"name": f"along {'xyz'[k]}", "direction": np.eye(3)[k].tolist(), "poses": poses}

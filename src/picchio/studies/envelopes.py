@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -20,12 +20,16 @@ from picchio.fatigue.shaft_stress import stress_per_torque
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.units import JointUnits, column, units_of
+from picchio.robot.varied import drawn_robots
 from picchio.studies.rivet.pose import ModelAtPose
 from picchio.vibration.closed_form.response import Response, described, peak_deflections
 
 FORMAT = "picchio-envelope/1"
 Quantity = Literal["deflection", "torque", "stress"]
 QUANTITIES: tuple[Quantity, ...] = ("deflection", "torque", "stress")
+# Drawn robots where values are estimates; between these quantiles 80 % of them lie.
+_CASES, ENDS = 64, (0.1, 0.9)
+_TIMES = 1024  # of a drawn case's curve
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,6 +57,9 @@ class DirectionEnvelope(TableResult):
         stress_factor: (n,) Pa/rad, shear stress per deflection; NaN without a shaft.
         response: the closed form behind it all.
         notes: what was left out, and why.
+        cases: (c, n, 3, t) rad, where a stiffness or damping is an estimate: the curves g_j(t) of
+            drawn robots at times so near that a peak is missed by 1 %; else c is 0.
+        case_stiffness: (c, n) N m/rad, of theirs.
     """
 
     robot: str
@@ -71,6 +78,8 @@ class DirectionEnvelope(TableResult):
     stress_factor: FloatArray
     response: Response
     notes: tuple[str, ...] = ()
+    cases: FloatArray = field(default_factory=lambda: np.empty((0, 0, 3, 0)))
+    case_stiffness: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     origin: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -85,6 +94,43 @@ class DirectionEnvelope(TableResult):
             quantity: "deflection", "torque" or "stress".
         """
         return self.peak_deflection * self._factor(quantity)
+
+    @property
+    def estimated(self) -> bool:
+        """Whether a stiffness or damping that it depends on is an estimate."""
+        return bool(len(self.cases))
+
+    def peak_interval(self, quantity: Quantity = "deflection") -> FloatArray:
+        """(n, 2) P10 and P90 of `peak` in the drawn cases; itself where nothing is estimated.
+
+        Args:
+            quantity: as in `peak`.
+        """
+        if not self.estimated:
+            return np.repeat(self.peak(quantity)[:, None], 2, axis=1)
+        longest = np.sqrt((self.cases**2).sum(axis=2).max(axis=2))
+        return np.quantile(longest * self._case_factor(quantity), ENDS, axis=0).T
+
+    def band(self, directions: ArrayLike, quantity: Quantity = "deflection") -> FloatArray:
+        """(2, n, d) P10 and P90 of `support` in the drawn cases.
+
+        Args:
+            directions: (d, 3) unit vectors.
+            quantity: as in `support`.
+        """
+        if not self.estimated:
+            return np.repeat(self.support(directions, quantity)[None], 2, axis=0)
+        wanted = np.atleast_2d(np.asarray(directions, dtype=float))
+        every = np.array([np.abs(wanted @ case).max(axis=2) for case in self.cases])
+        every *= self._case_factor(quantity)[:, :, None]
+        return np.asarray(np.quantile(every, ENDS, axis=0))
+
+    def _case_factor(self, quantity: Quantity) -> FloatArray:
+        """(c, n), as `_factor`: a stiffer drawn spring brings more torque for its deflection."""
+        factor = np.broadcast_to(self._factor(quantity), self.case_stiffness.shape)
+        if quantity == "deflection":
+            return factor
+        return factor * self.case_stiffness / self.torque_factor
 
     def _factor(self, quantity: Quantity) -> FloatArray:
         factors = {
@@ -181,9 +227,13 @@ class DirectionEnvelope(TableResult):
             "peak_torque": self.peak("torque"),
             "peak_shear_stress": self.peak("stress"),
         }
+        if self.estimated:
+            joints |= {"peak_deflection_interval": self.peak_interval(),
+                       "peak_torque_interval": self.peak_interval("torque")}  # fmt: skip
         return {
             "format": FORMAT,
             "robot": self.robot,
+            "estimated": self.estimated,
             "pose": self.pose,
             "tool_position": self.tool_position,
             "excitation": {**self.excitation.to_dict(), "hits": self.hits},
@@ -221,7 +271,7 @@ def envelope(
 
     Returns:
         the envelope, over the directions as programmed: a force that an effect turns is turned
-        from each of them.
+        from each of them. Where a value is an estimate, drawn cases stand beside it.
 
     Raises:
         InputError: a bad pose, a resonance without damping, no flexible joint, a nonlinear model
@@ -234,6 +284,7 @@ def envelope(
     if not all(np.isfinite(w.value) for w in worst):
         raise InputError("the deflections overflow", key="force", value=excitation.peak_force)
     tool, direction = at.tool_response(excitation, hits).worst_combination(np.eye(3))
+    curves, stiffness = _cases(model, at.pose, excitation, hits)
     return DirectionEnvelope(
         robot=model.robot.name,
         joint_names=model.robot.flexible_names,
@@ -251,8 +302,28 @@ def envelope(
         stress_factor=at.stiffness * stress_per_torque(model.robot.flexible_joints),
         response=response,
         notes=model.without_load(),
+        cases=curves,
+        case_stiffness=stiffness,
         origin=provenance(model.robot.files),
     )
+
+
+def _cases(
+    model: Model, pose: FloatArray, excitation: Excitation, hits: int | None
+) -> tuple[FloatArray, FloatArray]:
+    """Of drawn robots, where springs are estimates: g_j(t) (c, n, 3, t) and stiffness (c, n)."""
+    n = len(model.robot.flexible_joints)
+    if not any(joint.estimated for joint in model.robot.flexible_joints):
+        return np.empty((0, n, 3, 0)), np.empty((0, n))
+    curves, stiffness = [], []
+    for robot in drawn_robots(model.robot, _CASES):
+        at = ModelAtPose(replace(model, robot=robot), pose)
+        response = at.response(excitation, hits)
+        force, slowest = response.force, 1.0 / at.natural_frequencies[0]
+        end = force.end if response.periodic else float(force.start[-1]) + slowest
+        curves.append(response.unit_deflection(np.linspace(0.0, end, _TIMES)))
+        stiffness.append(at.stiffness)
+    return np.array(curves), np.array(stiffness)
 
 
 def icosphere(subdivisions: int) -> tuple[FloatArray, IndexArray]:

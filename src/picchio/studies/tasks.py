@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, warn_user
 from picchio.core.toml import Finite, Positive, StrictModel, parse_toml, validate
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import Hits
@@ -21,6 +21,8 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.vibration.closed_form.response import unit_vector
 
 FORMAT = "picchio-task/1"
+# Where nobody said: those of Nie et al. (2016); N, s, s.
+ASSUMED_BLOWS = ExcitationTable(kind="pulse_train", force=300.0, period=0.040, width=0.004)
 # An arm of fewer joints cannot choose where its tool points.
 _LEAST_JOINTS_TO_AIM = 5
 
@@ -100,10 +102,12 @@ class Task:
     Attributes:
         operations: in the order of the file.
         files: every file read, for provenance.
+        note: what it is, where nobody gave one; else "".
     """
 
     operations: tuple[Operation, ...]
     files: tuple[Path, ...] = ()
+    note: str = ""
 
     def __repr__(self) -> str:
         names = [op.name for op in self.operations]
@@ -249,7 +253,8 @@ def blows_of(
     """The blows of a study that has no task of its own: a task's, some of their numbers changed.
 
     Args:
-        robot: its example task fills in what is not given.
+        robot: its example task fills in what is not given; without one, `ASSUMED_BLOWS`, with a
+            warning.
         task: another task file to fill it in.
         force: N, height of a blow.
         period: s, from one blow to the next.
@@ -259,10 +264,16 @@ def blows_of(
         InputError: a number that is not positive and finite, or one that is not given anywhere.
     """
     file = task or robot.task_path
-    table = ExcitationTable()
+    given = {"force": force, "period": period, "width": width}
     if file is not None:
         table = parse_toml(file, TaskTable, format=FORMAT).excitation
-    given = {"force": force, "period": period, "width": width}
+    else:
+        table = ASSUMED_BLOWS
+        assumed = [f"{key} {getattr(table, key):g} {unit}" for key, unit in
+                   zip(given, ("N", "s", "s"), strict=True) if given[key] is None]  # fmt: skip
+        if assumed:
+            warn_user(f"{robot.name} has no task of its own: of the blows, {', '.join(assumed)} "
+                      "are assumed")  # fmt: skip
     for key, value in given.items():
         if value is not None:
             if not math.isfinite(value):

@@ -15,9 +15,10 @@ from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
 from picchio.studies.assessment.run import assess
+from picchio.studies.default_task import task_of
 from picchio.studies.maps.result import WorkspaceMap
 from picchio.studies.maps.stored import open_map
-from picchio.studies.tasks import Task, blows_of, load_task
+from picchio.studies.tasks import Task, blows_of
 from picchio.visuals.diagnosis_file import read_diagnosis
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.scene import Scene
@@ -48,7 +49,7 @@ def view(
 
     Args:
         robot: the robot, its name or file, or a model of it.
-        task: the robot's own example task if None.
+        task: the robot's own example task if None, else an assumed one (`default_task`).
         pose: (nv,) rad or m.
         excitation: the blows at `pose`; those of the task if None.
         hits: with `pose`, blows of a burst from rest; the steady state if None.
@@ -64,7 +65,7 @@ def view(
         the scene: `save` writes it as one offline HTML file, `show` opens a live viewer.
 
     Raises:
-        InputError: a file that cannot be read, a bad pose, an unknown joint, no task.
+        InputError: a file that cannot be read, a bad pose, an unknown joint.
     """
     found = robot if isinstance(robot, Model) else load_robot(robot, flex=flex, tool=tool)
     model = Model.of(found, gravity_stiffness=gravity_stiffness)
@@ -84,14 +85,7 @@ def view(
     for key, value in (("excitation", excitation), ("hits", hits)):
         if value is not None:
             raise InputError("needs --pose: a task says its blows itself", key=key, value=value)
-    if not isinstance(task, Task):
-        path = task or loaded.task_path
-        if path is None:
-            raise InputError(
-                f"{loaded.name} has no example task of its own", key="task",
-                hint="give one, or a pose",
-            )  # fmt: skip
-        task = load_task(path, loaded)
+    task = task_of(loaded, task)
     life = assess(model, task, progress=progress)
     worst = worst_rivet(life, model, task)
     return build_scene(

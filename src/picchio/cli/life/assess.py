@@ -12,16 +12,18 @@ import typer
 from picchio.cli.app import app
 from picchio.cli.life.how_sure import parse_spreads, show_spread
 from picchio.cli.options import (
+    ClassOption,
     FlexOption,
     GravityStiffnessOption,
     JsonOption,
+    PayloadOption,
+    ReachOption,
     ReducersOption,
     ReportOption,
     RobotArgument,
     SNCurveOption,
     TaskOption,
     ToolOption,
-    task_file,
 )
 from picchio.cli.output import (
     check_targets,
@@ -54,6 +56,9 @@ def assess(
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
+    payload: PayloadOption = None,
+    reach: ReachOption = None,
+    drive_class: ClassOption = None,
     method: Annotated[
         str,
         typer.Option(
@@ -155,6 +160,7 @@ def assess(
     """How many rivets each joint of a robot survives on a task."""
     import picchio
     from picchio.studies.assessment.method_comparison import method_terms
+    from picchio.studies.default_task import task_of
 
     # Refuse options that would be ignored, and numbers out of range.
     rainflow_only = {
@@ -185,9 +191,11 @@ def assess(
         from picchio.visuals.report.cover import embedded
 
         embedded(logo)  # refused before any work
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
-    path = task_file(loaded, task)
-    work = picchio.load_task(path, loaded)
+    loaded = picchio.load_robot(
+        robot, flex=flex, tool=tool, reducers=reducers or (), payload=payload, reach=reach,
+        drive_class=drive_class,
+    )  # fmt: skip
+    work = task_of(loaded, task, payload=payload)
     check_targets((json, report), [*loaded.files, *work.files, sn_curve, logo])
     options: dict[str, Any] = {
         "sn_curve": sn_curve,
@@ -253,7 +261,7 @@ def assess(
     def show_all() -> None:
         if allowed is not None:
             console().print(f"{allowed.answer}\n", style="bold")
-        show(found, path, terms)
+        show(found, work, terms)
         if allowed is not None:
             _show_allowable(allowed, work, found)
         if unsure is not None:
@@ -270,14 +278,15 @@ _NOT_SAFE = 3
 _ROUNDING = 1e-9
 
 
-def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
+def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
     """Print an assessment."""
     out = console()
-    if found.notice:
-        out.print(f"{found.notice}.", style="bold yellow")
+    for line in filter(None, (found.notice, task.note)):
+        out.print(f"{line}.", style="bold yellow")
         out.print()
-    passes = sum(len(op.poses) * op.rivets for op in found.operations)
-    out.print(styled(found.robot, f" on {task.name}: {count_of(passes, 'rivet')} a pass"))
+    on = f" on {task.files[0].name}" if task.files else ""
+    rivets = count_of(task.rivets_per_pass, "rivet")
+    out.print(styled(found.robot, f"{on}: {rivets} a pass"))
     for blows in dict.fromkeys(_blows(operation) for operation in found.operations):
         out.print(f"  {blows}")
         for operation in found.operations:
@@ -287,6 +296,10 @@ def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
                     f"    {operation.name}: {count_of(len(operation.poses), 'pose')}, force along "
                     f"({x:.3g}, {y:.3g}, {z:.3g})"
                 )
+    if task.note:
+        poses = task.operations[0].poses
+        for k, pose in enumerate(poses):
+            out.print(f"    pose {k + 1}: {', '.join(f'{q:.3g}' for q in pose)}")
     out.print()
     out.print(_estimated_table(found) if found.notice else _life_table(found))
     reducers = [
@@ -309,7 +322,7 @@ def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
     told = found.verdict
     out.print(told.headline, style="bold")
     for line in told.reasons:
-        if line != found.notice:
+        if line not in (found.notice, task.note):
             out.print(f"  - {line}")
     out.print()
     if len(found.operations) > 1 and any(joint.damage_share for joint in found.joints):
@@ -323,6 +336,7 @@ def show(found: Assessment, task: Path, terms: tuple[Term, ...] = ()) -> None:
     for line in found.assumptions:
         if line not in told.reasons:
             out.print(f"  - {line}", style="dim")
+    out.print()
 
 
 def _life_table(found: Assessment) -> FittedTable:
@@ -363,15 +377,7 @@ def _life_table(found: Assessment) -> FittedTable:
 
 def _estimated_table(found: Assessment) -> FittedTable:
     """The joints of a robot whose drives are estimates: intervals only."""
-    joints = found.joints
-    load, torques = column([j.units.load for j in joints], [j.told_interval("peak_torque")
-                                                            for j in joints])  # fmt: skip
-    rows = [
-        (j.name, torque, j.told_percent("reducer_utilisation"), j.told_percent("utilisation"),
-         j.told_life if j.worn else "unknown",
-         "-" if math.isnan(j.ends_first) else f"{100 * j.ends_first:.0f}")
-        for j, torque in zip(joints, torques, strict=True)
-    ]  # fmt: skip
+    load, rows = found.intervals()
     heads = ("joint", f">peak\ntorque\n{load}", ">of its\nlimit\n%", ">fatigue:\nused\n%",
              ">rivets to\nfailure\n", ">ends\nfirst\n%")  # fmt: skip
     return table(heads, rows, title="The joints, P10 to P90 (gravity and blows together)")

@@ -25,6 +25,7 @@ from picchio.cli.options import (
 from picchio.cli.output import check_targets, console, deliver, styled, table
 
 if TYPE_CHECKING:
+    from picchio.core.arrays import FloatArray
     from picchio.studies.envelopes import DirectionEnvelope
 
 
@@ -59,6 +60,14 @@ def envelope(
     deliver(found.to_dict(), json, lambda: _show(found))
 
 
+def _told(values: FloatArray, ends: FloatArray, digits: int) -> list[str]:
+    """Numbers as people read them, as intervals where they are estimates."""
+    return [
+        f"{value:.{digits}g}" if low == high else f"{low:.3g} to {high:.3g}"
+        for value, (low, high) in zip(values, ends, strict=True)
+    ]
+
+
 def _show(found: DirectionEnvelope) -> None:
     from picchio.robot.units import column
     from picchio.vibration.closed_form.response import described
@@ -72,9 +81,9 @@ def _show(found: DirectionEnvelope) -> None:
     out.print(f"  natural frequencies {frequencies} Hz\n")
     stresses = found.peak("stress") / 1e6
     small, peaks = column([u.small for u in found.units],
-                          [f"{1e3 * x:.5g}" for x in found.peak_deflection])  # fmt: skip
-    load, torques = column([u.load for u in found.units],
-                           [f"{x:.4g}" for x in found.peak("torque")])  # fmt: skip
+                          _told(1e3 * found.peak(), 1e3 * found.peak_interval(), 5))  # fmt: skip
+    told = _told(found.peak("torque"), found.peak_interval("torque"), 4)
+    load, torques = column([u.load for u in found.units], told)
     rows = [
         (
             name,
@@ -87,7 +96,7 @@ def _show(found: DirectionEnvelope) -> None:
     ]
     heads = ("joint", f">peak\ndeflection\n{small}", f">peak\ntorque\n{load}", ">peak\nstress\nMPa",
              ">worst direction\n(either sign)\nx, y, z")  # fmt: skip
-    out.print(table(heads, rows))
+    out.print(table(heads, rows, title="Estimated: P10 to P90" if found.estimated else None))
     x, y, z = found.worst_tool_direction
     out.print(
         f"The tool moves most, {found.peak_tool_displacement * 1e3:.4g} mm, under a force along "

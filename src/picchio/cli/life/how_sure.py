@@ -123,7 +123,7 @@ def show_spread(found: UncertainLife) -> None:
         title="Where the doubt is from: shares of the variance",
     ))  # fmt: skip
     if small:
-        out.print(f"Below {100 * _SMALL:g} % each: {', '.join(small)}.", style="dim")
+        out.print(f"Below {100 * _SMALL:g} % each: {', '.join(small)}.\n", style="dim")
     _show_measurements(found)
     for name, scan in found.scans.items():
         lines = [

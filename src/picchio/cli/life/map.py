@@ -196,6 +196,8 @@ def _show(summary: dict[str, Any]) -> None:
     from picchio.robot.units import column, units_of
 
     out = console()
+    for note in summary["notes"]:
+        out.print(f"{note}.", style="bold yellow")
     out.print(styled(summary["robot"], f": {summary['poses']} poses in {summary['file']}"))
     counted = summary["hits_of_damage"]
     along = {"worst": "each joint's worst direction", "normal": "along the surface's normal"}

@@ -18,9 +18,9 @@ from picchio.cli.options import (
     TaskOption,
     ToolOption,
     numbers,
-    task_file,
 )
 from picchio.cli.output import check_targets, console, deliver, progress, styled, table
+from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
@@ -84,6 +84,7 @@ def place(
     The poses are chosen with the place, and the hit rate where a range of periods is given.
     """
     import picchio
+    from picchio.studies.default_task import task_of
     from picchio.studies.placement.file import write_task
     from picchio.studies.placement.work import Work
 
@@ -92,8 +93,7 @@ def place(
         far[3] = math.radians(far[3])
     rates = None if period_range is None else numbers(period_range, "--period-range", 2)
     loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
-    path = task_file(loaded, task)
-    work = picchio.load_task(path, loaded)
+    work = task_of(loaded, task)
     check_targets((json, out), [*loaded.files, *work.files, sn_curve])
     with progress("steps of the search") as tick:
         found = picchio.place(
@@ -110,8 +110,14 @@ def place(
             progress=tick,
         )
     if out is not None:
-        write_task(found, Work.of(loaded, work), work, path, out)
-    deliver(found.to_dict(), json, lambda: _show(found, off))
+        write_task(found, Work.of(loaded, work), work, out)
+
+    def show_all() -> None:
+        for line in filter(None, (estimate_notice(loaded.name, loaded.origins), work.note)):
+            console().print(f"{line}.\n", style="bold yellow")
+        _show(found, off)
+
+    deliver(found.to_dict(), json, show_all)
 
 
 def _show(found: Placement, off: float) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from picchio.cli.app import app
-from picchio.cli.options import JsonOption, ToolOption
+from picchio.cli.options import ClassOption, JsonOption, PayloadOption, ReachOption, ToolOption
 from picchio.cli.output import check_targets, console, count_of, deliver, styled, table
 from picchio.core.errors import InputError
 
@@ -24,22 +24,9 @@ def start(
         str, typer.Argument(metavar="ROBOT", help="A URDF, or a name from `picchio robots`.")
     ],
     tool: ToolOption = None,
-    payload: Annotated[
-        float | None,
-        typer.Option(metavar="KG", help="Rated payload; narrows the estimates, bounds the blows."),
-    ] = None,
-    reach: Annotated[
-        float | None,
-        typer.Option(metavar="M", help="Rated reach; what the URDF says if not given."),
-    ] = None,
-    drive_class: Annotated[
-        str | None,
-        typer.Option(
-            "--class",
-            metavar="CLASS",
-            help="Of the drives: strain-wave, cycloidal, planetary, direct or ball-screw.",
-        ),
-    ] = None,
+    payload: PayloadOption = None,
+    reach: ReachOption = None,
+    drive_class: ClassOption = None,
     reducers: Annotated[
         list[str] | None,
         typer.Option(

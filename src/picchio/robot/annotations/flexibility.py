@@ -140,6 +140,8 @@ def estimate_notice(name: str, origins: Mapping[str, str]) -> str:
     if not made & {"stiffness", "strength"}:
         return ""
     what = "stiffness, damping and strength" if "stiffness" in made else "strength"
+    if any(part.endswith(".mass") for part in made):
+        what = f"masses, and the {what}"
     return (
         f"Estimated: nobody measured the {what} of the drives of {name}. What stands here is what "
         "such a robot probably has, and every result is an interval that holds 80 % of the cases"

@@ -22,6 +22,8 @@ USUAL = ("tool", "tcp", "tool0", "tool_frame", "ee_link", "flange", "link_tcp", 
 # What such names end in, likewise.
 CONVENTION = ("tcp", "tool0", "tool", "ee", "eef", "effector", "flange")
 
+_ARM = 3  # joints that lead to a hand, at least
+
 
 def choose_tool(
     tree: UrdfTree, argument: str | None, sources: Sequence[Source], srdf: Srdf | None
@@ -29,7 +31,7 @@ def choose_tool(
     """The tool, and where its values are from.
 
     The frame: the argument, a sidecar or annotation, a usual name, the SRDF's end effector, a name
-    that ends as usual, or the only place at which something ends.
+    that ends as usual, the only place at which something ends, or where an arm's fingers begin.
 
     Raises:
         InputError: no such frame, or several links could be it.
@@ -74,9 +76,46 @@ def _usual_frame(tree: UrdfTree, srdf: Srdf | None) -> tuple[str, str]:
     leaves = [link for link in carried if link in ends]
     if len({_place(tree, link) for link in leaves}) == 1:
         return leaves[0], "the only place at an end"
+    last = _last_of(tree, leaves)
+    if len({_place(tree, link) for link in last}) == 1:
+        return last[0], "the only place beyond all joints"
+    if (branch := _where_it_branches(tree, last)) is not None:
+        return branch, "where the arm ends and its fingers begin"
     raise InputError("several frames could carry the tool", file=tree.path, key="tool",
                      choices=leaves, hint="name one with --tool, or as [tool] frame in the "
                      "sidecar")  # fmt: skip
+
+
+def _joints_to(tree: UrdfTree, link: str) -> list[str]:
+    return [joint.name for joint in tree.chain(link) if joint.type in MOVABLE]
+
+
+def _last_of(tree: UrdfTree, leaves: Sequence[str]) -> list[str]:
+    """Those that do not stand on the way to another: what is fixed to an arm's middle does."""
+    chains = [_joints_to(tree, link) for link in leaves]
+    return [
+        link
+        for link, chain in zip(leaves, chains, strict=True)
+        if not any(len(c) > len(chain) and c[: len(chain)] == chain for c in chains)
+    ]
+
+
+def _where_it_branches(tree: UrdfTree, leaves: Sequence[str]) -> str | None:
+    """The link at which an arm becomes a hand: more joints lead there than from there to any end.
+
+    None where the branches are as long as what leads to them (of a torso with arms, or of a hand),
+    and where nothing branches.
+    """
+    moving = [_joints_to(tree, link) for link in leaves]
+    common = 0
+    while all(len(chain) > common for chain in moving) and (
+        len({chain[common] for chain in moving}) == 1
+    ):
+        common += 1
+    beyond = max(len(chain) for chain in moving) - common
+    if common < _ARM or not 0 < beyond < common:
+        return None
+    return tree.joints[moving[0][common - 1]].child
 
 
 def _is_called(link: str, word: str) -> bool:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -103,6 +103,51 @@ class DrivePriors(Result):
     drive_class: str | None
     class_probability: Mapping[str, float]
     left_out: Mapping[str, str]
+
+    def less_sure(self, factor: float, why: str) -> DrivePriors:
+        """The same where what they rest on is itself uncertain: one error, common to all joints.
+
+        Args:
+            factor: of stiffness and torques alike, one standard deviation.
+            why: a reason more, in words.
+
+        Returns:
+            the wider distribution.
+        """
+        size = math.log(factor)
+
+        def wider(spread: float) -> float:
+            return math.exp(math.hypot(math.log(spread), size))
+
+        def ends(middle: float, low_high: tuple[float, float]) -> tuple[float, float]:
+            """A range holds 90 %; its two sides grow each by itself."""
+            low, high = (math.hypot(math.log(end / middle), 1.645 * size) for end in low_high)
+            return middle * math.exp(-low), middle * math.exp(high)
+
+        joints = tuple(
+            replace(
+                joint,
+                stiffness_spread=wider(joint.stiffness_spread),
+                stiffness_range=ends(joint.stiffness, joint.stiffness_range),
+                repeated_peak_torque_spread=wider(joint.repeated_peak_torque_spread),
+                repeated_peak_torque_range=ends(
+                    joint.repeated_peak_torque, joint.repeated_peak_torque_range
+                ),
+                rated_torque_spread=wider(joint.rated_torque_spread),
+                reasons=(*joint.reasons, why),
+                strength_reasons=(*joint.strength_reasons, why),
+            )
+            if joint.repeated_peak_torque_spread > 1.0
+            else joint  # a named reducer's torque is known
+            for joint in self.joints
+        )
+        known = np.array([joint.repeated_peak_torque_spread > 1.0 for joint in self.joints])
+        common = size**2 * np.outer(both := np.tile(known, 2), both)
+        n = len(joints)
+        return replace(
+            self, joints=joints, covariance=self.covariance + common[:n, :n],
+            torque_covariance=self.torque_covariance + common,
+        )  # fmt: skip
 
     def posterior(self) -> Posterior:
         """How the logarithms hang together, as `[posterior]` of a sidecar has it."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
+from picchio.robot.masses.check import carrying
 from picchio.robot.urdf.tree import MOVABLE
 
 if TYPE_CHECKING:
@@ -38,6 +39,8 @@ def left_rigid(robot: FlexibleRobot, estimated: Collection[str]) -> dict[str, li
             reason = "joints that do not move the tool"
         elif joint.type == "prismatic":
             reason = "sliding joints, since no drive of one was measured"
+        elif name not in carrying(robot, [name]):
+            reason = "joints beyond which the URDF gives no mass, or one that cannot be"
         else:
             reason = "joints that hardly turn the tool"
         found.setdefault(reason, []).append(name)

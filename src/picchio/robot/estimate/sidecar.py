@@ -6,14 +6,18 @@ here, so that both give the same life.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from picchio.core.errors import InputError
 from picchio.robot.annotations.sidecar import JointEntry, Sidecar, spreads_of
 from picchio.robot.drives.priors import DrivePriors, JointPrior, drive_priors
+from picchio.robot.estimate.masses import SPREAD, estimated_masses, weighted
 from picchio.robot.joint import Strength
+from picchio.robot.link import LinkEntry
+from picchio.robot.masses.check import WAYS_OUT, carrying
 from picchio.robot.spread import Posterior
 from picchio.robot.tool import Tool
 
@@ -47,18 +51,29 @@ def estimated_sidecar(
         every value with its spread, marked as an estimate; `source` says what it rests on.
 
     Raises:
-        InputError: as `drive_priors`.
+        InputError: as `drive_priors`; the URDF's masses leave no joint any to move.
     """
+    links = estimated_masses(robot)
+    robot = weighted(robot, links)
     priors = drive_priors(
         robot, payload=payload, reach=reach, drive_class=drive_class, reducers=reducers
     )
-    return as_sidecar(robot, priors, reducers)
+    if links:
+        why = f"the masses are estimates, to a factor of {SPREAD:g}"
+        priors = priors.less_sure(SPREAD, why)
+    kept = carrying(robot, [one.name for one in priors.joints])
+    if not kept:
+        raise InputError("no joint that moves the tool moves a mass", key="link",
+                         hint=WAYS_OUT)  # fmt: skip
+    return as_sidecar(robot, priors, reducers, links, kept)
 
 
 def as_sidecar(
     robot: FlexibleRobot,
     priors: DrivePriors,
     reducers: Mapping[str, str | Reducer] | None = None,
+    links: Mapping[str, LinkEntry] | None = None,
+    kept: Collection[str] | None = None,
 ) -> Sidecar:
     """Drive priors as a sidecar.
 
@@ -66,6 +81,8 @@ def as_sidecar(
         robot: whose they are.
         priors: the drives.
         reducers: those given, by joint.
+        links: estimated masses, by link.
+        kept: joints that count; all of them if not given.
 
     Returns:
         the record, its numbers rounded.
@@ -73,13 +90,18 @@ def as_sidecar(
     named = {
         joint: one if isinstance(one, str) else one.name for joint, one in (reducers or {}).items()
     }
-    joints = {one.name: _entry(one, named.get(one.name)) for one in priors.joints}
+    joints = {
+        one.name: _entry(one, named.get(one.name))
+        for one in priors.joints
+        if kept is None or one.name in kept
+    }
     known = {spread.name for spread in spreads_of(Sidecar(joint=joints))}
     posterior = priors.posterior().among(known)
     return Sidecar(
         robot=robot.name,
         description=f"{robot.name}: drives estimated, none was measured",
         joint=joints,
+        link=dict(links or {}),
         tool=Tool(frame=robot.tool_frame),
         posterior=None if posterior is None else _rounded(posterior),
     )

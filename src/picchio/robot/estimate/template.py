@@ -11,6 +11,7 @@ import tomlkit
 from picchio.core.toml import StrictModel
 from picchio.robot.annotations.flexibility import ESTIMATE
 from picchio.robot.annotations.sidecar import FORMAT, JointEntry, Sidecar, given
+from picchio.robot.link import LinkEntry
 from picchio.robot.spread import Posterior, value_of
 
 WIDTH = 88
@@ -66,6 +67,9 @@ def sidecar_text(
         lines += ["", *comment("Where the tool's force acts. Its mass, `mass` in kg with `com` in "
                                "m, adds to the URDF's."), "[tool]"]  # fmt: skip
         lines += [f"{key} = {literal(value)}" for key, value in given(sidecar.tool).items()]
+    for link, body in sidecar.link.items():
+        lines += ["", *comment(f"{body.source}." if body.source else ""),
+                  f"[link.{_key(link)}]", *_link(body)]  # fmt: skip
     for joint, entry in sidecar.joint.items():
         why = " ".join(part for part in (entry.source, notes.get(joint)) if part)
         lines += ["", *comment(why), f"[joint.{_key(joint)}]", *_joint(joint, entry)]
@@ -176,6 +180,13 @@ def _joint(name: str, entry: JointEntry) -> Iterator[str]:
     if entry.strength is not None:
         yield f"[joint.{_key(name)}.strength]"
         yield from _keys(given(entry.strength))
+
+
+def _link(entry: LinkEntry) -> Iterator[str]:
+    values = given(entry)
+    for key, unit in (("mass", "kg"), ("com", "m"), ("inertia", "kg m^2, about com")):
+        yield beside(f"{key} = {literal(values[key])}", unit)
+    yield f"source = {literal(ESTIMATE)}"
 
 
 def _keys(values: Mapping[str, Any]) -> Iterator[str]:

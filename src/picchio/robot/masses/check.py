@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 # Reflected inertia below this, kg m^2 (a 1 mg body at 1 mm has 1e-12), is none.
 _LEAST_INERTIA = 1e-13
 _LEAST_EIGENVALUE = 1e-9
-_WAYS_OUT = (
+WAYS_OUT = (
     "give masses in the sidecar, [link.NAME] mass, com, inertia or [links] total_mass, or leave "
     "the joint rigid"
 )
@@ -59,8 +60,13 @@ def moving_links(robot: FlexibleRobot) -> list[str]:
     return [link for link in robot.tree.links if link in carried]
 
 
-def _weighs(robot: FlexibleRobot, link: str) -> bool:
-    """Mass without inertia is a point's; inertia without mass is written by some exporters."""
+def weighs(robot: FlexibleRobot, link: str) -> bool:
+    """Whether a link has mass, or inertia, which some exporters write without it.
+
+    Args:
+        robot: as it was loaded.
+        link: its name.
+    """
     body = robot.tree.links[link]
     return body is not None and (body.mass > 0 or any(body.inertia))
 
@@ -69,7 +75,7 @@ def _check_carried(robot: FlexibleRobot, joint: str) -> None:
     links = robot.tree.beyond(joint)
     on_it = robot.tool.frame in links
     added = (robot.tool.mass + (robot.gun.mass if robot.gun else 0.0)) if on_it else 0.0
-    if added > 0 or any(_weighs(robot, link) for link in links):
+    if added > 0 or any(weighs(robot, link) for link in links):
         return
     raise InputError(f"joint {joint!r} is flexible but carries no mass", file=robot.source,
                      key=f"link {links[0]}", hint="give the link an <inertial>, give [tool] a "
@@ -79,10 +85,10 @@ def _check_carried(robot: FlexibleRobot, joint: str) -> None:
 def _check_own_masses(robot: FlexibleRobot) -> None:
     """The tool's mass alone is no arm."""
     links = moving_links(robot)
-    if len(links) > 1 and not any(_weighs(robot, link) for link in links):
+    if len(links) > 1 and not any(weighs(robot, link) for link in links):
         some = ", ".join(links[:8]) + (" ..." if len(links) > 8 else "")
         raise InputError(f"no link that moves has a mass, only the tool has: {some}",
-                         file=robot.source, key="link", hint=_WAYS_OUT)  # fmt: skip
+                         file=robot.source, key="link", hint=WAYS_OUT)  # fmt: skip
 
 
 def general_pose(robot: FlexibleRobot) -> FloatArray:
@@ -116,6 +122,42 @@ def _check_mass_matrix(robot: FlexibleRobot) -> None:
         _refuse(robot, joint, "makes the mass matrix singular")
 
 
+def carrying(robot: FlexibleRobot, joints: Sequence[str]) -> list[str]:
+    """Those of some joints that could be flexible together: every motion of them moves a mass.
+
+    Args:
+        robot: it may be rigid.
+        joints: their names, from the base to the tool.
+
+    Returns:
+        what is left when one by one the joint that moves the least mass is taken out.
+    """
+    whole = robot.rigid.mass_matrix(general_pose(robot))
+    names = [name for name in joints if _moves_mass(robot, name)]
+    while names:
+        index = [robot.joint_names.index(name) for name in names]
+        mass = whole[np.ix_(index, index)]
+        diagonal = np.diag(mass)
+        worst = int(diagonal.argmin())
+        if diagonal[worst] >= _LEAST_INERTIA:
+            scale = 1.0 / np.sqrt(diagonal)
+            values, vectors = np.linalg.eigh(mass * np.outer(scale, scale))
+            if values[0] >= _LEAST_EIGENVALUE:
+                break
+            worst = int(np.abs(vectors[:, 0]).argmax())
+        del names[worst]
+    return names
+
+
+def _moves_mass(robot: FlexibleRobot, joint: str) -> bool:
+    links = robot.tree.beyond(joint)
+    bodies = [body for link in links if (body := robot.tree.links[link]) is not None]
+    return not any(bad_inertia(body) for body in bodies) and (
+        (robot.tool.mass > 0.0 and robot.tool.frame in links)
+        or any(weighs(robot, link) for link in links)
+    )  # fmt: skip
+
+
 def check_mass_at(robot: FlexibleRobot, pose: FloatArray, mass: FloatArray) -> None:
     """Refuse a pose at which some motion of the flexible joints moves no mass.
 
@@ -142,4 +184,4 @@ def _refuse(robot: FlexibleRobot, joint: str, what: str) -> None:
     tree = robot.tree
     link = tree.joints[joint].child if joint in tree.joints else robot.tool.frame
     raise InputError(f"joint {joint!r} {what}", file=robot.source, key=f"link {link}",
-                     hint=_WAYS_OUT)  # fmt: skip
+                     hint=WAYS_OUT)  # fmt: skip

@@ -16,6 +16,7 @@ from lxml import etree
 
 from picchio.core.arrays import symmetric
 from picchio.core.errors import InputError
+from picchio.robot.annotations.flexibility import is_estimate
 from picchio.robot.masses.by_volume import Body, bodies
 from picchio.robot.masses.check import general_pose, moving_links
 from picchio.robot.units import TURNING
@@ -160,6 +161,8 @@ def _frequencies(robot: FlexibleRobot) -> Iterator[str]:
             continue
         k = int(np.abs(shape).argmax())
         joint = robot.flexible_joints[rows[k]]
+        if is_estimate(robot.origins.get(f"{joint.name}.stiffness", "")):
+            continue  # of an estimate it tells nothing
         inertia, stiffness = joint.units.of("kg*m^2"), joint.units.of("N*m/rad")
         link = robot.tree.joints[joint.name].child
         yield (

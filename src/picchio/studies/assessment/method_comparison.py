@@ -103,7 +103,7 @@ def method_terms(robot: FlexibleRobot, task: Task, found: Assessment) -> tuple[T
         task: what it does.
         found: the assessment of that.
     """
-    known = any(joint.sn_curve for joint in found.joints)
+    known = any(joint.worn == "shaft" for joint in found.joints)
     damped = all(math.isfinite(check.rest_peak + check.steady_peak) for check in found.steady_state)
     return compare_methods(robot, task, load_sn_curve(DEFAULT_SN_CURVE)) if known and damped else ()
 

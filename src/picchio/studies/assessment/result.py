@@ -308,6 +308,7 @@ class Assessment(TableResult):
         warnings: of loading the robot and of the assessment.
         doubts: what else lowers trust in the result, a sentence each.
         uncertainty: the lives as distributions, where a value of the robot has a spread.
+        task_note: what the task is, where nobody gave one; else "".
     """
 
     PAGE = "visuals.report.assessment:assessment_report"
@@ -337,6 +338,7 @@ class Assessment(TableResult):
     warnings: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
     uncertainty: UncertainLife | None = None
+    task_note: str = ""
 
     @property
     def estimated(self) -> bool:
@@ -397,6 +399,24 @@ class Assessment(TableResult):
         # Unknown ratios are NaN and share a risk of their own, so they do not disturb the order.
         return tuple(sorted(found, key=lambda e: (RISKS.index(e["risk"]), -e["ratio"])))
 
+    def intervals(self) -> tuple[str, list[tuple[str, ...]]]:
+        """The joints of a robot whose drives are estimates, as people read them: P10 to P90 only.
+
+        Returns:
+            the unit of the torques, and a row a joint: its name, the peak torque of gravity and
+            blows together, its share of the limit and the fatigue used, in %, rivets to failure,
+            and in how many % of the cases it ends the robot's life.
+        """
+        joints = self.joints
+        load, torques = column([j.units.load for j in joints],
+                               [j.told_interval("peak_torque") for j in joints])  # fmt: skip
+        return load, [
+            (j.name, torque, j.told_percent("reducer_utilisation"), j.told_percent("utilisation"),
+             j.told_life if j.worn else "unknown",
+             "-" if math.isnan(j.ends_first) else f"{100 * j.ends_first:.0f}")
+            for j, torque in zip(joints, torques, strict=True)
+        ]  # fmt: skip
+
     def _headline(self) -> str:
         return f"{self.robot!r}, method={self.method!r}: {self.verdict.headline}"
 
@@ -411,6 +431,15 @@ class Assessment(TableResult):
         ]
 
     def _repr_html_(self) -> str:
+        told = self.verdict
+        note = " ".join([told.headline, *(f"Doubt: {line}." for line in told.reasons)])
+        facts = {"method": self.method, "S-N curve": self.sn_curve or None}
+        if self.notice:
+            load, cells = self.intervals()
+            heads = ["joint", f"peak torque [{load}]", "of its limit [%]", "fatigue: used [%]",
+                     "rivets to failure", "ends first [% of cases]"]  # fmt: skip
+            title = f"Assessment of {self.robot}, estimated: P10 to P90"
+            return sheet(title, facts, heads, cells, f"{self.notice}. {note}")
         joints = self.joints
         small, peaks = column([j.units.small for j in joints],
                               [f"{1e3 * j.peak_deflection:.4g}" for j in joints])  # fmt: skip
@@ -431,14 +460,11 @@ class Assessment(TableResult):
         if any(j.reducer for j in joints):
             table["reducer used [%]"] = [j.told_percent("reducer_utilisation") for j in joints]
             table["reducer's limit"] = [j.reducer_governed_by for j in joints]
-        facts = {"method": self.method, "S-N curve": self.sn_curve or None}
         rows = zip(*table.values(), strict=True)
-        told = self.verdict
-        note = " ".join([told.headline, *(f"Doubt: {line}." for line in told.reasons)])
         return sheet(f"Assessment of {self.robot}", facts, list(table), rows, note)
 
     def _content(self) -> dict[str, Any]:
-        hidden = ("doubts", "uncertainty")
+        hidden = ("doubts", "uncertainty", "task_note")
         own = {key: value for key, value in vars(self).items() if key not in hidden}
         if self.uncertainty is not None:
             own |= {

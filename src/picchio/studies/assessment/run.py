@@ -35,6 +35,7 @@ from picchio.studies.assessment.checks import (
 )
 from picchio.studies.assessment.inputs import inputs_of
 from picchio.studies.assessment.result import Assessment, JointLife, OperationResult
+from picchio.studies.default_task import task_of
 from picchio.studies.rivet.life_rules import LifeRule, PaperRule, RainflowRule, curves_of, peak
 from picchio.studies.rivet.pose import Rivet, need_springs
 from picchio.studies.tasks import Operation, Task
@@ -43,8 +44,9 @@ from picchio.studies.uncertainty.run import uncertain_life
 
 Method = Literal["rainflow", "paper"]
 METHODS: tuple[Method, ...] = ("rainflow", "paper")
-# Samples of the lives where the robot's own values have spreads.
-_SAMPLES = 2048
+# Samples of the lives where the robot's own values have spreads: at most so many, and fewer of
+# a task of many places, but never so few that the interval blurs.
+_SAMPLES, _PLACES, _FEWEST = 2048, 8_192, 512
 # Given for a joint as the largest value over all poses.
 _LARGEST = (
     "peak_deflection", "peak_torque", "gravity_torque", "peak_shear_stress",
@@ -55,7 +57,7 @@ _LARGEST = (
 @one_thread()
 def assess(
     robot: FlexibleRobot | Model,
-    task: Task,
+    task: Task | None = None,
     *,
     method: Method = "rainflow",
     sn_curve: str | SNCurve | None = None,
@@ -73,7 +75,7 @@ def assess(
 
     Args:
         robot: with stiffnesses, and shafts where stresses are wanted; or a model of it.
-        task: operations and poses.
+        task: operations and poses; the robot's example if not given, else `default_task`.
         method: "rainflow" (each rivet from rest, ring-down included, cycles counted) or
             "paper" (steady state, peak stress, one cycle a hit).
         sn_curve: for all joints, instead of their own.
@@ -86,7 +88,8 @@ def assess(
         steady_check: also say what the steady state misjudges, and whether a resonance is near;
             False leaves NaN there and takes about half the time.
         uncertainty: where values of the robot have a spread, and the method is rainflow: the lives
-            as distributions (True: with 2,048 samples at most); False leaves them out, and every
+            as distributions (True: with 2,048 samples at most, fewer for
+            tasks of more than 4 places); False leaves them out, and every
             value counts as stated.
         progress: called with (poses done, poses in all).
 
@@ -104,6 +107,7 @@ def assess(
     model = Model.of(robot, gravity_stiffness=gravity_stiffness, gravity_balanced=gravity_balanced)
     robot = model.robot
     need_springs(robot)
+    task = task_of(robot, task)
     rule: LifeRule = PaperRule() if method == "paper" else RainflowRule(residue, mean_stress, miner)
     if sn_curve is None and method == "paper":
         sn_curve = PAPER_SN_CURVE
@@ -151,27 +155,29 @@ def assess(
     with gathered() as more:
         warn_about_yield(joints)
     steady = steady_state_checks(joints, task, results, checks)
-    doubts = doubts_of(model, curves, steady, rule.needs)
+    doubts = (*filter(None, [task.note]), *doubts_of(model, curves, steady, rule.needs))
     # At a frequency that is an estimate, the drawn cases tell what a resonance does.
     if steady_check and not any(joint.estimated for joint in robot.flexible_joints):
         rates = rate_sensitivity(model, task, joints, results, rule.needs)
         joints = tuple(replace(j, rate_sensitivity=rates[j.name][0]) for j in joints)
         doubts = (*doubts, *filter(None, (text for _, text in rates.values())))
     unsure = None
+    # A force through every axis loads nothing, whatever the values are.
     parts = any(curves) or any(ratings)
+    parts &= not any(curves) or any(joint.utilisation > 0.0 for joint in joints)
     reducers = tuple(joint.reducer for joint in robot.flexible_joints)
     if robot.spreads and rule.needs == "rest" and miner is None and parts:
         if uncertainty is True:
             unsure = uncertain_life(
                 model, task, sn_curve=sn_curve, residue=residue, mean_stress=mean_stress,
-                samples=_SAMPLES, totals=False,
+                samples=max(_FEWEST, min(_SAMPLES, _PLACES // total)), totals=False,
             )  # fmt: skip
         elif uncertainty is not False:
             unsure = uncertainty
     if unsure is not None:
         guess = bool(unsure.estimated)
         joints = tuple(_with_spread(joint, unsure, guess) for joint in joints)
-        doubts = (*doubts, unsure.doubt())
+        doubts = (unsure.doubt(), *doubts)
     limiting = _limiting(joints)
     lasts = limiting.life if limiting else math.inf
     if unsure is not None and unsure.estimated:
@@ -188,6 +194,7 @@ def assess(
         uncertainty=unsure,
         steady_state=steady,
         origins=robot.origins,
+        task_note=task.note,
         provenance=provenance([*robot.files, *task.files]),
         inputs=inputs_of(
             model,
@@ -295,7 +302,6 @@ def _joint_life(
     warnings: tuple[str, ...] = ()
     if ratings is not None and np.isfinite(torques[0]):
         check = ratings.check_blows(*torques)
-        warnings = tuple(check.warnings)
     if (reducer := joint.reducer) is not None and check is not None:
         cycles = [r.swing_cycles[:, j] * r.rivets for r in results]
         places = [r.poses[:, robot.flexible_index[j]] for r in results]

@@ -164,7 +164,11 @@ def judge(found: Assessment) -> Verdict:
     unknown.sort(key=lambda joint: -joint.peak_deflection)
     guess = bool(found.notice)
     near = [part for part in worst if part.margin_at_other_rates < 1.0]
-    reasons = [*map(_failure, over[1:]), *map(_risk, unsure), *map(_wear, wearing), *_gaps(found)]
+    risk_first = bool(unsure) and not (over or contrary or unknown)
+    reasons = [*map(_failure, over[1:]), *_risks(unsure[risk_first:])]
+    # What an estimated drive survives is an interval in the table, and there are many of them.
+    reasons += [_wear(part) for part in wearing if not part.joint.estimated_drive]
+    reasons += _gaps(found)
     reasons += found.doubts
     reasons += found.warnings
 
@@ -288,6 +292,19 @@ def _risk(part: _Part) -> str:
         f"The {part.name} {keeps} its {part.limit} at {values}, but these are uncertain: it "
         f"is at {part.used}, and 10 % of the cases are beyond that"
     )
+
+
+def _risks(parts: list[_Part]) -> Iterator[str]:
+    """The risks of several parts, one sentence where they share a limit."""
+    by_limit: dict[tuple[Governor, str], list[_Part]] = {}
+    for part in parts:
+        by_limit.setdefault((part.governor, part.limit), []).append(part)
+    for (_, limit), those in by_limit.items():
+        if len(those) == 1:
+            yield _risk(those[0])
+            continue
+        told = ", ".join(f"{part.name} ({part.used.partition(' % ')[0]} %)" for part in those)
+        yield f"10 % of the cases or more are beyond the {limit} of {told}"
 
 
 def _life(part: _Part) -> str:

@@ -120,7 +120,8 @@ class WorkspaceMap(TableResult):
         facts = {
             key: content[key] for key in ("file", "excitation", "response", "direction", "poses")
         }
-        return sheet(f"Workspace map of {content['robot']}", facts, columns, rows)
+        return sheet(f"Workspace map of {content['robot']}", facts, columns, rows,
+                     ". ".join(content["notes"]))  # fmt: skip
 
     def _content(self) -> dict[str, Any]:
         """The largest values of every joint and where they are, read a slice at a time."""
@@ -177,5 +178,6 @@ class WorkspaceMap(TableResult):
             "hits_of_damage": attribute_of(found, "hits_of_damage", int) or None,
             "poses": count,
             "joints": best,
+            "estimated": bool(found.attrs.get("estimated", 0)),
             "notes": [note for note in attribute_of(found, "notes", list) if note],
         }

@@ -26,6 +26,7 @@ from picchio.core.provenance import provenance
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import check_hits
 from picchio.model.model import Model
+from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.maps.chunk import Columns, MapJob
 from picchio.studies.maps.files import join_chunks
@@ -266,19 +267,21 @@ def _require_scheduler(address: str) -> None:
 
 
 def _attributes(job: MapJob) -> dict[str, Any]:
+    robot = job.model.robot
     return {
         "format": "picchio-map/1",
-        "robot": job.model.robot.name,
-        "joint": list(job.model.robot.flexible_names),
-        "joint_kinds": [joint.kind for joint in job.model.robot.flexible_joints],
-        "coordinate": list(job.model.robot.joint_names),
+        "robot": robot.name,
+        "joint": list(robot.flexible_names),
+        "joint_kinds": [joint.kind for joint in robot.flexible_joints],
+        "coordinate": list(robot.joint_names),
         "excitation": job.excitation.describe(),
         "direction": str(job.direction),
         "branch": job.branch,
         "effects": [repr(effect) for effect in job.model.effects],
-        "notes": list(job.model.without_load()),
+        "estimated": int(bool(notice := estimate_notice(robot.name, robot.origins))),
+        "notes": [*filter(None, [notice]), *job.model.without_load()],
         "hits": job.hits or 0,
         "response": described(job.hits),
         "hits_of_damage": job.damage or 0,
-        "provenance": json.dumps(provenance(job.model.robot.files)),
+        "provenance": json.dumps(provenance(robot.files)),
     }

@@ -12,12 +12,12 @@ import numpy as np
 from picchio.core.files import read_text, write_text
 from picchio.studies.placement.result import Placement
 from picchio.studies.placement.work import Work
-from picchio.studies.tasks import Task
+from picchio.studies.tasks import FORMAT, Task
 
 _DIGITS = 12
 
 
-def write_task(found: Placement, work: Work, task: Task, source: Path, out: Path) -> None:
+def write_task(found: Placement, work: Work, task: Task, out: Path) -> None:
     """Write the task with the work moved, everything else as in its file.
 
     Every operation has poses: points would leave the choice of branch, roll and null space.
@@ -25,20 +25,21 @@ def write_task(found: Placement, work: Work, task: Task, source: Path, out: Path
     Args:
         found: the placement.
         work: the work that was moved.
-        task: as it was read.
-        source: its file.
+        task: as it was read, or assumed.
         out: where to write.
     """
     import tomlkit
 
     spot = found.best.spot
-    document = tomlkit.parse(read_text(source))
+    source = task.files[0] if task.files else None
+    document = tomlkit.parse(read_text(source) if source else tomlkit.dumps(_plain(task)))
     turn = work.turn(spot.move[3])
     shift = ", ".join(f"{c:.4f}" for c in spot.move[:3])
     about = ", ".join(f"{c:.4f}" for c in work.centre)
     heading = math.degrees(spot.move[3])
+    whose = source.name if source else "an assumed task"
     head = (
-        f"# The work of {source.name}, moved by picchio place: shifted by ({shift}) m and turned\n"
+        f"# The work of {whose}, moved by picchio place: shifted by ({shift}) m and turned\n"
         f"# by {heading:.3f} deg about the vertical through ({about}) m. Poses, directions and\n"
         "# period below are the moved ones; older comments may speak of what was.\n"
     )
@@ -75,8 +76,20 @@ def _set_period(table: Any, period: float | None, *, own: bool) -> None:
         table["period"] = float(f"{period:.9g}")
 
 
-def _relocate(table: Any, source: Path, out: Path) -> None:
+def _plain(task: Task) -> dict[str, Any]:
+    """Keys and values of a task that has no file, but for its poses and directions."""
+    first = task.operations[0]
+    blows = {key: value for key, value in first.excitation.to_dict().items() if value is not None}
+    return {
+        "format": FORMAT,
+        "hits_per_rivet": first.hits_per_rivet,
+        "excitation": blows,
+        "operation": [{"name": operation.name} for operation in task.operations],
+    }
+
+
+def _relocate(table: Any, source: Path | None, out: Path) -> None:
     """A measured blow is named relative to the file that names it."""
-    if "file" in table:
+    if source is not None and "file" in table:
         there = (source.parent / str(table["file"])).resolve()
         table["file"] = os.path.relpath(there, out.resolve().parent)

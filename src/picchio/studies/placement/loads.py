@@ -13,7 +13,7 @@ from picchio.fatigue.shaft_stress import stress_per_torque
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.model import Model
 from picchio.robot.drives.reducer import Reducer
-from picchio.robot.joint import Joint
+from picchio.robot.joint import Joint, Strength
 from picchio.studies.rivet.poses import BatchDamage, damage_at
 from picchio.studies.tasks import Task
 
@@ -26,7 +26,7 @@ class Loads:
         model: the robot, with stiffnesses, and its effects.
         task: its operations say blows and hits.
         curves: S-N curve of each of the n joints, or None.
-        reducers: reducer of each joint, or None.
+        ratings: what each joint's drive bears: of its reducer, or an estimate, or None.
 
     Raises:
         InputError: nothing by which joints could be ranked.
@@ -35,7 +35,7 @@ class Loads:
     model: Model
     task: Task
     curves: tuple[SNCurve | None, ...]
-    reducers: tuple[Reducer | None, ...]
+    ratings: tuple[Reducer | Strength | None, ...]
 
     def __post_init__(self) -> None:
         efforts = [joint.effort_limit for joint in self.joints]
@@ -55,7 +55,7 @@ class Loads:
     @property
     def by_effort(self) -> bool:
         """No joint has a shaft or reducer: torque over the URDF's effort limit ranks them."""
-        return not any(self.curves) and not any(self.reducers)
+        return not any(self.curves) and not any(self.ratings)
 
     def at(
         self,
@@ -87,7 +87,7 @@ class Loads:
     ) -> FloatArray:
         allowable = np.array([np.inf if c is None else c.allowable for c in self.curves])
         used = found.amplitude * stress_per_torque(self.joints, 0.0) / allowable
-        if not self.by_effort and not any(self.reducers):
+        if not self.by_effort and not any(self.ratings):
             return np.asarray(used)
         held = found.many.gravity_torque()
         if blows.preload:
@@ -97,10 +97,10 @@ class Loads:
             np.abs(found.stiffness * found.highest - held),
             np.abs(found.stiffness * found.lowest - held),
         )
-        for j, (joint, reducer) in enumerate(zip(self.joints, self.reducers, strict=True)):
+        for j, (joint, ratings) in enumerate(zip(self.joints, self.ratings, strict=True)):
             if self.by_effort:
                 used[:, j] = peak[:, j] / joint.effort_limit
-            elif reducer is not None:
-                shares = reducer.shares(peak[:, j], np.abs(held[:, j]))
+            elif ratings is not None:
+                shares = ratings.shares(peak[:, j], np.abs(held[:, j]))
                 used[:, j] = np.maximum(used[:, j], np.max(list(shares.values()), axis=0))
         return np.asarray(used)

@@ -23,12 +23,13 @@ from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.ik.chain import tool_chain
+from picchio.studies.default_task import task_of
 from picchio.studies.placement.loads import Loads
 from picchio.studies.placement.reach import Candidates
 from picchio.studies.placement.result import JointUse, Off, Placement, Standing
 from picchio.studies.placement.search import ROUNDS, SHIFTS, Search, Spot, descend
 from picchio.studies.placement.self_collision import SelfCollision
-from picchio.studies.placement.sureness import sureness
+from picchio.studies.placement.sureness import sureness, surest
 from picchio.studies.placement.work import Work
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.pose import need_springs
@@ -42,7 +43,7 @@ _PERIODS = 7
 @one_thread()
 def place(
     robot: FlexibleRobot | Model,
-    task: Task,
+    task: Task | None = None,
     *,
     move: Sequence[float] | None = None,
     period_range: tuple[float, float] | None = None,
@@ -60,7 +61,8 @@ def place(
 
     Args:
         robot: with stiffnesses, and shafts or reducers (or else effort limits); or a model of it.
-        task: the work; the tool's places are read off its poses.
+        task: the work; the tool's places are read off its poses. The robot's example if not
+            given, else `default_task`.
         move: how far the work may go each way: x, y, z in m, heading in rad; half the arm's
             reach and a half turn if not given. Zeros leave it where it is: poses alone.
         period_range: s, shortest and longest period of the blows; as the task says if not given.
@@ -93,6 +95,7 @@ def place(
             hint="place the work by a model without it, then assess the place with it",
         )
     need_springs(robot)
+    task = task_of(robot, task)
     if placements < 1:
         raise InputError("must be at least 1", key="placements", value=placements)
     if not (math.isfinite(off) and off > 0.0):
@@ -100,7 +103,7 @@ def place(
     if not (math.isfinite(margin) and margin >= 0.0):
         raise InputError("must not be negative", key="margin", value=margin)
     curves = curves_of(robot, sn_curve)
-    loads = Loads(model, task, curves, tuple(j.reducer for j in robot.flexible_joints))
+    loads = Loads(model, task, curves, tuple(j.ratings for j in robot.flexible_joints))
     work = Work.of(robot, task)
     half = _half(robot, move)
     periods = _periods(task, period_range)
@@ -232,7 +235,8 @@ def _search(
 
         ended.append(descend(search, spot, step, half, periods, rng, step_done))
     tell(total)
-    return min(ended, key=lambda s: (s.damage, s.utilisation), default=None)
+    ended.sort(key=lambda s: (s.damage, s.utilisation))
+    return surest(search.loads, search.work, ended)
 
 
 def _near(one: Spot, other: Spot, half: FloatArray) -> bool:
@@ -293,6 +297,11 @@ def _assumptions(loads: Loads, meshes: SelfCollision | str) -> tuple[str, ...]:
         *loads.model.without_load(),
         "nothing is known of obstacles around robot and work, nor whether the tool fits",
     ]
+    if loads.model.robot.spreads:
+        lines.append(
+            "values of the robot are uncertain: of the best places found, that is taken which is "
+            "the best in most of the drawn cases"
+        )
     if loads.by_effort:
         lines.append(
             "no joint has a shaft or a reducer: utilisation is the largest torque, gravity and "

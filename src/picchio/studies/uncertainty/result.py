@@ -120,12 +120,15 @@ class UncertainLife(TableResult):
             f"cases; {most} matters most, {100 * self.robot.shares[most]:.0f} % of the variance of "
             "the logarithm of the utilisation"
         )
-        if self.decades > _WIDE:
-            text += (
-                f"; the interval is {self.decades:.2g} powers of ten wide: it tells which joint is "
-                "weakest, and hardly how long it lasts"
-            )
-        return text
+        wide = f"is {self.decades:.2g} powers of ten wide"
+        if math.isinf(self.robot.p90) and math.isfinite(self.robot.p10):
+            wide = "has no upper end"
+        elif not self.decades > _WIDE:
+            return text
+        return (
+            f"{text}; the interval {wide}: it tells which joints are weak, and hardly how long "
+            "they last"
+        )
 
     @property
     def decades(self) -> float:

@@ -20,6 +20,7 @@ from picchio.fatigue.uncertain_lives import Uncertain
 from picchio.model.effects.structure.joint_stiffness import JointStiffness
 from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model
+from picchio.robot.annotations.flexibility import is_estimate
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.spread import Spread
 from picchio.robot.varied import robot_with
@@ -294,11 +295,14 @@ class Sampler:
         return [self.inputs[i].name for k, i in enumerate(asked) if same[k + 1]]
 
     def scans(self) -> dict[str, LifeScan]:
-        """The stiffnesses along which the robot's life turns."""
+        """The stiffnesses along which the robot's life turns.
+
+        Not those of picchio's own estimates: where no joint's is known, one alone tells nothing.
+        """
         found = {}
         score = np.linspace(-2.0, 2.0, _SCAN)
         for i, each in enumerate(self.inputs):
-            if each.key != "stiffness":
+            if each.key != "stiffness" or is_estimate(each.source):
                 continue
             moved = np.zeros((_SCAN, len(self.inputs)))
             moved[:, i] = score

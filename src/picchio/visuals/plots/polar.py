@@ -12,7 +12,16 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.robot.units import labelled
 from picchio.studies.envelopes import DirectionEnvelope, Quantity
-from picchio.visuals.plots.style import INK, MUTED, axes_or_new, look, plain, styled
+from picchio.visuals.plots.style import (
+    ESTIMATED,
+    HATCH,
+    INK,
+    MUTED,
+    axes_or_new,
+    look,
+    plain,
+    styled,
+)
 
 Plane = Literal["xy", "xz", "yz"]
 PLANES: tuple[Plane, ...] = ("xy", "xz", "yz")
@@ -55,12 +64,15 @@ def plot_polar_envelope(
         quantity: "deflection" (mrad, mm), "torque" (N m, N) or "stress" (MPa).
         count: directions over half a turn; the other half is its mirror image.
 
+    Where values are estimates, the line is of the most likely ones, and the hatched band holds 80 %
+    of the drawn cases.
+
     Raises:
         InputError: an unknown plane, joint or quantity.
     """
     ax = axes_or_new(ax, width=5.4, height=4.2, polar=True)
     angle, directions = cut_directions(plane, count)
-    support = envelope.support(directions, quantity)
+    support, band = envelope.support(directions, quantity), envelope.band(directions, quantity)
     unit, factor = _UNITS[quantity]
     units = [kind.of(unit) for kind in envelope.units]
     unit, names = labelled(units, map(plain, envelope.joint_names))
@@ -75,8 +87,14 @@ def plot_polar_envelope(
         turn = np.concatenate([angle, angle + np.pi, [2 * np.pi]])
         style = look(j)
         ax.plot(turn, radius, label=names[j], **style)
-        ax.fill(turn, radius, color=style["color"], alpha=0.10)
-    ax.set_title(f"Peak {quantity} by force direction, {plane} plane [{unit}]", pad=18)
+        if envelope.estimated:
+            low, high = (np.concatenate([end, end, end[:1]]) * factor for end in band[:, j])
+            ax.fill_between(turn, low, high, facecolor="none", edgecolor=style["color"],
+                            hatch=HATCH, linewidth=0.0, alpha=0.45)  # fmt: skip
+        else:
+            ax.fill(turn, radius, color=style["color"], alpha=0.10)
+    title = f"Peak {quantity} by force direction, {plane} plane [{unit}]"
+    ax.set_title(f"{title}\n{ESTIMATED}" if envelope.estimated else title, pad=18)
     ax.set_xticks(np.arange(8) * np.pi / 4,
                   [f"+{plane[0]}", "45°", f"+{plane[1]}", "135°", f"−{plane[0]}", "225°",
                    f"−{plane[1]}", "315°"], color=INK)  # fmt: skip

@@ -33,6 +33,9 @@ DASHES: tuple[Any, ...] = (
     "-", (0, (5, 1.6)), (0, (1.4, 1.4)), (0, (6, 1.6, 1.4, 1.6)), (0, (9, 2)),
     (0, (3, 1.2, 1.2, 1.2, 1.2, 1.2)), (0, (2.6, 2.6)),
 )  # fmt: skip
+HATCH = "////"
+"""Of what is an estimate."""
+ESTIMATED = "estimated; hatched: P10 to P90 of the cases"
 CMAP = "viridis"
 """Sequential, even in lightness, safe for the colour-blind."""
 WIDTH, HEIGHT = 6.4, 3.4

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.robot.units import units_of
 from picchio.studies.maps.result import WorkspaceMap, joint_kinds, response_of
 from picchio.studies.maps.stored import values_of
-from picchio.visuals.plots.style import CMAP, axes_or_new, plain, styled
+from picchio.visuals.plots.style import CMAP, HATCH, PAPER, axes_or_new, plain, styled
 
 if TYPE_CHECKING:
     import xarray
@@ -102,6 +103,10 @@ def plot_workspace_map(
     size = 72.0 / ax.figure.dpi * wide * step * 0.8
     shown = ax.scatter(places[order, across], places[order, up], c=peak[order] * 1e3, s=size**2,
                        marker="s", cmap=CMAP, vmin=0.0, linewidths=0)  # fmt: skip
+    if found.attrs.get("estimated"):
+        ax.set_title(f"{ax.get_title(loc='left')}\nestimated: at the most likely values")
+        ax.add_patch(Rectangle((0, 0), 1, 1, transform=ax.transAxes, fill=False, hatch=HATCH,
+                               edgecolor=PAPER, linewidth=0.0, alpha=0.35))  # fmt: skip
     bar = ax.figure.colorbar(shown, ax=ax, shrink=0.85, pad=0.02)
     bar.set_label(f"peak deflection [{unit}]")
     bar.outline.set_visible(False)  # type: ignore[operator]

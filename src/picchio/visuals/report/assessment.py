@@ -242,7 +242,11 @@ def assessment_report(
         spread_rows=[*spread.joints.items(), ("robot", spread.robot)] if spread else [],
         terms=list(terms),
         shafts=any(joint.sn_curve for joint in assessment.joints),
-        warnings=list(dict.fromkeys([*told.reasons, *warnings])),
+        warnings=[
+            line
+            for line in dict.fromkeys([*told.reasons, *warnings])
+            if line not in (assessment.notice, assessment.task_note)
+        ],
         units=Counter(joint.units for joint in assessment.joints).most_common(1)[0][0],
         command=command or f"picchio assess {robot.name}",
         scene=scene,

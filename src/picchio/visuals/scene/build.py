@@ -15,9 +15,10 @@ from picchio.diagnosis.result import Diagnosis
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.measured import MeasuredForce
 from picchio.model.model import Model
+from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import Assessment
-from picchio.studies.envelopes import DirectionEnvelope
+from picchio.studies.envelopes import DirectionEnvelope, icosphere
 from picchio.studies.envelopes import envelope as envelope_of
 from picchio.studies.maps.result import WorkspaceMap, response_of
 from picchio.studies.maps.stored import values_of
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
     import xarray
 
     from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
+
+_SHELL = 2  # subdivisions of the net about what is estimated
 
 
 def build_scene(
@@ -84,6 +87,7 @@ def build_scene(
     how = described(hits)
     scene = Scene(robot.name, f"pose ({where}); {excitation.describe()}; {how}", envelope, tree)
     scene.chosen, scene.reach = _first(envelope, assessment, joint), body.reach
+    scene.notice = estimate_notice(robot.name, robot.origins)
     _add_body(scene, body)
     units = [joint.units.small for joint in robot.flexible_joints]
     _add_rings(scene, body, assessment, units)
@@ -176,6 +180,9 @@ def _add_rings(scene: Scene, body: Body, assessment: Assessment | None, units: l
         matrix = turned_to(frame.axis, np.zeros(3))
         scene.items.append(Item(mesh, "joints", frame.path, matrix, joint=k))
         told = f"{value:.3g} N" if alone else _told(float(value), scale)
+        if assessment is not None and assessment.notice and scale.unit == "%":
+            used = assessment.joint(name)
+            told = f"{used.told_percent(used.governing_key)} %"
         scene.labels.append({"text": f"{name}: {told}", "layer": "joints", "node": frame.path})
 
 
@@ -190,10 +197,16 @@ def _add_envelopes(scene: Scene, body: Body, units: list[str], subdivisions: int
     envelope = scene.envelope
     scene.layers.append(("envelope", "direction envelope at the tool", True))
     scene.layers.append(("worst", "worst direction", True))
+    if envelope.estimated:
+        text = "estimated: each way, 90 % of the cases lie within this net"
+        scene.layers.append(("likely", text, True))
     # A translucent double ball a joint, in rad (m for a prismatic joint).
     surfaces, faces = envelope.surfaces(subdivisions)
     size = 0.26 * body.reach
     pointer = scene.add(arrow(1.18 * size, 0.011 * body.reach, "#c2410c", head=0.075 * body.reach))
+    interval = envelope.peak_interval()
+    directions, edges = icosphere(_SHELL)
+    shells = envelope.band(directions)[1] if envelope.estimated else []
     for k, (name, unit, surface) in enumerate(
         zip(envelope.joint_names, units, surfaces, strict=True)
     ):
@@ -205,11 +218,18 @@ def _add_envelopes(scene: Scene, body: Body, units: list[str], subdivisions: int
         place = np.diag([factor, factor, factor, 1.0])
         place[:3, 3] = envelope.tool_position
         scene.items.append(Item(scene.add(mesh), "envelope", "", place, joint=k))
+        if envelope.estimated:
+            shell = Mesh(
+                directions * shells[k][:, None], edges, opacity=0.35, exact=True, wire=True
+            )
+            scene.items.append(Item(scene.add(shell), "likely", "", place, joint=k))
         along = envelope.worst_direction[k]
         scene.items.append(
             Item(pointer, "worst", "", turned_to(along, envelope.tool_position), joint=k)
         )
-        text = f"{name}: {peak * 1e3:.3g} {unit} along {direction_label(along)}"
+        low, high = (f"{1e3 * end:.3g}" for end in interval[k])
+        told = f"{low} to {high}" if envelope.estimated else f"{peak * 1e3:.3g}"
+        text = f"{name}: {told} {unit} along {direction_label(along)}"
         tip = envelope.tool_position + 1.2 * size * along
         scene.labels.append({"text": text, "layer": "worst", "at": tip.tolist(), "joint": k})
         scene.joints.append({"name": name, "scale": scale.to_dict(), "peak": peak, "text": text})

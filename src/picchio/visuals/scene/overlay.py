@@ -62,7 +62,8 @@ def joint_values(
         return torque, Scale("peak torque, worst direction", "N m", _largest(torque, ~slides))
     joints = assessment.joints
     damage = np.array([joint.damage_per_rivet for joint in joints])
-    if np.nansum(damage) > 0.0:
+    # A damage by estimated values is one of many: how much of what it bears is used, tells more.
+    if np.nansum(damage) > 0.0 and not assessment.notice:
         share = 100.0 * damage / np.nanmax(damage)
         return share, Scale("damage of the joints, worst = 100", "%", 100.0)
     parts = np.array([[joint.utilisation, joint.reducer_utilisation] for joint in joints])
@@ -86,7 +87,7 @@ def rivet_values(assessment: Assessment) -> tuple[list[FloatArray], Scale]:
     if shafts:
         damage = [np.nanmax(op.damage_per_rivet, axis=1) for op in operations]
         top = max(float(d.max()) for d in damage)
-        if top > 0.0:
+        if top > 0.0 and not assessment.notice:
             scale = Scale("damage of a rivet, worst = 100", "%", 100.0)
             return [d / top * 100 for d in damage], scale
         use = [100 * np.nanmax(op.utilisation, axis=1) for op in operations]

@@ -46,7 +46,8 @@ class Packer:
     def add_mesh(self, mesh: Mesh) -> dict[str, Any]:
         """A mesh as references; see `Mesh.exact` for how exact."""
         packed: dict[str, Any] = {
-            "crease": mesh.crease, "opacity": mesh.opacity, "colour": mesh.colour,
+            "crease": mesh.crease, "opacity": mesh.opacity, "wire": mesh.wire,
+            "colour": mesh.colour,
         }  # fmt: skip
         vertices = np.asarray(mesh.vertices, dtype=float)
         if mesh.exact:
@@ -84,7 +85,11 @@ def scene_html(scene: Scene) -> str:
     parts = {
         "title": escape(scene.title),
         "subtitle": escape(scene.subtitle),
-        "judged": f'<p id="judged">{escape(scene.verdict)}</p>' if scene.verdict else "",
+        "judged": "".join(
+            f'<p id="{name}">{escape(text)}</p>'
+            for name, text in (("estimated", scene.notice), ("judged", scene.verdict))
+            if text
+        ),
         "version": escape(scene.version),
         "style": (folder / "page.css").read_text("utf-8"),
         "viewer": _viewer(),

@@ -59,6 +59,7 @@ class Scene(Page, Result):
         reach: m, size of the robot.
         envelope: what the double balls are of.
         verdict: of the task's assessment, where one is shown.
+        notice: what of the drives is an estimate; "" where nothing is.
         file: where it was saved last, or None.
     """
 
@@ -77,6 +78,7 @@ class Scene(Page, Result):
     tracks: list[dict[str, Any]] = field(default_factory=list)
     diagnosis: dict[str, Any] | None = None
     verdict: str = ""
+    notice: str = ""
     playing: bool = True
     camera: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
     floor: dict[str, Any] = field(default_factory=dict)
@@ -126,6 +128,7 @@ class Scene(Page, Result):
             "file": self.file,
             "bytes": 0 if self.file is None else self.file.stat().st_size,
             "verdict": self.verdict or None,
+            "estimated": bool(self.notice),
             "layers": [{"id": name, "text": text} for name, text, _ in self.layers],
             "envelope": self.envelope.to_dict(),
             "provenance": self.envelope.origin,

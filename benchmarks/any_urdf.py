@@ -1,0 +1,130 @@
+"""Does any URDF get an answer? A folder of them, each assessed from the file alone.
+
+    python benchmarks/any_urdf.py FOLDER [--json FILE]    # every *.urdf below it
+    python benchmarks/any_urdf.py shipped                 # the robots of `picchio robots`
+
+Each is loaded and assessed on the default task in a process of its own, so that a crash is counted
+and not suffered. Files of the same bytes count once. Printed: how many loaded, how many of those
+got an interval, the slowest, and why the others were refused. No URDF is part of picchio: a good
+folder is the data set of Tola and Corke, "Understanding URDF: a dataset and analysis"
+(github.com/Daniella1/urdf_files_dataset).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import multiprocessing
+import re
+import time
+import warnings
+from collections import Counter, defaultdict
+from pathlib import Path
+from typing import Any
+
+import picchio
+from picchio.core.errors import InputError
+from picchio.robot.loading.catalogue import shipped_robots
+
+LIMIT = 10.0
+"""s of one core that an answer may take, importing what is needed not counted."""
+
+
+def answer(robot: str, end: Any) -> None:
+    """Load and assess one robot; what came of it goes through the pipe."""
+    found: dict[str, Any] = {"step": "load"}
+    began = time.process_time()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            loaded = picchio.load_robot(robot)
+            found |= {"step": "assess", "joints": len(loaded.flexible_joints)}
+            life = picchio.assess(loaded)
+            ends = life.uncertainty and life.uncertainty.utilisation
+            found["interval"] = bool(ends) and 0.0 < ends["p10"] < ends["p90"] < math.inf
+            found |= {"step": "answer", "verdict": life.verdict.status}
+        except InputError as error:
+            found["why"] = str(error)
+        except Exception as error:
+            found |= {"why": f"{type(error).__name__}: {error}", "crash": True}
+    found["seconds"] = time.process_time() - began
+    found["told"] = sum("inertia" in str(w.message) or "mass" in str(w.message) for w in said)
+    end.send(found)
+
+
+def warm_up() -> None:
+    """Import what is needed once, before the processes part."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        picchio.assess(picchio.load_robot("fanuc_like_3dof"))
+
+
+def ask(robot: str) -> dict[str, Any]:
+    """The answer, or how the process that looked for it ended."""
+    ours, theirs = multiprocessing.Pipe(duplex=False)
+    process = multiprocessing.get_context("fork").Process(target=answer, args=(robot, theirs))
+    process.start()
+    theirs.close()
+    found: dict[str, Any] = {"step": "load", "crash": True, "seconds": math.nan}
+    if ours.poll(20.0 * LIMIT):
+        try:
+            found = ours.recv()
+        except EOFError:
+            found["why"] = "the process died"
+    else:
+        found["why"] = "no answer in time"
+        process.kill()
+    process.join()
+    return found
+
+
+def kind(why: str) -> str:
+    """A refusal without its file, names and numbers."""
+    text = re.sub(r"^.*?\.urdf: ", "", why)
+    text = re.sub(r"'[^']*'", "'...'", text)
+    return re.sub(r"\d[\d.e+-]*", "#", text)[:110]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", help="a folder, or `shipped`")
+    parser.add_argument("--json", type=Path, help="write every answer")
+    asked = parser.parse_args()
+    if asked.folder == "shipped":
+        names = sorted(shipped_robots())
+    else:
+        paths = sorted(Path(asked.folder).rglob("*.urdf"))
+        names = [str(path) for path in {path.read_bytes(): path for path in paths[::-1]}.values()]
+        names.sort()
+    warm_up()
+    all_found = {}
+    for name in names:
+        all_found[name] = found = ask(name)
+        print(f"{found['step']:7s} {found['seconds']:6.2f} s  {name}  {found.get('why', '')[:150]}",
+              flush=True)  # fmt: skip
+    loaded = {n: f for n, f in all_found.items() if f["step"] != "load"}
+    told = {n: f for n, f in loaded.items() if f.get("interval")}
+    fast = [n for n, f in told.items() if f["seconds"] < LIMIT]
+    refused: dict[str, list[str]] = defaultdict(list)
+    for name, found in all_found.items():
+        if not found.get("interval"):
+            refused[f"{found['step']}: {kind(found.get('why', 'no interval'))}"].append(name)
+    share = 100 * len(told) / max(len(loaded), 1)
+    print(
+        f"\n{len(names)} files; loaded {len(loaded)}; an interval of {len(told)} of these "
+        f"({share:.1f} %), of {len(fast)} within {LIMIT:g} s"
+    )
+    if told:
+        slowest = max(told, key=lambda n: told[n]["seconds"])
+        print(f"slowest: {told[slowest]['seconds']:.1f} s, {slowest}")
+    print(f"crashes: {sum(bool(f.get('crash')) for f in all_found.values())}")
+    print("verdicts:", dict(Counter(f["verdict"] for f in told.values())))
+    for why, those in sorted(refused.items(), key=lambda one: -len(one[1])):
+        print(f"{len(those):4d}  {why}   such as {Path(those[0]).name}")
+    if asked.json:
+        asked.json.write_text(json.dumps(all_found, indent=1))
+
+
+if __name__ == "__main__":
+    main()
