@@ -1,6 +1,6 @@
 """Does any URDF get an answer? A folder of them, each assessed from the file alone.
 
-    python benchmarks/any_urdf.py FOLDER [--json FILE]    # every *.urdf below it
+    python benchmarks/any_urdf.py FOLDER [--most N] [--json FILE]   # the *.urdf below it
     python benchmarks/any_urdf.py shipped                 # the robots of `picchio robots`
 
 Each is loaded and assessed on the default task in a process of its own, so that a crash is counted
@@ -16,6 +16,7 @@ import argparse
 import json
 import math
 import multiprocessing
+import random
 import re
 import time
 import warnings
@@ -89,6 +90,7 @@ def kind(why: str) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", help="a folder, or `shipped`")
+    parser.add_argument("--most", type=int, help="so many of them, drawn; all if not given")
     parser.add_argument("--json", type=Path, help="write every answer")
     asked = parser.parse_args()
     if asked.folder == "shipped":
@@ -97,6 +99,9 @@ def main() -> None:
         paths = sorted(Path(asked.folder).rglob("*.urdf"))
         names = [str(path) for path in {path.read_bytes(): path for path in paths[::-1]}.values()]
         names.sort()
+    if asked.most is not None and asked.most < len(names):
+        print(f"{asked.most} of {len(names)}, drawn")
+        names = sorted(random.Random(0).sample(names, asked.most))
     warm_up()
     all_found = {}
     for name in names:

@@ -49,6 +49,7 @@ ARMS = (
     "ur5", "ur10", "panda", "xarm7", "z1", "kinova", "kuka_iiwa14", "abb_irb2600", "fanuc_m20ia",
     "fanuc_r2000ic", "kuka_kr210_r2700",
 )  # fmt: skip
+SAMPLES = 512  # as many as `assess` takes of 15 places
 KNOWN = ("fanuc_r2000ic", "kuka_kr210_r2700", "kuka_kr500_r2830mt", "kuka_kr300_r2500",
          "manutec_r3", "kuka_iiwa14")  # fmt: skip
 
@@ -133,7 +134,8 @@ def coverage(count: int, seed: int) -> None:
             for strong in (False, True):
                 task = default_task(robot)
                 task = hard(task, robot) if strong else task
-                told[name, strong] = robot, task, picchio.uncertain_life(robot, task, totals=False)
+                life = picchio.uncertain_life(robot, task, samples=SAMPLES, totals=False)
+                told[name, strong] = robot, task, life
         for k in range(count):
             name, strong = ARMS[k % len(ARMS)], bool((k // len(ARMS)) % 2)
             robot, task, life = told[name, strong]
@@ -173,7 +175,7 @@ def ranking(count: int, seed: int, readings: int = 24, worlds: int = 256) -> Non
             robot = bare(name, folder)
             task = default_task(robot, seed=k)
             task = hard(task, robot) if k // len(ARMS) % 2 else task
-            life = picchio.uncertain_life(robot, task, totals=False)
+            life = picchio.uncertain_life(robot, task, samples=SAMPLES, totals=False)
             if not life.measure_first:
                 continue
             model = Model.of(robot)
@@ -227,7 +229,7 @@ def hidden() -> None:
         for name in KNOWN:
             robot = bare(name, Path(text))
             task = default_task(robot)
-            told = picchio.uncertain_life(robot, task, totals=False)
+            told = picchio.uncertain_life(robot, task, samples=SAMPLES, totals=False)
             known = picchio.load_robot(name, tool=robot.tool_frame)
             # Rigid wrists and arms: only joints that both have are compared.
             true = picchio.assess(known, task, uncertainty=False, steady_check=False)
@@ -240,7 +242,7 @@ def hidden() -> None:
                 factors.append(abs(math.log(own / peak)))
                 print(f"| {name} | {joint.name} | {whole:.4g} | {low:.3g} to {high:.3g} | "
                       f"{own / peak:.2f} |")  # fmt: skip
-            life = picchio.uncertain_life(known, task, totals=False)
+            life = picchio.uncertain_life(known, task, samples=SAMPLES, totals=False)
             lives.append((name, life, told))
     print(f"\npeak torque in the interval: {sum(held)} of {len(held)}; median factor of the "
           f"vibration's peak {math.exp(float(np.median(factors))):.2f}\n")  # fmt: skip

@@ -104,8 +104,13 @@ def test_every_tool_frame_that_is_guessed_says_why(arm_text, write):
         '<link name="lamp"/><joint name="l" type="fixed"><parent link="upper"/>'
         '<child link="lamp"/></joint></robot>',
     )
+    robot = load_robot(write("b.urdf", two), values=values)  # the lamp is fixed to the arm's middle
+    assert (robot.tool_frame, robot.origins["tool.frame"]) == (
+        "tip", "the only place beyond all joints"
+    )  # fmt: skip
+    hands = two.replace('name="l" type="fixed"', 'name="l" type="continuous"')
     with pytest.raises(InputError, match=r"several frames could carry the tool; valid: tip, lamp"):
-        load_robot(write("b.urdf", two), values=values)
+        load_robot(write("b.urdf", hands), values=values)
     named = two.replace('"lamp"', '"tcp"')
     assert load_robot(write("c.urdf", named), values=values).tool_frame == "tcp"
 
