@@ -1,6 +1,6 @@
 """How honest the answer for a robot is of which nothing but the URDF is known.
 
-    python benchmarks/estimated_robots.py coverage [--count 500]   # intervals against drawn robots
+    python benchmarks/estimated_robots.py coverage [--count 500] [--minutes 15]   # intervals against drawn robots
     python benchmarks/estimated_robots.py ranking [--count 40]     # what to measure first
     python benchmarks/estimated_robots.py hidden                   # robots whose stiffness is known
 
@@ -24,6 +24,7 @@ import argparse
 import math
 import shutil
 import tempfile
+import time
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -121,8 +122,8 @@ def exactly(robot: FlexibleRobot, task: Task, factors: dict[str, float]) -> picc
     return picchio.assess(robot, task, uncertainty=False, steady_check=False)
 
 
-def coverage(count: int, seed: int) -> None:
-    rng = np.random.default_rng(seed)
+def coverage(count: int, seed: int, minutes: float) -> None:
+    rng, began = np.random.default_rng(seed), time.monotonic()
     inside: dict[str, list[bool]] = {"robot": [], "joint": []}
     by_arm: dict[str, list[bool]] = {}
     below = []
@@ -137,6 +138,9 @@ def coverage(count: int, seed: int) -> None:
                 life = picchio.uncertain_life(robot, task, samples=SAMPLES, totals=False)
                 told[name, strong] = robot, task, life
         for k in range(count):
+            if time.monotonic() - began > 60.0 * minutes:
+                print(f"stopped after {minutes:g} minutes: {k} of {count} robots")
+                break
             name, strong = ARMS[k % len(ARMS)], bool((k // len(ARMS)) % 2)
             robot, task, life = told[name, strong]
             made, factors = drawn(robot, rng, folder)
@@ -160,7 +164,7 @@ def coverage(count: int, seed: int) -> None:
         print(f"{name:35s} {100 * np.mean(hits):5.1f} % of {len(hits)}")
     for what, hits in inside.items():
         share, size = float(np.mean(hits)), len(hits)
-        error = 1.96 * math.sqrt(share * (1.0 - share) / min(size, count))
+        error = 1.96 * math.sqrt(share * (1.0 - share) / min(size, len(below)))
         print(f"{what}: P10 to P90 holds {100 * share:.1f} % (+- {100 * error:.1f}) of {size}")
     print(f"beyond the interval on its mild side: {100 * np.mean(below):.1f} %")
 
@@ -266,10 +270,11 @@ def main() -> None:
     parser.add_argument("what", choices=("coverage", "ranking", "hidden"))
     parser.add_argument("--count", type=int)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--minutes", type=float, default=math.inf, help="of coverage, at most")
     asked = parser.parse_args()
     warnings.simplefilter("ignore")
     if asked.what == "coverage":
-        coverage(asked.count or 500, asked.seed)
+        coverage(asked.count or 500, asked.seed, asked.minutes)
     elif asked.what == "ranking":
         ranking(asked.count or 40, asked.seed)
     else:

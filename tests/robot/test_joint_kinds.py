@@ -115,6 +115,21 @@ def test_every_tool_frame_that_is_guessed_says_why(arm_text, write):
     assert load_robot(write("c.urdf", named), values=values).tool_frame == "tcp"
 
 
+FINGER = (
+    '<link name="{0}"/><joint name="to_{0}" type="prismatic"><parent link="tip"/>'
+    '<child link="{0}"/><origin xyz="0 {1} 0"/><limit lower="0" upper="0.01" effort="9" '
+    'velocity="1"/></joint>'
+)
+
+
+def test_fingers_are_carried_by_the_arms_end(arm_text, write):
+    fingers = FINGER.format("left", 0.02) + FINGER.format("right", -0.02)
+    robot = load_robot(write("h.urdf", arm_text.replace("</robot>", fingers + "</robot>")))
+    assert robot.tool_frame == "tip"
+    assert robot.origins["tool.frame"] == "where the arm ends and its fingers begin"
+    assert robot.flexible_names == ("a", "b")
+
+
 FIXED = '<link name="{0}"/><joint name="to_{0}" type="fixed"><parent link="slide"/>' + (
     '<child link="{0}"/><origin xyz="{1} 0 0"/></joint>'
 )

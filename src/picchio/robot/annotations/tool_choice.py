@@ -115,7 +115,8 @@ def _where_it_branches(tree: UrdfTree, leaves: Sequence[str]) -> str | None:
     beyond = max(len(chain) for chain in moving) - common
     if common < _ARM or not 0 < beyond < common:
         return None
-    return tree.joints[moving[0][common - 1]].child
+    hands = {tree.joints[chain[common]].parent for chain in moving if len(chain) > common}
+    return hands.pop() if len(hands) == 1 else tree.joints[moving[0][common - 1]].child
 
 
 def _is_called(link: str, word: str) -> bool:

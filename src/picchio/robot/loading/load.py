@@ -117,7 +117,8 @@ def _estimate(robot: FlexibleRobot, known: Mapping[str, Any]) -> Sidecar | None:
     drives = [joint for joint in robot.flexible_joints if is_drive(joint.name)]
     if not drives:
         try:
-            return estimated_sidecar(robot, **known)
+            # The tool's frame was found without it.
+            return estimated_sidecar(robot, **known).model_copy(update={"tool": None})
         except InputError as error:
             if error.key in known:
                 raise
