@@ -1,8 +1,8 @@
 """How honest the answer for a robot is of which nothing but the URDF is known.
 
-    python benchmarks/estimated_robots.py coverage [--count 500] [--minutes 15]   # intervals against drawn robots
-    python benchmarks/estimated_robots.py ranking [--count 40]     # what to measure first
-    python benchmarks/estimated_robots.py hidden                   # robots whose stiffness is known
+    python benchmarks/estimated_robots.py coverage [--count 500] [--minutes 15]
+    python benchmarks/estimated_robots.py ranking [--count 40]
+    python benchmarks/estimated_robots.py hidden
 
 coverage: robots are drawn from the drive priors themselves (the mixture, not its normal
 approximation), with a material, a force and a model error of their own, and assessed one by one by

@@ -269,3 +269,23 @@ def test_without_shafts_effort_limits_rank_and_links_do_not_touch():
     assert found.by_effort and found.utilisation_gain > 1.0
     assert "pairs of links" in found.self_collision
     assert "effort" in " ".join(found.assumptions)
+
+
+def test_the_place_that_is_mostly_the_best_is_taken(monkeypatch):
+    """In two of three cases the second place lives longer; a tie is the first's."""
+    from types import SimpleNamespace
+
+    from picchio.studies.placement import sureness
+
+    cases = [
+        SimpleNamespace(robots_life=np.array(lives), used=np.ones((1, 3)), geared=np.ones((1, 3)))
+        for lives in ([9.0, 20.0, 30.0], [10.0, 21.0, 1.0], [np.inf, 1.0, 1.0])
+    ]
+    monkeypatch.setattr(sureness, "_drawn", lambda loads, work, spots: cases[: len(spots)])
+    robot = SimpleNamespace(spreads={"stiffness.joint_1": 1})
+    loads = SimpleNamespace(model=SimpleNamespace(robot=robot), by_effort=False)
+    assert sureness.surest(loads, None, ["a", "b"]) == "b"
+    assert sureness.surest(loads, None, ["a", "b", "c"]) == "a"
+    assert sureness.surest(loads, None, []) is None
+    robot.spreads = {}
+    assert sureness.surest(loads, None, ["a", "b"]) == "a"

@@ -59,6 +59,16 @@ def robot_with(robot: FlexibleRobot, values: Iterable[tuple[Spread, Number]]) ->
     return replace(robot, flexible_joints=tuple(joints[name] for name in names), **changes)
 
 
+def springs_of(robot: FlexibleRobot) -> list[Spread]:
+    """What of a robot's joints is uncertain that its vibration depends on.
+
+    Args:
+        robot: whose values may have spreads.
+    """
+    return [one for one in robot.spreads.values()
+            if one.table == "joint" and one.path[0] in _SPRINGS]  # fmt: skip
+
+
 def drawn_robots(robot: FlexibleRobot, count: int, seed: int = 0) -> Iterator[FlexibleRobot]:
     """Robots whose joints' values are drawn from their spreads, correlated as the posterior says.
 
@@ -70,8 +80,7 @@ def drawn_robots(robot: FlexibleRobot, count: int, seed: int = 0) -> Iterator[Fl
     Yields:
         each, its values known exactly.
     """
-    spreads = [one for one in robot.spreads.values()
-               if one.table == "joint" and one.path[0] in _SPRINGS]  # fmt: skip
+    spreads = springs_of(robot)
     root = root_of([one.name for one in spreads], robot.posterior)
     for row in np.random.default_rng(seed).standard_normal((count, len(spreads))) @ root:
         values = [(one, one.at(float(score))) for one, score in zip(spreads, row, strict=True)]

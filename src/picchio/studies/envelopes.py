@@ -20,7 +20,7 @@ from picchio.fatigue.shaft_stress import stress_per_torque
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.units import JointUnits, column, units_of
-from picchio.robot.varied import drawn_robots
+from picchio.robot.varied import drawn_robots, springs_of
 from picchio.studies.rivet.pose import ModelAtPose
 from picchio.vibration.closed_form.response import Response, described, peak_deflections
 
@@ -313,7 +313,7 @@ def _cases(
 ) -> tuple[FloatArray, FloatArray]:
     """Of drawn robots, where springs are estimates: g_j(t) (c, n, 3, t) and stiffness (c, n)."""
     n = len(model.robot.flexible_joints)
-    if not any(joint.estimated for joint in model.robot.flexible_joints):
+    if not any(one.estimated for one in springs_of(model.robot)):
         return np.empty((0, n, 3, 0)), np.empty((0, n))
     curves, stiffness = [], []
     for robot in drawn_robots(model.robot, _CASES):

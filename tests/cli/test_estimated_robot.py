@@ -1,0 +1,146 @@
+"""A robot of which only the URDF is known, at every command: an answer, marked as an estimate."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+import picchio
+from picchio.cli.main import run
+from picchio.robot.loading.find import find_robot
+from picchio.robot.varied import drawn_robots
+from picchio.studies.envelopes import ENDS
+from picchio.studies.tasks import ASSUMED_BLOWS
+
+BLOWS = picchio.PulseTrain(300.0, 0.04, 0.004)
+POSE = [0.2, 0.9, -1.1]
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory):
+    """The three-joint arm's URDF, its annotations left out."""
+    path = tmp_path_factory.mktemp("bare") / "arm.urdf"
+    text = find_robot("fanuc_like_3dof").urdf.read_text()
+    path.write_text(re.sub(r"<picchio:[^>]*>", "", text))
+    return path
+
+
+def told(capsys) -> str:
+    return " ".join(capsys.readouterr().out.split())
+
+
+def test_assess_says_first_what_it_assumes(bare, tmp_path, capsys):
+    page, out = tmp_path / "r.html", tmp_path / "a.json"
+    assert run(["assess", str(bare), "--payload", "10", "--report", str(page),
+                "--json", str(out)]) == 0  # fmt: skip
+    said = told(capsys)
+    assert said.startswith("Estimated: nobody measured the stiffness, damping and strength")
+    assert "No task was given, so one is assumed: 12 blows a rivet of 98.1 N, the weight" in said
+    assert said.index("pose 5:") < said.index("The joints, P10 to P90")
+    assert "What to measure first" in said
+    found = json.loads(out.read_text())
+    assert found["estimated"] and found["verdict"]["estimated"]
+    assert 0.0 < found["utilisation"]["p10"] < found["utilisation"]["p90"]
+    assert sum(joint["ends_first"] for joint in found["joints"]) == pytest.approx(1.0)
+    assert any("No task was given" in line for line in found["verdict"]["reasons"])
+    assert found["operations"][0]["excitation"].startswith("rectangular pulses of 98.1 N")
+    html = page.read_text()
+    assert html.count('<tr class="estimate') == 3
+    assert html.count("nobody measured") == 1 and 'id="measure"' in html
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("--payload", "-1"), ("--reach", "0"), ("--class", "belt")]
+)
+def test_what_narrows_an_estimate_is_checked(bare, capsys, option, value):
+    assert run(["assess", str(bare), option, value]) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith(f"picchio: error: {option}: ")
+
+
+def test_what_is_known_changes_the_estimate(bare):
+    free, heavy, geared = (
+        picchio.load_robot(bare, **known)
+        for known in ({}, {"payload": 400.0}, {"drive_class": "strain-wave"})
+    )
+    assert (heavy.stiffness > 1.2 * free.stiffness).all()
+    assert (geared.stiffness != free.stiffness).all()
+
+
+def test_an_envelope_is_a_band(bare, tmp_path, capsys):
+    robot = picchio.load_robot(bare)
+    found = picchio.envelope(robot, POSE, BLOWS, hits=12)
+    directions = np.eye(3)
+    every = [picchio.envelope(one, POSE, BLOWS, hits=12) for one in drawn_robots(robot, 64)]
+    assert not every[0].estimated
+    brute = np.quantile([one.support(directions) for one in every], ENDS, axis=0)
+    np.testing.assert_allclose(found.band(directions), brute, rtol=0.02)
+    torque = np.quantile([one.peak("torque") for one in every], ENDS, axis=0).T
+    np.testing.assert_allclose(found.peak_interval("torque"), torque, rtol=0.02)
+    out = tmp_path / "e.json"
+    assumed = (
+        f"of the blows, force {ASSUMED_BLOWS.force:g} N, period 0.04 s, width 0.004 s are assumed"
+    )
+    with pytest.warns(picchio.PicchioWarning, match=assumed):
+        assert run(["envelope", str(bare), "--pose=0.2,0.9,-1.1", "--json", str(out)]) == 0
+    assert "Estimated: P10 to P90" in told(capsys)
+    content = json.loads(out.read_text())
+    assert content["estimated"]
+    low, high = content["joints"][1]["peak_torque_interval"]
+    assert 0.0 < low < high
+
+
+def test_a_scene_has_a_net_about_what_is_likely(bare):
+    from picchio.visuals.scene.page import scene_html
+
+    scene = picchio.view(bare, pose=POSE, excitation=BLOWS)
+    nets = [item for item in scene.items if item.layer == "likely"]
+    assert len(nets) == 3 and all(scene.meshes[item.mesh].wire for item in nets)
+    reach = np.linalg.norm(scene.meshes[nets[1].mesh].vertices, axis=1).max()
+    assert reach == pytest.approx(scene.envelope.peak_interval()[1, 1], rel=0.1)
+    assert "nobody measured" in scene_html(scene)
+    known = picchio.view("fanuc_like_3dof", pose=POSE, excitation=BLOWS)
+    assert not known.notice and not any(item.layer == "likely" for item in known.items)
+
+
+def test_a_map_and_its_plot_say_it(bare, tmp_path, capsys):
+    from picchio.visuals.plots.workspace import plot_workspace_map
+
+    path, out = tmp_path / "m.nc", tmp_path / "m.json"
+    command = ["map", str(bare), "--joint-grid", "2", "--out", str(path), "--json", str(out)]
+    assert run(command) == 0
+    assert json.loads(out.read_text())["estimated"]
+    assert told(capsys).startswith("Estimated: nobody measured")
+    from picchio.studies.maps.stored import open_map
+
+    with open_map(path) as found:
+        ax = plot_workspace_map(found, "joint_2")
+    assert "estimated" in ax.get_title(loc="left")
+    assert any(patch.get_hatch() for patch in ax.patches)
+
+
+def test_hatched_bars_reach_from_p10_to_p90(bare):
+    from picchio.visuals.plots.life import plot_utilisation
+
+    robot = picchio.load_robot(bare)
+    found = picchio.assess(robot, picchio.load_task(find_robot("fanuc_like_3dof").task, robot))
+    boxes = [patch for patch in plot_utilisation(found).patches if patch.get_hatch()]
+    keys = ("utilisation", "reducer_utilisation")
+    ends = [max(joint.intervals[key][1] for key in keys) for joint in found.joints]
+    assert len(boxes) == 3
+    for box, high in zip(boxes, ends, strict=True):
+        assert box.get_x() + box.get_width() == pytest.approx(100 * high, rel=1e-6)
+    assert "estimated: P10 to P90" in found._repr_html_()
+
+
+def test_work_that_nobody_gave_is_placed_and_written(bare, tmp_path, capsys):
+    out = tmp_path / "moved.toml"
+    assert run(["place", str(bare), "--move", "0.1,0.1,0.1,10", "--placements", "4",
+                "--no-self-collision", "--out", str(out)]) == 0  # fmt: skip
+    said = told(capsys)
+    assert said.startswith("Estimated: ") and "No task was given" in said
+    assert "The best place is the better one in" in said
+    task = picchio.load_task(out, picchio.load_robot(bare))
+    assert [operation.name for operation in task.operations] == ["along x", "along y", "along z"]
