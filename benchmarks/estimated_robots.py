@@ -35,7 +35,10 @@ import numpy as np
 import picchio
 from picchio.fatigue.sn.library import DEFAULT_LIFE_CURVE, load_sn_curve, write_sn_curve
 from picchio.model.model import Model
-from picchio.robot.drives.priors import DrivePriors, drive_priors
+from picchio.robot.drives.facts import fitted, group_of
+from picchio.robot.drives.hierarchy import Group, predict
+from picchio.robot.drives.predictors import QUANTITIES, predictors
+from picchio.robot.drives.priors import _with_strength
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint, Strength
 from picchio.robot.spread import root_of
@@ -76,8 +79,7 @@ def hard(task: Task, robot: FlexibleRobot) -> Task:
 
 def drawn(robot: FlexibleRobot, rng: np.random.Generator, folder: Path) -> tuple[Any, ...]:
     """A robot drawn from the priors, and its own factors on force, width and stress."""
-    priors = drive_priors(robot)
-    draw = draw_of(priors, rng)
+    draw = draw_of(robot, rng)
     curve = load_sn_curve(DEFAULT_LIFE_CURVE)
     assert curve.scatter is not None and curve.survival is not None
     factor = 10.0 ** (curve.scatter * rng.standard_normal())
@@ -95,12 +97,20 @@ def drawn(robot: FlexibleRobot, rng: np.random.Generator, folder: Path) -> tuple
     return made, factors
 
 
-def draw_of(priors: DrivePriors, rng: np.random.Generator) -> dict[str, tuple[float, float, float]]:
-    """Stiffness, damping ratio and repeated-peak torque of every joint: one draw of the mixture."""
-    n = len(priors.joints)
-    both = np.exp(pick(priors.mixture, rng))
-    damping = np.exp(pick(priors.damping_mixture, rng))
-    return {joint.name: (both[k], damping[k], both[n + k]) for k, joint in enumerate(priors.joints)}
+def draw_of(
+    robot: FlexibleRobot, rng: np.random.Generator
+) -> dict[str, tuple[float, float, float]]:
+    """Stiffness, damping ratio and repeated-peak torque of every joint: one draw of the mixture.
+
+    As `drive_priors` makes it, before it is told by its mean and covariance.
+    """
+    found, fit = predictors(robot), fitted()
+    n = len(found.names)
+    mixture = predict(fit.stiffness, group_of(found), also=2 + QUANTITIES.index("effort"))
+    nothing = Group(np.full((n, 1), np.nan), np.zeros((n, 0)), np.zeros(n, dtype=np.intp))
+    both = np.exp(pick(_with_strength(mixture, found, {}, None), rng))
+    damping = np.exp(pick(predict(fit.damping, nothing), rng))
+    return {name: (both[k], damping[k], both[n + k]) for k, name in enumerate(found.names)}
 
 
 def pick(mixture: Any, rng: np.random.Generator) -> np.ndarray:
