@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -144,3 +145,27 @@ def test_work_that_nobody_gave_is_placed_and_written(bare, tmp_path, capsys):
     assert "The best place is the better one in" in said
     task = picchio.load_task(out, picchio.load_robot(bare))
     assert [operation.name for operation in task.operations] == ["along x", "along y", "along z"]
+
+
+def test_what_a_life_allows_is_by_the_estimated_drives(bare):
+    robot = picchio.load_robot(bare)
+    task = picchio.load_task(find_robot("fanuc_like_3dof").task, robot)
+
+    def harder(factor):
+        return replace(task, operations=tuple(
+            replace(op, excitation=op.excitation.scaled(force=factor)) for op in task.operations
+        ))  # fmt: skip
+
+    found = picchio.allowable(robot, harder(0.1), 1e4, gravity_balanced=True)
+    assert {joint.governed_by for joint in found} == {"reducer"}
+    least = min(found, key=lambda joint: joint.force_factor)
+    assert 0.0 < least.force_factor < np.inf
+    for factor, holds in ((0.999, True), (1.02, False)):
+        joint = picchio.assess(
+            robot, harder(0.1 * factor * least.force_factor), gravity_balanced=True,
+            uncertainty=False, steady_check=False,
+        ).joint(least.joint)  # fmt: skip
+        assert (joint.reducer_utilisation <= 1.0 and joint.rivets_to_failure >= 1e4) == holds
+    # A yes by estimates is no promise.
+    easy = picchio.allowable(robot, harder(1e-4), 1e4, gravity_balanced=True)
+    assert easy.met and easy.answer.startswith("Probably: ") and not easy.yes
