@@ -12,6 +12,7 @@ from picchio.core.errors import InputError
 from picchio.model.conditions import Conditions
 from picchio.model.expansion import Motion
 from picchio.model.geometry import Geometry
+from picchio.model.inertia import point_masses
 from picchio.model.linear_system import shared_damping
 from picchio.model.system import Element, ElementKind, VibratingSystem
 from picchio.robot.dynamics.rigid_model import Mass
@@ -23,6 +24,8 @@ Row = dict[str, float]
 _MASSLESS = 1e-9
 # What then stands for the unknown own inertia of what yields, relative to all that it carries.
 _OWN_INERTIA = 1e-4
+# How far apart the point masses stand that make up a body; any size does as well.
+_REACH = 0.1  # m
 
 
 @dataclass
@@ -90,6 +93,16 @@ class Changes:
     def add_mass(self, weight: float, link: str, point: tuple[float, ...] | None = None) -> None:
         """Add `weight` times a link's own inertia, or kg at a point (3,) m of it."""
         self._masses.append((weight, link, point))
+
+    def add_body(self, link: str, ten: FloatArray) -> None:
+        """Add a body that is fixed in a link, as in `picchio.model.inertia`.
+
+        Args:
+            link: its name, or the tool frame's.
+            ten: (10,) mass, first moments and inertia in the link's frame.
+        """
+        for weight, point in point_masses(ten, _REACH):
+            self.add_mass(weight, link, point)
 
     def add_inertia(self, joint: str, inertia: float) -> None:
         """Add a constant inertia that turns with the link side, kg m^2."""

@@ -30,6 +30,8 @@ _SAME = 0.02  # of a column's power: less of its own and others do the same alre
 _LEAST_BIC = 3.0
 _LEAST_CONFIDENCE = 0.90
 _LEAST_SHARE = 0.005
+_SPOILT = 1.1  # power left in a channel over that before
+_MANY = 3  # numbers: with more, one channel could be paid for with another
 _TIE = 2.0
 _SURE = 0.95
 
@@ -49,6 +51,7 @@ class Score:
         admissible: within their bounds.
         groups: equations that it acts in.
         differences: what every stretch that was held out gains.
+        numbers: how many the records determine, those that were searched for among them.
     """
 
     gain: float
@@ -60,6 +63,7 @@ class Score:
     admissible: bool
     groups: tuple[Group, ...]
     differences: Mapping[int, float]
+    numbers: float = 1.0
 
 
 class Scorer:
@@ -134,6 +138,10 @@ class Scorer:
         if base is None:
             first = [without_added(block, index.size) for block in second]
             base = cross_validate(first, elsewhere, prior, pull, len(index))
+        # What is known beforehand of the added numbers, which start where they do nothing.
+        known = np.array([c.precision for c in coordinates])
+        towards = known * (np.array([c.centre for c in coordinates]) - neutral)
+        prior, pull = np.append(prior, known), np.append(pull, towards)
         if key is not None:
             self._bases[key] = base
         wide = cross_validate(second, elsewhere, prior, pull, len(index))
@@ -157,7 +165,7 @@ class Scorer:
             correlation = {g: noise / self.base.level[g] ** 2 for g in groups}
             common |= correlation
         return _compare(base, wide, correlation, common, groups,
-                        columns.shape[1] + searched, tuple(float(v) for v in values),
+                        wide.determined + searched, tuple(float(v) for v in values),
                         admissible)  # fmt: skip
 
     def noise_of(self, effect: Effect) -> float | None:
@@ -210,7 +218,7 @@ def _compare(
     correlation: Mapping[Group, float],
     common: Mapping[Group, float],
     groups: tuple[Group, ...],
-    added: int,
+    added: float,
     values: tuple[float, ...],
     admissible: bool,
 ) -> Score:
@@ -229,6 +237,7 @@ def _compare(
         inside = max(base.inside[group], _TINY) / max(wide.inside[group], _TINY)
         bic += 0.5 * samples * np.log(inside)
         removed, total = removed + before - after, total + before
+        admissible = admissible and (added <= _MANY or after <= _SPOILT * before)
         for (g, number), x in base.outside.items():
             if g == group:
                 # In logarithms one bad stretch does not outvote the others; without, stretches
@@ -246,7 +255,7 @@ def _compare(
     return Score(
         gain=float(gain), rank=float(rank), bic=float(bic), share=removed / max(total, _TINY),
         confidence=sure, values=values, admissible=admissible, groups=groups,
-        differences=differences,
+        differences=differences, numbers=added,
     )  # fmt: skip
 
 
@@ -289,15 +298,20 @@ def _from_neutral(current: Fit, i: int) -> float:
     c = current.coordinates[i]
     effect = current.state.every[c.index]
     parameter = next(p for p in effect.parameters if p.name == c.name)
-    if parameter.name == "order" or parameter.logarithmic:
+    if parameter.shape or parameter.logarithmic:
         return c.value if c.name in effect.inverse else 0.0
     return c.value - parameter.neutral
 
 
 def indistinguishable(score: Score, other: Score) -> bool:
-    """Whether a rival is nearly as likely, or loses in no clear majority of the stretches."""
+    """Whether a rival is nearly as likely, or loses in no clear majority of the stretches.
+
+    One that needs more numbers to do the same loses nowhere: it has to be as likely.
+    """
     if other.rank >= score.rank - _TIE:
         return True
+    if other.numbers > score.numbers + 1.0:
+        return False
     shared = sorted(set(score.differences) | set(other.differences))
     lead = np.array([
         score.differences.get(b, 0.0) - other.differences.get(b, 0.0) for b in shared

@@ -127,12 +127,16 @@ class State:
         return replace(self, nuisances=tuple(every[:count]), effects=tuple(every[count:]))
 
     def with_effect(self, effect: Effect) -> State:
-        """With one effect more.
+        """With one effect more, or in place of the one that it refines.
 
         Args:
             effect: to be added.
         """
-        return replace(self, effects=(*self.effects, effect))
+        coarser = [(e.name, e.target) for e in self.effects]
+        if (effect.refines, effect.target) not in coarser:
+            return replace(self, effects=(*self.effects, effect))
+        place = coarser.index((effect.refines, effect.target))
+        return replace(self, effects=(*self.effects[:place], effect, *self.effects[place + 1 :]))
 
     def without(self, index: int) -> State:
         """Without the effect of this number.
@@ -154,14 +158,17 @@ def effect_coordinates(effect: Effect, index: int, rate: float) -> list[Coordina
     found = []
     for p in effect.parameters:
         value, lower, upper = effect.values[p.name], p.lower, p.upper
-        if p.name == "order" and value.is_integer():
+        if p.whole or (p.name == "order" and value.is_integer()):
             continue  # locked to the motor's turn: no measured order is whole to the last digit
+        if p.moving is not None:
+            lower = p.moving
         if p.name in effect.inverse:
             value, lower, upper = 1.0 / value, 1.0 / p.upper, 1.0 / p.lower
             step = 0.1
         else:
             step = _step(p, value, rate)
-        found.append(Coordinate(index, p.name, value, lower, upper, step))
+        known = (p.spread, p.neutral) if p.spread else (None, 0.0)
+        found.append(Coordinate(index, p.name, value, lower, upper, step, *known))
     return found
 
 

@@ -101,15 +101,28 @@ def candidates(
                     made = _make(system, base, predicted, effect, {"order"}, around)
                     found += [replace(each, noise=noise) for each in made]
             elif (name, target) not in taken and (not kind.needs or (kind.needs, target) in taken):
-                for trial in _trials(system, kind, target):
-                    effect = kind(target, **trial)
-                    found += _make(system, base, predicted, effect, set(trial), around)
+                for effect, set_ in _starts(system, base, kind, target):
+                    found += _make(system, base, predicted, effect, set_, around)
     return found
 
 
 def usual(name: str) -> tuple[int, str]:
     """Where an effect stands among those that explain the same."""
     return (effect_class(name).usual, name)
+
+
+def _starts(
+    system: System, base: Fit, kind: type[Effect], target: str
+) -> list[tuple[Effect, set[str]]]:
+    """Where an effect is tried from, and which of its parameters are set there.
+
+    One that refines another stands in its place, at the values that they share: those are in the
+    base, and are not scored again.
+    """
+    if kind.refines and effect_class(kind.refines).shows(motion=True):
+        coarse = [e for e in base.state.effects if (e.name, e.target) == (kind.refines, target)]
+        return [(kind(target, **e.values), set(e.values)) for e in coarse]
+    return [(kind(target, **trial), set(trial)) for trial in _trials(system, kind, target)]
 
 
 def _trials(system: System, kind: type[Effect], target: str) -> list[dict[str, float]]:
@@ -126,7 +139,7 @@ def _make(system: System, base: Fit, predicted: FloatArray, effect: Effect,
           searched: set[str], around: list[Around]) -> list[Candidate]:  # fmt: skip
     """Derivatives at nothing, by what is not searched for."""
     state = base.state.with_effect(effect)
-    coordinates = effect_coordinates(effect, len(state.every) - 1, system.logs[0].rate)
+    coordinates = effect_coordinates(effect, state.every.index(effect), system.logs[0].rate)
     if effect.inverse:
         # Nothing is an infinite stiffness; the column is what the nominal one does.
         changed = system.predict(state.every, state.scales, effect, predicted)
@@ -137,4 +150,5 @@ def _make(system: System, base: Fit, predicted: FloatArray, effect: Effect,
     kept, columns = jacobian(system, state, predicted, varied, around)
     if not kept:
         return []
-    return [Candidate(effect, columns, kept, np.array([c.value for c in kept]), len(searched))]
+    tried = 0 if effect.refines else len(searched)
+    return [Candidate(effect, columns, kept, np.array([c.value for c in kept]), tried)]
