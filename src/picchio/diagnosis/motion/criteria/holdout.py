@@ -78,8 +78,11 @@ def _withdrawn(
         gains = gains or _gains(train, held_out, current, by_channel=True)
         channel = f"{kind}.{joint}"
         own = [i for i, e in enumerate(effects) if e.target == joint and e.target_kind == "joint"]
-        # Where none of the joint's own is left, what acts in several joints and loses in this one.
-        own = own or [i for i, found in enumerate(gains) if found.get(channel, 0.0) < 0.0]
+        if not own:
+            # What acts in several joints loses in this one, and on the whole.
+            whole = _gains(train, held_out, current)
+            own = [i for i, found in enumerate(gains)
+                   if found.get(channel, 0.0) < 0.0 and sum(whole[i].values()) <= 0.0]  # fmt: skip
         if own:
             worst = min(own, key=lambda i: gains[i].get(channel, 0.0))
             gone[worst] = gains[worst]

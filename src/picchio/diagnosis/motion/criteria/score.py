@@ -6,7 +6,7 @@ And by that: whether a candidate may be claimed, and whether one that was added 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from picchio.diagnosis.motion.fit.stretches import (
 from picchio.model.effects.effect import Effect
 
 _TINY = 1e-300
+_ROUNDED = 1e-9
 _SAME = 0.02  # of a column's power: less of its own and others do the same already
 _LEAST_BIC = 3.0
 _LEAST_CONFIDENCE = 0.90
@@ -148,6 +149,24 @@ class Scorer:
         if wide.own < _SAME:
             return None
         values = neutral + wide.solution[len(index) :]
+        beyond = np.array(
+            [
+                v < c.lower - _ROUNDED and n <= c.lower or v > c.upper + _ROUNDED and n >= c.upper
+                for c, v, n in zip(coordinates, values, neutral, strict=True)
+            ]
+        )
+        if beyond.any() and not beyond.all():
+            # What would leave its bounds where it does nothing stays there, as in a fit.
+            inside = np.flatnonzero(~beyond)
+            fewer = self.score(
+                columns[:, inside], [coordinates[i] for i in inside], neutral[inside],
+                searched=searched, without=without, back=back, noise=noise,
+            )  # fmt: skip
+            if fewer is None:
+                return None
+            values = neutral.copy()
+            values[inside] = fewer.values
+            return replace(fewer, values=tuple(float(v) for v in values))
         admissible = all(
             c.lower - 1e-9 <= v <= c.upper + 1e-9
             for c, v in zip(coordinates, values, strict=True)

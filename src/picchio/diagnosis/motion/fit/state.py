@@ -63,6 +63,7 @@ class State:
         tolerance: relative standard deviation of that factor.
         fixed: joints whose factor an effect has taken over: it is 1.
         priors: (label, parameter, value, standard deviation) told by other records.
+        held: numbers of the nuisances that stay as they are.
     """
 
     nuisances: tuple[Effect, ...] = ()
@@ -71,6 +72,7 @@ class State:
     tolerance: float = 0.05
     fixed: frozenset[str] = frozenset()
     priors: tuple[tuple[str, str, float, float], ...] = ()
+    held: frozenset[int] = frozenset()
 
     @property
     def every(self) -> tuple[Effect, ...]:
@@ -90,6 +92,8 @@ class State:
         ]  # fmt: skip
         told = {(label, name): (value, std) for label, name, value, std in self.priors}
         for index, effect in enumerate(self.every):
+            if index in self.held:
+                continue
             for c in effect_coordinates(effect, index, rate):
                 if (effect.label, c.name) in told:
                     value, std = told[effect.label, c.name]
@@ -98,6 +102,14 @@ class State:
                     c = replace(c, prior=std, centre=value)
                 found.append(c)
         return found
+
+    def given(self) -> State:
+        """What was found, as a robot to start from: friction is fitted anew, all else stays."""
+        held = {i for i, e in enumerate(self.every) if not e.urdf}
+        return replace(
+            self, nuisances=self.every, effects=(), priors=(), held=frozenset(held),
+            fixed=frozenset(self.scales),
+        )  # fmt: skip
 
     def informed(self, effect: Effect, std: Mapping[str, float]) -> State:
         """With an effect of which other records tell the values, and how well.

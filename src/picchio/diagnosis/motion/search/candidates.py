@@ -85,7 +85,8 @@ def candidates(
         kinds: the catalogue.
         near: only what acts at this target, or on more than a joint.
     """
-    taken = {(e.name, e.target) for e in base.state.every}
+    held = base.state.held
+    taken = {(e.name, e.target) for i, e in enumerate(base.state.every) if i not in held}
     predicted = system.measured - base.residual
     around = system.around(base.state.every)
     found: list[Candidate] = []
