@@ -86,7 +86,7 @@ def test_a_link_that_is_not_the_files_is_found_whole(robot, chain, body):
 def rubbing(coupled):
     """Friction and rotors of the wrist, whose last motor may turn with the fifth joint, too."""
 
-    def torque(v, a):
+    def torque(v, a, q):
         found = np.zeros_like(v)
         found[4] += 2.0 * np.sign(v[4]) + 3.0 * v[4]
         turn, speed_up = (v[5] + v[4], a[5] + a[4]) if coupled else (v[5], a[5])
@@ -112,6 +112,25 @@ def test_a_wrist_whose_joints_have_motors_of_their_own_is_not_said_to_be_coupled
     found = diagnose_motion(robot, moving.campaign(chain, 10, rubbing(False)))
     assert ("coulomb_friction", "wrist_3_joint") in causes(found)
     assert "coupled_drive" not in {effect for effect, _ in causes(found)}
+
+
+def carried(chain, size):
+    """A gas spring on the second joint: what its lever makes of a force, less half of its rise."""
+
+    def torque(v, a, q):
+        found = np.zeros_like(v)
+        found[1] = -size * np.sin(q[1] + 0.4) - 0.1 * size * q[1]
+        return found
+
+    return torque
+
+
+def test_a_counterbalance_is_found(robot, chain):
+    found = diagnose_motion(robot, moving.campaign(chain, 11, carried(chain, 40.0)))
+    values = causes(found)["counterbalance", "shoulder_lift_joint"]
+    sizes = [values[name].value for name in ("cosine", "sine", "spring")]
+    np.testing.assert_allclose(sizes, [40.0 * np.sin(0.4), 40.0 * np.cos(0.4), 4.0], atol=1.0)
+    assert found.gain.explained > 0.99
 
 
 def test_no_change_makes_a_body_that_cannot_exist():

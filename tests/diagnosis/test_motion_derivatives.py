@@ -44,6 +44,7 @@ EVERYTHING = (
     ("payload_body", "tool", {"mass": 3.0, "x": 0.1, "z": -0.05, "yy": 0.01}),
     ("link_inertia", "link_2", {"mass": 0.2, "x": 0.1, "yy": -0.1, "xz": 0.3}),
     ("coupled_drive", "joint_3", {"coefficient": 2.0, "torque": 1.0, "inertia": 0.3}),
+    ("counterbalance", "joint_2", {"cosine": 30.0, "sine": -12.0, "spring": 5.0}),
     ("encoder_delay", "motor_position", {"delay": 0.0031}),
     ("joint_stiffness", "joint_2", {"scale": 0.8}),
     ("backlash", "joint_1", {"gap": 2e-4}),

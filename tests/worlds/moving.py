@@ -86,7 +86,7 @@ def campaign(chain, seed, more=None, records=3, noise=0.01):
     Args:
         chain: the true robot; its coordinates are all joints of the robot.
         seed: of motion and noise.
-        more: (v, a) -> (n, m) torques of what is in the drives.
+        more: (v, a, q) -> (n, m) torques of what is in the drives.
         records: how many.
         noise: of a torque, over its own spread.
     """
@@ -96,7 +96,7 @@ def campaign(chain, seed, more=None, records=3, noise=0.01):
         q, v, a = waves(rng, len(chain.names), t)
         torque = torques(chain, q, v, a)
         if more is not None:
-            torque = torque + more(v, a)
+            torque = torque + more(v, a, q)
         torque += noise * torque.std(axis=1, keepdims=True) * rng.normal(size=torque.shape)
         angle = q + 2e-6 * rng.normal(size=q.shape)
         channels = {}

@@ -72,6 +72,7 @@ class Evidence:
         kelvin: over which their temperatures are spread; 0 where they are not known.
         driven: joints that move and whose drive's torque was recorded.
         wound: joints that move and that have encoders on both sides of the gear.
+        swept: joints that turn through so much in one record that a torque over the angle shows.
     """
 
     robot: FlexibleRobot
@@ -87,6 +88,7 @@ class Evidence:
     kelvin: float = 0.0
     driven: tuple[str, ...] = ()
     wound: tuple[str, ...] = ()
+    swept: tuple[str, ...] = ()
 
     @property
     def programmed(self) -> bool:

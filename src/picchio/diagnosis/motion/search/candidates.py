@@ -17,6 +17,10 @@ from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.registry import catalogue, effect_class
 from picchio.model.motion import TORQUE, WINDUP
 from picchio.prediction.motion.readings import Around
+from picchio.robot.units import SLIDING
+
+# Over less of a turn than this, sine, cosine and angle are nearly a straight line.
+_SWEPT = 1.0  # rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +75,15 @@ def evidence_of(system: System) -> Evidence:
         groups=tuple(sorted(groups)),
         driven=tuple(joint for kind, joint in system.groups if kind == TORQUE),
         wound=tuple(joint for kind, joint in system.groups if kind == WINDUP),
+        swept=tuple(
+            dict.fromkeys(
+                joint
+                for log in system.logs
+                for joint in log.moving
+                if np.ptp(log.angle[joint]) > _SWEPT
+                and system.robot.tree.joints[joint].units is not SLIDING
+            )
+        ),
     )
 
 
