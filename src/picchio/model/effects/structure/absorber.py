@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from picchio.model.effects.effect import Effect, Parameter
@@ -22,10 +23,11 @@ class Absorber(Effect):
     target_kind = "link"
     parameters = (
         Parameter("mass", "kg", lower=0.0, upper=1e4, meaning="that swings"),
-        Parameter("stiffness", "N/m", neutral=float("inf"), lower=1e-3, upper=1e12,
-                  logarithmic=True, meaning="of what holds it"),
-        Parameter("damping", "N*s/m", lower=1e-9, upper=1e9, logarithmic=True,
-                  meaning="of what holds it"),
+        # Faster than that it is a mass that moves with the link: a payload.
+        Parameter("frequency", "Hz", neutral=10.0, lower=0.5, upper=40.0, logarithmic=True,
+                  meaning="at which it swings where the link stands still"),
+        Parameter("damping_ratio", neutral=0.04, lower=1e-4, upper=0.7, logarithmic=True,
+                  meaning="of that swing"),
         yielding.MODAL_SHARE,
     )  # fmt: skip
     meaning = "a hose or a tool pack swings on a spring of its own"
@@ -42,17 +44,17 @@ class Absorber(Effect):
         """Hang the mass."""
         if self.values["mass"] > 0.0:
             plant.modal_share = self.values["modal_share"]
-            names = ("mass", "stiffness", "damping")
-            plant.add_hanging(self.target, *(self.values[name] for name in names))
+            mass, w = self.values["mass"], 2.0 * math.pi * self.values["frequency"]
+            drag = 2.0 * self.values["damping_ratio"] * mass * w
+            plant.add_hanging(self.target, mass, mass * w * w, drag)
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """One per cent of what moves, at 8, 12, 18 and 27 Hz: a resonance is narrow."""
-        return self._swinging(scales, (50.0, 75.0, 113.0, 170.0))
+        """One per cent of what moves, at four frequencies: a resonance is narrow."""
+        return self._swinging(scales, (8.0, 12.0, 18.0, 27.0))
 
     def early_trials(self, scales: Scales) -> list[dict[str, float]]:
-        """From 6 to 60 Hz, a fifth apart."""
-        return self._swinging(scales, [38.0 * 1.2**i for i in range(13)])
+        """From 5 to 37 Hz, a fifth apart."""
+        return self._swinging(scales, [5.0 * 1.2**i for i in range(12)])
 
     def _swinging(self, scales: Scales, rates: Sequence[float]) -> list[dict[str, float]]:
-        m = 0.01 * scales.mass
-        return [{"mass": m, "stiffness": m * w * w, "damping": 0.08 * m * w} for w in rates]
+        return [{"mass": 0.01 * scales.mass, "frequency": f} for f in rates]
