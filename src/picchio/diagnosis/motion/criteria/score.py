@@ -149,12 +149,11 @@ class Scorer:
         if wide.own < _SAME:
             return None
         values = neutral + wide.solution[len(index) :]
-        beyond = np.array(
-            [
-                v < c.lower - _ROUNDED and n <= c.lower or v > c.upper + _ROUNDED and n >= c.upper
-                for c, v, n in zip(coordinates, values, neutral, strict=True)
-            ]
-        )
+        bounds = zip(coordinates, values, neutral, strict=True)
+        beyond = np.array([
+            (v < c.lower - _ROUNDED and n <= c.lower) or (v > c.upper + _ROUNDED and n >= c.upper)
+            for c, v, n in bounds
+        ])  # fmt: skip
         if beyond.any() and not beyond.all():
             # What would leave its bounds where it does nothing stays there, as in a fit.
             inside = np.flatnonzero(~beyond)

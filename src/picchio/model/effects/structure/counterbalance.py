@@ -28,7 +28,7 @@ class Counterbalance(Effect):
     )
     meaning = "a weight, a spring or a gas cylinder carries part of the load of the joint"
     mark = "spring"
-    usual = 7
+    usual = 10
     takes = "motion"
     told_by = "slowly through the joint's whole range, once with a known mass at the tool"
     tried = ({"cosine": 500.0}, {"spring": -1e4})
