@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+import trial
 
 import picchio
 from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 from picchio.model.effects.registry import effect_class, from_dict
 from picchio.model.geometry import Geometry
 from picchio.model.model import Model
@@ -68,6 +70,34 @@ CASES = {
 def test_a_world_and_the_model_agree(robot, name):
     cause, (target, values), share = CASES[name]
     assert left(robot, cause, effect_class(name)(target, **values)) < share
+
+
+FOUND = {
+    "coupled_joints": ("belt_coupling", "stiffness", "stiffness"),
+    "loose_bolt": ("loose_bolt", "change", "stiffness"),
+    "sprung_pack": ("absorber", "mass", "mass"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hidden", FOUND)
+def test_it_is_found_from_blows(robot, hidden):
+    effect, parameter, known = FOUND[hidden]
+    case = {"robot": ARM, "kind": "outside", "effect": hidden, "snr": 40, "draw": 0, "records": 9}
+    campaign, truth = trial.make(case)
+    found = diagnose_percussion(robot, campaign, workers=1).diagnosis
+    (cause,) = found.causes
+    assert cause.effect == effect
+    assert cause.parameters[parameter].value == pytest.approx(
+        truth["causes"][0]["parameters"][known], rel=0.01
+    )
+
+
+def test_what_a_trial_leaves_out_is_in_the_catalogue():
+    for hidden, names in outside.IN_CATALOGUE.items():
+        assert hidden in outside.EFFECTS
+        assert trial.outside(hidden) == names
+        assert all(effect_class(name) for name in names)
 
 
 def body_at(chain, body, mass, centre, inertia):
