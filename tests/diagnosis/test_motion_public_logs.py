@@ -84,8 +84,8 @@ def test_its_load_is_told_with_its_centre_of_mass(ur10e, unloaded):
     found = diagnose_motion(robot, Campaign.from_records(logs), given=unloaded)
     load = next(c.parameters for c in found.causes if c.effect == "payload_body")
     where = [load[axis].value for axis in "xyz"]
-    np.testing.assert_allclose(where, [0.029, 0.154, -0.165], atol=0.015)
-    assert load["mass"].value == pytest.approx(2.805, rel=0.2)
+    np.testing.assert_allclose(where, [0.029, 0.154, -0.165], atol=0.005)
+    assert load["mass"].value == pytest.approx(2.805, rel=0.05)
     assert found.gain.explained > 0.98
 
 
