@@ -39,17 +39,6 @@ def tuned_mass(bench: Bench, _, p):
 
 
 @effect
-def sprung_pack(bench: Bench, _, p):
-    """A mass on a spring at the tool, the same along x, y and z: kg, N/m, N s/m."""
-    body, turn, offset = bench.chain.tool, bench.chain.tool_rotation, bench.chain.tool_offset
-    for number, axis in enumerate(np.eye(3)):
-        name, mass = f"pack {number}", p["mass"] if number == 2 else 0.0
-        bench.chain = bench.chain.hang(name, body, turn, offset, axis, True, mass)
-        bench.soft[name] = p["stiffness"], p["damping"]
-        body, turn, offset = len(bench.chain.names) - 1, np.eye(3), np.zeros(3)
-
-
-@effect
 def coupled_joints(bench: Bench, joints, p):
     """Off-diagonal stiffness (N m/rad) between two joints."""
     n = len(bench.springs)
@@ -159,7 +148,6 @@ def counterbalance(bench: Bench, joint, p):
 # What the catalogue has of them by now: a trial of what is outside leaves these out.
 IN_CATALOGUE = {
     "tuned_mass": {"absorber"},
-    "sprung_pack": {"absorber"},
     "coupled_joints": {"belt_coupling"},
     "loose_bolt": {"loose_bolt"},
     "counterbalance": {"counterbalance"},
@@ -197,10 +185,6 @@ def draw(name, rng, size, groups, joints, factor=1.0):
         f = float(size.frequencies[:3].mean() * rng.uniform(0.7, 1.5))
         ratio = {"damping_ratio": 0.02, "frequency": f}
         return "tool", {"mass": between(0.03, 0.06) * size.mass, **ratio, **xyz}
-    if name == "sprung_pack":
-        mass = between(0.03, 0.06) * size.mass
-        w = 2.0 * np.pi * float(size.frequencies[:3].mean() * rng.uniform(0.7, 1.5))
-        return "tool", {"mass": mass, "stiffness": mass * w * w, "damping": 0.04 * mass * w}
     if name == "coupled_joints":
         other = str(rng.choice([name for name in joints if name != joint]))
         both = np.sqrt(k * size.springs[size.index(other)])

@@ -45,7 +45,6 @@ ZERO = {
     "mount_resonance": {"frequency": 1e6, "damping_ratio": 0.7},
     "mains_hum": {"amplitude": 0.0, "frequency": 50.0},
     "tuned_mass": {"mass": 1e-7, "frequency": 15.0, "damping_ratio": 0.02, "x": 1, "y": 0, "z": 0},
-    "sprung_pack": {"mass": 1e-7, "stiffness": 1e-3, "damping": 1e-6},
     "coupled_joints": {"stiffness": 0.0},
     "quadratic_damping": {"damping": 0.0},
     "loose_bolt": {"stiffness": 0.0},
