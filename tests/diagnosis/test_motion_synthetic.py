@@ -71,7 +71,7 @@ def test_two_at_once():
     ("effect", "gone"),
     [
         ({("coulomb", 1): 30.0}, {"coulomb_friction"}),
-        ({"payload": 8.0}, {"payload"}),
+        ({"payload": 8.0}, {"payload", "link_inertia"}),
         ({("offset", 2): 15.0}, {"torque_offset", "asymmetric_friction"}),
         ({("ripple", 0): 20.0}, {"torque_ripple"}),
     ],
@@ -99,7 +99,8 @@ def test_a_slide_cannot_tell_payload_inertia_and_gain_apart():
     diagnosis = diagnose_motion(robot, Campaign.from_records(records))
     assert diagnosis.verdict == "ambiguous"
     every = labels(diagnosis) | {pair for each in diagnosis.alternatives for pair in each}
-    assert every == {("payload", "tool"), ("joint_inertia", "slide"), ("torque_gain", "slide")}
+    assert every == {("payload", "tool"), ("joint_inertia", "slide"), ("torque_gain", "slide"),
+                     ("link_inertia", "carriage")}  # fmt: skip
     assert diagnosis.next_measurement["why"]
     assert diagnosis.causes[0].parameters["mass"].value == pytest.approx(40.0, rel=0.02)
 

@@ -26,6 +26,7 @@ from picchio.diagnosis.percussion.diagnosis import diagnose_percussion  # noqa: 
 from picchio.model.effects.registry import catalogue  # noqa: E402
 from worlds import campaign as worlds  # noqa: E402
 from worlds import cases  # noqa: E402
+from worlds.outside import IN_CATALOGUE  # noqa: E402
 
 # Parameters whose error says nothing: what a handful of draws realises of a spread or a share,
 # conventions that the worlds fix, and what `latent` effects tell in another way.
@@ -118,6 +119,11 @@ def make(case, salt=0):
     )
 
 
+def outside(effect):
+    """Names of the catalogue that stand for an effect of `worlds.outside`."""
+    return IN_CATALOGUE.get(effect, set())
+
+
 def run(case, salt=0, without=(), method="diagnose", workers=1):
     """Make, diagnose and judge one case: a flat dictionary.
 
@@ -136,6 +142,9 @@ def run(case, salt=0, without=(), method="diagnose", workers=1):
         without = {
             name for cause in truth["causes"] for name in class_of(cause["effect"], cause["target"])
         }
+    # What is outside of the catalogue stays outside where the catalogue has learnt it.
+    hidden = {name for cause in truth["causes"] for name in outside(cause["effect"])}
+    without = {*without, *(hidden if case["kind"] == "outside" else ())}
     robot = picchio.load_robot(case["robot"])
     began, spent = time.monotonic(), time.process_time()
     if method == "diagnose":

@@ -409,7 +409,7 @@ def test_what_is_tried_of_an_effect_changes_what_is_read(problem, scales, name):
         moved = problem.residuals((effect,))
         return sum(float(((a - b) ** 2).sum()) for a, b in zip(moved, plain, strict=True))
 
-    targets = kind.applies(evidence_of(problem))
+    targets = kind.targets(evidence_of(problem))
     tried = {target: kind(target).trials(scales) for target in targets}
     assert all(tried.values())
     assert any(

@@ -145,6 +145,15 @@ def counterbalance(bench: Bench, joint, p):
     bench.coupling[i, i] += p["stiffness"] * np.cos(bench.pose[i] - p["angle"])
 
 
+# What the catalogue has of them by now: a trial of what is outside leaves these out.
+IN_CATALOGUE = {
+    "tuned_mass": {"absorber"},
+    "coupled_joints": {"belt_coupling"},
+    "loose_bolt": {"loose_bolt"},
+    "counterbalance": {"counterbalance"},
+}
+
+
 def draw(name, rng, size, groups, joints, factor=1.0):
     """(target, parameters) of an outside effect.
 

@@ -48,7 +48,9 @@ class ManyPoses:
         first: Changes | None = None
         names = self._robot.flexible_names
         for k, row in enumerate(self.stiffness):
-            changes = Changes(self._robot, dict(zip(names, row, strict=True)), Conditions())
+            springs = dict(zip(names, row, strict=True))
+            angles = self._poses[k, self._robot.flexible_index]
+            changes = Changes(self._robot, springs, Conditions(), angles)
             for effect in self._model.ordered:
                 effect.structure(changes)
             self.stiffness[k] = list(changes.springs.values())

@@ -34,7 +34,10 @@ class Motion:
         gains: joint -> factor on what the drive reports.
         delays: channel group -> s.
         signs: `direction`, kept.
-        tool_load: () -> joint -> torque for each kg at the tool frame's origin.
+        tool: the tool frame.
+        loads: frame -> joint -> (m, 10) torque for one of each of the ten numbers, as in
+            `picchio.model.inertia`, of a body fixed in the frame.
+        link: link -> (10,) those numbers of the link by the robot's files, in its frame.
     """
 
     rate: float
@@ -45,7 +48,9 @@ class Motion:
     body: dict[str, FloatArray]
     stiffness: Mapping[str, float]
     gear_ratio: Mapping[str, float]
-    tool_load: Callable[[], Mapping[str, FloatArray]]
+    tool: str
+    loads: Callable[[str], Mapping[str, FloatArray]]
+    link: Callable[[str], FloatArray]
     added: list[tuple[str, str, FloatArray]] = field(default_factory=list)
     gains: dict[str, float] = field(default_factory=dict)
     delays: dict[str, float] = field(default_factory=dict)
@@ -70,6 +75,16 @@ class Motion:
             self.signs[joint] = sign
         return self.signs[joint]
 
+    def before(self, joint: str) -> str | None:
+        """The joint before one in the robot's order; None of the first.
+
+        Args:
+            joint: its name.
+        """
+        names = list(self.velocity)
+        place = names.index(joint)
+        return names[place - 1] if place else None
+
     # What effects may do ---------------------------------------------------------------------
 
     def add_body_torque(self, joint: str, torque: FloatArray) -> None:
@@ -80,6 +95,16 @@ class Motion:
             torque: (m,) N m or N.
         """
         self.body[joint] = self.body[joint] + torque
+
+    def add_body(self, frame: str, ten: FloatArray) -> None:
+        """Add the torques of a body that is fixed in a frame.
+
+        Args:
+            frame: of a link or the tool.
+            ten: (10,) what the body is; see `picchio.model.inertia`.
+        """
+        for joint, load in self.loads(frame).items():
+            self.add_body_torque(joint, load @ ten)
 
     def add(self, kind: str, joint: str, values: FloatArray) -> None:
         """Add to what a joint's drive or encoders read.

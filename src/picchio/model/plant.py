@@ -12,6 +12,7 @@ from picchio.core.errors import InputError
 from picchio.model.conditions import Conditions
 from picchio.model.expansion import Motion
 from picchio.model.geometry import Geometry
+from picchio.model.inertia import point_masses
 from picchio.model.linear_system import shared_damping
 from picchio.model.system import Element, ElementKind, VibratingSystem
 from picchio.robot.dynamics.rigid_model import Mass
@@ -23,6 +24,8 @@ Row = dict[str, float]
 _MASSLESS = 1e-9
 # What then stands for the unknown own inertia of what yields, relative to all that it carries.
 _OWN_INERTIA = 1e-4
+# How far apart the point masses stand that make up a body; any size does as well.
+_REACH = 0.1  # m
 
 
 @dataclass
@@ -42,6 +45,7 @@ class Changes:
         robot: the robot.
         springs: stiffness of every flexible joint by name, N m/rad.
         conditions: when and how warm.
+        angles: (n,) rad or m, of the flexible joints in this pose.
 
     Attributes:
         damping_scale: factor on all modal damping ratios.
@@ -55,9 +59,14 @@ class Changes:
     """
 
     def __init__(
-        self, robot: FlexibleRobot, springs: dict[str, float], conditions: Conditions
+        self,
+        robot: FlexibleRobot,
+        springs: dict[str, float],
+        conditions: Conditions,
+        angles: FloatArray,
     ) -> None:
         self.robot = robot
+        self.angles = dict(zip(springs, angles.tolist(), strict=True))
         self.springs = springs
         self.conditions = conditions
         self.damping_scale = 1.0
@@ -69,6 +78,8 @@ class Changes:
         self.added_inertias: list[tuple[str, float]] = []
         self._springs: list[_Spring] = []
         self._anchors: list[_Spring] = []
+        self._couplings: list[tuple[str, str, float]] = []
+        self._hanging: list[tuple[str, list[str], float]] = []
         self._elements: list[tuple[Element, str]] = []
         self._contacts: list[Element] = []
 
@@ -90,6 +101,16 @@ class Changes:
     def add_mass(self, weight: float, link: str, point: tuple[float, ...] | None = None) -> None:
         """Add `weight` times a link's own inertia, or kg at a point (3,) m of it."""
         self._masses.append((weight, link, point))
+
+    def add_body(self, link: str, ten: FloatArray) -> None:
+        """Add a body that is fixed in a link, as in `picchio.model.inertia`.
+
+        Args:
+            link: its name, or the tool frame's.
+            ten: (10,) mass, first moments and inertia in the link's frame.
+        """
+        for weight, point in point_masses(ten, _REACH):
+            self.add_mass(weight, link, point)
 
     def add_inertia(self, joint: str, inertia: float) -> None:
         """Add a constant inertia that turns with the link side, kg m^2."""
@@ -113,6 +134,46 @@ class Changes:
     def add_damper(self, joint: str, damping: float) -> None:
         """Add a viscous damper beside a joint's spring, N m s/rad."""
         self._springs.append(_Spring(self.check_joint(joint), 0.0, damping, deflection=True))
+
+    def add_coupling(self, joint: str, stiffness: float) -> None:
+        """Let a joint's deflection load the flexible joint before it, and the other way, N m/rad.
+
+        Args:
+            joint: the outer of the two.
+            stiffness: off the diagonal.
+
+        Raises:
+            InputError: no flexible joint, or the first one.
+        """
+        names = list(self.springs)
+        place = names.index(self.check_joint(joint))
+        if place == 0:
+            raise InputError("is the first flexible joint: none is before it", key="target",
+                             value=joint, choices=names[1:])  # fmt: skip
+        self._couplings.append((names[place - 1], joint, stiffness))
+
+    def add_hanging(self, link: str, mass: float, stiffness: float, damping: float) -> None:
+        """Hang a mass at a link's origin on a spring, the same in all directions.
+
+        Args:
+            link: its name, or the tool frame's.
+            mass: kg.
+            stiffness: N/m.
+            damping: N s/m.
+        """
+        self.add_mass(mass, link, (0.0, 0.0, 0.0))
+        names = [f"hanging.{link}.{axis}" for axis in "xyz"]
+        for name in names:
+            self.add_coordinate(name, stiffness, damping, mass)
+        self._hanging.append((link, names, mass))
+
+    def angle(self, joint: str) -> float:
+        """Where a flexible joint stands in this pose, rad or m.
+
+        Args:
+            joint: its name.
+        """
+        return self.angles[self.check_joint(joint)]
 
     def add_anchor(self, link: str, stiffness: float, damping: float) -> None:
         """Tie a link's origin to the world with a spring (N/m) and damper (N s/m)."""
@@ -139,6 +200,7 @@ class Changes:
         return not (
             self._springs
             or self._anchors
+            or self._couplings
             or self._elements
             or self._contacts
             or len(self.coordinates) > len(self.springs)
@@ -167,7 +229,8 @@ class Plant(Changes):
     ) -> None:
         names = geometry.robot.flexible_names
         springs = dict(zip(names, geometry.stiffness, strict=True))
-        super().__init__(geometry.robot, springs, conditions or Conditions())
+        angles = geometry.pose[geometry.robot.flexible_index]
+        super().__init__(geometry.robot, springs, conditions or Conditions(), angles)
         self.geometry = geometry
         self.gravity_stiffness = gravity_stiffness
 
@@ -234,6 +297,12 @@ class Plant(Changes):
         for name, value in self.added_inertias:
             mass = mass.copy()
             mass[names.index(name), names.index(name)] += value
+        for link, hung, weight in self._hanging:
+            mass = mass.copy()
+            at = [names.index(name) for name in hung]
+            moves = weight * geometry.motion(link).jacobian[:3, taken]
+            mass[np.ix_(at, wide)] += moves
+            mass[np.ix_(wide, at)] += moves.T
         mass = self._with_own_inertia(mass)
 
         joints = np.array(list(self.springs.values()))
@@ -249,6 +318,9 @@ class Plant(Changes):
             vector = self._vector(row)
             stiffness += spring.stiffness * np.outer(vector, vector)
             dampers += spring.damping * np.outer(vector, vector)
+        for first, second, coupling in self._couplings:
+            one, other = (self._vector(self.deflection(j)) for j in (first, second))
+            stiffness += coupling * (np.outer(one, other) + np.outer(other, one))
         for anchor in self._anchors:
             jacobian = np.zeros((3, size))
             jacobian[:, wide] = geometry.motion(anchor.of).jacobian[:3, taken]

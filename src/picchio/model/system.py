@@ -18,6 +18,7 @@ class ElementKind(IntEnum):
     BOUC_WEN = 2
     COULOMB = 3
     CONTACT = 4
+    BILINEAR = 5
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class Element:
         kind: what it does.
         parameters: BACKLASH: stiffness, gap, rest deflection, rest torque; CUBIC: N m/rad^3;
             BOUC_WEN: torque, yield deflection; COULOMB: torque, smoothing rate; CONTACT:
-            stiffness, damping, preload. SI.
+            stiffness, damping, preload; BILINEAR: more stiffness where positive, N m/rad. SI.
     """
 
     kind: ElementKind

@@ -28,6 +28,7 @@ PLACES: Mapping[str, str] = {
 
 TARGETS: Mapping[str, tuple[str, str]] = {
     "joint": ("a flexible joint", "joint_1"),
+    "joint pair": ("the outer of two joints in a row", "joint_2"),
     "link": ("a link", "link_2"),
     "joint or link": ("a joint or a link", "joint_1"),
     "tool": ('always "tool"', "tool"),

@@ -68,6 +68,7 @@ def diagnose_motion(
     known: Sequence[Estimate] = (),
     train: Collection[str] = (),
     held_out: Collection[str] = (),
+    given: Diagnosis | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Diagnosis:
     """What the simulation gets wrong about a moving robot, why, and the gain of knowing it.
@@ -85,6 +86,8 @@ def diagnose_motion(
             that are not needed here.
         train: names of records to fit to; see `split`.
         held_out: names of records to judge by.
+        given: of other motion records of this robot, such as those without a load: what it found
+            is part of the robot here. Friction, which no two days have in common, is fitted anew.
         progress: told (step, steps).
 
     Returns:
@@ -105,6 +108,8 @@ def diagnose_motion(
     judge_on = System(robot, outside, system.cutoff) if outside else system
     kinds = motion_effects(without)
     start = baseline(system, campaign.tolerance.force)
+    if given is not None:
+        start = given.details["extended"].given()
     before = fit(system, start)
     informed = _informed(system, start, known)
     found, steps = select(system, informed, kinds, progress or (lambda done, total: None))

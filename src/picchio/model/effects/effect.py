@@ -29,9 +29,12 @@ if TYPE_CHECKING:
     from picchio.model.motion import Motion
     from picchio.model.plant import Changes
     from picchio.model.sensing import Sensors
+    from picchio.robot.flexible_robot import FlexibleRobot
 
 Where = Literal["structure", "nonlinear", "blows", "over-time", "sensor", "motion"]
-TargetKind = Literal["joint", "link", "joint or link", "tool", "robot", "axis", "channel group"]
+TargetKind = Literal[
+    "joint", "joint pair", "link", "joint or link", "tool", "robot", "axis", "channel group"
+]
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,10 @@ class Parameter:
         size: of a linear one, in what steps it is fitted from 0; see `size_beside` where 0.
         share: of the other parameters' size, where they start away from 0 and it does not.
         by_inverse: of one that is neutral at infinity: whether half of it does twice as much.
+        shape: whether it says where or how, not how much: by itself it changes nothing.
+        whole: whether it is a whole number: tried, not fitted.
+        spread: what is known beforehand: its standard deviation about `neutral`; 0: nothing.
+        moving: the smallest value that a motion may tell; as `lower` where None.
     """
 
     name: str
@@ -62,6 +69,10 @@ class Parameter:
     size: float = 0.0
     share: float = 1.0
     by_inverse: bool = False
+    shape: bool = False
+    whole: bool = False
+    spread: float = 0.0
+    moving: float | None = None
 
     def size_beside(self, typical: float) -> float:
         """The size of a linear parameter that starts at 0.
@@ -149,6 +160,8 @@ class Effect(ABC):
             for it.
         urdf: attribute of URDF's <dynamics> -> the parameter that it states.
         needs: the effect without which, at the same target, this one has no meaning.
+        refines: the effect that this one tells with more numbers: where that one shows, too, it
+            takes the place of one that was found, with the values that they share.
         usual: where effects explain a motion equally well, the smallest comes first.
         elastic: in a motion, it winds the gear up, which is looked for once loads are known.
         periodic: in a motion, a wave of `order` periods a turn, found as a line in the residual.
@@ -182,6 +195,7 @@ class Effect(ABC):
     sidecar: ClassVar[str] = ""
     urdf: ClassVar[Mapping[str, str]] = {}
     needs: ClassVar[str] = ""
+    refines: ClassVar[str] = ""
     usual: ClassVar[int] = 99
     elastic: ClassVar[bool] = False
     periodic: ClassVar[bool] = False
@@ -337,6 +351,17 @@ class Effect(ABC):
         """
         sizes = self.early_trials(scales) if early else self.trials(scales)
         return [self.bounded(**values) for values in sizes]
+
+    def follows(self, robot: FlexibleRobot) -> dict[str, tuple[float, str]]:
+        """Quantities that follow from its values, for people.
+
+        Args:
+            robot: that it is at work in.
+
+        Returns:
+            name -> value and unit, SI; none of its parameters.
+        """
+        return {}
 
     # Where it may be at work -----------------------------------------------------------------
 

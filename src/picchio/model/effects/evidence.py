@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -12,6 +13,7 @@ from picchio.robot.flexible_robot import FlexibleRobot
 
 _ANYWHERE: dict[TargetKind, Callable[[FlexibleRobot], Iterable[str]]] = {
     "joint": lambda robot: robot.joint_names,
+    "joint pair": lambda robot: robot.joint_names[1:],
     "joint or link": lambda robot: (*robot.joint_names, *robot.tree.links),
     "link": lambda robot: robot.tree.links,
     "axis": lambda _: BASE_AXES,
@@ -24,6 +26,7 @@ LACKING = {
     "reshaped": "blows of a force that was measured have no other shape to turn into",
     "days": "the records are not of several known dates",
     "kelvin": "the records are not of several known temperatures",
+    "motion": "blows alone tell it in fewer numbers: a simpler effect is looked for in its place",
 }
 """What an effect may take of the records (`Effect.takes`), and what is wrong without it."""
 
@@ -69,6 +72,7 @@ class Evidence:
         kelvin: over which their temperatures are spread; 0 where they are not known.
         driven: joints that move and whose drive's torque was recorded.
         wound: joints that move and that have encoders on both sides of the gear.
+        swept: joints that turn through so much in one record that a torque over the angle shows.
     """
 
     robot: FlexibleRobot
@@ -84,6 +88,7 @@ class Evidence:
     kelvin: float = 0.0
     driven: tuple[str, ...] = ()
     wound: tuple[str, ...] = ()
+    swept: tuple[str, ...] = ()
 
     @property
     def programmed(self) -> bool:
@@ -110,6 +115,10 @@ class Evidence:
         """
         if kind in ("joint", "joint or link"):
             return list(self.driven if self.motion else self.robot.flexible_names)
+        if kind == "joint pair":
+            names = self.driven if self.motion else self.robot.flexible_names
+            every = self.robot.joint_names
+            return [b for a, b in itertools.pairwise(every) if a in names and b in names]
         if kind == "link":
             joints = self.robot.tree.joints
             return [joints[name].child for name in self.robot.joint_names if name in joints]

@@ -143,7 +143,7 @@ def friction_curve(effects: Sequence[Effect], joint: str, fastest: float) -> Cal
         motion = Motion(
             rate=1e9, angle={joint: zero}, velocity={joint: grid}, acceleration={joint: zero},
             still={joint: 0.0}, body={joint: zero}, stiffness={}, gear_ratio={joint: 1.0},
-            tool_load=dict,
+            tool="", loads=lambda frame: {}, link=lambda link: np.zeros(10),
         )  # fmt: skip
         effect.motion(motion)
         for _, name, values in motion.added:

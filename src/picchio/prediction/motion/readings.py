@@ -10,9 +10,11 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.model.effects.effect import Effect
+from picchio.model.inertia import in_frame
 from picchio.model.motion import RIPPLE, ROTOR, TORQUE, WINDUP, Motion
 from picchio.prediction.motion.filters import Band, shift, shift_smooth
 from picchio.prediction.motion.log import MotionLog
+from picchio.robot.dynamics.rigid_model import unit_inertia
 from picchio.robot.dynamics.statics import balancing
 from picchio.robot.flexible_robot import FlexibleRobot
 
@@ -39,12 +41,14 @@ class Around:
         key: what the body torque follows from.
         gains: joint -> factor on what its drive reports.
         delays: channel group -> s.
+        loaded: whether any effect's own term depends on what the bodies take.
     """
 
     body: Mapping[str, FloatArray]
     key: Hashable
     gains: Mapping[str, float]
     delays: Mapping[str, float]
+    loaded: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +75,8 @@ class Predictor:
         self._moving = frozenset(log.moving)
         self._terms: dict[Hashable, _Term] = {}
         self._heavy: dict[type[Effect], bool] = {}
+        self._rests: dict[type[Effect], bool] = {}
+        self._alone: tuple[Effect, Mapping[str, FloatArray]] | None = None
 
     def concerns(self, effect: Effect) -> bool:
         """Whether the effect can show in this record: a joint that stands tells nothing."""
@@ -93,7 +99,8 @@ class Predictor:
                 gains[name] = gains.get(name, 1.0) * gain
             for group, delay in term.delays.items():
                 delays[group] = delays.get(group, 0.0) + delay
-        return Around(loaded.body, key, gains, delays)
+        rests = any(self._rests_on_load(e) for e in effects if e not in heavy)
+        return Around(loaded.body, key, gains, delays, rests)
 
     def predict(
         self,
@@ -153,9 +160,19 @@ class Predictor:
             None where the effect acts through others' terms, too (masses, gains, delays): the
             whole prediction has to be made twice.
         """
-        if effect.target_kind != "joint":
-            return None
         found: Readings = {TORQUE: {}, RIPPLE: {}, WINDUP: {}}
+        if effect.target_kind != "joint":
+            if around.loaded or not (self._is_body(effect) or self._is_body(other)):
+                return None
+            # Of what no other term depends on, the bodies' torques are all that changes.
+            before = self._bodies(effect)
+            motion = self._motion(self.nominal.body)
+            other.motion(motion)
+            found[TORQUE] = {
+                j: (x - before[j]) / step for j, x in motion.body.items() if x is not before[j]
+            }
+            self._report(found, around)
+            return found
         if not self.concerns(effect):
             return found
         if name in effect.linear:
@@ -205,6 +222,26 @@ class Predictor:
                 return changed
             self._heavy[kind] = changed
         return self._heavy[kind]
+
+    def _bodies(self, effect: Effect) -> Mapping[str, FloatArray]:
+        """The bodies' torques with this effect alone; those of the last one are kept."""
+        if self._alone is None or self._alone[0] != effect:
+            motion = self._motion(self.nominal.body)
+            effect.motion(motion)
+            self._alone = effect, motion.body
+        return self._alone[1]
+
+    def _rests_on_load(self, effect: Effect) -> bool:
+        """Whether what an effect adds depends on the load of the gears."""
+        if not self.concerns(effect):
+            return False
+        kind = type(effect)
+        if kind not in self._rests:
+            motion = self._motion(self.nominal.body)
+            motion.body = loads = _Watched(motion.body)
+            effect.motion(motion)
+            self._rests[kind] = loads.seen
+        return self._rests[kind]
 
     def _parts(self, effect: Effect, around: Around) -> list[tuple[float, Part]]:
         """What an effect adds, each with a factor."""
@@ -288,10 +325,9 @@ def rigid_motion(robot: FlexibleRobot, log: MotionLog, band: Band) -> Motion:
     index = {joint: i for i, joint in enumerate(robot.joint_names)}
 
     @cache
-    def tool_load() -> dict[str, FloatArray]:
-        frame = robot.rigid.frame(robot.tool_frame)
-        load = robot.rigid.point_load(poses, velocities, accelerations, frame)
-        return {joint: load[:, index[joint]] for joint in q}
+    def loads(frame: str) -> dict[str, FloatArray]:
+        found = body_loads(robot, frame, poses, velocities, accelerations)
+        return {joint: found[:, index[joint]] for joint in q if np.any(found[:, index[joint]])}
 
     stiffness = dict(zip(robot.flexible_names, robot.stiffness, strict=True))
     ratio = {joint.name: joint.gear_ratio for joint in robot.flexible_joints}
@@ -304,8 +340,45 @@ def rigid_motion(robot: FlexibleRobot, log: MotionLog, band: Band) -> Motion:
         body={joint: torque[:, index[joint]] for joint in q},
         stiffness={joint: float(k) for joint, k in stiffness.items()},
         gear_ratio={joint: abs(ratio.get(joint) or 1.0) for joint in q},
-        tool_load=tool_load,
+        tool=robot.tool_frame,
+        loads=loads,
+        link=lambda link: np.asarray(unit_inertia(robot.tree, link, None).toDynamicParameters()),
     )
+
+
+def body_loads(
+    robot: FlexibleRobot,
+    frame: str,
+    poses: FloatArray,
+    velocities: FloatArray,
+    accelerations: FloatArray,
+) -> FloatArray:
+    """Torques (m, nv, 10) for one of each of the ten numbers of a body fixed in a frame, N m.
+
+    Args:
+        robot: kinematics and gravity.
+        frame: of a link or the tool.
+        poses: (m, nv) rad or m.
+        velocities: (m, nv) a second.
+        accelerations: (m, nv) a second squared.
+    """
+    import pinocchio as pin
+
+    rigid = robot.rigid
+    model, data = rigid._model, rigid._data()
+    place = model.frames[rigid.frame(frame)]
+    own = slice(10 * (place.parentJoint - 1), 10 * place.parentJoint)
+    found = np.zeros((len(poses), model.nv, 10))
+    if place.parentJoint:
+        follow = rigid._follow
+        for i, state in enumerate(zip(
+            poses @ follow.T + rigid._offset, velocities @ follow.T, accelerations @ follow.T,
+            strict=True,
+        )):  # fmt: skip
+            every = np.array(pin.computeJointTorqueRegressor(model, data, *state))
+            found[i] = every.reshape(model.nv, -1)[:, own]  # one row comes flattened
+    turned = in_frame(place.placement.rotation, place.placement.translation)
+    return np.einsum("mjk,jn->mnk", found @ turned, rigid._follow)
 
 
 def _stack(robot: FlexibleRobot, series: dict[str, FloatArray], samples: int) -> FloatArray:

@@ -355,6 +355,8 @@ def _spring_torque(
             torque[joint] = torque[joint] - p[0] * d + p[0] * beyond - p[3]
         elif element.kind == ElementKind.CUBIC:
             torque[joint] = torque[joint] + p[0] * d**3
+        elif element.kind == ElementKind.BILINEAR:
+            torque[joint] = torque[joint] + p[0] * np.maximum(d, 0.0)
     return torque
 
 

@@ -31,6 +31,8 @@ def element_force(kind, parameters, d, rate, state):
     if kind == 4:  # contact: unilateral
         push = parameters[2] - parameters[0] * d - parameters[1] * rate
         return max(push, 0.0) - parameters[2]
+    if kind == 5:  # bilinear: more stiffness, or less, on one side
+        return -parameters[0] * max(d, 0.0)
     return 0.0
 
 
@@ -74,6 +76,11 @@ def _straight(kind, parameters, d0, rate0, d1, rate1, length, out):
         if low + rest >= -half and high + rest <= half:
             spring = stiffness
         elif not (low + rest >= half or high + rest <= -half):
+            return False
+    elif kind == 5:
+        if low >= 0.0:
+            spring = -parameters[0]
+        elif high > 0.0:
             return False
     else:
         middle = 3.0 * rise / length - rate0 - rate1

@@ -28,7 +28,7 @@ from picchio.vibration.integration.step_kernel import fastest_rate, step_matrice
 
 # From so many time constants of the fastest mode on, matrices are cheaper than a series.
 _STIFF = 30.0
-_BACKLASH, _BOUC_WEN, _CONTACT = 0, 2, 4
+_BACKLASH, _BOUC_WEN, _CONTACT, _BILINEAR = 0, 2, 4, 5
 
 
 @njit(cache=True, nogil=True)
@@ -261,7 +261,7 @@ def integrate(
             crossed = False
             if kinds is not None:
                 for e in range(kinds.size):
-                    if kinds[e] == _BACKLASH or kinds[e] == _CONTACT:
+                    if kinds[e] == _BACKLASH or kinds[e] == _CONTACT or kinds[e] == _BILINEAR:
                         straight = add_kink(
                             y, new, length, rows[e], pulls[e], kinds[e], parameters[e], bend,
                             first, final,
@@ -376,7 +376,7 @@ def integrate_with_friction(
             for i in range(n):
                 f1[i] = own[i] * force1[k] + p1[i]
             for e in range(elements):
-                if kinds[e] == _BACKLASH or kinds[e] == _CONTACT:
+                if kinds[e] == _BACKLASH or kinds[e] == _CONTACT or kinds[e] == _BILINEAR:
                     add_kink(
                         y, new, lengths[k], rows[e], pulls[e], kinds[e], parameters[e], bend, f0,
                         f1,

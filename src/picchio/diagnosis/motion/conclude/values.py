@@ -8,6 +8,7 @@ import numpy as np
 
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.motion.fit.least_squares import Fit
+from picchio.diagnosis.motion.fit.state import with_coordinate
 from picchio.diagnosis.result import Correlation, Value, unit_of
 from picchio.model.effects.effect import Effect
 from picchio.robot.units import SLIDING
@@ -31,6 +32,16 @@ def parameters(system: System, current: Fit, effect: Effect) -> dict[str, Value]
         if p.name in effect.inverse:
             spread *= value**2
         found[p.name] = Value(float(value), spread, unit_of(robot, effect.target, p.unit))
+    index = [i for i, c in enumerate(current.coordinates) if c.index == number]
+    block, here = current.covariance[np.ix_(index, index)], effect.follows(robot)
+    slopes = dict.fromkeys(here, np.zeros(0))
+    for c in (current.coordinates[i] for i in index):
+        moved = with_coordinate(effect, c.name, c.value + c.step).follows(robot)
+        for name, (value, _) in here.items():
+            slopes[name] = np.append(slopes[name], (moved[name][0] - value) / c.step)
+    for name, (value, unit) in here.items():
+        spread = math.sqrt(max(float(slopes[name] @ block @ slopes[name]), 0.0))
+        found[name] = Value(value, spread, unit)
     if "scale" in effect.inverse and "scale" in found:
         stated = dict(zip(robot.flexible_names, robot.stiffness, strict=True))
         documented = float(stated[effect.target])

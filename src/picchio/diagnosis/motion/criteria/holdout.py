@@ -26,8 +26,8 @@ def validate(
 ) -> tuple[Fit, list[tuple[Effect, dict[str, float]]]]:
     """The fit without causes that lose on records held out, and those causes.
 
-    Where two or more records are held out, a cause has to gain on each. In any case no cause of
-    a joint stays while that joint's own channel is predicted worse than without any cause.
+    Where two or more records are held out, a cause has to gain on each. In any case no cause
+    stays that loses in a channel that is predicted worse than without any cause.
 
     Args:
         train: the equations fitted to.
@@ -69,16 +69,22 @@ def validate(
 def _withdrawn(
     train: System, held_out: System, current: Fit, before: State
 ) -> dict[int, dict[str, float]]:
-    """The worst effect of each joint whose channel is worse off: number -> its gains."""
+    """The worst effect of each channel that is worse off: number -> its gains by channel."""
     groups = [g for g in worse_off(held_out, before, current.state) if g[0] != RIPPLE]
     effects = current.state.effects
     gone: dict[int, dict[str, float]] = {}
     gains: list[dict[str, float]] = []
-    for joint in dict.fromkeys(joint for _, joint in groups):
+    for kind, joint in groups:
+        gains = gains or _gains(train, held_out, current, by_channel=True)
+        channel = f"{kind}.{joint}"
         own = [i for i, e in enumerate(effects) if e.target == joint and e.target_kind == "joint"]
+        if not own:
+            # What acts in several joints loses in this one, and on the whole.
+            whole = _gains(train, held_out, current)
+            own = [i for i, found in enumerate(gains)
+                   if found.get(channel, 0.0) < 0.0 and sum(whole[i].values()) <= 0.0]  # fmt: skip
         if own:
-            gains = gains or _gains(train, held_out, current)
-            worst = min(own, key=lambda i: sum(gains[i].values()))
+            worst = min(own, key=lambda i: gains[i].get(channel, 0.0))
             gone[worst] = gains[worst]
     return gone
 
@@ -106,10 +112,18 @@ def _fails(gains: dict[str, float], ripple: bool) -> bool:
     return mean <= 0.0 or worst <= (-_LITTLE if ripple else 0.0)
 
 
-def _gains(train: System, held_out: System, current: Fit) -> list[dict[str, float]]:
+def _gains(
+    train: System, held_out: System, current: Fit, by_channel: bool = False
+) -> list[dict[str, float]]:
     """Of every effect: file -> part of the power in its equations that it takes away, linearised.
 
     Without the effect everything else is fitted anew to the training records.
+
+    Args:
+        train: the equations fitted to.
+        held_out: those of the records held out.
+        current: the fit.
+        by_channel: by channels in place of files.
     """
     weight = row_weights(train, current.level)
     left = current.columns * weight[:, None]
@@ -134,7 +148,8 @@ def _gains(train: System, held_out: System, current: Fit) -> list[dict[str, floa
             if not np.any(columns[s.rows][:, own]):
                 continue
             without = residual[s.rows] + columns[s.rows] @ change
-            sums = found.setdefault(held_out.logs[s.record].file, [0.0, 0.0])
+            name = ".".join(s.group) if by_channel else held_out.logs[s.record].file
+            sums = found.setdefault(name, [0.0, 0.0])
             sums[0] += float(np.sum((without * scale[s.rows]) ** 2))
             sums[1] += float(np.sum((residual[s.rows] * scale[s.rows]) ** 2))
         gains.append({file: (a - b) / max(a, 1e-300) for file, (a, b) in found.items()})

@@ -6,7 +6,7 @@ And by that: whether a candidate may be claimed, and whether one that was added 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,10 +26,13 @@ from picchio.diagnosis.motion.fit.stretches import (
 from picchio.model.effects.effect import Effect
 
 _TINY = 1e-300
+_ROUNDED = 1e-9
 _SAME = 0.02  # of a column's power: less of its own and others do the same already
 _LEAST_BIC = 3.0
 _LEAST_CONFIDENCE = 0.90
 _LEAST_SHARE = 0.005
+_SPOILT = 1.1  # power left in a channel over that before
+_MANY = 3  # numbers: with more, one channel could be paid for with another
 _TIE = 2.0
 _SURE = 0.95
 
@@ -49,6 +52,7 @@ class Score:
         admissible: within their bounds.
         groups: equations that it acts in.
         differences: what every stretch that was held out gains.
+        numbers: how many the records determine, those that were searched for among them.
     """
 
     gain: float
@@ -60,6 +64,7 @@ class Score:
     admissible: bool
     groups: tuple[Group, ...]
     differences: Mapping[int, float]
+    numbers: float = 1.0
 
 
 class Scorer:
@@ -134,12 +139,33 @@ class Scorer:
         if base is None:
             first = [without_added(block, index.size) for block in second]
             base = cross_validate(first, elsewhere, prior, pull, len(index))
+        # What is known beforehand of the added numbers, which start where they do nothing.
+        known = np.array([c.precision for c in coordinates])
+        towards = known * (np.array([c.centre for c in coordinates]) - neutral)
+        prior, pull = np.append(prior, known), np.append(pull, towards)
         if key is not None:
             self._bases[key] = base
         wide = cross_validate(second, elsewhere, prior, pull, len(index))
         if wide.own < _SAME:
             return None
         values = neutral + wide.solution[len(index) :]
+        bounds = zip(coordinates, values, neutral, strict=True)
+        beyond = np.array([
+            (v < c.lower - _ROUNDED and n <= c.lower) or (v > c.upper + _ROUNDED and n >= c.upper)
+            for c, v, n in bounds
+        ])  # fmt: skip
+        if beyond.any() and not beyond.all():
+            # What would leave its bounds where it does nothing stays there, as in a fit.
+            inside = np.flatnonzero(~beyond)
+            fewer = self.score(
+                columns[:, inside], [coordinates[i] for i in inside], neutral[inside],
+                searched=searched, without=without, back=back, noise=noise,
+            )  # fmt: skip
+            if fewer is None:
+                return None
+            values = neutral.copy()
+            values[inside] = fewer.values
+            return replace(fewer, values=tuple(float(v) for v in values))
         admissible = all(
             c.lower - 1e-9 <= v <= c.upper + 1e-9
             for c, v in zip(coordinates, values, strict=True)
@@ -157,7 +183,7 @@ class Scorer:
             correlation = {g: noise / self.base.level[g] ** 2 for g in groups}
             common |= correlation
         return _compare(base, wide, correlation, common, groups,
-                        columns.shape[1] + searched, tuple(float(v) for v in values),
+                        wide.determined + searched, tuple(float(v) for v in values),
                         admissible)  # fmt: skip
 
     def noise_of(self, effect: Effect) -> float | None:
@@ -210,7 +236,7 @@ def _compare(
     correlation: Mapping[Group, float],
     common: Mapping[Group, float],
     groups: tuple[Group, ...],
-    added: int,
+    added: float,
     values: tuple[float, ...],
     admissible: bool,
 ) -> Score:
@@ -229,6 +255,7 @@ def _compare(
         inside = max(base.inside[group], _TINY) / max(wide.inside[group], _TINY)
         bic += 0.5 * samples * np.log(inside)
         removed, total = removed + before - after, total + before
+        admissible = admissible and (added <= _MANY or after <= _SPOILT * before)
         for (g, number), x in base.outside.items():
             if g == group:
                 # In logarithms one bad stretch does not outvote the others; without, stretches
@@ -246,7 +273,7 @@ def _compare(
     return Score(
         gain=float(gain), rank=float(rank), bic=float(bic), share=removed / max(total, _TINY),
         confidence=sure, values=values, admissible=admissible, groups=groups,
-        differences=differences,
+        differences=differences, numbers=added,
     )  # fmt: skip
 
 
@@ -289,15 +316,20 @@ def _from_neutral(current: Fit, i: int) -> float:
     c = current.coordinates[i]
     effect = current.state.every[c.index]
     parameter = next(p for p in effect.parameters if p.name == c.name)
-    if parameter.name == "order" or parameter.logarithmic:
+    if parameter.shape or parameter.logarithmic:
         return c.value if c.name in effect.inverse else 0.0
     return c.value - parameter.neutral
 
 
 def indistinguishable(score: Score, other: Score) -> bool:
-    """Whether a rival is nearly as likely, or loses in no clear majority of the stretches."""
+    """Whether a rival is nearly as likely, or loses in no clear majority of the stretches.
+
+    One that needs more numbers to do the same loses nowhere: it has to be as likely.
+    """
     if other.rank >= score.rank - _TIE:
         return True
+    if other.numbers > score.numbers + 1.0:
+        return False
     shared = sorted(set(score.differences) | set(other.differences))
     lead = np.array([
         score.differences.get(b, 0.0) - other.differences.get(b, 0.0) for b in shared

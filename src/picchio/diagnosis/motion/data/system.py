@@ -135,13 +135,13 @@ class System:
             if readings is None:
                 return None
             found.append(readings)
-        return self._rows(effect.target, found)
+        return self._rows(effect.target if effect.target_kind == "joint" else None, found)
 
-    def _rows(self, joint: str, readings: Sequence[Readings]) -> FloatArray:
-        """(rows,) what one joint's readings are there, record by record."""
+    def _rows(self, joint: str | None, readings: Sequence[Readings]) -> FloatArray:
+        """(rows,) what one joint's readings are there, or all joints', record by record."""
         out = np.zeros(self.size)
         for s in self.segments:
-            if s.group[1] == joint and joint in readings[s.record][s.group[0]]:
+            if joint in (None, s.group[1]) and s.group[1] in readings[s.record][s.group[0]]:
                 out[s.rows] = _at(s, readings[s.record])
         return out
 

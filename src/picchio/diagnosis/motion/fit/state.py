@@ -63,6 +63,7 @@ class State:
         tolerance: relative standard deviation of that factor.
         fixed: joints whose factor an effect has taken over: it is 1.
         priors: (label, parameter, value, standard deviation) told by other records.
+        held: numbers of the nuisances that stay as they are.
     """
 
     nuisances: tuple[Effect, ...] = ()
@@ -71,6 +72,7 @@ class State:
     tolerance: float = 0.05
     fixed: frozenset[str] = frozenset()
     priors: tuple[tuple[str, str, float, float], ...] = ()
+    held: frozenset[int] = frozenset()
 
     @property
     def every(self) -> tuple[Effect, ...]:
@@ -90,6 +92,8 @@ class State:
         ]  # fmt: skip
         told = {(label, name): (value, std) for label, name, value, std in self.priors}
         for index, effect in enumerate(self.every):
+            if index in self.held:
+                continue
             for c in effect_coordinates(effect, index, rate):
                 if (effect.label, c.name) in told:
                     value, std = told[effect.label, c.name]
@@ -98,6 +102,14 @@ class State:
                     c = replace(c, prior=std, centre=value)
                 found.append(c)
         return found
+
+    def given(self) -> State:
+        """What was found, as a robot to start from: friction is fitted anew, all else stays."""
+        held = {i for i, e in enumerate(self.every) if not e.urdf}
+        return replace(
+            self, nuisances=self.every, effects=(), priors=(), held=frozenset(held),
+            fixed=frozenset(self.scales),
+        )  # fmt: skip
 
     def informed(self, effect: Effect, std: Mapping[str, float]) -> State:
         """With an effect of which other records tell the values, and how well.
@@ -127,12 +139,16 @@ class State:
         return replace(self, nuisances=tuple(every[:count]), effects=tuple(every[count:]))
 
     def with_effect(self, effect: Effect) -> State:
-        """With one effect more.
+        """With one effect more, or in place of the one that it refines.
 
         Args:
             effect: to be added.
         """
-        return replace(self, effects=(*self.effects, effect))
+        coarser = [(e.name, e.target) for e in self.effects]
+        if (effect.refines, effect.target) not in coarser:
+            return replace(self, effects=(*self.effects, effect))
+        place = coarser.index((effect.refines, effect.target))
+        return replace(self, effects=(*self.effects[:place], effect, *self.effects[place + 1 :]))
 
     def without(self, index: int) -> State:
         """Without the effect of this number.
@@ -154,14 +170,17 @@ def effect_coordinates(effect: Effect, index: int, rate: float) -> list[Coordina
     found = []
     for p in effect.parameters:
         value, lower, upper = effect.values[p.name], p.lower, p.upper
-        if p.name == "order" and value.is_integer():
+        if p.whole or (p.name == "order" and value.is_integer()):
             continue  # locked to the motor's turn: no measured order is whole to the last digit
+        if p.moving is not None:
+            lower = p.moving
         if p.name in effect.inverse:
             value, lower, upper = 1.0 / value, 1.0 / p.upper, 1.0 / p.lower
             step = 0.1
         else:
             step = _step(p, value, rate)
-        found.append(Coordinate(index, p.name, value, lower, upper, step))
+        known = (p.spread, p.neutral) if p.spread else (None, 0.0)
+        found.append(Coordinate(index, p.name, value, lower, upper, step, *known))
     return found
 
 

@@ -105,6 +105,7 @@ class Validated:
         outside: (group, stretch) -> power left there by the solution of all other stretches.
         count: (group, stretch) -> rows.
         own: the largest part of an added column that the others can't make up.
+        determined: how many of the added columns' numbers the rows determine.
     """
 
     solution: FloatArray
@@ -112,6 +113,7 @@ class Validated:
     outside: Mapping[tuple[Group, int], float]
     count: Mapping[tuple[Group, int], int]
     own: float
+    determined: float
 
 
 def cross_validate(
@@ -126,16 +128,18 @@ def cross_validate(
     Args:
         blocks: of at least one stretch.
         elsewhere: normal equations that other groups add for the first `base` columns.
-        prior: (base,) precision of each.
-        pull: (base,) towards its centre.
+        prior: (columns,) precision of each, of the added ones, too.
+        pull: (columns,) towards its centre.
         base: how many columns are not added ones.
     """
     normals = np.array([b.normal for b in blocks])
     rights = np.array([b.right for b in blocks])
     power = np.array([b.power for b in blocks])
     normal, right = normals.sum(axis=0), rights.sum(axis=0)
-    normal[:base, :base] += elsewhere[0] + np.diag(prior)
-    right[:base] += elsewhere[1] + pull
+    normal[:base, :base] += elsewhere[0]
+    right[:base] += elsewhere[1]
+    normal += np.diag(prior)
+    right += pull
     solution = stable_solve(normal, right)
     # Every stretch is left out in turn, with all groups' equations in it.
     numbers, stretch = np.unique([b.block for b in blocks], return_inverse=True)
@@ -152,7 +156,18 @@ def cross_validate(
         inside[b.group] = inside.get(b.group, 0.0) + own
         outside[place] = outside.get(place, 0.0) + foreign
         count[place] = count.get(place, 0) + b.rows
-    return Validated(solution, inside, outside, count, _own(normal, base))
+    return Validated(
+        solution, inside, outside, count, _own(normal, base), _determined(normal, prior, base)
+    )
+
+
+def _determined(normal: FloatArray, prior: FloatArray, base: int) -> float:
+    """How many of the added columns' numbers the rows determine, rather than what is known."""
+    if not np.any(prior[base:]):
+        return float(len(prior) - base)
+    spread = np.array([stable_solve(normal, np.eye(len(prior))[k])[k]
+                       for k in range(base, len(prior))])  # fmt: skip
+    return float(np.sum(1.0 - np.clip(prior[base:] * spread, 0.0, 1.0)))
 
 
 def _own(normal: FloatArray, count: int) -> float:

@@ -17,6 +17,10 @@ from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.registry import catalogue, effect_class
 from picchio.model.motion import TORQUE, WINDUP
 from picchio.prediction.motion.readings import Around
+from picchio.robot.units import SLIDING
+
+# Over less of a turn than this, sine, cosine and angle are nearly a straight line.
+_SWEPT = 1.0  # rad
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +75,15 @@ def evidence_of(system: System) -> Evidence:
         groups=tuple(sorted(groups)),
         driven=tuple(joint for kind, joint in system.groups if kind == TORQUE),
         wound=tuple(joint for kind, joint in system.groups if kind == WINDUP),
+        swept=tuple(
+            dict.fromkeys(
+                joint
+                for log in system.logs
+                for joint in log.moving
+                if np.ptp(log.angle[joint]) > _SWEPT
+                and system.robot.tree.joints[joint].units is not SLIDING
+            )
+        ),
     )
 
 
@@ -85,7 +98,8 @@ def candidates(
         kinds: the catalogue.
         near: only what acts at this target, or on more than a joint.
     """
-    taken = {(e.name, e.target) for e in base.state.every}
+    held = base.state.held
+    taken = {(e.name, e.target) for i, e in enumerate(base.state.every) if i not in held}
     predicted = system.measured - base.residual
     around = system.around(base.state.every)
     found: list[Candidate] = []
@@ -101,15 +115,28 @@ def candidates(
                     made = _make(system, base, predicted, effect, {"order"}, around)
                     found += [replace(each, noise=noise) for each in made]
             elif (name, target) not in taken and (not kind.needs or (kind.needs, target) in taken):
-                for trial in _trials(system, kind, target):
-                    effect = kind(target, **trial)
-                    found += _make(system, base, predicted, effect, set(trial), around)
+                for effect, set_ in _starts(system, base, kind, target):
+                    found += _make(system, base, predicted, effect, set_, around)
     return found
 
 
 def usual(name: str) -> tuple[int, str]:
     """Where an effect stands among those that explain the same."""
     return (effect_class(name).usual, name)
+
+
+def _starts(
+    system: System, base: Fit, kind: type[Effect], target: str
+) -> list[tuple[Effect, set[str]]]:
+    """Where an effect is tried from, and which of its parameters are set there.
+
+    One that refines another stands in its place, at the values that they share: those are in the
+    base, and are not scored again.
+    """
+    if kind.refines and effect_class(kind.refines).shows(motion=True):
+        coarse = [e for e in base.state.effects if (e.name, e.target) == (kind.refines, target)]
+        return [(kind(target, **e.values), set(e.values)) for e in coarse]
+    return [(kind(target, **trial), set(trial)) for trial in _trials(system, kind, target)]
 
 
 def _trials(system: System, kind: type[Effect], target: str) -> list[dict[str, float]]:
@@ -126,7 +153,7 @@ def _make(system: System, base: Fit, predicted: FloatArray, effect: Effect,
           searched: set[str], around: list[Around]) -> list[Candidate]:  # fmt: skip
     """Derivatives at nothing, by what is not searched for."""
     state = base.state.with_effect(effect)
-    coordinates = effect_coordinates(effect, len(state.every) - 1, system.logs[0].rate)
+    coordinates = effect_coordinates(effect, state.every.index(effect), system.logs[0].rate)
     if effect.inverse:
         # Nothing is an infinite stiffness; the column is what the nominal one does.
         changed = system.predict(state.every, state.scales, effect, predicted)
@@ -137,4 +164,5 @@ def _make(system: System, base: Fit, predicted: FloatArray, effect: Effect,
     kept, columns = jacobian(system, state, predicted, varied, around)
     if not kept:
         return []
-    return [Candidate(effect, columns, kept, np.array([c.value for c in kept]), len(searched))]
+    tried = 0 if effect.refines else len(searched)
+    return [Candidate(effect, columns, kept, np.array([c.value for c in kept]), tried)]

@@ -5,6 +5,7 @@ Last, which other effects would do as well as one that was found.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -19,8 +20,8 @@ from picchio.diagnosis.motion.criteria.score import (
     necessity,
     passes,
 )
-from picchio.diagnosis.motion.data.system import System
-from picchio.diagnosis.motion.fit.least_squares import Fit, fit, row_weights
+from picchio.diagnosis.motion.data.system import Group, System
+from picchio.diagnosis.motion.fit.least_squares import Fit, fit, len_of, row_weights
 from picchio.diagnosis.motion.fit.state import State
 from picchio.diagnosis.motion.search.candidates import Candidate, candidates, usual
 from picchio.diagnosis.motion.search.timing import time_by_ripple
@@ -32,6 +33,10 @@ _ALIKE = 0.9
 _ROUNDS = 12
 _NEAR = 0.05  # orders
 _WITHIN = 3.0  # standard deviations
+_MANY = 3  # numbers
+_COMMON = 8  # of `Effect.usual`: from there on it is what drives report wrongly, or rarer
+_CONTENDERS = 4
+_TINY = 1e-300
 _TOLD_APART = 0.1  # orders: no chance hit of a whole number
 
 Scored = tuple[Score, Candidate]
@@ -58,9 +63,14 @@ def select(
 ) -> tuple[Fit, list[Step]]:
     """Search forwards and backwards until nothing changes.
 
-    The order: ripple, and what it tells of timing; everything else but elasticity; elasticity,
-    which needs the torque that the gears transmit; ripple again; then what is no longer needed
-    goes, and everything is tried once more.
+    The order: ripple, and what it tells of timing; everything else but elasticity, what has many
+    numbers last; elasticity, which needs the torque that the gears transmit; ripple again; then
+    what is no longer needed goes, and everything is tried once more.
+
+    Wrong bodies look like wrong gains and offsets of what the drives report, and those are found
+    first. So it is searched in another order as well: only what every robot has (friction, rotors,
+    a payload), then what has many numbers, then the rest. Where that finds such a cause, the
+    better fit of the two is taken, by Schwarz' criterion.
 
     Args:
         system: the training equations.
@@ -70,22 +80,43 @@ def select(
     """
     ripple = {n: k for n, k in kinds.items() if k.periodic}
     elastic = {n: k for n, k in kinds.items() if k.elastic}
-    slow = {n: k for n, k in kinds.items() if not (k.periodic or k.elastic)}
-    stages = [(ripple, 2), (slow, _ROUNDS), (elastic, 3), (ripple, _ROUNDS)]
-    current = fit(system, start)
-    steps: list[Step] = []
-    for number, (pool, rounds) in enumerate(stages):
-        progress(number, 2 * len(stages))
-        current = _forward(system, current, pool, kinds, rounds, steps)
-    for number in range(_AGAIN):
-        progress(len(stages) + number, 2 * len(stages))
-        current = eliminate(system, current)
-        before = [(e.name, e.target) for e in current.state.effects]
-        for pool in (slow, elastic):
-            current = _forward(system, current, pool, kinds, 3, steps)
-        if before == [(e.name, e.target) for e in current.state.effects]:
-            break
-    return eliminate(system, current), steps
+    rest = {n: k for n, k in kinds.items() if not (k.periodic or k.elastic)}
+    broad = {n: k for n, k in rest.items() if len(k.parameters) > _MANY}
+    slow = {n: k for n, k in rest.items() if n not in broad}
+    common = {n: k for n, k in slow.items() if not k.needs and k.usual < _COMMON}
+    last = [(elastic, 3), (ripple, _ROUNDS)]
+    total = 2 * len(last) + 2 * _AGAIN + 6
+    done = 0
+
+    def through(current: Fit, stages: list, steps: list[Step]) -> Fit:
+        nonlocal done
+        for pool, rounds in stages:
+            progress(done, total)
+            done += 1
+            current = _forward(system, current, pool, kinds, rounds, steps)
+        return current
+
+    def settled(current: Fit, steps: list[Step]) -> tuple[Fit, list[Step]]:
+        current = through(current, last, steps)
+        for _ in range(_AGAIN):
+            current = eliminate(system, current)
+            before = [e.label for e in current.state.effects]
+            for pool in (slow, broad, elastic):
+                current = _forward(system, current, pool, kinds, 3, steps)
+            if before == [e.label for e in current.state.effects]:
+                break
+        return eliminate(system, current), steps
+
+    first: list[Step] = []
+    begun = through(fit(system, start), [(ripple, 2)], first)
+    one = list(first)
+    found = settled(through(begun, [(slow, _ROUNDS), (broad, _ROUNDS)], one), one)
+    two = list(first)
+    other = through(begun, [(common, _ROUNDS), (broad, _ROUNDS)], two)
+    if not any(e.name in broad for e in other.state.effects):
+        return found
+    again = settled(through(other, [(slow, _ROUNDS)], two), two)
+    return min(found, again, key=lambda each: _cost(system, each[0], again[0].correlation))
 
 
 def _forward(system: System, current: Fit, pool: Mapping[str, type[Effect]],
@@ -99,16 +130,64 @@ def _forward(system: System, current: Fit, pool: Mapping[str, type[Effect]],
         steps.append(Step(tuple(c.label for _, c in chosen), levels, table))
         if not chosen:
             break
-        state = current.state
-        for score, candidate in chosen:
-            grown = state.with_effect(candidate.started(score.values))
-            state = _take_over(system, current, grown, candidate)
-        current = fit(system, state)
+        current = _contest(system, current, chosen, scored, kinds)
         if any(kind.periodic for kind in pool.values()):
             current = lock(system, current)
             for late in (kind for kind in kinds.values() if kind.late):
                 current = time_by_ripple(system, current, late)
     return current
+
+
+def _contest(
+    system: System,
+    current: Fit,
+    chosen: list[Scored],
+    scored: list[Scored],
+    kinds: Mapping[str, type[Effect]],
+) -> Fit:
+    """The fit with what was chosen; where that has many numbers, the best of it and simpler ones.
+
+    A cause of many numbers bends to whatever is wrong: scores are linearised, and it makes up for
+    what others cannot in one step. So what is simpler is fitted to the end, and in turn with the
+    numbers that refine it.
+    """
+    grown = fit(system, _grown(system, current, chosen))
+    first = chosen[0]
+    if not _broad(first):
+        return grown
+    groups = set(first[0].groups)
+    simpler = [p for p in scored if passes(p[0], p[1].effect.periodic) and not _broad(p)
+               and groups & set(p[0].groups)]  # fmt: skip
+    fits = [grown]
+    for pair in simpler[:_CONTENDERS]:
+        fits.append(fit(system, _grown(system, current, [pair])))
+        finer = [k for k in kinds.values() if k.refines == pair[1].effect.name]
+        for kind in finer:
+            own = next(e for e in fits[-1].state.effects if e.label == pair[1].effect.label)
+            fits.append(fit(system, fits[-1].state.with_effect(kind(own.target, **own.values))))
+    best = min(fits, key=lambda each: _cost(system, each, each.correlation))
+    return min(fits, key=lambda each: _cost(system, each, best.correlation))
+
+
+def _grown(system: System, current: Fit, chosen: list[Scored]) -> State:
+    state = current.state
+    for score, candidate in chosen:
+        grown = state.with_effect(candidate.started(score.values))
+        state = _take_over(system, current, grown, candidate)
+    return state
+
+
+def _broad(pair: Scored) -> bool:
+    return len(pair[1].coordinates) > _MANY
+
+
+def _cost(system: System, each: Fit, correlation: Mapping[Group, float]) -> float:
+    """Schwarz' criterion, halved; a number that is known beforehand is none."""
+    samples = {g: len_of(system, g) / correlation[g] for g in system.groups}
+    known = np.array([c.precision for c in each.coordinates])
+    numbers = float(np.sum(1.0 - np.clip(known * each.std**2, 0.0, 1.0)))
+    misfit = sum(n * math.log(max(each.level[g], _TINY)) for g, n in samples.items())
+    return misfit + 0.5 * numbers * math.log(max(sum(samples.values()), 2.0))
 
 
 def lock(system: System, current: Fit) -> Fit:
@@ -156,7 +235,7 @@ def choose(scored: list[Scored]) -> list[Scored]:
                 chosen.append((score, candidate))
             continue
         # One cause for several joints is not kept waiting by one for each of them.
-        if groups & taken and (len(groups) == 1 or blocked):
+        if groups & taken and (len(groups) == 1 or blocked or _broad((score, candidate))):
             continue
         blocked = blocked or len(groups) > 1
         equal = [

@@ -18,10 +18,11 @@ class TorqueRipple(Effect):
     where = "motion"
     target_kind = "joint"
     parameters = (
-        Parameter("order", "1", neutral=1.0, lower=1e-3, upper=1e6, meaning="cycles a motor turn"),
+        Parameter("order", "1", neutral=1.0, lower=1e-3, upper=1e6, shape=True,
+                  meaning="cycles a motor turn"),
         Parameter("cosine", "N*m", lower=-1e6, upper=1e6, meaning="amplitude at angle zero"),
         Parameter("sine", "N*m", lower=-1e6, upper=1e6, meaning="a quarter period later"),
-    )
+    )  # fmt: skip
     linear = ("cosine", "sine")
     meaning = "magnets, slots, bearings or the wave generator pulse once or several times a turn"
     periodic = True

@@ -16,7 +16,12 @@ class JointInertia(Effect):
     target_kind = "joint"
     parameters = (
         Parameter(
-            "inertia", "kg*m^2", lower=-1e4, upper=1e5, meaning="added inertia about the joint"
+            "inertia",
+            "kg*m^2",
+            lower=-1e4,
+            upper=1e5,
+            moving=0.0,
+            meaning="added inertia about the joint",
         ),
     )
     linear = ("inertia",)

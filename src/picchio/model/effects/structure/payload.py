@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
 from picchio.model.motion import Motion
@@ -32,5 +34,4 @@ class Payload(Effect):
     def motion(self, motion: Motion) -> None:
         """Add its weight and inertia to every joint's torque."""
         if self.values["mass"] != 0.0:
-            for joint, torque in motion.tool_load().items():
-                motion.add_body_torque(joint, self.values["mass"] * torque)
+            motion.add_body(motion.tool, self.values["mass"] * np.eye(10)[0])

@@ -225,6 +225,7 @@ MARKS: Mapping[str, Callable[[Site], list[Drawn]]] = {
     "joint": _ring,
     "link": _link,
     "joint or link": _joint_or_link,
+    "joint pair": _ring,
     "tool": _tool,
     "robot": _whole,
     "axis": _base,

@@ -91,7 +91,13 @@ def check_place(robot: FlexibleRobot, effect: str, target: str) -> None:
     """
     kind = effect_class(effect).target_kind
     joints, links = robot.joint_names, (*robot.tree.links, robot.tool_point)
-    there = {"joint": joints, "link": links, "joint or link": (*joints, *links), "axis": BASE_AXES}
+    there = {
+        "joint": joints,
+        "joint pair": joints[1:],
+        "link": links,
+        "joint or link": (*joints, *links),
+        "axis": BASE_AXES,
+    }
     if target not in there.get(kind, (target,)):
         raise InputError(f"{robot.name} has no such {kind}", key=effect, value=target,
                          choices=there[kind])  # fmt: skip
