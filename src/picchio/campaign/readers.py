@@ -23,12 +23,14 @@ class Reading:
         samples: when.
         force: () -> the tool's force along the blow.
         motion: () -> the kinematics, and the motion of the coordinates, (samples, N) each.
+        place: (3,) m, from the frame's origin to the sensor, in the frame's axes; None: there.
     """
 
     subject: str | None
     samples: Samples
     force: Callable[[], PiecewiseForce]
     motion: Callable[[], tuple[VibratingSystem, CoordinateMotion]]
+    place: FloatArray | None = None
 
     def frame(self) -> tuple[Motion, FloatArray, FloatArray, FloatArray]:
         """The subject's kinematics, and position, velocity, acceleration of its coordinates.
@@ -38,6 +40,8 @@ class Reading:
         """
         system, motion = self.motion()
         found = system.geometry.motion(self.subject or "", system.taken)
+        if self.place is not None:
+            found = found.at(self.place)
         wide = list(system.wide)
         whole = (motion.position, motion.velocity, motion.acceleration)
         x, v, a = (part if len(wide) == part.shape[1] else part[:, wide] for part in whole)

@@ -16,9 +16,10 @@ from picchio.robot.flexible_robot import FlexibleRobot
 if TYPE_CHECKING:
     from picchio.model.plant import Plant
 
-# How many sums of inertias are kept: those of a robot with a few payloads tried in turn.
-_KEPT_TOTALS = 32
+# How many sums of inertias are kept: those of a robot with many small masses, each tried in turn.
+_KEPT_TOTALS = 512
 _KEPT_PLANTS = 4
+_KEPT_BESIDE = 32
 
 
 class Geometry:
@@ -37,6 +38,7 @@ class Geometry:
         self._totals: Recent[Inertia] = Recent(_KEPT_TOTALS)
         # Records of one pose share theirs.
         self.plants: Recent[Plant] = Recent(_KEPT_PLANTS)
+        self._beside: Recent[Geometry] = Recent(_KEPT_BESIDE)
         state = chain.robot.state(pose)
         self.stiffness = state.stiffness
         self.gravity_torque = state.gravity_torque
@@ -68,6 +70,14 @@ class Geometry:
             self._inertias[key] = self.chain.inertia(self.pose, what, point)
         return self._inertias[key]
 
+    def beside(self, pose: FloatArray) -> Geometry:
+        """The geometry of the same robot at a pose nearby.
+
+        Args:
+            pose: (nv,) rad or m.
+        """
+        return self._beside.get(pose.tobytes(), lambda: Geometry(self.chain, pose))
+
     def total(self, masses: tuple[Mass, ...], taken: tuple[int, ...]) -> Inertia:
         """The weighted sum of inertias, of some of the coordinates.
 
@@ -77,11 +87,15 @@ class Geometry:
         """
 
         def make() -> Inertia:
-            parts = [(weight, self.inertia(what, point)) for weight, what, point in masses]
+            (weight, what, point), before = masses[-1], masses[:-1]
+            part = self.inertia(what, point)
+            # One more mass is often tried beside many that stay.
+            rest = self.total(before, taken) if before else None
 
             def add(name: str) -> FloatArray:
-                whole = np.asarray(sum(weight * getattr(part, name) for weight, part in parts))
-                return np.ascontiguousarray(whole[np.ix_(*[taken] * whole.ndim)])
+                own = getattr(part, name)
+                own = weight * own[np.ix_(*[taken] * own.ndim)]
+                return np.asarray(own if rest is None else getattr(rest, name) + own)
 
             return Inertia(**{f.name: add(f.name) for f in fields(Inertia)})
 

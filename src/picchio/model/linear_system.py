@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,6 +112,7 @@ def shared_damping(
     joints: FloatArray,
     ratios: FloatArray,
     share: float,
+    scales: Sequence[float] = (),
 ) -> FloatArray:
     """As `modal_damping_matrix`, in coordinates of which joints' deflections are a part.
 
@@ -121,6 +123,7 @@ def shared_damping(
         joints: (n,) N m/rad, the joints' springs.
         ratios: (n,) the joints' damping ratios.
         share: as `picchio.model.plant.Plant.modal_share`.
+        scales: factors on the modes' ratios, by ascending frequency; 1 beyond them.
 
     Returns:
         (c, c) N m s/rad.
@@ -128,10 +131,10 @@ def shared_damping(
     n = len(joints)
     whole = np.zeros_like(mass)
     if share > 0.0:
-        whole = _by_modes(mass, stiffness, deflections, joints, ratios)
+        whole = _by_modes(mass, stiffness, deflections, joints, ratios, scales)
     if share == 1.0:
         return whole
-    alone = _by_modes(mass[:n, :n], np.diag(joints), np.eye(n), joints, ratios)
+    alone = _by_modes(mass[:n, :n], np.diag(joints), np.eye(n), joints, ratios, scales)
     return np.asarray(share * whole + (1.0 - share) * deflections.T @ alone @ deflections)
 
 
@@ -141,10 +144,14 @@ def _by_modes(
     deflections: FloatArray,
     joints: FloatArray,
     ratios: FloatArray,
+    scales: Sequence[float] = (),
 ) -> FloatArray:
     omega, shapes = _modes(mass, stiffness)
     energy = joints[:, None] * (deflections @ shapes) ** 2 + 1e-300
     ratio = ratios @ energy / energy.sum(axis=0)
+    if len(scales):
+        known = min(len(scales), ratio.size)
+        ratio[:known] = ratio[:known] * np.asarray(scales)[:known]
     weighted = mass @ shapes
     return np.asarray((weighted * (2.0 * ratio * omega)) @ weighted.T)
 

@@ -49,6 +49,9 @@ class Changes:
 
     Attributes:
         damping_scale: factor on all modal damping ratios.
+        mode_scales: factors on the modes' ratios, those of the lowest frequency first; modes beyond
+            them keep theirs.
+        gravity_scale: factor on gravity's change with the deflection.
         modal_share: whether the stated modal damping is that of the modes with all coordinates
             and springs (1, the convention of linear effects in `docs`), or acts between link
             and motor side alone, as if nothing else moved (0), or in between: where an effect
@@ -70,6 +73,8 @@ class Changes:
         self.springs = springs
         self.conditions = conditions
         self.damping_scale = 1.0
+        self.mode_scales: tuple[float, ...] = ()
+        self.gravity_scale = 1.0
         self.modal_share = 1.0
         self.force_offset = np.zeros(3)
         self.coordinates: list[str] = list(robot.flexible_names)
@@ -292,8 +297,8 @@ class Plant(Changes):
         mass, gradient = among_all(inertia.mass), among_all(inertia.mass_gradient)
         gravity, curvature = np.zeros((size, size)), np.zeros((size, size, size))
         if self.gravity_stiffness:
-            gravity = among_all(inertia.gravity_gradient)
-            curvature = among_all(inertia.gravity_curvature)
+            gravity = self.gravity_scale * among_all(inertia.gravity_gradient)
+            curvature = self.gravity_scale * among_all(inertia.gravity_curvature)
         for name, value in self.added_inertias:
             mass = mass.copy()
             mass[names.index(name), names.index(name)] += value
@@ -329,7 +334,9 @@ class Plant(Changes):
         # Where nothing but the joints' springs holds it, both conventions of damping are one.
         share = self.modal_share if not np.array_equal(stiffness, springs) else 0.0
         ratios = self.damping_scale * geometry.robot.damping_ratio
-        damping = shared_damping(mass, stiffness, deflections, joints, ratios, share) + dampers
+        damping = dampers + shared_damping(
+            mass, stiffness, deflections, joints, ratios, share, self.mode_scales
+        )
 
         robot = geometry.robot
         # The force acts at the tool point; an offset is given in the tool frame.

@@ -18,6 +18,7 @@ class SensorChain:
 
     Attributes:
         mount: (frequency Hz, damping ratio) of a resonant mount.
+        place: (3,) m, from the frame's origin to the sensor, in the frame's axes.
         turn: (3, 3) from what the frame's axes carry to what the sensor's axes read.
         gain: factor.
         highpass: Hz, first order.
@@ -29,6 +30,7 @@ class SensorChain:
     """
 
     mount: tuple[float, float] | None = None
+    place: FloatArray = field(default_factory=lambda: np.zeros(3))
     turn: FloatArray = field(default_factory=lambda: np.eye(3))
     gain: float = 1.0
     highpass: float | None = None

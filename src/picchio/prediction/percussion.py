@@ -168,6 +168,7 @@ class PercussionSetup:
                 samples,
                 lambda: self.struck(model).force,
                 lambda: self._motion(model, samples, at_jumps),
+                chain.place if chain.place.any() else None,
             )
         )
         if chain.filters:
