@@ -106,8 +106,8 @@ class CampaignExcitation(ExcitationTable):
 class Tolerance(StrictModel):
     """`[tolerance]`: standard deviations of the nominal values, all normal.
 
-    What is within them is known beforehand never to be exact: it is no cause of anything. Zero means
-    that a value is exact.
+    What is within them is known beforehand never to be exact: it is no cause of anything. Zero
+    means that a value is exact.
 
     Attributes:
         stiffness: 1, of each joint; drawn once a campaign, as all where nothing else is said.

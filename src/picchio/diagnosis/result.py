@@ -36,9 +36,9 @@ FORMAT = "picchio-diagnosis/1"
 _SHOWN = 3  # causes that one line names
 Verdict = Literal["nothing-wrong", "named", "ambiguous", "partial", "unexplained"]
 VERDICTS: dict[str, str] = {
-    "nothing-wrong": "the residual is noise",
-    "named": "the causes leave noise",
-    "ambiguous": "two or more sets of causes leave noise and these data cannot tell them apart",
+    "nothing-wrong": "the residual is noise and what the tolerances allow",
+    "named": "the causes leave noise, and no more than a small remainder",
+    "ambiguous": "two or more sets of causes do so, and these data cannot tell them apart",
     "partial": "the causes, or what acts much like them, explain most; more than noise is left",
     "unexplained": "more than noise is left and no cause may be claimed",
 }
@@ -215,6 +215,25 @@ class Gain:
         return {**found, "explained": self.explained}
 
 
+@dataclass(frozen=True)
+class Left:
+    """What a model leaves of records that it has not seen, beside noise and what is tolerated.
+
+    Attributes:
+        nrmse: of the signal, RMS.
+        within_tolerance: whether a model that is right may leave as much (1 % of the signal).
+        by_pose: pose -> the same, of its records.
+    """
+
+    nrmse: float
+    within_tolerance: bool
+    by_pose: Mapping[str, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As in JSON."""
+        return {**asdict(self), "by_pose": dict(self.by_pose)}
+
+
 @dataclass(frozen=True, repr=False)
 class Diagnosis(Result):
     """The answer.
@@ -230,6 +249,7 @@ class Diagnosis(Result):
         life_note: what the life takes into account, or why there is none; empty where it is plain.
         next_measurement: what to measure to know more; None where there is nothing to ask.
         note: why, where it is not what `VERDICTS` says; empty otherwise.
+        remainder: what is left beside noise and tolerance; None where that was not looked at.
         not_looked_for: effect -> why these records cannot show it; of percussion records.
         scores: every candidate's score, for the report: dicts with effect, target, numbers.
         kinds: of a campaign with percussion and motion records, each kind's verdict and gain.
@@ -251,6 +271,7 @@ class Diagnosis(Result):
     life_note: str = ""
     next_measurement: Mapping[str, Any] | None = None
     note: str = ""
+    remainder: Left | None = None
     not_looked_for: Mapping[str, str] = field(default_factory=dict)
     scores: tuple[Mapping[str, Any], ...] = ()
     kinds: Mapping[str, Any] = field(default_factory=dict)
@@ -292,6 +313,7 @@ class Diagnosis(Result):
             "life": self.life,
             "next_measurement": self.next_measurement,
             "note": self.note or None,
+            "remainder": self.remainder.to_dict() if self.remainder else None,
             **more,
             **({"life_note": self.life_note} if self.life_note else {}),
             "not_looked_for": dict(self.not_looked_for),

@@ -21,8 +21,11 @@ from picchio.diagnosis.percussion.conclude.causes import (
     reported_covariance,
     with_solved,
 )
-from picchio.diagnosis.percussion.conclude.holdout import holdout_gain
+from picchio.diagnosis.percussion.conclude.holdout import held_out_remainder, holdout_gain
 from picchio.diagnosis.percussion.conclude.verdict import (
+    claimed_of,
+    doubtful,
+    leaves_little,
     may_be_partial,
     pair_of,
     verdict_of,
@@ -32,6 +35,7 @@ from picchio.diagnosis.percussion.criteria.common_fault import common_faults
 from picchio.diagnosis.percussion.criteria.dominance import dominant_causes
 from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic, bic_difference
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
+from picchio.diagnosis.percussion.criteria.remainder import Remainder, allowed, decisive_gain
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence
 from picchio.diagnosis.percussion.data.problem import Problem, Split, held_out
 from picchio.diagnosis.percussion.fit.drawn import refit, with_solved_numbers
@@ -47,7 +51,8 @@ from picchio.diagnosis.percussion.search.select import (
     start_from,
 )
 from picchio.diagnosis.percussion.search.state import LEAST_GAIN, Search, Trial
-from picchio.diagnosis.result import Diagnosis, Estimate
+from picchio.diagnosis.percussion.tolerance.linearise import about_another, linearise, settled
+from picchio.diagnosis.result import Cause, Diagnosis, Estimate
 from picchio.model.effects.effect import Effect
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.tasks import Task
@@ -173,17 +178,31 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
     """What may be said of what a search has found."""
     problem = search.problem
     whole, after = _fitted_to_all(search, nominal)
-    gain = holdout_gain(problem, search.baseline.hypothesis, search.best.hypothesis,
-                        search.records, search.kept)  # fmt: skip
-    rivals = [
-        t
-        for t in (search.steps[0] if search.steps else [])
-        if t.finished(search.records) and t.fit.hypothesis.labels != whole.hypothesis.labels
-    ]
     same: list[Trial] = []
+    rivals = _rivals(search, whole)
     causes = fitted_causes(search, whole, rivals)
+    dropped: list[tuple[str, str]] = []
+    while len(causes) > 1 and (doubted := doubtful(causes)):
+        # What is not beyond doubt is none beside what is: it is told as a lead.
+        rest = attempt("without what is doubted", partial(_without, search, doubted[0]))
+        if rest is None:
+            break
+        dropped.append((doubted[0].effect, doubted[0].target))
+        search.best = rest
+        whole = refit(problem, rest.hypothesis, problem.records)
+        after = fit_evidence(problem, whole)
+        rivals = _rivals(search, whole)
+        causes = fitted_causes(search, whole, rivals)
+    if allowed(problem):
+        linearise(problem, whole.hypothesis, both=True)
+        whole = refit(problem, whole.hypothesis, problem.records)
+    stands, judged = search.best.hypothesis, search.kept or search.records
+    gain = holdout_gain(problem, search.baseline.hypothesis, stands, search.records, search.kept)
+    left = None
+    if allowed(problem):
+        left = Remainder.of(nominal), Remainder.of(whole)
     # More rivals can only lessen the confidence: what isn't sure by now won't be claimed.
-    if causes and (after.is_noise or may_be_partial(causes, gain.explained)):
+    if causes and (leaves_little(after, left) or may_be_partial(causes, gain.explained, left)):
         search.say("looking for other causes that would do as well")
         # Over the same samples: else a rival may lose, or win, by which of them it knows.
         with problem.pinned(search.best.hypothesis.effects):
@@ -192,25 +211,28 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
             same, refuted = _on_all_records(problem, whole, same)
         causes = fitted_causes(search, whole, rivals, refuted)
     common = common_faults(whole.hypothesis, reported_covariance(whole), problem.groups)
-    verdict = verdict_of(causes, before, after, bool(same), gain.explained, common)
+    verdict = verdict_of(causes, before, after, bool(same), gain.explained, common, left)
     if any(e.latent and e.latent.linear for e in whole.hypothesis.effects):
         causes = with_solved(causes, with_solved_numbers(problem, whole))
     others: dict[tuple[tuple[str, str], ...], Hypothesis] = {}
     for t in same:
         pairs = tuple(sorted(pair_of(label) for label in t.fit.hypothesis.labels))
         others.setdefault(pairs, t.fit.hypothesis)
-    note = why_not_claimed(causes, common) if after.is_noise and verdict == "unexplained" else ""
+    little = leaves_little(after, left)
+    note = why_not_claimed(causes, common) if little and verdict == "unexplained" else ""
     leads: tuple[tuple[str, str], ...] = ()
     if note:
         leads = tuple((c.effect, c.target) for c in causes)
     elif verdict == "unexplained":
         leads = tuple(_leads(search))
+    elif claimed_of(verdict):
+        leads = tuple(dropped)
     ask = None
     if verdict in ("ambiguous", "unexplained", "partial") and not common:
         search.say("looking for the measurement that would tell most")
         looked = partial(next_measurement, problem, whole, rivals, same)
         ask = attempt("next measurement", looked)
-    claimed = verdict in ("named", "ambiguous", "partial")
+    claimed = claimed_of(verdict)
     diagnosis = Diagnosis(
         verdict=verdict,
         causes=causes if claimed else (),
@@ -221,11 +243,28 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         next_measurement=ask,
         scores=tuple(_scores(search)),
         note=note,
+        remainder=held_out_remainder(problem, stands, judged),
     )
     return PercussionDiagnosis(
         diagnosis, problem, nominal, whole, search, before, after,
         tuple(others.values()) if claimed else (),
     )  # fmt: skip
+
+
+def _rivals(search: Search, whole: Fit) -> list[Trial]:
+    """Other first causes that were fitted to the end."""
+    first = search.steps[0] if search.steps else []
+    return [
+        t
+        for t in first
+        if t.finished(search.records) and t.fit.hypothesis.labels != whole.hypothesis.labels
+    ]
+
+
+def _without(search: Search, cause: Cause) -> Fit:
+    """The best fit without one of its causes, fitted again."""
+    rest = search.best.hypothesis.minus(f"{cause.effect}:{cause.target}")
+    return settled(search.problem, search.fit(rest, iterations=5), search.records, rounds=1)
 
 
 def _fitted_to_all(search: Search, nominal: Fit) -> tuple[Fit, Evidence]:
@@ -253,12 +292,21 @@ def _on_all_records(
     kept: list[Trial] = []
     refuted: list[Trial] = []
     for trial in same:
-        there = attempt(trial.label, partial(refit, problem, trial.fit.hypothesis, problem.records))
+        with about_another(problem):
+            there = attempt(trial.label, partial(_refitted, problem, trial))
         if there is None:
             continue
         alike = bic_difference(problem, whole, there) < SAME
+        if allowed(problem):
+            alike = alike or decisive_gain(there, whole) < SAME
         (kept if alike else refuted).append(replace(trial, fit=there, score=bic(there)))
     return kept, refuted
+
+
+def _refitted(problem: Problem, trial: Trial) -> Fit:
+    """A trial fitted to all records, about its own inexact numbers."""
+    found = refit(problem, trial.fit.hypothesis, problem.records)
+    return found if trial.draws else settled(problem, found, problem.records, 1, anew=False)
 
 
 def _leads(search: Search) -> list[tuple[str, str]]:

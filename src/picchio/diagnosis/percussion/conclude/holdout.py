@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
+from picchio.diagnosis.percussion.criteria.remainder import ALLOWED
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.fit.drawn import current_hidden, fit_latent, with_hidden
 from picchio.diagnosis.percussion.fit.least_squares import fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.result import Gain
+from picchio.diagnosis.result import Gain, Left
 
 
 def holdout_gain(
@@ -43,6 +44,32 @@ def holdout_gain(
         float(np.sqrt(floor / signal)),
         floor,
     )
+
+
+def held_out_remainder(
+    problem: Problem, hypothesis: Hypothesis, judged: Sequence[MeasuredRecord]
+) -> Left:
+    """What is left beside noise, the tolerances integrated out, of the signal, RMS.
+
+    Args:
+        problem: data and noise.
+        hypothesis: of the model.
+        judged: records.
+    """
+    hypothesis = _own_latent(problem, hypothesis, judged)
+    excess: dict[int, float] = {}
+    signal: dict[int, float] = {}
+    for record, residual in zip(judged, problem.residuals(hypothesis.effects, judged), strict=True):
+        own = float((residual**2).sum() - residual.size)
+        excess[record.pose] = excess.get(record.pose, 0.0) + own
+        signal[record.pose] = signal.get(record.pose, 0.0) + signal_power([record])
+
+    def share(poses: Sequence[int]) -> float:
+        left = max(sum(excess[p] for p in poses), 0.0)
+        return float(np.sqrt(left / max(sum(signal[p] for p in poses), 1e-300)))
+
+    whole = share(list(excess))
+    return Left(whole, whole <= ALLOWED, {f"pose {p + 1}": share([p]) for p in sorted(excess)})
 
 
 def _mean_square(

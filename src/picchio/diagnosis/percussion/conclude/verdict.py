@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
+from picchio.diagnosis.percussion.criteria.remainder import Remainder
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence
 from picchio.diagnosis.result import BEYOND_DOUBT, MOSTLY, Cause, Verdict
+from picchio.model.effects.registry import effect_class
+
+# A value this many of its standard deviations from doing nothing may as well do nothing.
+_UNSURE = 2.0
+
+BeforeAndAfter = tuple[Remainder, Remainder]
 
 
 def verdict_of(
@@ -15,6 +23,7 @@ def verdict_of(
     others_do_as_well: bool,
     explained: float | None,
     common: Sequence[str],
+    left: BeforeAndAfter | None = None,
 ) -> Verdict:
     """The verdict.
 
@@ -22,27 +31,80 @@ def verdict_of(
         causes: that stand at the end.
         before: what is left without them.
         after: what is left with them.
+        left: what is left beside noise and tolerance, without the causes and with them; None where
+            nothing may be left.
         others_do_as_well: whether another set of causes explains as much.
         explained: share of the held-out excess.
         common: effects that all sensors, though of different kinds, would have alike.
     """
     if not causes:
-        return "nothing-wrong" if before.is_noise else "unexplained"
+        little = before.is_noise or (left is not None and left[0].within_tolerance)
+        return "nothing-wrong" if little else "unexplained"
     if common:
         return "unexplained"
-    if after.is_noise:
+    if leaves_little(after, left):
         if others_do_as_well:
             return "ambiguous"
         return "unexplained" if _doubted(causes) else "named"
-    if may_be_partial(causes, explained) and not others_do_as_well:
+    if may_be_partial(causes, explained, left) and not others_do_as_well:
         return "partial"
     return "unexplained"
 
 
-def may_be_partial(causes: Sequence[Cause], explained: float | None) -> bool:
-    """Whether causes may be claimed that leave more than noise."""
+def leaves_little(after: Evidence, left: BeforeAndAfter | None) -> bool:
+    """Whether what is left is noise, or no more than a remainder that is allowed.
+
+    Args:
+        after: what is left with the causes.
+        left: beside noise and tolerance, before and after; None where nothing may be left.
+    """
+    return after.is_noise or (left is not None and left[1].may_be_named(left[0]))
+
+
+def may_be_partial(
+    causes: Sequence[Cause], explained: float | None, left: BeforeAndAfter | None = None
+) -> bool:
+    """Whether causes may be claimed that leave more than noise.
+
+    Args:
+        causes: that stand at the end.
+        explained: share of the held-out excess.
+        left: as in `leaves_little`.
+    """
     mostly = explained is not None and explained >= MOSTLY
+    if left is not None:
+        mostly = left[1].may_be_partial(left[0])
     return mostly and all(cause.confidence >= BEYOND_DOUBT for cause in causes)
+
+
+def claimed_of(verdict: Verdict) -> bool:
+    """Whether a verdict claims causes."""
+    return verdict in ("named", "ambiguous", "partial")
+
+
+def doubtful(causes: Sequence[Cause]) -> list[Cause]:
+    """Of several causes, those not beyond doubt, and those that their spread takes to nothing.
+
+    Args:
+        causes: with their values and confidences.
+
+    Returns:
+        the most doubtful first.
+    """
+    found = [c for c in causes if c.confidence < BEYOND_DOUBT or _is_nothing(c)]
+    return sorted(found, key=lambda c: (not _is_nothing(c), c.confidence))
+
+
+def _is_nothing(cause: Cause) -> bool:
+    """Whether every number of a cause is as near to doing nothing as it is unsure."""
+    for p in effect_class(cause.effect).parameters:
+        value = cause.parameters.get(p.name)
+        if value is None or not math.isfinite(p.neutral) or value.std == 0.0:
+            continue
+        if abs(value.value - p.neutral) > _UNSURE * value.std:
+            return False
+    told = [v.std for v in cause.parameters.values()]
+    return any(std > 0.0 for std in told)
 
 
 def _doubted(causes: Sequence[Cause]) -> list[Cause]:

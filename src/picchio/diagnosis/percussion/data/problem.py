@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -29,6 +29,7 @@ from picchio.vibration.integration.integrate import Samples
 
 if TYPE_CHECKING:
     from picchio.diagnosis.percussion.fit.parallel import _Helpers
+    from picchio.diagnosis.percussion.tolerance.marginal import Marginal
 
 # A sample this near a jump of the force, but not on it, holds neither side for sure: a sensor of
 # finite bandwidth smears a jump, and what keeps it from aliasing by about half a sample.
@@ -40,6 +41,8 @@ _SMEARED = 0.5
 _ON_EDGE = 1e-7
 _SMALL_JUMP = 0.05
 _KEPT_EDGES = 8
+# So many times the tolerated rise time after an edge the force may still be on its way.
+_RISES = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +54,14 @@ class MeasuredRecord:
         values: channel -> (m,) SI.
         noise: channel -> its noise at the record's rate.
         pose: number of its pose among the campaign's.
+        smeared: s, more than usual by which a sample may be away from a jump and not tell its side.
     """
 
     setup: PercussionSetup
     values: Mapping[str, FloatArray]
     noise: Mapping[str, Noise]
     pose: int
+    smeared: float = 0.0
     _cuts: dict[float, PercussionSetup] = field(default_factory=dict)
     _edges: Recent[dict[str, BoolArray] | None] = field(default_factory=lambda: Recent(_KEPT_EDGES))
     _fillers: dict[str, FloatArray] = field(default_factory=dict)
@@ -100,15 +105,42 @@ class MeasuredRecord:
         return self._cuts[end]
 
 
-def near_edges(setup: PercussionSetup, model: Model) -> dict[str, BoolArray] | None:
-    """Which samples of each group stand so near a jump that either side may be meant."""
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """Where a record's inexact numbers are taken to be: what is linearised is linearised there.
+
+    Attributes:
+        record: with its pose moved.
+        effects: what else is moved.
+        shift: (channels, m) what all that does to the residual by the slopes, which is added again;
+            None to have the residual as it is there.
+    """
+
+    record: MeasuredRecord
+    effects: tuple[Effect, ...]
+    shift: FloatArray | None
+
+
+def near_edges(
+    setup: PercussionSetup, model: Model, smeared: float = 0.0
+) -> dict[str, BoolArray] | None:
+    """Which samples of each group stand so near a jump that either side may be meant.
+
+    Args:
+        setup: of the record.
+        model: whose blows and sensors count.
+        smeared: s, more than usual by which a sample may be away.
+
+    Returns:
+        (samples,) of each group; None where nothing jumps.
+    """
     force = setup.struck(model).unit
     sensors, clock = model.sensors(setup.conditions), setup.samples
     found = {}
     for group in setup.groups:
         timing = sensors.get(group).timing
         near = setup.in_common.edges.get(
-            (force, clock, timing), partial(_marked, force, clock, *timing)
+            (force, clock, timing, smeared), partial(_marked, force, clock, *timing, smeared)
         )
         if near is None:
             return None
@@ -116,7 +148,9 @@ def near_edges(setup: PercussionSetup, model: Model) -> dict[str, BoolArray] | N
     return found
 
 
-def _marked(force: PiecewiseForce, clock: Samples, delay: float, rate: float) -> BoolArray | None:
+def _marked(
+    force: PiecewiseForce, clock: Samples, delay: float, rate: float, smeared: float
+) -> BoolArray | None:
     """(count,) which samples of a sensor; None where nothing jumps."""
     from picchio.diagnosis.percussion.data.residual_kernel import near_edges as mark
 
@@ -129,7 +163,7 @@ def _marked(force: PiecewiseForce, clock: Samples, delay: float, rate: float) ->
         return None
     if np.isfinite(force.end):
         edges = (edges + force.end * np.arange(int(clock.last / force.end) + 2)[:, None]).ravel()
-    near = max(_NEAR_EDGE, _SMEARED * clock.step) + _MARGIN
+    near = max(_NEAR_EDGE, _SMEARED * clock.step) + _MARGIN + smeared
     out = np.empty(clock.count, dtype=bool)
     mark(clock.start, clock.step, rate, delay, edges, near, out)
     return out
@@ -162,6 +196,9 @@ class Problem:
     ) -> None:
         self.workers = workers
         self.helpers: _Helpers | None = None
+        self.marginal: Marginal | None = None
+        self.moved: dict[str, Moved] = {}
+        self.sizes: dict[str, FloatArray] = {}
         self.pins: list[Pin] = []
         self.robot, self.campaign = robot, campaign
         self.model = Model(robot, gravity_stiffness)
@@ -185,6 +222,7 @@ class Problem:
                     {name: data[name] for name in names},
                     {name: noise[name].at(rate) for name in names},
                     poses.setdefault(setup.geometry.pose.tobytes(), len(poses)),
+                    _RISES * campaign.tolerance.rise_time,
                 )
             )
         if not self.records:
@@ -219,6 +257,8 @@ class Problem:
     ) -> list[FloatArray]:
         """Whitened residuals of every record, (channels, m): unit variance where all is noise.
 
+        What is never exact is integrated out, once its slopes are known (`marginal`).
+
         Args:
             effects: of the model.
             records: all where None.
@@ -229,8 +269,32 @@ class Problem:
         """
         chosen = self.records if records is None else records
         wanted = tuple(effects)
-        shared = self.helpers.residuals(wanted, chosen, end) if self.helpers else None
-        return self.own_residuals(wanted, chosen, end) if shared is None else shared
+        found = self.unmarginalised(wanted, chosen, end)
+        if self.marginal is None or not chosen:
+            return found
+        names = [record.name for record in chosen]
+        return self.marginal.whitened(found, names, (effect.label for effect in wanted))
+
+    def unmarginalised(
+        self,
+        effects: Iterable[Effect],
+        records: Sequence[MeasuredRecord] | None = None,
+        end: float | None = None,
+    ) -> list[FloatArray]:
+        """As `residuals`, in units of the noise alone.
+
+        Args:
+            effects: of the model.
+            records: all where None.
+            end: s, look no further.
+
+        Returns:
+            an array (channels, m) a record.
+        """
+        chosen = self.records if records is None else records
+        wanted = tuple(effects)
+        found = self.helpers.residuals(wanted, chosen, end) if self.helpers else None
+        return self.own_residuals(wanted, chosen, end) if found is None else found
 
     def own_residuals(
         self, effects: Iterable[Effect], records: Sequence[MeasuredRecord], end: float | None
@@ -249,12 +313,19 @@ class Problem:
         # One after the other: threads would wait for the interpreter most of the time.
         try:
             with np.errstate(all="ignore"):
-                found = [residual(record, model, end) for record in records]
+                found = [self._residual(record, model, end) for record in records]
         except (ArithmeticError, np.linalg.LinAlgError) as error:
             raise InputError(f"no model that can be computed: {error}") from error
         if not all(math.isfinite(each.sum()) for each in found):
             raise InputError("no model that can be computed: the motion diverges")
         return found
+
+    def _residual(self, record: MeasuredRecord, model: Model, end: float | None) -> FloatArray:
+        moved = self.moved.get(record.name)
+        if moved is None:
+            return residual(record, model, end)
+        found = residual_under(record, model, moved.record, moved.effects, end)
+        return found if moved.shift is None else found - moved.shift[:, : found.shape[1]]
 
     @contextmanager
     def pinned(self, effects: Iterable[Effect]) -> Iterator[None]:
@@ -285,7 +356,7 @@ class Problem:
         model = self.model.with_effects(pin)
         self.pins.append(pin)
         for record in self.records:
-            record._pinned.append(near_edges(record.setup, model))
+            record._pinned.append(near_edges(record.setup, model, record.smeared))
 
     def unpin(self) -> None:
         """Undo the last `pin`."""
@@ -307,8 +378,40 @@ class Problem:
         return [record.setup.predict(model) for record in chosen]
 
 
-def residual(record: MeasuredRecord, model: Model, end: float | None = None) -> FloatArray:
-    """One record's whitened residual (channels, m) up to a time."""
+def residual_under(
+    record: MeasuredRecord,
+    model: Model,
+    there: MeasuredRecord,
+    more: Sequence[Effect],
+    end: float | None = None,
+) -> FloatArray:
+    """As `residual`, with small changes of the record and the model.
+
+    Args:
+        record: as stated; with `model` it says which samples are known.
+        model: without the changes.
+        there: the record with its changes.
+        more: what else is changed.
+        end: s, up to when.
+    """
+    kept = _kept_edges(record, record.until(end), model)
+    return residual(there, replace(model, effects=(*model.effects, *more)), end, lambda: kept)
+
+
+def residual(
+    record: MeasuredRecord,
+    model: Model,
+    end: float | None = None,
+    near: Callable[[], dict[str, BoolArray] | None] | None = None,
+) -> FloatArray:
+    """One record's whitened residual (channels, m) up to a time.
+
+    Args:
+        record: to predict.
+        model: by which.
+        end: s; None for all of the record.
+        near: which samples stand near a jump; as the model has it where None.
+    """
     from picchio.diagnosis.percussion.data.residual_kernel import whitened
 
     setup = record.until(end)
@@ -322,7 +425,7 @@ def residual(record: MeasuredRecord, model: Model, end: float | None = None) -> 
         for effect in solved:
             take_out(rows, setup, effect)
         predicted = {name: record.values[name][:count] - row for name, row in rows.items()}
-    masked = _kept_edges(record, setup, model)
+    masked = _kept_edges(record, setup, model) if near is None else near()
     out, room, known = np.empty((len(record.values), count)), np.empty(count), np.zeros(0, bool)
     for i, channel in enumerate(record.channels):
         name = channel.name
@@ -384,7 +487,7 @@ def _kept_edges(
         count = setup.samples.count
         return None if fixed is None else {g: mask[:count] for g, mask in fixed.items()}
     key = (setup.samples, model.key("blows", "sensor"))
-    return record._edges.get(key, lambda: near_edges(setup, model))
+    return record._edges.get(key, lambda: near_edges(setup, model, record.smeared))
 
 
 # Which records a model is fitted to, and which it is judged on.

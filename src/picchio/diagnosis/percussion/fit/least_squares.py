@@ -38,6 +38,8 @@ class Fit:
         cost: sum of squares of the residuals and of the priors.
         records: fitted.
         end: s; None for all.
+        absorbed: (unknowns, unknowns) covariance of what the unknowns took up of numbers that are
+            never exact; None where everything is.
     """
 
     hypothesis: Hypothesis
@@ -46,6 +48,7 @@ class Fit:
     cost: float
     records: tuple[MeasuredRecord, ...]
     end: float | None
+    absorbed: FloatArray | None = None
 
     @property
     def chi_square(self) -> float:
@@ -72,7 +75,8 @@ class Fit:
         """(unknowns, unknowns) of the transformed unknowns."""
         matrix = self.normal_matrix()
         scale = np.sqrt(np.maximum(matrix.diagonal(), 1e-300))
-        return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale)) / np.outer(scale, scale))
+        inverse = np.linalg.pinv(matrix / np.outer(scale, scale)) / np.outer(scale, scale)
+        return np.asarray(inverse if self.absorbed is None else inverse + self.absorbed)
 
 
 def prior_weights(hypothesis: Hypothesis) -> FloatArray:
@@ -183,7 +187,11 @@ def fit(
             slopes = None
     if with_jacobian and not (fresh and slopes is not None):
         slopes = jacobian(problem, here, chosen, end, residuals, steps)
-    return Fit(here, residuals, slopes if with_jacobian else None, cost, chosen, end)
+    absorbed = None
+    if with_jacobian and problem.marginal is not None:
+        unknown = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
+        absorbed = problem.marginal.absorbed_covariance(unknown)
+    return Fit(here, residuals, slopes if with_jacobian else None, cost, chosen, end, absorbed)
 
 
 def is_nonsmooth(hypothesis: Hypothesis) -> bool:

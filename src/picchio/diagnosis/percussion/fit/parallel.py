@@ -125,12 +125,21 @@ class _Helpers:
     """The processes, and what passes between them and this one."""
 
     def __init__(self, problem: Problem, count: int) -> None:
-        self._problem, self._owner = problem, os.getpid()
+        self._problem, self._owner, self._count = problem, os.getpid(), count
         self._places = {record.name: i for i, record in enumerate(problem.records)}
         self._ends: list[Connection] = []
+        self._processes: list[Any] = []
+        self._start()
+
+    def renew(self) -> None:
+        """Start them anew: they have the problem as it is now."""
+        self.close()
+        self._start()
+
+    def _start(self) -> None:
         context = multiprocessing.get_context("fork")
-        self._processes = []
-        for _ in range(count):
+        problem = self._problem
+        for _ in range(self._count):
             mine, its = context.Pipe()
             self._ends.append(mine)
             # Were our ends open in it, it would not notice that we are gone.

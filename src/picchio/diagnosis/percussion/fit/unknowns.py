@@ -16,7 +16,7 @@ from picchio.model.effects.registry import catalogue
 from picchio.robot.flexible_robot import FlexibleRobot
 
 # Nominal values within so many standard deviations are nuisances, not causes.
-TOLERATED = 2.0
+TOLERATED = 3.8
 _STEP_LOG = 1e-3
 _STEP_LINEAR = 1e-2
 

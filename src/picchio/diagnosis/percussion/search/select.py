@@ -7,7 +7,8 @@ from contextlib import ExitStack
 from functools import partial
 
 from picchio.diagnosis.attempt import attempt
-from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic, bic_difference, confidence
+from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic_difference, confidence
+from picchio.diagnosis.percussion.criteria.remainder import allowed, decisive_gain
 from picchio.diagnosis.percussion.data.problem import Problem, Split
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
@@ -25,8 +26,10 @@ from picchio.diagnosis.percussion.search.trials import (
     MOST_RIVALS,
     holdout_choice,
     over_the_same_samples,
+    settled_alike,
     try_candidates,
 )
+from picchio.diagnosis.percussion.tolerance.linearise import settled
 from picchio.diagnosis.result import BEYOND_DOUBT, Estimate
 from picchio.model.effects.effect import Effect
 
@@ -55,7 +58,7 @@ def begin_search(
     """
     say("fitting the nominal model within its tolerance")
     start = Hypothesis.baseline(problem.robot, problem.campaign.tolerance)
-    baseline = fit_growing(problem, start, split[0])
+    baseline = settled(problem, fit_growing(problem, start, split[0]), split[0])
     effects = baseline.hypothesis.effects
     scales = measure_scales(problem, effects, problem.predictions(effects))
     return Search(problem, candidates, scales, *split, baseline, baseline, say)
@@ -102,6 +105,8 @@ def _grow(search: Search, stack: ExitStack) -> None:
     problem = search.problem
     for _ in range(MOST_CAUSES):
         here = search.best
+        if search.explains_enough(here):
+            break
         search.say(f"looking for cause {len(search.labels) + 1}")
         quiet = search.leaves_noise(here)
         if quiet and not search.pinned:
@@ -113,9 +118,10 @@ def _grow(search: Search, stack: ExitStack) -> None:
             break
         if not search.pinned:
             trials = over_the_same_samples(search, trials)
+        trials = settled_alike(search, trials)
         search.steps.append(trials)
         best = _chosen(search, trials, wider=not quiet)
-        gain = bic(here) - best.score if best is not None else 0.0
+        gain = search.pays(here, best.fit) if best is not None else 0.0
         if best is None or gain < search.least:
             break
         trials.sort(key=lambda t: t is not best)
@@ -130,7 +136,7 @@ def _grow(search: Search, stack: ExitStack) -> None:
             if search.best.cost < here.cost and not quiet:
                 continue
             break
-        search.best = restarted(search, search.best)
+        search.best = settled(problem, restarted(search, search.best), search.records, rounds=2)
         if known:
             _settle(search, best.label)
         if len(search.labels) >= MOST_CAUSES:
@@ -193,15 +199,22 @@ def alternatives(search: Search) -> tuple[list[Trial], list[Trial]]:
             search, best, cause.label, MOST_RIVALS
         )
         finished = [t for t in trials if t.finished(search.records)]
+        finished = settled_alike(search, finished, best)
         tried += finished
         for trial in finished:
             if trial.fit.hypothesis.labels == best.hypothesis.labels:
                 continue
-            compared = partial(bic_difference, search.problem, best, trial.fit)
+            compared = partial(_rise, search, trial.fit)
             rise = attempt(trial.label, compared)
             if rise is not None and rise < SAME:
                 same.append(trial)
     return same, tried
+
+
+def _rise(search: Search, other: Fit) -> float:
+    """By how much another fit does worse than the best, in units of chi-square."""
+    rise = bic_difference(search.problem, search.best, other)
+    return min(rise, decisive_gain(other, search.best)) if allowed(search.problem) else rise
 
 
 def _tried_before(search: Search, label: str) -> list[Trial]:

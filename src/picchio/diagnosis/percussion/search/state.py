@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.criteria.equivalence import bic
+from picchio.diagnosis.percussion.criteria.remainder import Remainder, allowed, decisive_gain
 from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
@@ -79,7 +80,9 @@ class Search:
     least: float = field(init=False)
 
     def __post_init__(self) -> None:
-        self.least = max(LEAST_GAIN, EXACT**2 * signal_power(self.records))
+        self.least = LEAST_GAIN
+        if not allowed(self.problem):
+            self.least = max(LEAST_GAIN, EXACT**2 * signal_power(self.records))
 
     @property
     def labels(self) -> frozenset[str]:
@@ -105,6 +108,26 @@ class Search:
             rival: cost of a fit that it must come near; one that stays far above is given up.
         """
         return fit(self.problem, hypothesis, self.records, None, iterations=iterations, rival=rival)
+
+    def pays(self, without: Fit, found: Fit) -> float:
+        """By how much a fit beats another one, in units of chi-square.
+
+        Args:
+            without: the fit that lacks something.
+            found: the fit that has it.
+        """
+        gain = bic(without) - bic(found)
+        return min(gain, decisive_gain(without, found)) if allowed(self.problem) else gain
+
+    def explains_enough(self, found: Fit) -> bool:
+        """Whether what a fit with causes leaves is no more than a remainder that is allowed.
+
+        Args:
+            found: the fit.
+        """
+        if not allowed(self.problem) or not found.hypothesis.causes:
+            return False
+        return Remainder.of(found).may_be_named(Remainder.of(self.baseline))
 
     def leaves_noise(self, found: Fit) -> bool:
         """Whether noise is all that a fit leaves.

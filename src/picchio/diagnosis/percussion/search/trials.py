@@ -10,6 +10,7 @@ from typing import Any
 
 from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic
+from picchio.diagnosis.percussion.criteria.remainder import allowed, decisive_gain
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing, is_nonsmooth
@@ -17,6 +18,7 @@ from picchio.diagnosis.percussion.fit.parallel import worker_pool
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.screen import Screen, Suspect
 from picchio.diagnosis.percussion.search.state import Search, Trial
+from picchio.diagnosis.percussion.tolerance.linearise import about_another, settled
 from picchio.model.effects.effect import Effect
 
 # One candidate fitted: to the first part of the records, and from there to all of them.
@@ -322,3 +324,44 @@ def over_the_same_samples(search: Search, trials: Sequence[Trial]) -> list[Trial
                 again.append(replace(t, fit=there, score=bic(there)))
     others = [t for t in trials if t not in close]
     return sorted([*again, *others], key=lambda t: t.score)
+
+
+# So many close trials are settled, each by itself; and how much worse one may be to be close, since
+# none has come to its end yet.
+_SETTLED = 3
+_CLOSE = 3.0 * SAME
+
+
+def settled_alike(search: Search, trials: Sequence[Trial], best: Fit | None = None) -> list[Trial]:
+    """Trials, the best first; close ones are compared each about its own inexact numbers.
+
+    All were fitted about those of the hypothesis without them, which one may suit better than
+    another. Where everything is exact, nothing changes.
+
+    Args:
+        search: data and records.
+        trials: the best first.
+        best: the fit to come close to; the first trial's where None.
+
+    Returns:
+        all of them, the best first.
+    """
+    if not allowed(search.problem) or not trials:
+        return list(trials)
+    mark = trials[0].fit if best is None else best
+    close = [
+        t
+        for t in trials
+        if t.finished(search.records)
+        and not t.draws
+        and decisive_gain(t.fit, mark) < _CLOSE
+        and (best is None or t.fit.hypothesis.labels != best.hypothesis.labels)
+    ][:_SETTLED]
+    again = {}
+    for trial in close:
+        with about_another(search.problem):
+            settle = partial(settled, search.problem, trial.fit, search.records, rounds=2)
+            there = attempt(trial.label, settle)
+        if there is not None and there.cost < trial.fit.cost:
+            again[trial.label] = replace(trial, fit=there, score=bic(there))
+    return sorted((again.get(t.label, t) for t in trials), key=lambda t: t.score)

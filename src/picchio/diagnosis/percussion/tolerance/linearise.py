@@ -1,0 +1,230 @@
+"""About which model, and which inexact numbers, the records are linearised."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Moved, Problem
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, jacobian, prior_cost
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.tolerance.marginal import Marginal
+from picchio.diagnosis.percussion.tolerance.nudges import POSE, inexact, nudged
+from picchio.diagnosis.percussion.tolerance.slopes import Slopes, all_slopes
+
+# Numbers are moved by so many standard deviations at most.
+_FARTHEST = 3.5
+# The stretch, s, that is looked at first; how often slopes are taken at most, and what fall of the
+# cost asks for it once more; and by how much more what is not exact is held back where a move to
+# where it seems to be leads nowhere.
+_SHORT = 0.16
+_ROUNDS = 3
+_SETTLED = 0.01
+# Chi-square per sample above which more is wrong than what is not exact.
+_ELSE = 3.0
+_TEMPERS = (1.0, 10.0, 100.0)
+
+
+def linearise(
+    problem: Problem, here: Hypothesis, end: float | None = None, both: bool = False
+) -> None:
+    """Have what is never exact integrated out of all residuals, to first order about a hypothesis.
+
+    What its own unknowns can take up of what the campaign shares is left to them: a link that
+    is heavier looks like a softer joint, and what is left of it is small, so that it stays linear.
+    What they take up makes them less sure (`Absorbed`).
+
+    Args:
+        problem: what is changed: its `marginal`, and where its inexact numbers are taken to be.
+        here: the hypothesis.
+        end: s, up to when; None for whole records.
+        both: take slopes either way. What the unknowns take up must cancel to a thousandth, or the
+            little that is left passes for knowledge of what no record can tell, such as the mass of
+            all. That matters for how sure values are, not for which model is the better.
+    """
+    effects = here.effects
+    slopes = all_slopes(problem, effects, end, both)
+    if len(slopes) < len(problem.records) or not any(s.what for s in slopes.values()):
+        problem.marginal = None
+        return
+    _move(problem, problem.sizes, shifted=False)
+    problem.marginal = None
+    raw = problem.unmarginalised(effects, None, end)
+    steps = np.array([u.step for u in here.unknowns()])
+    ahead, behind = (
+        jacobian(problem, here, problem.records, end, raw, way * steps) for way in (0.5, -0.5)
+    )
+    jacobians = [0.5 * (a + b) for a, b in zip(ahead, behind, strict=True)]
+    shared, absorbed = _without(slopes, jacobians, [r.name for r in problem.records])
+    unknowns = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
+    problem.marginal = Marginal(shared, dict(zip(unknowns, absorbed, strict=True)))
+    _move(problem, problem.sizes)
+
+
+def _without(
+    slopes: Mapping[str, Slopes], jacobians: Sequence[FloatArray], names: Sequence[str]
+) -> tuple[dict[str, Slopes], FloatArray]:
+    """The slopes without what a fit's unknowns take up of the shared ones; that, (unknowns, k)."""
+    normal = sum(j.T @ j for j in jacobians)
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    own = next(iter(slopes.values())).own
+    flat = {n: slopes[n].columns.reshape(-1, slopes[n].columns.shape[2])[:, own:] for n in names}
+    right = sum(j.T @ flat[n].astype(float) for n, j in zip(names, jacobians, strict=True))
+    inverse = np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True)
+    absorbed = inverse @ (right / scale[:, None]) / scale[:, None]
+    found = {}
+    for name, own_jacobian in zip(names, jacobians, strict=True):
+        columns = slopes[name].columns.copy()
+        left = flat[name] - own_jacobian @ absorbed
+        columns[:, :, own:] = left.reshape(*columns.shape[:2], -1)
+        found[name] = replace(slopes[name], columns=columns)
+    return found, absorbed
+
+
+def settled(
+    problem: Problem,
+    start: Fit,
+    records: Sequence[MeasuredRecord],
+    rounds: int = _ROUNDS,
+    *,
+    anew: bool = True,
+) -> Fit:
+    """A hypothesis fitted together with what is not exact, linearised where it comes to stand.
+
+    A long record at once lets a frequency skip cycles: the stretch that is looked at grows. Where
+    what is not exact cannot explain the first stretch, something else is wrong: then it stays where
+    it is stated, or it would be pulled to the ends of what is tolerated.
+
+    Args:
+        problem: its slopes, and where its inexact numbers are taken to be, are found anew.
+        start: the hypothesis, fitted; where everything is exact, that is all.
+        records: to fit; what is inexact in the others is found beside it.
+        rounds: how often slopes are taken at most, of the first stretch and of all.
+        anew: begin where everything is as stated; else where it is taken to be now. Without the
+            right cause it was pulled to wherever it made up for that.
+    """
+    if not any(inexact(problem, problem.records[0], problem.campaign.tolerance)):
+        return start
+    if anew and problem.sizes:
+        _move(problem, {})
+    here = start.hypothesis
+    for end in (_SHORT, None):
+        before = math.inf
+        for _ in range(rounds):
+            linearise(problem, here, end)
+            found = fit(problem, here, records, end, iterations=4)
+            power = found.chi_square / max(found.samples, 1)
+            if power > _ELSE:
+                here = _at_stated(problem, found.hypothesis, end)
+                break
+            here = _recentred(problem, found)
+            if before - found.cost < _SETTLED * found.cost:
+                break
+            before = found.cost
+    return fit(problem, here, records, None, with_jacobian=True)
+
+
+@contextmanager
+def about_another(problem: Problem) -> Iterator[None]:
+    """Within the block other hypotheses may be settled; then all is linearised as before.
+
+    Args:
+        problem: whose slopes, and numbers that are not exact, are kept.
+
+    Returns:
+        a context manager.
+    """
+    kept = problem.marginal, problem.sizes, problem.moved
+    try:
+        yield
+    finally:
+        if problem.marginal is not kept[0] or problem.moved is not kept[2]:
+            problem.marginal, problem.sizes, problem.moved = kept
+            _renew(problem)
+
+
+def _at_stated(problem: Problem, here: Hypothesis, end: float | None) -> Hypothesis:
+    """A hypothesis about the numbers as they are stated, and the slopes there."""
+    if problem.sizes:
+        problem.sizes, problem.moved = {}, {}
+        linearise(problem, here, end)
+    return here
+
+
+def _recentred(problem: Problem, found: Fit) -> Hypothesis:
+    """The fit's hypothesis about inexact numbers that explain more, if any do."""
+    best, before = found.hypothesis, problem.sizes
+    cost = _cost(problem, best, found.end)
+    temper = max(1.0, found.chi_square / max(found.samples, 1))
+    for harder in _TEMPERS:
+        other = recentre(problem, found, harder * temper)
+        now = _cost(problem, other, found.end)
+        if now < cost:
+            return other
+        _move(problem, before)
+    return best
+
+
+def _cost(problem: Problem, hypothesis: Hypothesis, end: float | None) -> float:
+    try:
+        there = problem.residuals(hypothesis.effects, None, end)
+    except InputError:
+        return math.inf
+    return sum(float((r * r).sum()) for r in there) + prior_cost(hypothesis)
+
+
+def recentre(problem: Problem, found: Fit, temper: float = 1.0) -> Hypothesis:
+    """Move the inexact numbers to where the records have them, the slopes being kept.
+
+    Args:
+        problem: what is changed.
+        found: a fit.
+        temper: variance of what the residuals hold beside the inexact numbers, 1 for noise.
+
+    Returns:
+        the fit's hypothesis, less what its unknowns had taken up of what was moved.
+    """
+    marginal, hypothesis = problem.marginal, found.hypothesis
+    if marginal is None:
+        return hypothesis
+    names = [record.name for record in problem.records]
+    raw = problem.unmarginalised(hypothesis.effects, None, found.end)
+    sizes = marginal.estimated(raw, names, temper)
+    # A pose's geometry takes long to find, and its small errors act in proportion.
+    stays = {n: np.array([w.where == POSE for w in s.what]) for n, s in marginal.slopes.items()}
+    new = {n: np.where(stays[n], 0.0, np.clip(v, -_FARTHEST, _FARTHEST)) for n, v in sizes.items()}
+    own = marginal.slopes[names[0]].own
+    change = new[names[0]][own:]
+    if names[0] in problem.sizes:
+        change = change - problem.sizes[names[0]][own:]
+    vector = hypothesis.vector()
+    for k, u in enumerate(hypothesis.unknowns()):
+        taken = marginal.absorbed.get((hypothesis.effects[u.effect].label, u.name))
+        if taken is not None:
+            vector[k] -= taken @ change
+    _move(problem, new)
+    return hypothesis.at(vector)
+
+
+def _move(problem: Problem, sizes: dict[str, FloatArray], shifted: bool = True) -> None:
+    problem.sizes, problem.moved = sizes, {}
+    for record in problem.records:
+        if record.name in sizes:
+            assert problem.marginal is not None
+            slopes, size = problem.marginal.slopes[record.name], sizes[record.name]
+            there, effects = nudged(record, slopes.moved(size))
+            shift = slopes.columns @ size if shifted else None
+            problem.moved[record.name] = Moved(there, effects, shift)
+    _renew(problem)
+
+
+def _renew(problem: Problem) -> None:
+    """Other processes have the problem as it was when they were started."""
+    if problem.helpers is not None:
+        problem.helpers.renew()
