@@ -79,8 +79,9 @@ def an_effect(name: str, robot) -> Effect:
     kind = effects()[name]
     links = [link for link, inertial in robot.tree.links.items() if inertial]
     target = {
-        "joint": "joint_2", "joint or link": "joint_2", "link": links[-1], "tool": "tool",
-        "robot": "robot", "axis": "ry", "channel group": "accelerometer.tool",
+        "joint": "joint_2", "joint pair": "joint_2", "joint or link": "joint_2",
+        "link": links[-1], "tool": "tool", "robot": "robot", "axis": "ry",
+        "channel group": "accelerometer.tool",
     }[kind.target_kind]  # fmt: skip
     tried = kind(target).trials(scales(robot))
     values = dict(tried[0]) if tried else {}

@@ -5,7 +5,14 @@ import pinocchio as pin
 import pytest
 
 from picchio.diagnosis.motion.diagnosis import diagnose_motion
-from picchio.model.inertia import in_frame, point_masses, pseudo_inertia, stretched, ten_numbers
+from picchio.model.inertia import (
+    body,
+    in_frame,
+    point_masses,
+    pseudo_inertia,
+    stretched,
+    ten_numbers,
+)
 from picchio.robot.loading.load import load_robot
 from worlds import moving, robots
 from worlds.chain import from_pinocchio, merge
@@ -135,7 +142,8 @@ def test_a_counterbalance_is_found(robot, chain):
 
 def test_no_change_makes_a_body_that_cannot_exist():
     rng = np.random.default_rng(0)
-    own = pin.Inertia.Random().toDynamicParameters()
+    # Pinocchio's random inertias need not be those of a body that can exist.
+    own = body(3.0, [0.1, -0.2, 0.3], [0.02, 0.05, 0.01])
     np.testing.assert_allclose(stretched(own, np.zeros(10)), own, atol=1e-12)
     for _ in range(100):
         ten = stretched(own, rng.uniform(-2.5, 2.5, 10))

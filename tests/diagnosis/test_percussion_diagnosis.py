@@ -209,7 +209,7 @@ def test_a_nuisance_that_is_no_cause_any_more_stays_where_it_was():
     arm = load_robot("fanuc_like_3dof")
     start = Hypothesis.baseline(arm, Tolerance(stiffness=0.05))
     softer = effect_class("joint_stiffness")
-    for scale, back in ((0.93, 0.93), (0.7, 0.9), (1.4, 1.1)):
+    for scale, back in ((0.93, 0.93), (0.7, 0.81), (1.4, 1.19)):  # 3.8 deviations either way
         freed = start.plus(softer("joint_3", scale=scale))
         assert freed.labels == {"joint_stiffness:joint_3"}
         held = freed.minus("joint_stiffness:joint_3")

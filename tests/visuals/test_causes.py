@@ -24,8 +24,10 @@ from picchio.visuals.scene.build import build_scene
 
 BLOWS = PulseTrain(300.0, 0.040, 0.004)
 POSE = [-0.3, 0.6, -0.5]
-TARGETS = {"joint": "joint_2", "link": "link_2", "joint or link": "joint_3", "tool": "tool",
-           "robot": "robot", "axis": "ry", "channel group": "accelerometer.tool"}  # fmt: skip
+TARGETS = {
+    "joint": "joint_2", "joint pair": "joint_2", "link": "link_2", "joint or link": "joint_3",
+    "tool": "tool", "robot": "robot", "axis": "ry", "channel group": "accelerometer.tool",
+}  # fmt: skip
 WRONG = [
     ("no json", "not valid JSON"),
     ("[1, 2]", "an object"),
