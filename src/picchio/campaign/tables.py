@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from datetime import UTC, datetime
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Annotated, Any, Literal
@@ -154,6 +155,14 @@ class Tolerance(StrictModel):
     static_force: NotNegative = 0.01
     dial: NotNegative = 1e-5
     torque_gain: NotNegative = 0.03
+
+    def beyond(self, keys: Collection[str]) -> bool:
+        """Whether anything but some keys is not exact.
+
+        Args:
+            keys: those that do not count.
+        """
+        return any(value > 0.0 for key, value in self.model_dump().items() if key not in keys)
 
     @classmethod
     def zero(cls) -> Tolerance:
