@@ -32,7 +32,7 @@ from picchio.diagnosis.percussion.conclude.verdict import (
     why_not_claimed,
 )
 from picchio.diagnosis.percussion.criteria.common_fault import common_faults
-from picchio.diagnosis.percussion.criteria.dominance import dominant_causes
+from picchio.diagnosis.percussion.criteria.dominance import dominant_causes, explained_share
 from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic, bic_difference
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.criteria.remainder import Remainder, allowed, decisive_gain
@@ -56,6 +56,9 @@ from picchio.diagnosis.result import Cause, Diagnosis, Estimate
 from picchio.model.effects.effect import Effect
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.tasks import Task
+
+# A doubtful cause that explains more than this of what is wrong without it is not left out.
+_NEEDED = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +188,8 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
     while len(causes) > 1 and (doubted := doubtful(causes)):
         # What is not beyond doubt is none beside what is: it is told as a lead.
         rest = attempt("without what is doubted", partial(_without, search, doubted[0]))
-        if rest is None:
+        # A set that explains little without it stands or falls as a whole.
+        if rest is None or explained_share(search.best, rest) > _NEEDED:
             break
         dropped.append((doubted[0].effect, doubted[0].target))
         search.best = rest

@@ -97,14 +97,14 @@ def doubtful(causes: Sequence[Cause]) -> list[Cause]:
 
 def _is_nothing(cause: Cause) -> bool:
     """Whether every number of a cause is as near to doing nothing as it is unsure."""
-    for p in effect_class(cause.effect).parameters:
-        value = cause.parameters.get(p.name)
-        if value is None or not math.isfinite(p.neutral) or value.std == 0.0:
-            continue
-        if abs(value.value - p.neutral) > _UNSURE * value.std:
-            return False
-    told = [v.std for v in cause.parameters.values()]
-    return any(std > 0.0 for std in told)
+    fitted = [
+        (value, p.neutral)
+        for p in effect_class(cause.effect).parameters
+        if (value := cause.parameters.get(p.name)) is not None and value.std > 0.0
+    ]
+    # What does nothing only at infinity, such as a sensor's range, has no distance from it.
+    near = (math.isfinite(n) and abs(v.value - n) <= _UNSURE * v.std for v, n in fitted)
+    return bool(fitted) and all(near)
 
 
 def _doubted(causes: Sequence[Cause]) -> list[Cause]:
