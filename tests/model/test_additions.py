@@ -93,13 +93,14 @@ import json, warnings
 warnings.simplefilter("ignore")
 import picchio
 from picchio.model.effects.registry import catalogue
+from picchio.campaign.tables import Tolerance
 from picchio.prediction.plan import Plan
 robot = picchio.load_robot("fanuc_like_3dof")
 plan = Plan(
     poses=[[0.2, 0.5, -0.8], [-0.6, 0.2, 0.4], [0.9, 0.9, -1.2]],
     directions=[[1, 0, 0], [0, 0.6, 0.8]], repeats=2, levels=[300.0], sample_rate=500.0,
     quiet=0.4, length=0.3, seed=4, excitation=dict({BLOWS}, hits=4),
-    sensor=[dict(channels="gyroscope", noise=1e-5)],
+    tolerance=Tolerance.zero(), sensor=[dict(channels="gyroscope", noise=1e-5)],
     effect=[dict(effect="supply_scatter", target="tool", parameters=dict(std=0.2))],
 )
 picchio.simulate(robot, plan, "campaign")
