@@ -216,6 +216,9 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         causes = fitted_causes(search, whole, rivals, refuted)
     common = common_faults(whole.hypothesis, reported_covariance(whole), problem.groups)
     verdict = verdict_of(causes, before, after, bool(same), gain.explained, common, left)
+    remainder = held_out_remainder(problem, stands, judged)
+    if verdict == "nothing-wrong" and not (before.is_noise or remainder.within_tolerance):
+        verdict = "unexplained"  # records that were held out have more than an honest model leaves
     if any(e.latent and e.latent.linear for e in whole.hypothesis.effects):
         causes = with_solved(causes, with_solved_numbers(problem, whole))
     others: dict[tuple[tuple[str, str], ...], Hypothesis] = {}
@@ -247,7 +250,7 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         next_measurement=ask,
         scores=tuple(_scores(search)),
         note=note,
-        remainder=held_out_remainder(problem, stands, judged),
+        remainder=remainder,
     )
     return PercussionDiagnosis(
         diagnosis, problem, nominal, whole, search, before, after,
