@@ -236,31 +236,6 @@ class RigidModel:
         torque = np.array(every).reshape(len(poses), self._all)
         return torque if self._plain else torque @ self._follow
 
-    def point_load(
-        self, poses: Array, velocities: Array, accelerations: Array, frame: int
-    ) -> Array:
-        """Torques (m, nv) for each kg at a frame's origin: J^T (acceleration less gravity).
-
-        Args:
-            poses: (m, nv) rad or m.
-            velocities: (m, nv) a second.
-            accelerations: (m, nv) a second squared.
-            frame: of `frame`.
-        """
-        self._check_frame(frame)
-        model, data = self._model, self._data()
-        world, gravity = pin.LOCAL_WORLD_ALIGNED, self._model.gravity.linear
-        found = np.empty((len(poses), self.nv))
-        for i, pose in enumerate(poses):
-            q = self._q(pose)
-            v, a = velocities[i], accelerations[i]
-            if not self._plain:
-                v, a = self._follow @ v, self._follow @ a
-            pin.forwardKinematics(model, data, q, v, a)
-            linear = pin.getFrameClassicalAcceleration(model, data, frame, world).linear - gravity
-            found[i] = linear @ self.jacobian(pose, frame)[:3]
-        return found
-
     def placement(self, pose: Array, frame: int) -> tuple[Array, Array]:
         """The world position (3,) in m and rotation (3, 3) of a frame.
 
