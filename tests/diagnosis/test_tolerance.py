@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.criteria.remainder import Remainder, decisive_gain
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
-from picchio.diagnosis.percussion.fit.least_squares import fit_growing
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.tolerance.linearise import linearise, settled
 from picchio.diagnosis.percussion.tolerance.marginal import Marginal
@@ -115,7 +117,7 @@ def test_the_mass_of_all_is_told_by_no_record(wrong_everywhere):
     problem = Problem(robot, campaign)
     start = Hypothesis.baseline(robot, campaign.tolerance)
     with one_thread():
-        linearise(problem, start, both=True)
+        linearise(problem, start, problem.records, both=True)
     marginal = problem.marginal
     heavier = np.array([name.startswith("link_mass") for name in marginal.shared], dtype=float)
     for slopes in marginal.slopes.values():
@@ -174,13 +176,22 @@ def test_worlds_that_are_a_little_wrong_everywhere(kind, draw, tmp_path):
 
 
 def test_a_better_fit_is_decisive_only_if_little_is_left_of_it():
-    class Stub:
-        """A fit's cost, of six poses."""
+    def left(share, held=None):
+        """A fit that leaves so much of the signal at six poses, and what tolerances cost in it."""
+        signal = 100.0 * np.sin(np.arange(1000.0))
+        records = [
+            SimpleNamespace(pose=pose, values={"x": signal}, noise={"x": SimpleNamespace(std=1.0)})
+            for pose in range(6)
+        ]
+        power = 1.0 + (share * signal.std()) ** 2
+        residuals = [np.full((1, 1000), math.sqrt(power)) for _ in records]
+        cost = 6000.0 * power
+        return Fit(None, residuals, None, cost, tuple(records), None, held=held)
 
-        def __init__(self, cost):
-            self.cost, self.samples = cost, 1000
-            self.records = [type("R", (), {"pose": pose})() for pose in range(6)]
-
-    assert decisive_gain(Stub(1e5), Stub(1e3)) > 50.0
-    assert decisive_gain(Stub(1e5), Stub(5e4)) < 8.0
-    assert decisive_gain(Stub(900.0), Stub(800.0)) == 0.0
+    assert decisive_gain(left(0.1), left(0.001)) > 50.0
+    assert decisive_gain(left(0.004), left(0.003)) < 8.0
+    assert decisive_gain(left(0.2), left(0.1)) > 50.0  # more than an honest model leaves
+    assert abs(decisive_gain(left(0.0001), left(0.0))) < 0.5
+    # What is known beforehand counts in full, whatever the remainder.
+    assert decisive_gain(left(0.0, 90.0), left(0.0, 40.0)) == pytest.approx(50.0, abs=3.0)
+    assert decisive_gain(left(0.0, 90.0), left(0.0)) == pytest.approx(0.0, abs=1e-9)

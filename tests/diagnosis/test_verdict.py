@@ -17,7 +17,7 @@ COMMON = ("sensor_gain",)
 
 def causes(*confidences):
     return [
-        Cause(f"effect_{i}", f"joint_{i}", confidence, {})
+        Cause("joint_stiffness", f"joint_{i}", confidence, {})
         for i, confidence in enumerate(confidences)
     ]
 
@@ -46,7 +46,7 @@ def test_verdict(confidences, before, after, others, explained, common, verdict)
 def test_which_of_several_causes_is_doubted_is_said():
     why = why_not_claimed(causes(0.999, 0.95, 0.999), ())
     assert "3 causes together" in why
-    assert "effect 1 (joint_1, confidence 0.95) is not beyond doubt" in why
-    assert "effect 0" not in why
+    assert "joint stiffness (joint_1, confidence 0.95) is not beyond doubt" in why
+    assert "joint_0" not in why
     assert why_not_claimed(causes(0.999, 0.999), ()) == "" == why_not_claimed(causes(0.5), ())
     assert "all sensors" in why_not_claimed(causes(0.5, 0.5), COMMON)

@@ -98,6 +98,12 @@ class Inertia:
     gravity_curvature: FloatArray
 
 
+# [r, s, t]: (a x b)_r is the sum of this times a_s b_t.
+_CROSS = np.zeros((3, 3, 3))
+for _r, _s, _t in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+    _CROSS[_r, _s, _t], _CROSS[_r, _t, _s] = 1.0, -1.0
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """How a frame moves with c coordinates, to second order; world axes.
@@ -119,13 +125,14 @@ class Motion:
             offset: (3,) m, from the frame's origin, in its axes.
         """
         lever = self.rotation @ offset
-        linear, angular = self.jacobian[:3], self.jacobian[3:]
-        jacobian = self.jacobian.copy()
-        jacobian[:3] = linear + _cross(angular, lever)
-        gradient = self.gradient.copy()
-        turned = np.cross(angular.T, lever)  # (c, 3): the lever's change by each coordinate
-        for k in range(len(gradient)):
-            gradient[k, :3] += _cross(self.gradient[k, 3:], lever) + _cross(angular, turned[k])
+        angular = self.jacobian[3:]
+        across = _CROSS @ lever
+        turned = across @ angular  # (3, c): the lever's change by each coordinate
+        jacobian, gradient = self.jacobian.copy(), self.gradient.copy()
+        jacobian[:3] += turned
+        gradient[:, :3] += (
+            across @ self.gradient[:, 3:] + (_CROSS @ turned).T.swapaxes(1, 2) @ angular
+        )
         return Motion(jacobian, gradient, self.rotation)
 
     def take(self, columns: list[int]) -> Motion:
@@ -139,11 +146,6 @@ class Motion:
             np.ascontiguousarray(self.gradient[np.ix_(columns, range(6), columns)]),
             self.rotation,
         )
-
-
-def _cross(columns: FloatArray, lever: FloatArray) -> FloatArray:
-    """(3, c) cross (3,)."""
-    return np.cross(columns.T, lever).T
 
 
 class WideChain:
@@ -274,7 +276,7 @@ class WideChain:
             full = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
             full = np.array(full).reshape(6, model.nv) @ columns
             lever = data.oMi[joint].rotation @ placement.translation
-            full[:3] += _cross(full[3:], lever)
+            full[:3] += _CROSS @ lever @ full[3:]
             return full
 
         here = jacobian(q)

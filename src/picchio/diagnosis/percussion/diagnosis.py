@@ -34,6 +34,7 @@ from picchio.diagnosis.percussion.conclude.verdict import (
 from picchio.diagnosis.percussion.criteria.common_fault import common_faults
 from picchio.diagnosis.percussion.criteria.dominance import dominant_causes, explained_share
 from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic, bic_difference
+from picchio.diagnosis.percussion.criteria.exceeded import exceeded
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.criteria.remainder import Remainder, allowed, decisive_gain
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence
@@ -170,11 +171,12 @@ def _searched(
 
 def _nominal(search: Search) -> tuple[Fit, Evidence]:
     problem, baseline = search.problem, search.baseline.hypothesis
-    if search.labels:
-        nominal = fit(problem, baseline, problem.records, None, iterations=3)
-    else:
+    if not search.labels:
         nominal = refit(problem, search.best.hypothesis, problem.records)
-    return nominal, fit_evidence(problem, nominal)
+        return nominal, fit_evidence(problem, nominal)
+    with about_another(problem, search.about):
+        nominal = fit(problem, baseline, problem.records, None, iterations=3)
+        return nominal, fit_evidence(problem, nominal)
 
 
 def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiagnosis:
@@ -198,10 +200,19 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         rivals = _rivals(search, whole)
         causes = fitted_causes(search, whole, rivals)
     if allowed(problem):
-        linearise(problem, whole.hypothesis, both=True)
+        linearise(problem, whole.hypothesis, problem.records, both=True)
         whole = refit(problem, whole.hypothesis, problem.records)
+        # Where it comes to stand, or slopes and Jacobian would differ, and what no record can tell
+        # would pass for known.
+        linearise(problem, whole.hypothesis, problem.records, both=True)
+        whole = fit(
+            problem, whole.hypothesis, problem.records, None, iterations=0, with_jacobian=True
+        )
+    off = exceeded(problem, whole)
+    beyond = off is not None and off.improbable
     stands, judged = search.best.hypothesis, search.kept or search.records
-    gain = holdout_gain(problem, search.baseline.hypothesis, stands, search.records, search.kept)
+    nuisances = search.baseline.hypothesis
+    gain = holdout_gain(problem, nuisances, stands, search.records, search.kept, search.about)
     left = None
     if allowed(problem):
         left = Remainder.of(nominal), Remainder.of(whole)
@@ -217,8 +228,12 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
     common = common_faults(whole.hypothesis, reported_covariance(whole), problem.groups)
     verdict = verdict_of(causes, before, after, bool(same), gain.explained, common, left)
     remainder = held_out_remainder(problem, stands, judged)
-    if verdict == "nothing-wrong" and not (before.is_noise or remainder.within_tolerance):
-        verdict = "unexplained"  # records that were held out have more than an honest model leaves
+    if verdict == "nothing-wrong" and (
+        beyond or not (before.is_noise or remainder.within_tolerance)
+    ):
+        verdict = (
+            "unexplained"  # tolerances alone are not so far off, or held-out records have more
+        )
     if any(e.latent and e.latent.linear for e in whole.hypothesis.effects):
         causes = with_solved(causes, with_solved_numbers(problem, whole))
     others: dict[tuple[tuple[str, str], ...], Hypothesis] = {}
@@ -227,6 +242,8 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         others.setdefault(pairs, t.fit.hypothesis)
     little = leaves_little(after, left)
     note = why_not_claimed(causes, common) if little and verdict == "unexplained" else ""
+    if verdict == "unexplained" and not causes and beyond and off is not None:
+        note = off.told()
     leads: tuple[tuple[str, str], ...] = ()
     if note:
         leads = tuple((c.effect, c.target) for c in causes)

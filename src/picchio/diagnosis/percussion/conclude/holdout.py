@@ -12,6 +12,7 @@ from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, s
 from picchio.diagnosis.percussion.fit.drawn import current_hidden, fit_latent, with_hidden
 from picchio.diagnosis.percussion.fit.least_squares import fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.tolerance.linearise import About, about_another
 from picchio.diagnosis.result import Gain, Left
 
 
@@ -21,11 +22,20 @@ def holdout_gain(
     extended: Hypothesis,
     train: Sequence[MeasuredRecord],
     kept: Sequence[MeasuredRecord],
+    about: About | None = None,
 ) -> Gain:
     """Normalised RMS residuals of both models on the records held out.
 
     Each channel's residual is divided by its noise's standard deviation and the square root of
     its samples; all together are relative to the signal so weighted.
+
+    Args:
+        problem: data and noise, linearised about the extended model.
+        baseline: nuisances alone.
+        extended: with the causes.
+        train: records that were fitted.
+        kept: records held out; those fitted count where there are none.
+        about: what the baseline's records were linearised about; the same where None.
     """
     judged = list(kept) or list(train)
     signal, floor = 0.0, 0
@@ -36,10 +46,12 @@ def holdout_gain(
             signal += float(np.mean(((values - offset) / record.noise[channel.name].std) ** 2))
             floor += 1
     signal = max(signal, 1e-300)
+    with about_another(problem, about):
+        before = _mean_square(problem, baseline, judged)
     return Gain(
         tuple(r.name for r in train),
         tuple(r.name for r in judged),
-        float(np.sqrt(_mean_square(problem, baseline, judged) / signal)),
+        float(np.sqrt(before / signal)),
         float(np.sqrt(_mean_square(problem, extended, judged) / signal)),
         float(np.sqrt(floor / signal)),
         floor,

@@ -74,7 +74,7 @@ def may_be_partial(
     mostly = explained is not None and explained >= MOSTLY
     if left is not None:
         mostly = left[1].may_be_partial(left[0])
-    return mostly and all(cause.confidence >= BEYOND_DOUBT for cause in causes)
+    return mostly and all(c.confidence >= BEYOND_DOUBT and not _is_nothing(c) for c in causes)
 
 
 def claimed_of(verdict: Verdict) -> bool:

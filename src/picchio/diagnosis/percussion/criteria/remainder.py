@@ -3,8 +3,8 @@
 No model of a real robot is exact, so where a campaign states tolerances a little is always left: of
 the size of half a per cent of the signal, different at every pose, and alike within one. Records
 then say no more against a model than their poses do, however many samples they have (a discrepancy
-in the manner of Kennedy and O'Hagan, doi:10.1111/1467-9868.00294, its variance integrated out over
-the poses). Where everything is stated as exact nothing may be left.
+in the manner of Kennedy and O'Hagan, doi:10.1111/1467-9868.00294, its size integrated out). Where
+everything is stated as exact nothing may be left.
 """
 
 from __future__ import annotations
@@ -12,11 +12,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.data.problem import Problem, signal_power
 from picchio.diagnosis.percussion.fit.least_squares import Fit
+from picchio.diagnosis.percussion.fit.unknowns import FITTED
 
 # Of the signal, RMS: what is left of an honest model; above that something is wrong.
 ALLOWED = 0.01
+# Its usual size: the standard deviation of a half-normal distribution; and sizes to integrate over.
+USUAL = 0.005
+_SIZES = np.geomspace(1e-5, 10.0, 300)
 # Of the power of what the causes explain: what a named cause may leave, and a partial one.
 _NAMED = 0.1
 _PARTIAL = 0.5
@@ -80,24 +87,47 @@ class Remainder:
 
 
 def allowed(problem: Problem) -> bool:
-    """Whether anything may be left: where everything is stated as exact, nothing may.
+    """Whether anything may be left: where all but what is fitted is stated as exact, nothing may.
 
     Args:
-        problem: whose tolerances are integrated out, if it has any.
+        problem: its campaign's tolerances.
     """
-    return problem.marginal is not None
+    return problem.campaign.tolerance.beyond(FITTED)
 
 
 def decisive_gain(without: Fit, found: Fit) -> float:
     """By how much a fit beats another one, in units of chi-square, with a remainder in both.
 
-    The remainder's variance is integrated out over the poses: what is left counts by the logarithm
-    of its power.
+    The remainder's size is integrated out: what is left counts by its poses while an honest model
+    may leave it, and in full beyond.
 
     Args:
         without: the fit that lacks something.
         found: the fit that has it.
     """
-    poses = len({record.pose for record in found.records})
-    left = [max(each.cost - each.samples, 0.0) / poses for each in (without, found)]
-    return poses * math.log((1.0 + left[0]) / (1.0 + left[1]))
+    both = without.held is not None and found.held is not None
+    return _evidence_against(without, both) - _evidence_against(found, both)
+
+
+def _evidence_against(found: Fit, with_held: bool) -> float:
+    """Minus twice the logarithm of the likelihood of what a fit leaves at each of its poses.
+
+    A pose's share of the signal that is left is normal about nothing, its variance that of the
+    remainder and of what noise leaves open; the remainder's size is half-normal.
+    """
+    left: dict[int, FloatArray] = {}
+    for record, residual in zip(found.records, found.residuals, strict=True):
+        own = np.array([(residual**2).sum(), residual.size, signal_power([record])])
+        left[record.pose] = left.get(record.pose, np.zeros(3)) + own
+    cost, samples, signal = np.array(list(left.values())).T
+    # What is known beforehand counts in full: no remainder makes it any likelier.
+    held = found.held if with_held and found.held is not None else 0.0
+    known = held + found.cost - cost.sum()
+    cost = cost - held * samples / samples.sum()
+    excess = np.maximum(cost - samples, 0.0) / signal
+    variance = _SIZES**2 + (np.sqrt(2.0 * samples) / signal)[:, None]
+    poses = (np.log(variance) + excess[:, None] / variance).sum(axis=0)
+    # Even steps of the logarithm: a size counts by its density times itself.
+    exponents = -0.5 * (poses + (_SIZES / USUAL) ** 2) + np.log(_SIZES)
+    most = exponents.max()
+    return float(known - 2.0 * (most + np.log(np.exp(exponents - most).sum())))

@@ -182,6 +182,10 @@ class Problem:
         gravity_stiffness: whether gravity's change with the deflection counts.
         workers: processes for what is independent; as many as cores where None.
 
+    Attributes:
+        idle: numbers that are not exact but that no record shows, such as the centre of mass of a
+            link that turns about its own axis.
+
     Raises:
         InputError: no percussion record, or none with a channel that can be predicted.
     """
@@ -199,6 +203,7 @@ class Problem:
         self.marginal: Marginal | None = None
         self.moved: dict[str, Moved] = {}
         self.sizes: dict[str, FloatArray] = {}
+        self.idle: frozenset[str] = frozenset()
         self.pins: list[Pin] = []
         self.robot, self.campaign = robot, campaign
         self.model = Model(robot, gravity_stiffness)
@@ -274,6 +279,32 @@ class Problem:
             return found
         names = [record.name for record in chosen]
         return self.marginal.whitened(found, names, (effect.label for effect in wanted))
+
+    def held(
+        self, effects: Iterable[Effect], records: Sequence[MeasuredRecord] | None = None
+    ) -> float | None:
+        """What it costs to have what is not exact where a model asks it to be.
+
+        Args:
+            effects: of the model.
+            records: all where None.
+
+        Returns:
+            the sum of squares of their standard deviations; part of that of the residuals. None
+            where nothing is integrated out.
+        """
+        chosen = self.records if records is None else records
+        if self.marginal is None or not chosen:
+            return None
+        wanted = tuple(effects)
+        names = [record.name for record in chosen]
+        raw = self.unmarginalised(wanted, chosen)
+        found = self.marginal.estimated(raw, names, claimed=(e.label for e in wanted))
+        own = self.marginal.slopes[names[0]].own
+        shared = float((found[names[0]][own:] ** 2).sum())
+        return shared + sum(
+            float((found[n][: self.marginal.slopes[n].own] ** 2).sum()) for n in names
+        )
 
     def unmarginalised(
         self,

@@ -22,6 +22,7 @@ from picchio.diagnosis.percussion.fit.least_squares import (
     prior_weights,
 )
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.tolerance.linearise import set_aside
 from picchio.model.effects.effect import Effect, Latent
 
 # What numbers that are drawn anew in every record cost: they come from one distribution.
@@ -321,8 +322,12 @@ def fit_latent(problem: Problem, start: Fit, effect: Effect, rival: float = np.i
     here = start
     known_in = set(current_hidden(start.hypothesis, effect.label))
     if latent.times and not {r.name for r in start.records} <= known_in:
-        begun = blow_by_blow(problem, start, effect)
-        here = fit(problem, begun, start.records, start.end, iterations=2)
+        # What is not exact would make up for blows that are elsewhere.
+        with set_aside(problem):
+            plain = fit(problem, start.hypothesis, start.records, start.end, iterations=0)
+            begun = blow_by_blow(problem, plain, effect)
+            begun = fit(problem, begun, start.records, start.end, iterations=2).hypothesis
+        here = fit(problem, begun, start.records, start.end, iterations=0)
     for turn in range(_ROUNDS):
         before = here.cost
         if turn > 1 and before > HOPELESS * rival:

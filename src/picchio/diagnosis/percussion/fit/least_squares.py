@@ -40,6 +40,8 @@ class Fit:
         end: s; None for all.
         absorbed: (unknowns, unknowns) covariance of what the unknowns took up of numbers that are
             never exact; None where everything is.
+        held: the part of the cost by which what is never exact is not where it is stated; None
+            where that is not integrated out, or only the first part was fitted.
     """
 
     hypothesis: Hypothesis
@@ -49,6 +51,7 @@ class Fit:
     records: tuple[MeasuredRecord, ...]
     end: float | None
     absorbed: FloatArray | None = None
+    held: float | None = None
 
     @property
     def chi_square(self) -> float:
@@ -191,7 +194,10 @@ def fit(
     if with_jacobian and problem.marginal is not None:
         unknown = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
         absorbed = problem.marginal.absorbed_covariance(unknown)
-    return Fit(here, residuals, slopes if with_jacobian else None, cost, chosen, end, absorbed)
+    held = None if end is not None else problem.held(here.effects, chosen)
+    return Fit(
+        here, residuals, slopes if with_jacobian else None, cost, chosen, end, absorbed, held
+    )
 
 
 def is_nonsmooth(hypothesis: Hypothesis) -> bool:

@@ -133,8 +133,9 @@ class _Helpers:
 
     def renew(self) -> None:
         """Start them anew: they have the problem as it is now."""
-        self.close()
-        self._start()
+        if os.getpid() == self._owner:
+            self.close()
+            self._start()
 
     def _start(self) -> None:
         context = multiprocessing.get_context("fork")

@@ -20,7 +20,7 @@ from picchio.robot.flexible_robot import FlexibleRobot
 # told apart from everything else, and counts.
 TOLERATED = 3.8
 _AMONG_EXACT = 2.0
-_FITTED = ("stiffness", "damping_ratio", "force")
+FITTED = ("stiffness", "damping_ratio", "force")
 _STEP_LOG = 1e-3
 _STEP_LINEAR = 1e-2
 
@@ -201,7 +201,7 @@ class Hypothesis:
 
     def _tolerance(self, nuisance: Effect) -> tuple[float, float]:
         sigma = getattr(self.tolerance, nuisance.tolerance)
-        reach = TOLERATED if self.tolerance.beyond(_FITTED) else _AMONG_EXACT
+        reach = TOLERATED if self.tolerance.beyond(FITTED) else _AMONG_EXACT
         return max(1.0 - reach * sigma, 0.05), 1.0 + reach * sigma
 
     def unknowns(self) -> list[Unknown]:

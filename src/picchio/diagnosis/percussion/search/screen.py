@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -17,7 +18,8 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.drawn import blow_by_blow, drawn_cost, hidden_columns
-from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, prior_weights
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, prior_cost, prior_weights
+from picchio.diagnosis.percussion.fit.unknowns import TOLERATED
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
 
@@ -85,6 +87,8 @@ _FIRST = 0.6
 _CHANCE = 4.0
 # A trial that changes the data by so many times what is left beyond noise is tried smaller, too.
 _LARGE = 3.0
+# A value so near to an end of what is tolerated, transformed, stands at it.
+_AT_END = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +124,7 @@ class Projector:
         # What stands at its bound is no longer free to explain anything.
         vector = fit.hypothesis.vector()
         inside = [
-            u.lower + 1e-6 < x < u.upper - 1e-6
+            u.lower + _AT_END < x < u.upper - _AT_END
             for u, x in zip(fit.hypothesis.unknowns(), vector, strict=True)
         ]
         keep = (norms > 0.0) & np.array(inside, dtype=bool)
@@ -205,7 +209,31 @@ class Screen:
             if acts_either_way(kind, faint=True) and len(kind.parameters) == 1:
                 trials = [smallest(trials)]  # the others would become the same
             trials = [self._faint(trial) for trial in trials]
-        return _judged(*self._changes(trials), self.left, self.faint)
+        found = _judged(*self._changes(trials), self.left, self.faint)
+        if found is None:
+            return None
+        gain = max(found.gain + self._freed(found.effect), self._exceeding.get(found.label, 0.0))
+        return replace(found, gain=gain)
+
+    @cached_property
+    def _exceeding(self) -> dict[str, float]:
+        """Of what stands for a tolerance: the fall of chi-square where it may be exceeded."""
+        problem, known, end = self.problem, self.fit, self.fit.end
+        if problem.marginal is None:
+            return {}
+        raw = problem.unmarginalised(known.hypothesis.effects, known.records, end)
+        names = [record.name for record in known.records]
+        return problem.marginal.freed(raw, names, known.hypothesis.labels)
+
+    def _freed(self, effect: Effect) -> float:
+        """What a value that leaves its tolerance no longer costs; the least, where it asks to."""
+        known = self.fit.hypothesis
+        freed = max(prior_cost(known) - prior_cost(known.plus(effect)), 0.0)
+        for unknown, here in zip(known.unknowns(), known.vector(), strict=True):
+            ends = unknown.lower + _AT_END, unknown.upper - _AT_END
+            if known.effects[unknown.effect].label == effect.label and not ends[0] < here < ends[1]:
+                freed = max(freed, TOLERATED**2)
+        return freed
 
     def _latent(self, starts: Sequence[Effect]) -> Suspect:
         """What an effect's hidden numbers could explain; `starts` is it as its trials have it."""

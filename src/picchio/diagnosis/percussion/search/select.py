@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 
 from picchio.diagnosis.attempt import attempt
@@ -24,6 +25,7 @@ from picchio.diagnosis.percussion.search.restart import restarted
 from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.diagnosis.percussion.search.trials import (
     MOST_RIVALS,
+    exceeding_trials,
     holdout_choice,
     over_the_same_samples,
     settled_alike,
@@ -121,10 +123,11 @@ def _grow(search: Search, stack: ExitStack) -> None:
         trials = settled_alike(search, trials)
         search.steps.append(trials)
         best = _chosen(search, trials, wider=not quiet)
-        gain = search.pays(here, best.fit) if best is not None else 0.0
+        gain = search.pays(here, best.fit, best.about) if best is not None else 0.0
         if best is None or gain < search.least:
             break
-        trials.sort(key=lambda t: t is not best)
+        # The slopes of those that were not chosen need not be kept.
+        trials[:] = [best, *(replace(t, about=None) for t in trials if t is not best)]
         # What the model itself is not exact to may look like a last small cause in some pose.
         known = bool(here.hypothesis.labels)
         if quiet and known and confidence(best.fit, here) < BEYOND_DOUBT:
@@ -136,7 +139,12 @@ def _grow(search: Search, stack: ExitStack) -> None:
             if search.best.cost < here.cost and not quiet:
                 continue
             break
-        search.best = settled(problem, restarted(search, search.best), search.records, rounds=2)
+        if best.about is not None and search.best is best.fit:
+            best.about.restore(problem)
+        again = restarted(search, search.best)
+        if best.about is None or again is not best.fit:
+            again = settled(problem, again, search.records, rounds=2)
+        search.best = again
         if known:
             _settle(search, best.label)
         if len(search.labels) >= MOST_CAUSES:
@@ -147,7 +155,9 @@ def _chosen(search: Search, trials: list[Trial], wider: bool) -> Trial | None:
     """The trial that is taken, if any; more candidates are tried where that is `wider`."""
     here = search.best
     tied = [t for t in trials if t.score - trials[0].score < SAME]
-    best = holdout_choice([(t, search.held_out_gain(here, t.fit)) for t in tied])
+    # What only leaves its tolerance need not be seen at every pose: it must not be refuted.
+    least = -search.least if allowed(search.problem) else 0.0
+    best = holdout_choice([(t, search.held_out_gain(here, t.fit, t.about)) for t in tied], least)
     if best is None and wider:
         # What looked best is none; the right one may not have been among those fitted.
         looked = partial(try_candidates, search, here.hypothesis, wide=True)
@@ -195,9 +205,13 @@ def alternatives(search: Search) -> tuple[list[Trial], list[Trial]]:
     same: list[Trial] = []
     tried: list[Trial] = []
     for cause in best.hypothesis.causes:
-        trials = _tried_before(search, cause.label) or rivals_of(
-            search, best, cause.label, MOST_RIVALS
-        )
+        trials = _tried_before(search, cause.label)
+        if not trials or _hidden_by_tolerances(search):
+            known = {t.label for t in trials if t.finished(search.records)}
+            more = rivals_of(search, best, cause.label, MOST_RIVALS)
+            if len(best.hypothesis.causes) == 1:
+                more = [*exceeding_trials(search), *more]
+            trials = [*trials, *(t for t in more if t.label not in known)]
         finished = [t for t in trials if t.finished(search.records)]
         finished = settled_alike(search, finished, best)
         tried += finished
@@ -209,6 +223,11 @@ def alternatives(search: Search) -> tuple[list[Trial], list[Trial]]:
             if rise is not None and rise < SAME:
                 same.append(trial)
     return same, tried
+
+
+def _hidden_by_tolerances(search: Search) -> bool:
+    """Whether tolerances could make up for what is wrong, so that trials say little of rivals."""
+    return allowed(search.problem) and search.leaves_noise(search.baseline)
 
 
 def _rise(search: Search, other: Fit) -> float:

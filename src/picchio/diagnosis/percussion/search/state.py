@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.criteria.equivalence import bic
@@ -13,6 +13,7 @@ from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.tolerance.linearise import About, about_another
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import effect_class
 from picchio.model.effects.scales import Scales
@@ -27,12 +28,21 @@ EXACT = 3e-4
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One candidate fitted."""
+    """One candidate fitted.
+
+    Attributes:
+        label: of its effect and target.
+        fit: to the records that were looked at.
+        score: BIC; infinite where it was not fitted to the end.
+        promise: fall of chi-square that its screening expected.
+        about: what the records were linearised about where it was settled by itself; else None.
+    """
 
     label: str
     fit: Fit
     score: float
     promise: float
+    about: About | None = None
 
     @property
     def draws(self) -> bool:
@@ -59,6 +69,7 @@ class Search:
         records: that are fitted.
         kept: those held out, which must confirm what is found.
         baseline: nuisances alone, fitted to the first.
+        about: what the records were linearised about for it.
         best: the hypothesis that stands, fitted to the first; the baseline to begin with.
         say: told what is being done.
         steps: per step the trials, the best first.
@@ -78,9 +89,10 @@ class Search:
     pinned: bool = False
     replacements: dict[str, tuple[Fit, list[Trial]]] = field(default_factory=dict)
     least: float = field(init=False)
+    about: About = field(init=False)
 
     def __post_init__(self) -> None:
-        self.least = LEAST_GAIN
+        self.least, self.about = LEAST_GAIN, About.of(self.problem)
         if not allowed(self.problem):
             self.least = max(LEAST_GAIN, EXACT**2 * signal_power(self.records))
 
@@ -109,15 +121,40 @@ class Search:
         """
         return fit(self.problem, hypothesis, self.records, None, iterations=iterations, rival=rival)
 
-    def pays(self, without: Fit, found: Fit) -> float:
+    def pays(self, without: Fit, found: Fit, about: About | None = None) -> float:
         """By how much a fit beats another one, in units of chi-square.
+
+        Where a remainder is allowed, the records held out count as well: evidence is counted by
+        poses.
 
         Args:
             without: the fit that lacks something.
             found: the fit that has it.
+            about: what the records were linearised about for it; as now where None.
         """
         gain = bic(without) - bic(found)
-        return min(gain, decisive_gain(without, found)) if allowed(self.problem) else gain
+        if not allowed(self.problem):
+            return gain
+        with about_another(self.problem, about):
+            whole = attempt("records held out", lambda: self._with_held_out(found))
+        before = self._with_held_out(without)
+        if whole is None or len(whole.records) != len(before.records):
+            return min(gain, decisive_gain(without, found))
+        return min(gain, decisive_gain(before, whole))
+
+    def _with_held_out(self, found: Fit) -> Fit:
+        """A fit with what it leaves of the records held out, where they can tell."""
+        if not self.kept or any(e.latent is not None for e in found.hypothesis.causes):
+            return found
+        left = self.problem.residuals(found.hypothesis.effects, self.kept)
+        return replace(
+            found,
+            records=(*found.records, *self.kept),
+            residuals=[*found.residuals, *left],
+            jacobians=None,
+            held=self.problem.held(found.hypothesis.effects, (*found.records, *self.kept)),
+            cost=found.cost + float(sum((r * r).sum() for r in left)),
+        )
 
     def explains_enough(self, found: Fit) -> bool:
         """Whether what a fit with causes leaves is no more than a remainder that is allowed.
@@ -137,12 +174,13 @@ class Search:
         """
         return whiteness_test(self.problem, found).is_noise
 
-    def held_out_gain(self, before: Fit, after: Fit) -> float | None:
+    def held_out_gain(self, before: Fit, after: Fit, about: About | None = None) -> float | None:
         """The fall of chi-square in the records held out; None where they can't tell.
 
         Args:
             before: a fit.
             after: a fit that should explain more.
+            about: what the records were linearised about for it; as now where None.
         """
         if not self.kept or any(e.latent is not None for e in after.hypothesis.causes):
             return None
@@ -151,7 +189,8 @@ class Search:
             left = self.problem.residuals(found.hypothesis.effects, self.kept)
             return float(sum((r * r).sum() for r in left))
 
-        after_it = attempt("records held out", lambda: chi_square(after))
+        with about_another(self.problem, about):
+            after_it = attempt("records held out", lambda: chi_square(after))
         # What is no model at a pose that was held out is refuted by it.
         return -math.inf if after_it is None else chi_square(before) - after_it
 

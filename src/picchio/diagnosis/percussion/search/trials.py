@@ -18,7 +18,7 @@ from picchio.diagnosis.percussion.fit.parallel import worker_pool
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.screen import Screen, Suspect
 from picchio.diagnosis.percussion.search.state import Search, Trial
-from picchio.diagnosis.percussion.tolerance.linearise import about_another, settled
+from picchio.diagnosis.percussion.tolerance.linearise import About, about_another, settled
 from picchio.model.effects.effect import Effect
 
 # One candidate fitted: to the first part of the records, and from there to all of them.
@@ -284,20 +284,21 @@ def records_of_every_pose(records: Sequence[MeasuredRecord]) -> list[MeasuredRec
 _ROUGH = 100.0
 
 
-def holdout_choice(tied: Sequence[tuple[Trial, float | None]]) -> Trial | None:
+def holdout_choice(tied: Sequence[tuple[Trial, float | None]], least: float = 0.0) -> Trial | None:
     """Of trials that do as well, the first that the records held out confirm, or clearly prefer.
 
     Args:
         tied: with the fall of chi-square there, None where they can't tell.
+        least: fall that must be exceeded there.
     """
-    held = [(t, gain) for t, gain in tied if gain is None or gain > 0.0]
+    held = [(t, gain) for t, gain in tied if gain is None or gain > least]
     if not held:
         return None
-    best, least = held[0]
-    if least is None:
+    best, own = held[0]
+    if own is None:
         return best
     other, most = max(held, key=lambda each: -math.inf if each[1] is None else each[1])
-    return other if most is not None and most > least + SAME else best
+    return other if most is not None and most > own + SAME else best
 
 
 def over_the_same_samples(search: Search, trials: Sequence[Trial]) -> list[Trial]:
@@ -326,10 +327,37 @@ def over_the_same_samples(search: Search, trials: Sequence[Trial]) -> list[Trial
     return sorted([*again, *others], key=lambda t: t.score)
 
 
-# So many close trials are settled, each by itself; and how much worse one may be to be close, since
-# none has come to its end yet.
+# So many close trials are settled, each by itself; and how much worse one may be to be close.
 _SETTLED = 3
-_CLOSE = 3.0 * SAME
+_CLOSE = 5.0 * SAME
+# One that explains nearly as much may well explain more: it lacks at most this share.
+_NEARLY = 0.3
+# The fall of chi-square above which a tolerance may be exceeded.
+_EXCEEDING = 9.0
+
+
+def exceeding_trials(search: Search) -> list[Trial]:
+    """What stands for each tolerance that may be exceeded, fitted; the best first.
+
+    Tolerances together may have made up for one of them, so that its slope alone promises little.
+
+    Args:
+        search: data and records.
+    """
+    problem, baseline, trials = search.problem, search.baseline, []
+    with about_another(problem, search.about):
+        if problem.marginal is None:
+            return []
+        raw = problem.unmarginalised(baseline.hypothesis.effects, baseline.records)
+        falls = problem.marginal.freed(raw, [record.name for record in baseline.records])
+        for kind, target in search.candidates:
+            label = f"{kind.name}:{target}"
+            if falls.get(label, 0.0) > _EXCEEDING:
+                start = baseline.hypothesis.plus(kind(target))
+                found = attempt(label, partial(search.fit, start, iterations=6))
+                if found is not None:
+                    trials.append(Trial(label, found, bic(found), falls[label]))
+    return sorted(trials, key=lambda t: t.score)
 
 
 def settled_alike(search: Search, trials: Sequence[Trial], best: Fit | None = None) -> list[Trial]:
@@ -349,12 +377,13 @@ def settled_alike(search: Search, trials: Sequence[Trial], best: Fit | None = No
     if not allowed(search.problem) or not trials:
         return list(trials)
     mark = trials[0].fit if best is None else best
+    nearly = _NEARLY * (search.best.cost - mark.cost) if best is None else 0.0
     close = [
         t
         for t in trials
         if t.finished(search.records)
         and not t.draws
-        and decisive_gain(t.fit, mark) < _CLOSE
+        and (decisive_gain(t.fit, mark) < _CLOSE or t.fit.cost - mark.cost < nearly)
         and (best is None or t.fit.hypothesis.labels != best.hypothesis.labels)
     ][:_SETTLED]
     again = {}
@@ -362,6 +391,7 @@ def settled_alike(search: Search, trials: Sequence[Trial], best: Fit | None = No
         with about_another(search.problem):
             settle = partial(settled, search.problem, trial.fit, search.records, rounds=2)
             there = attempt(trial.label, settle)
+            about = About.of(search.problem)
         if there is not None and there.cost < trial.fit.cost:
-            again[trial.label] = replace(trial, fit=there, score=bic(there))
+            again[trial.label] = replace(trial, fit=there, score=bic(there), about=about)
     return sorted((again.get(t.label, t) for t in trials), key=lambda t: t.score)

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Moved, Problem
-from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, jacobian, prior_cost
+from picchio.diagnosis.percussion.fit.least_squares import (
+    Fit,
+    fit,
+    jacobian,
+    prior_cost,
+    prior_weights,
+)
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.tolerance.marginal import Marginal
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, inexact, nudged
@@ -25,14 +31,20 @@ _FARTHEST = 3.5
 # where it seems to be leads nowhere.
 _SHORT = 0.16
 _ROUNDS = 3
-_SETTLED = 0.01
+_SETTLED = 0.002
 # Chi-square per sample above which more is wrong than what is not exact.
 _ELSE = 3.0
+# What is not exact explains little where it leaves more than this share of chi-square.
+_LITTLE = 0.5
 _TEMPERS = (1.0, 10.0, 100.0)
 
 
 def linearise(
-    problem: Problem, here: Hypothesis, end: float | None = None, both: bool = False
+    problem: Problem,
+    here: Hypothesis,
+    fitted: Sequence[MeasuredRecord],
+    end: float | None = None,
+    both: bool = False,
 ) -> None:
     """Have what is never exact integrated out of all residuals, to first order about a hypothesis.
 
@@ -43,6 +55,7 @@ def linearise(
     Args:
         problem: what is changed: its `marginal`, and where its inexact numbers are taken to be.
         here: the hypothesis.
+        fitted: the records that it is fitted to: what its unknowns take up they take up there.
         end: s, up to when; None for whole records.
         both: take slopes either way. What the unknowns take up must cancel to a thousandth, or the
             little that is left passes for knowledge of what no record can tell, such as the mass of
@@ -61,27 +74,45 @@ def linearise(
         jacobian(problem, here, problem.records, end, raw, way * steps) for way in (0.5, -0.5)
     )
     jacobians = [0.5 * (a + b) for a, b in zip(ahead, behind, strict=True)]
-    shared, absorbed = _without(slopes, jacobians, [r.name for r in problem.records])
+    shared, absorbed = _without(problem, slopes, jacobians, here, {r.name for r in fitted})
     unknowns = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
     problem.marginal = Marginal(shared, dict(zip(unknowns, absorbed, strict=True)))
     _move(problem, problem.sizes)
 
 
 def _without(
-    slopes: Mapping[str, Slopes], jacobians: Sequence[FloatArray], names: Sequence[str]
+    problem: Problem,
+    slopes: Mapping[str, Slopes],
+    jacobians: Sequence[FloatArray],
+    here: Hypothesis,
+    fitted: Set[str],
 ) -> tuple[dict[str, Slopes], FloatArray]:
-    """The slopes without what a fit's unknowns take up of the shared ones; that, (unknowns, k)."""
-    normal = sum(j.T @ j for j in jacobians)
+    """The slopes without what a fit's unknowns take up of the shared ones; that, (unknowns, k).
+
+    As the fit does it: by the records that are fitted, their own numbers integrated out, and by
+    what is known beforehand. Records held out then show just what the fit could not know.
+    """
+    names = [r.name for r in problem.records]
+    flat = {n: slopes[n].columns.reshape(-1, slopes[n].columns.shape[2]) for n in names}
+    normal, right = np.diag(prior_weights(here) ** 2), 0.0
+    for name, jacobian_of in zip(names, jacobians, strict=True):
+        if name in fitted:
+            own = slopes[name].own
+            columns = flat[name].astype(float)
+            seen = columns[:, :own].T @ np.column_stack([jacobian_of, columns])
+            n = jacobian_of.shape[1]
+            inner = np.linalg.inv(np.eye(own) + seen[:, n : n + own])
+            normal = normal + jacobian_of.T @ jacobian_of - seen[:, :n].T @ inner @ seen[:, :n]
+            cross = seen[:, n + own :]
+            right = right + jacobian_of.T @ columns[:, own:] - seen[:, :n].T @ inner @ cross
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    own = next(iter(slopes.values())).own
-    flat = {n: slopes[n].columns.reshape(-1, slopes[n].columns.shape[2])[:, own:] for n in names}
-    right = sum(j.T @ flat[n].astype(float) for n, j in zip(names, jacobians, strict=True))
     inverse = np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True)
     absorbed = inverse @ (right / scale[:, None]) / scale[:, None]
     found = {}
-    for name, own_jacobian in zip(names, jacobians, strict=True):
+    for name, jacobian_of in zip(names, jacobians, strict=True):
+        own = slopes[name].own
         columns = slopes[name].columns.copy()
-        left = flat[name] - own_jacobian @ absorbed
+        left = flat[name][:, own:] - jacobian_of @ absorbed
         columns[:, :, own:] = left.reshape(*columns.shape[:2], -1)
         found[name] = replace(slopes[name], columns=columns)
     return found, absorbed
@@ -111,50 +142,121 @@ def settled(
     """
     if not any(inexact(problem, problem.records[0], problem.campaign.tolerance)):
         return start
-    if anew and problem.sizes:
+    if anew:
         _move(problem, {})
+        problem.idle = frozenset()  # a cause may set free what stood still without it
     here = start.hypothesis
     for end in (_SHORT, None):
         before = math.inf
         for _ in range(rounds):
-            linearise(problem, here, end)
+            linearise(problem, here, records, end)
             found = fit(problem, here, records, end, iterations=4)
             power = found.chi_square / max(found.samples, 1)
             if power > _ELSE:
-                here = _at_stated(problem, found.hypothesis, end)
+                here = _at_stated(problem, found, end)
                 break
             here = _recentred(problem, found)
             if before - found.cost < _SETTLED * found.cost:
                 break
             before = found.cost
-    return fit(problem, here, records, None, with_jacobian=True)
+    found = fit(problem, here, records, None, with_jacobian=True)
+    if found.chi_square > _ELSE * found.samples:
+        return _unless_little(problem, found)
+    return found
+
+
+def _unless_little(problem: Problem, found: Fit) -> Fit:
+    """A fit without what is not exact, where that explains but little of what is left; else it.
+
+    Slopes about a model that is far off lead astray: what is wrong is looked for without them.
+    """
+    with set_aside(problem):
+        plain = fit(problem, found.hypothesis, found.records, None, with_jacobian=True)
+    if found.chi_square < _LITTLE * plain.chi_square:
+        return found
+    _move(problem, {})
+    problem.marginal = None
+    return plain
+
+
+@dataclass(frozen=True, eq=False)
+class About:
+    """About what the records are linearised: what `linearise` and `recentre` have found.
+
+    Attributes:
+        marginal, sizes, moved, idle: the problem's.
+    """
+
+    marginal: Marginal | None
+    sizes: dict[str, FloatArray]
+    moved: dict[str, Moved]
+    idle: frozenset[str]
+
+    @classmethod
+    def of(cls, problem: Problem) -> About:
+        """As it is now.
+
+        Args:
+            problem: whose slopes, and numbers that are not exact.
+        """
+        return cls(problem.marginal, problem.sizes, problem.moved, problem.idle)
+
+    def restore(self, problem: Problem) -> None:
+        """Linearise as it was then.
+
+        Args:
+            problem: what is changed.
+        """
+        known = problem.moved is self.moved
+        problem.marginal, problem.sizes, problem.moved = self.marginal, self.sizes, self.moved
+        problem.idle = self.idle
+        if not known:
+            _renew(problem)
 
 
 @contextmanager
-def about_another(problem: Problem) -> Iterator[None]:
+def about_another(problem: Problem, other: About | None = None) -> Iterator[None]:
     """Within the block other hypotheses may be settled; then all is linearised as before.
 
     Args:
         problem: whose slopes, and numbers that are not exact, are kept.
+        other: about what to linearise within the block; as before where None.
 
     Returns:
         a context manager.
     """
-    kept = problem.marginal, problem.sizes, problem.moved
+    kept = About.of(problem)
+    if other is not None:
+        other.restore(problem)
     try:
         yield
     finally:
-        if problem.marginal is not kept[0] or problem.moved is not kept[2]:
-            problem.marginal, problem.sizes, problem.moved = kept
-            _renew(problem)
+        kept.restore(problem)
 
 
-def _at_stated(problem: Problem, here: Hypothesis, end: float | None) -> Hypothesis:
-    """A hypothesis about the numbers as they are stated, and the slopes there."""
+@contextmanager
+def set_aside(problem: Problem) -> Iterator[None]:
+    """Within the block nothing is integrated out: what is not exact is where it is taken to be.
+
+    Args:
+        problem: data and noise.
+
+    Returns:
+        a context manager.
+    """
+    with about_another(problem):
+        if problem.sizes:
+            _move(problem, problem.sizes, shifted=False)
+        problem.marginal = None
+        yield
+
+
+def _at_stated(problem: Problem, found: Fit, end: float | None) -> Hypothesis:
+    """A fit's hypothesis about the numbers as they are stated, and the slopes there."""
     if problem.sizes:
         problem.sizes, problem.moved = {}, {}
-        linearise(problem, here, end)
-    return here
+        linearise(problem, found.hypothesis, found.records, end)
+    return found.hypothesis
 
 
 def _recentred(problem: Problem, found: Fit) -> Hypothesis:
@@ -213,6 +315,9 @@ def recentre(problem: Problem, found: Fit, temper: float = 1.0) -> Hypothesis:
 
 
 def _move(problem: Problem, sizes: dict[str, FloatArray], shifted: bool = True) -> None:
+    if not sizes and not problem.moved:
+        problem.sizes = sizes
+        return
     problem.sizes, problem.moved = sizes, {}
     for record in problem.records:
         if record.name in sizes:
@@ -225,6 +330,6 @@ def _move(problem: Problem, sizes: dict[str, FloatArray], shifted: bool = True) 
 
 
 def _renew(problem: Problem) -> None:
-    """Other processes have the problem as it was when they were started."""
+    """Other processes have the problem as it was when they were started: all but its marginal."""
     if problem.helpers is not None:
         problem.helpers.renew()

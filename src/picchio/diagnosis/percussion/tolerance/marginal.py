@@ -20,6 +20,8 @@ from picchio.core.recent import Recent
 from picchio.diagnosis.percussion.tolerance.slopes import Slopes
 
 _KEPT = 24
+# A number of which the records know less than this share is not told from where it is stated.
+_UNKNOWN = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +118,11 @@ class Marginal:
         return np.asarray(rows @ (np.eye(count) - _left(gram)) @ rows.T)
 
     def estimated(
-        self, residuals: Sequence[FloatArray], names: Sequence[str], temper: float = 1.0
+        self,
+        residuals: Sequence[FloatArray],
+        names: Sequence[str],
+        temper: float = 1.0,
+        claimed: Iterable[str] = (),
     ) -> dict[str, FloatArray]:
         """Where the inexact numbers of each record most probably are, standard deviations.
 
@@ -124,10 +130,66 @@ class Marginal:
             residuals: (channels, m) in units of the noise alone.
             names: of their records.
             temper: variance of what the residuals hold beside the inexact numbers.
+            claimed: as in `whitened`; their numbers stay where they are.
 
         Returns:
             (columns,) of each record.
         """
+        return self._estimated(residuals, names, temper, frozenset(claimed))[0]
+
+    def shared_estimate(
+        self,
+        residuals: Sequence[FloatArray],
+        names: Sequence[str],
+        temper: float = 1.0,
+        claimed: Iterable[str] = (),
+    ) -> tuple[FloatArray, FloatArray]:
+        """What the campaign shares: where it most probably is, and how well that is known.
+
+        Args:
+            residuals: (channels, m) in units of the noise alone.
+            names: of their records.
+            temper: as in `estimated`.
+            claimed: as in `estimated`.
+
+        Returns:
+            (shared,) standard deviations of the tolerances, and their covariance (shared, shared).
+        """
+        found, together = self._estimated(residuals, names, temper, frozenset(claimed))
+        return found[names[0]][self.slopes[names[0]].own :], _functions(together)[1]
+
+    def freed(
+        self, residuals: Sequence[FloatArray], names: Sequence[str], claimed: Iterable[str] = ()
+    ) -> dict[str, float]:
+        """By how much chi-square falls where shared numbers are free that a cause stands for.
+
+        Args:
+            residuals: (channels, m) in units of the noise alone.
+            names: of their records.
+            claimed: as in `estimated`.
+
+        Returns:
+            by the cause's label.
+        """
+        where, covariance = self.shared_estimate(residuals, names, claimed=claimed)
+        slopes = self.slopes[names[0]]
+        means = np.array(slopes.means[slopes.own :], dtype=object)
+        falls = {}
+        for label in set(means) - {""}:
+            own = means == label
+            spread = np.eye(int(own.sum())) - covariance[np.ix_(own, own)]
+            inverse = np.linalg.pinv(spread, rcond=_UNKNOWN, hermitian=True)
+            falls[label] = float(where[own] @ inverse @ where[own])
+        return falls
+
+    def _estimated(
+        self,
+        residuals: Sequence[FloatArray],
+        names: Sequence[str],
+        temper: float,
+        freed: frozenset[str],
+    ) -> tuple[dict[str, FloatArray], FloatArray]:
+        """As `estimated`; and what the records know of the shared numbers, (shared, shared)."""
         from picchio.diagnosis.percussion.tolerance.kernel import projected
 
         parts = []
@@ -136,6 +198,8 @@ class Marginal:
             products = np.empty(slopes.columns.shape[2])
             projected(slopes.columns, np.ascontiguousarray(rows), products)
             gram, n = self._gram(name, rows.shape[1]) / temper, slopes.own
+            free = np.array([m in freed for m in slopes.means], dtype=bool)
+            gram[free], gram[:, free], products[free] = 0.0, 0.0, 0.0
             inverse = _functions(gram[:n, :n])[1]
             cross = gram[:n, n:]
             mine = gram[n:, n:] - cross.T @ inverse @ cross
@@ -147,7 +211,7 @@ class Marginal:
         for name, (inverse, cross, _, products) in zip(names, parts, strict=True):
             left = products[: len(inverse)] + cross @ common
             found[name] = np.concatenate([-(inverse @ left), common])
-        return found
+        return found, together
 
     @property
     def _meant(self) -> frozenset[str]:

@@ -215,13 +215,16 @@ def _poses(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterat
             yield Inexact(f"{key}.{joint}", key, once, POSE, (int(index), getattr(sigma, key)))
 
 
+# What is moved already is moved on, so what multiplies must do so by exponentials: they add up.
+
+
 def _modes(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterator[Inexact]:
     count = len(problem.robot.flexible_names)
     for mode in range(count):
 
         def damped(plant: Changes, size: float, mode: int = mode) -> None:
             scales = list(plant.mode_scales or (1.0,) * count)
-            scales[mode] *= max(1.0 + size * sigma.damping_by_mode, 0.05)
+            scales[mode] *= math.exp(size * sigma.damping_by_mode)
             plant.mode_scales = tuple(scales)
 
         yield Inexact(f"damping_by_mode.{mode + 1}", "damping_by_mode", False, "structure", damped)
@@ -229,7 +232,7 @@ def _modes(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterat
 
 def _gravity(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterator[Inexact]:
     def heavier(plant: Changes, size: float) -> None:
-        plant.gravity_scale *= 1.0 + size * sigma.gravity_stiffness
+        plant.gravity_scale *= math.exp(size * sigma.gravity_stiffness)
 
     if problem.model.gravity_stiffness:
         yield Inexact("gravity_stiffness", "gravity_stiffness", True, "structure", heavier)

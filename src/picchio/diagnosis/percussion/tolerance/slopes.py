@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,8 @@ from picchio.model.effects.effect import Effect
 _STEP = 0.1
 _STRUCTURE = 0.05
 _TURN = 5e-6
+# What moves all records together by less than this, in units of the noise, need not be looked at.
+_IDLE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +42,18 @@ class Slopes:
     def means(self) -> tuple[str, ...]:
         """Of every column the effect and target that stand for it as a cause; empty for none."""
         return tuple(one.means for one in self.what)
+
+    def without(self, names: Set[str]) -> Slopes:
+        """The slopes of all but some numbers.
+
+        Args:
+            names: of these.
+        """
+        kept = np.array([one.name not in names for one in self.what], dtype=bool)
+        if kept.all():
+            return self
+        what = tuple(one for one, stays in zip(self.what, kept, strict=True) if stays)
+        return Slopes(what, int(kept[: self.own].sum()), self.columns[:, :, kept])
 
     def moved(self, sizes: FloatArray) -> list[tuple[Inexact, FloatArray]]:
         """What is moved by how many standard deviations, (numbers,) each.
@@ -62,12 +76,20 @@ def all_slopes(
         problem: data and noise, and where its inexact numbers are now.
         effects: of the model.
         end: s, up to when; None for whole records.
-        both: whether the structure is moved either way: slopes are then exact to the second order.
+        both: whether the structure is moved either way, and every blow by itself: slopes are then
+            exact to the second order.
 
     Returns:
         by the record's name.
     """
-    every = {r.name: inexact(problem, r, problem.campaign.tolerance) for r in problem.records}
+    every = {
+        r.name: [
+            one
+            for one in inexact(problem, r, problem.campaign.tolerance)
+            if one.name not in problem.idle
+        ]
+        for r in problem.records
+    }
     poses: dict[int, list[MeasuredRecord]] = {}
     for record in problem.records:
         poses.setdefault(record.pose, []).append(record)
@@ -76,11 +98,7 @@ def all_slopes(
         # Records of one pose share what its geometry costs.
         found = []
         for record in poses[pose]:
-            ahead = _of_record(problem, record, tuple(effects), every[record.name], end, 1.0)
-            if both:
-                behind = _of_record(problem, record, tuple(effects), every[record.name], end, -1.0)
-                ahead = 0.5 * (ahead + behind)
-            found.append(ahead)
+            found.append(_of_record(problem, record, tuple(effects), every[record.name], end, both))
         return found
 
     with problem.pinned(effects), worker_pool(problem.workers, {"slopes": at_pose}) as mapped:
@@ -91,7 +109,19 @@ def all_slopes(
             blows = len(_starts(record))
             what = tuple(w for w in every[record.name] for _ in range(blows if w.each_blow else 1))
             slopes[record.name] = Slopes(what, sum(not w.once for w in what), own)
+    if not problem.sizes:
+        problem.idle |= _idle(slopes.values())
+        slopes = {name: each.without(problem.idle) for name, each in slopes.items()}
     return slopes
+
+
+def _idle(slopes: Iterable[Slopes]) -> frozenset[str]:
+    """Names of what moves no record by as much as counts."""
+    power: dict[str, float] = {}
+    for each in slopes:
+        for one, column in zip(each.what, np.moveaxis(each.columns, -1, 0), strict=True):
+            power[one.name] = power.get(one.name, 0.0) + float(np.vdot(column, column))
+    return frozenset(name for name, found in power.items() if found < _IDLE**2)
 
 
 def _of_record(
@@ -100,7 +130,7 @@ def _of_record(
     effects: tuple[Effect, ...],
     every: Sequence[Inexact],
     end: float | None,
-    way: float,
+    both: bool,
 ) -> np.ndarray:
     """(channels, samples, columns) in single precision."""
     sizes = problem.sizes.get(record.name)
@@ -117,7 +147,11 @@ def _of_record(
         }
         for one in every:
             there, base = about[one.where == POSE]
-            found += _columns(problem, record, effects, base, one, there, end, way)
+            ahead = _columns(problem, record, effects, base, one, there, end, both)
+            if both and one.where == "structure":
+                behind = _columns(problem, record, effects, base, one, there, end, both, -1.0)
+                ahead = [0.5 * (a + b) for a, b in zip(ahead, behind, strict=True)]
+            found += ahead
     columns = np.stack(found, axis=-1) if found else np.zeros((*base.shape, 0))
     columns[~np.isfinite(columns)] = 0.0
     return columns.astype(np.float32)
@@ -131,26 +165,30 @@ def _columns(
     one: Inexact,
     here: Mapping[str, tuple[Inexact, FloatArray]],
     end: float | None,
-    way: float,
-) -> Iterator[FloatArray]:
+    exact: bool,
+    way: float = 1.0,
+) -> list[FloatArray]:
     """The change of the residual (channels, m): of every blow, where each has its own number."""
     step = way * _STRUCTURE if one.where == "structure" else _STEP
     if one.where == POSE:
         step = _TURN / one.change[1]
-    there = list(here.values())
-    if one.where == "structure" or one.name not in here:
-        # What is moved already stays as it is, and so need not be found anew.
-        there.append((one, np.array([step])))
-    else:
-        size = here[one.name][1].copy()
-        size[0] += step
-        there = [pair for pair in there if pair[0].name != one.name] + [(one, size)]
-    moved = attempt(one.name, lambda: _moved_residual(problem, record, effects, there, end))
-    change = np.zeros_like(base) if moved is None else (moved - base) / step
-    if one.each_blow:
-        yield from _every_blow(record, change)
-    else:
-        yield change
+    others = [pair for pair in here.values() if pair[0].name != one.name]
+
+    def change(blow: int) -> FloatArray:
+        if one.where == "structure" or one.name not in here:
+            # What is moved already stays as it is, and so need not be found anew.
+            there = [*here.values(), (one, step * np.eye(blow + 1)[blow])]
+        else:
+            size = here[one.name][1].copy()
+            size[blow] += step
+            there = [*others, (one, size)]
+        moved = attempt(one.name, lambda: _moved_residual(problem, record, effects, there, end))
+        return np.zeros_like(base) if moved is None else (moved - base) / step
+
+    if not one.each_blow:
+        return [change(0)]
+    starts = _starts(record)
+    return [change(k) for k in range(len(starts))] if exact else _every_blow(record, change(0))
 
 
 def _moved_residual(
@@ -164,13 +202,15 @@ def _moved_residual(
     return residual_under(record, problem.model.with_effects(effects), there, more, end)
 
 
-def _every_blow(record: MeasuredRecord, first: FloatArray) -> Iterator[FloatArray]:
+def _every_blow(record: MeasuredRecord, first: FloatArray) -> list[FloatArray]:
     """The first blow's change, moved to every blow: the answer to a blow is nearly its own."""
+    found = []
     samples = np.arange(first.shape[1], dtype=float)
     starts = _starts(record)
     for start in starts:
         shift = (start - starts[0]) / record.setup.samples.step
-        yield np.array([np.interp(samples - shift, samples, row, left=0.0) for row in first])
+        found.append(np.array([np.interp(samples - shift, samples, row, left=0) for row in first]))
+    return found
 
 
 def _starts(record: MeasuredRecord) -> list[float]:
