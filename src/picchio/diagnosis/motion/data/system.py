@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,6 +75,8 @@ class System:
             np.zeros(0)
         )  # fmt: skip
         self.block = self._blocks()
+        self._reported: tuple[tuple[tuple[str, float], ...], ...] = ()
+        self._begun: dict[tuple[Hashable, ...], FloatArray | None] = {}
 
     def _blocks(self) -> np.ndarray:
         """(rows,) in which stretch of which record a row lies."""
@@ -128,7 +130,24 @@ class System:
     def by_parameter(
         self, around: Sequence[Around], effect: Effect, other: Effect, name: str, step: float
     ) -> FloatArray | None:
-        """(rows,) derivative by an effect's parameter, as `Predictor.by_parameter` has it."""
+        """(rows,) derivative by an effect's parameter, as `Predictor.by_parameter` has it.
+
+        Those of bodies from nothing are kept, as a search asks for them again and again.
+        """
+        reported = tuple((*a.gains.items(), *a.delays.items()) for a in around)
+        starts = not effect.linear and effect == type(effect)(effect.target)
+        if not starts or any(a.loaded for a in around):
+            return self._derivative(around, effect, other, name, step)
+        if reported != self._reported:
+            self._reported, self._begun = reported, {}
+        key = (effect.key, other.key, step)
+        if key not in self._begun:
+            self._begun[key] = self._derivative(around, effect, other, name, step)
+        return self._begun[key]
+
+    def _derivative(
+        self, around: Sequence[Around], effect: Effect, other: Effect, name: str, step: float
+    ) -> FloatArray | None:
         found: list[Readings] = []
         for predictor, each in zip(self.predictors, around, strict=True):
             readings = predictor.by_parameter(each, effect, other, name, step)
