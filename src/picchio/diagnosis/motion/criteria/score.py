@@ -57,7 +57,8 @@ class Score:
         share: part of the groups' power that it removes in stretches held out.
         confidence: that the gain is one, from its spread over the stretches.
         values: of the candidate's coordinates.
-        admissible: within their bounds.
+        admissible: within their bounds, and everywhere where it has to be.
+        spoils: whether it has many numbers and makes a channel worse.
         groups: equations that it acts in.
         differences: what every stretch that was held out gains.
         numbers: how many it has, those that were searched for among them.
@@ -70,6 +71,7 @@ class Score:
     confidence: float
     values: tuple[float, ...]
     admissible: bool
+    spoils: bool
     groups: tuple[Group, ...]
     differences: Mapping[int, float]
     numbers: int = 1
@@ -287,6 +289,7 @@ def _compare(
     everywhere: bool,
 ) -> Score:
     gain = rank = bic = removed = total = effective = 0.0
+    spoils = False
     differences: dict[int, float] = {}
     raw: dict[int, float] = {}
     for group in groups:
@@ -301,8 +304,8 @@ def _compare(
         inside = max(base.inside[group], _TINY) / max(wide.inside[group], _TINY)
         bic += 0.5 * samples * np.log(inside)
         removed, total = removed + before - after, total + before
-        if everywhere or added > _MANY:
-            admissible = admissible and after <= (1.0 if everywhere else _SPOILT) * before
+        admissible = admissible and not (everywhere and after > before)
+        spoils = spoils or (added > _MANY and after > _SPOILT * before)
         for (g, number), x in base.outside.items():
             if g == group:
                 # In logarithms one bad stretch does not outvote the others; without, stretches
@@ -319,7 +322,7 @@ def _compare(
     sure = max(confidence(np.array(list(x.values()))) for x in (differences, raw))
     return Score(
         gain=float(gain), rank=float(rank), bic=float(bic), share=removed / max(total, _TINY),
-        confidence=sure, values=values, admissible=admissible, groups=groups,
+        confidence=sure, values=values, admissible=admissible, spoils=spoils, groups=groups,
         differences=differences, numbers=added,
     )  # fmt: skip
 
@@ -337,6 +340,7 @@ def passes(score: Score, ripple: bool = False, there: bool = False) -> bool:
     return (
         score.admissible and score.bic > least and score.gain > 0.0
         and score.confidence >= _LEAST_CONFIDENCE and enough
+        and (there or not score.spoils)
     )  # fmt: skip
 
 

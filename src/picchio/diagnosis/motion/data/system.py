@@ -121,6 +121,22 @@ class System:
         """What all effects together do to each one's term, record by record."""
         return [predictor.around(effects) for predictor in self.predictors]
 
+    def bodies(self, effects: Sequence[Effect], fewer: Sequence[Effect]) -> list[FloatArray]:
+        """Joint by joint, (rows,) what the bodies of some effects take more than those of fewer.
+
+        Args:
+            effects: the ones.
+            fewer: the others.
+        """
+        parts = []
+        for more, less in zip(self.around(effects), self.around(fewer), strict=True):
+            parts.append({j: x - less.body[j] for j, x in more.body.items()})
+        joints = dict.fromkeys(joint for kind, joint in self.groups if kind == TORQUE)
+        return [
+            self._rows(j, [{TORQUE: {j: each[j]}, RIPPLE: {}, WINDUP: {}} for each in parts])
+            for j in joints if all(j in each for each in parts)
+        ]  # fmt: skip
+
     def by_scale(self, around: Sequence[Around], joint: str) -> FloatArray:
         """(rows,) derivative by the factor on a joint's rigid-body torque."""
         return self._rows(

@@ -127,7 +127,8 @@ def _bodies(
     if state is current.state:
         return found
     bare = fit(system, state)
-    other = forward(bare, broad, _ROUNDS)
+    several = {n: k for n, k in broad.items() if k.target_kind != "joint"}
+    other = forward(bare, several, _ROUNDS)
     if len(other.state.effects) == len(bare.state.effects):
         return found
     other = forward(other, slow, _ROUNDS)

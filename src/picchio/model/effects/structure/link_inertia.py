@@ -40,7 +40,6 @@ class LinkInertia(Effect):
     meaning = "the link's mass, centre of mass and inertia are not the URDF's"
     mark = "link mass"
     usual = 8
-    over = ("joint_inertia",)
     told_by = "at speeds and poses at which every joint above the link turns it about"
     refines = "link_mass"
     tried = ({"mass": 0.12}, {"x": 0.3, "zz": 0.1})
