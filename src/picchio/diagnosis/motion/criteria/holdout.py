@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from picchio.diagnosis.motion.fit.least_squares import (
 )
 from picchio.diagnosis.motion.fit.state import State
 from picchio.model.effects.effect import Effect
+from picchio.model.effects.registry import effect_class
 from picchio.model.motion import RIPPLE
 
 Powers = dict[tuple[str, str], tuple[float, float]]  # file and channel -> without, with
@@ -31,6 +33,7 @@ def validate(
 ) -> tuple[Fit, list[tuple[Effect, dict[str, float]]]]:
     """The fit without causes that lose on records held out, and those causes.
 
+    What tells another cause with more numbers gives way to that one unless it predicts better.
     Where two or more records are held out, a cause has to gain on each. In any case one that is
     everywhere or nowhere has to gain in each of its channels, and no cause stays that loses in a
     channel that is predicted worse than without any cause.
@@ -41,7 +44,7 @@ def validate(
         current: the fit.
         before: the nominal model's state.
     """
-    dropped: list[tuple[Effect, dict[str, float]]] = []
+    current, dropped = _coarser(train, held_out, current)
     while current.state.effects:
         powers = _powers(train, held_out, current)
         gains = [_gains(each, lambda file, channel: file) for each in powers]
@@ -72,6 +75,35 @@ def validate(
             dropped.append((state.effects[i], gain))
             state = state.without(i)
         current = fit(train, state, rounds=3)
+    return current, dropped
+
+
+def _coarser(
+    train: System, held_out: System, current: Fit
+) -> tuple[Fit, list[tuple[Effect, dict[str, float]]]]:
+    """The fit with the simpler form of each effect whose finer one does not predict better."""
+    dropped: list[tuple[Effect, dict[str, float]]] = []
+    scale = row_weights(held_out, {g: current.level.get(g, 1.0) for g in held_out.groups})
+    for index, effect in enumerate(current.state.effects):
+        kind = effect_class(effect.refines) if effect.refines else None
+        if kind is None or not kind.shows(motion=True):
+            continue
+        shared = {p.name: effect.values[p.name] for p in kind.parameters}
+        effects = list(current.state.effects)
+        effects[index] = kind(effect.target, **shared)
+        other = fit(train, replace(current.state, effects=tuple(effects)))
+        powers: Powers = {}
+        left = [
+            (held_out.measured - held_out.predict(state.every, state.scales)) * scale
+            for state in (other.state, current.state)
+        ]
+        for s in held_out.segments:
+            without, beside = (float(each[s.rows] @ each[s.rows]) for each in left)
+            powers[held_out.logs[s.record].file, ".".join(s.group)] = without, beside
+        gains = _gains(powers, lambda file, channel: file)
+        if sum(gains.values()) <= 0.0:
+            dropped.append((effect, gains))
+            current = other
     return current, dropped
 
 
