@@ -87,7 +87,14 @@ class System:
         return found
 
     def of(self, group: Group) -> list[Segment]:
-        """The segments of a group."""
+        """The segments of a group.
+
+        Args:
+            group: kind and joint.
+
+        Returns:
+            record by record.
+        """
         return [s for s in self.segments if s.group == group]
 
     def predict(
@@ -118,15 +125,25 @@ class System:
         return out
 
     def around(self, effects: Sequence[Effect]) -> list[Around]:
-        """What all effects together do to each one's term, record by record."""
+        """What all effects together do to each one's term.
+
+        Args:
+            effects: all that act.
+
+        Returns:
+            record by record.
+        """
         return [predictor.around(effects) for predictor in self.predictors]
 
     def bodies(self, effects: Sequence[Effect], fewer: Sequence[Effect]) -> list[FloatArray]:
-        """Joint by joint, (rows,) what the bodies of some effects take more than those of fewer.
+        """What the bodies of some effects take more than those of fewer.
 
         Args:
             effects: the ones.
             fewer: the others.
+
+        Returns:
+            (rows,) N m or N, joint by joint.
         """
         parts = []
         for more, less in zip(self.around(effects), self.around(fewer), strict=True):
@@ -138,7 +155,15 @@ class System:
         ]  # fmt: skip
 
     def by_scale(self, around: Sequence[Around], joint: str) -> FloatArray:
-        """(rows,) derivative by the factor on a joint's rigid-body torque."""
+        """Derivative by the factor on a joint's rigid-body torque.
+
+        Args:
+            around: of `System.around`.
+            joint: its name.
+
+        Returns:
+            (rows,) N m or N.
+        """
         return self._rows(
             joint, [p.by_scale(a, joint) for p, a in zip(self.predictors, around, strict=True)]
         )
@@ -146,9 +171,19 @@ class System:
     def by_parameter(
         self, around: Sequence[Around], effect: Effect, other: Effect, name: str, step: float
     ) -> FloatArray | None:
-        """(rows,) derivative by an effect's parameter, as `Predictor.by_parameter` has it.
+        """Derivative by an effect's parameter, as `Predictor.by_parameter` has it.
 
         Those of bodies from nothing are kept, as a search asks for them again and again.
+
+        Args:
+            around: of `System.around`.
+            effect: as it is.
+            other: the same with that parameter moved.
+            name: the parameter.
+            step: by which it was moved.
+
+        Returns:
+            (rows,); None where the whole prediction has to be made twice.
         """
         reported = tuple((*a.gains.items(), *a.delays.items()) for a in around)
         starts = not effect.linear and effect == type(effect)(effect.target)
