@@ -79,8 +79,8 @@ def test_a_ur10e_is_learnt_without_a_load(unloaded):
 def test_its_load_is_told_with_its_centre_of_mass(ur10e, unloaded):
     """2.805 kg hung there; least squares with these gains say 3.08 kg at 0.029, 0.154, -0.165 m.
 
-    The authors found the gains by the load that they knew, and they are a tenth and more smaller
-    than these: what was published of the drives leaves as much open, and so does a load so weighed.
+    The authors found their gains with the mass as known, up to a third below these: what was
+    published of the drives leaves a tenth open, and so does a load that is weighed by them.
     """
     robot, log = ur10e
     logs = [log("ur-20_02_19_14harm50secLoad.csv", 308, 5071),
