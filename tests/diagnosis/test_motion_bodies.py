@@ -4,6 +4,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
 from picchio.diagnosis.motion.diagnosis import diagnose_motion
 from picchio.model.inertia import (
     body,
@@ -72,6 +74,42 @@ def test_a_load_tells_its_mass_and_where_it_is(robot, chain):
     assert found.gain.explained > 0.999
 
 
+@pytest.mark.parametrize("told", [0.0, 0.1])
+def test_a_load_is_known_no_better_than_the_drives_that_weigh_it(robot, chain, told):
+    """Drives that report 5 % too much: the true mass lies within what their tolerance leaves."""
+    world = with_load(chain, 4.0, np.zeros(3), np.zeros((3, 3)))
+    bare, loaded = (moving.campaign(each, 5) for each in (chain, world))
+    records = []
+    for off, on in zip(bare, loaded, strict=True):
+        read, own = on.read(), off.read()
+        time = read.pop("time")
+        for name in read:
+            if name.startswith("torque"):
+                read[name] = own[name] + 1.05 * (read[name] - own[name])
+        records.append(Record.from_arrays(on.file, time, read, kind="motion"))
+    changed = Campaign.from_records(records, tolerance={"torque_gain": told})
+    mass = causes(diagnose_motion(robot, changed))["payload", "tool"]["mass"]
+    assert mass.value == pytest.approx(4.2, rel=0.01)
+    assert (mass.value - 4.0 < 2.0 * mass.std) == (told > 0.0)
+
+
+def test_what_a_model_lacks_widens_the_spread(robot, chain):
+    """A slow torque of the second joint that nothing in the catalogue makes."""
+
+    def lacking(v, a, q):
+        found = np.zeros_like(v)
+        found[1] = 6.0 * np.sin(np.linspace(0.0, 25.0, v.shape[1]))
+        return found
+
+    world = with_load(chain, 4.0, np.zeros(3), np.zeros((3, 3)))
+    found = diagnose_motion(
+        robot, Campaign.from_records(list(moving.campaign(world, 5, lacking)),
+                                     tolerance={"torque_gain": 0.0})
+    )  # fmt: skip
+    mass = next(c for c in found.causes if c.target == "tool").parameters["mass"]
+    assert abs(mass.value - 4.0) < 3.0 * mass.std
+
+
 def test_a_load_at_the_tool_frame_is_told_as_that(robot, chain):
     world = with_load(chain, 4.0, np.zeros(3), np.zeros((3, 3)))
     found = diagnose_motion(robot, moving.campaign(world, 5))
@@ -118,6 +156,12 @@ def test_a_motor_that_turns_two_joints_is_found(robot, chain):
 def test_a_wrist_whose_joints_have_motors_of_their_own_is_not_said_to_be_coupled(robot, chain):
     found = diagnose_motion(robot, moving.campaign(chain, 10, rubbing(False)))
     assert ("coulomb_friction", "wrist_3_joint") in causes(found)
+    assert "coupled_drive" not in {effect for effect, _ in causes(found)}
+
+
+@pytest.mark.parametrize("gone", ["viscous_friction", "joint_inertia"])
+def test_a_coupling_does_not_stand_in_for_what_each_joint_has_by_itself(robot, chain, gone):
+    found = diagnose_motion(robot, moving.campaign(chain, 10, rubbing(False)), without=[gone])
     assert "coupled_drive" not in {effect for effect, _ in causes(found)}
 
 

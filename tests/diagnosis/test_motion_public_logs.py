@@ -77,15 +77,22 @@ def test_a_ur10e_is_learnt_without_a_load(unloaded):
 
 @pytest.mark.slow
 def test_its_load_is_told_with_its_centre_of_mass(ur10e, unloaded):
-    """2.805 kg hung there; least squares with these gains say 3.08 kg at 0.029, 0.154, -0.165 m."""
+    """2.805 kg hung there; least squares with these gains say 3.08 kg at 0.029, 0.154, -0.165 m.
+
+    The authors found their gains with the mass as known, up to a third below these: what was
+    published of the drives leaves a tenth open, and so does a load that is weighed by them.
+    """
     robot, log = ur10e
     logs = [log("ur-20_02_19_14harm50secLoad.csv", 308, 5071),
             log("ur-20_01_31-load.csv", 200, 2300)]  # fmt: skip
-    found = diagnose_motion(robot, Campaign.from_records(logs), given=unloaded)
+    found = diagnose_motion(
+        robot, Campaign.from_records(logs, tolerance={"torque_gain": 0.1}), given=unloaded
+    )
     load = next(c.parameters for c in found.causes if c.effect == "payload_body")
     where = [load[axis].value for axis in "xyz"]
     np.testing.assert_allclose(where, [0.029, 0.154, -0.165], atol=0.005)
-    assert load["mass"].value == pytest.approx(2.805, rel=0.05)
+    assert load["mass"].value == pytest.approx(3.08, rel=0.05)
+    assert abs(load["mass"].value - 2.805) < 2.0 * load["mass"].std < 0.2 * 2.805
     assert found.gain.explained > 0.98
 
 
@@ -106,7 +113,7 @@ def test_a_pandas_links_are_none_that_cannot_be(measured_data):
     found = diagnose_motion(
         robot, Campaign.from_records(logs), train=["first.csv"], held_out=["second.csv"]
     )
-    assert left(found, "extended") <= 0.016
+    assert left(found, "extended") <= 0.013
     inertias = [c.parameters["inertia"].value for c in found.causes if c.effect == "joint_inertia"]
     masses = [c.parameters["link_mass"].value for c in found.causes if c.effect == "link_inertia"]
     assert masses and all(value > 0.0 for value in (*inertias, *masses))
@@ -136,4 +143,5 @@ def test_a_tx40s_wrist_is_coupled(measured_data):
     wrist = {(c.effect, c.target): c.parameters for c in found.causes}["coupled_drive", "joint_6"]
     assert wrist["coefficient"].value == pytest.approx(0.616, rel=0.1)
     assert wrist["torque"].value == pytest.approx(1.95, rel=0.35)
-    assert found.gain.extended_nrmse <= 0.29
+    assert {c.target for c in found.causes if c.effect == "coupled_drive"} == {"joint_6"}
+    assert found.gain.extended_nrmse <= 0.11

@@ -24,6 +24,7 @@ from picchio.diagnosis.motion.data.split import split
 from picchio.diagnosis.motion.data.system import Group, System
 from picchio.diagnosis.motion.fit.instruments import instrument_shifts
 from picchio.diagnosis.motion.fit.least_squares import Fit, fit
+from picchio.diagnosis.motion.fit.spread import honest
 from picchio.diagnosis.motion.fit.state import State, baseline
 from picchio.diagnosis.motion.follow_up.advice import next_measurement
 from picchio.diagnosis.motion.search.candidates import evidence_of, motion_effects
@@ -49,6 +50,7 @@ class _Search:
         kinds: the catalogue.
         steps: its rounds.
         dropped: effects that lost on records held out, and by how much on each.
+        gain: relative standard deviation of a drive's torque.
     """
 
     system: System
@@ -57,6 +59,7 @@ class _Search:
     kinds: Mapping[str, type[Effect]]
     steps: list[Step]
     dropped: list[tuple[Effect, dict[str, float]]]
+    gain: float
 
 
 @one_thread()
@@ -118,7 +121,9 @@ def diagnose_motion(
         found, dropped = validate(system, judge_on, found, before.state)
         # What stood only beside a cause that is gone goes, too.
         found = eliminate(system, found) if dropped else found
-    search = _Search(system, judge_on, before, kinds, steps, dropped)
+    search = _Search(
+        system, judge_on, before, kinds, steps, dropped, campaign.tolerance.torque_gain
+    )
     return _conclude(search, fit(system, found.state))
 
 
@@ -151,6 +156,7 @@ def _conclude(search: _Search, found: Fit) -> Diagnosis:
         sure.append(min(_SURE, score.confidence) if score is not None else 0.5)
     rivals = alternatives(system, found, search.kinds)
     valued = zip(found.state.effects, sure, strict=True)
+    found = honest(system, found, search.gain)
     causes = tuple(
         Cause(effect.name, effect.target, confidence, parameters(system, found, effect))
         for effect, confidence in sorted(valued, key=lambda each: each[0].periodic)

@@ -162,6 +162,10 @@ class Effect(ABC):
         needs: the effect without which, at the same target, this one has no meaning.
         refines: the effect that this one tells with more numbers: where that one shows, too, it
             takes the place of one that was found, with the values that they share.
+        over: effects on joints that do in each joint by themselves what this one does: in a motion
+            it has to gain beside all of them, found or not. What couples joints is told by that.
+        beside: parameters of which bodies may do as much: in a motion, the others have to gain.
+        everywhere: in a motion, it gains in each channel that it acts in, or is not there.
         usual: where effects explain a motion equally well, the smallest comes first.
         elastic: in a motion, it winds the gear up, which is looked for once loads are known.
         periodic: in a motion, a wave of `order` periods a turn, found as a line in the residual.
@@ -196,6 +200,9 @@ class Effect(ABC):
     urdf: ClassVar[Mapping[str, str]] = {}
     needs: ClassVar[str] = ""
     refines: ClassVar[str] = ""
+    over: ClassVar[tuple[str, ...]] = ()
+    beside: ClassVar[tuple[str, ...]] = ()
+    everywhere: ClassVar[bool] = False
     usual: ClassVar[int] = 99
     elastic: ClassVar[bool] = False
     periodic: ClassVar[bool] = False

@@ -147,7 +147,7 @@ class Predictor:
     def by_parameter(
         self, around: Around, effect: Effect, other: Effect, name: str, step: float
     ) -> Readings | None:
-        """Derivative of the readings by one parameter of an effect on a joint.
+        """Derivative of the readings by one parameter of an effect.
 
         Args:
             around: all effects, this one among them or not.
@@ -161,8 +161,8 @@ class Predictor:
             whole prediction has to be made twice.
         """
         found: Readings = {TORQUE: {}, RIPPLE: {}, WINDUP: {}}
-        if effect.target_kind != "joint":
-            if around.loaded or not (self._is_body(effect) or self._is_body(other)):
+        if self._is_body(effect) or self._is_body(other):
+            if around.loaded:
                 return None
             # Of what no other term depends on, the bodies' torques are all that changes.
             before = self._bodies(effect)
@@ -178,8 +178,6 @@ class Predictor:
         if name in effect.linear:
             parts = [(1.0, part) for part in self._unit(effect, name, around)]
         else:
-            if self._is_body(effect) or self._is_body(other):
-                return None
             for each in () if effect.linear else (effect, other):
                 term = self._of(each, around.body, around.key)
                 if term.gains or term.delays:

@@ -12,9 +12,14 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.motion.data.system import Group, Segment, System
-from picchio.diagnosis.motion.fit.least_squares import Fit, correlation_length, row_weights
+from picchio.diagnosis.motion.fit.least_squares import (
+    Fit,
+    correlation_length,
+    jacobian,
+    row_weights,
+)
 from picchio.diagnosis.motion.fit.orders import Spectrum, order_spectrum
-from picchio.diagnosis.motion.fit.state import Coordinate
+from picchio.diagnosis.motion.fit.state import Coordinate, effect_coordinates
 from picchio.diagnosis.motion.fit.stretches import (
     Stretch,
     Validated,
@@ -24,15 +29,18 @@ from picchio.diagnosis.motion.fit.stretches import (
     without_added,
 )
 from picchio.model.effects.effect import Effect
+from picchio.model.effects.registry import effect_class
+from picchio.model.motion import TORQUE
 
 _TINY = 1e-300
 _ROUNDED = 1e-9
 _SAME = 0.02  # of a column's power: less of its own and others do the same already
 _LEAST_BIC = 3.0
+_STAYS = 0.5  # of that is enough for what is in: what is just worth it does not come and go
 _LEAST_CONFIDENCE = 0.90
 _LEAST_SHARE = 0.005
 _SPOILT = 1.1  # power left in a channel over that before
-_MANY = 3  # numbers: with more, one channel could be paid for with another
+_MANY = 2  # numbers: with more, one channel could be paid for with another
 _TIE = 2.0
 _SURE = 0.95
 
@@ -49,10 +57,11 @@ class Score:
         share: part of the groups' power that it removes in stretches held out.
         confidence: that the gain is one, from its spread over the stretches.
         values: of the candidate's coordinates.
-        admissible: within their bounds.
+        admissible: within their bounds, and everywhere where it has to be.
+        spoils: whether it has many numbers and makes a channel worse.
         groups: equations that it acts in.
         differences: what every stretch that was held out gains.
-        numbers: how many the records determine, those that were searched for among them.
+        numbers: how many it has, those that were searched for among them.
     """
 
     gain: float
@@ -62,9 +71,10 @@ class Score:
     confidence: float
     values: tuple[float, ...]
     admissible: bool
+    spoils: bool
     groups: tuple[Group, ...]
     differences: Mapping[int, float]
-    numbers: float = 1.0
+    numbers: int = 1
 
 
 class Scorer:
@@ -86,6 +96,7 @@ class Scorer:
         self._sums: dict[int, tuple[np.ndarray, FloatArray, FloatArray]] = {}
         self._spectra: dict[str, Spectrum | None] = {}
         self._bases: dict[object, Validated] = {}
+        self._own: dict[str, FloatArray | None] = {}
         # A coordinate at its bound stays there.
         self.free = np.array([
             c.lower + 1e-9 < c.value < c.upper - 1e-9 for c in base.coordinates
@@ -93,6 +104,7 @@ class Scorer:
 
     def score(
         self,
+        effect: Effect,
         columns: FloatArray,
         coordinates: list[Coordinate],
         neutral: FloatArray,
@@ -105,6 +117,7 @@ class Scorer:
         """Score a candidate.
 
         Args:
+            effect: which.
             columns: (rows, c) its derivatives.
             coordinates: the c of them.
             neutral: (c,) the values at which nothing changes.
@@ -121,7 +134,9 @@ class Scorer:
         groups = tuple(dict.fromkeys(s.group for s in touched))
         if not groups:
             return None
-        added = columns * self.weight[:, None]
+        beside = self._beside(effect, groups)
+        beside += [columns[:, i] for i, c in enumerate(coordinates) if c.name in effect.beside]
+        added = np.column_stack([*beside, columns]) * self.weight[:, None]
         kept = [s for s in self.system.segments if s.group in groups]
         # Coordinates of the base that other groups determine as well are held by those, too.
         free = self.free.copy()
@@ -134,21 +149,30 @@ class Scorer:
         second = [part.block(index, added, right) for part in parts]
         elsewhere = self._elsewhere(groups, index)
         prior, pull = self.prior[index], self.pull[index]
-        key = (groups, index.tobytes()) if back is None and not without else None
+        if beside:
+            elsewhere = (
+                np.pad(elsewhere[0], (0, len(beside))),
+                np.pad(elsewhere[1], (0, len(beside))),
+            )
+            prior, pull = np.pad(prior, (0, len(beside))), np.pad(pull, (0, len(beside)))
+        size = len(prior)
+        key = None
+        if back is None and not without and not effect.beside:
+            key = groups, index.tobytes(), effect.over
         base = self._bases.get(key)
         if base is None:
-            first = [without_added(block, index.size) for block in second]
-            base = cross_validate(first, elsewhere, prior, pull, len(index))
+            first = [without_added(block, size) for block in second]
+            base = cross_validate(first, elsewhere, prior, pull, size)
         # What is known beforehand of the added numbers, which start where they do nothing.
         known = np.array([c.precision for c in coordinates])
         towards = known * (np.array([c.centre for c in coordinates]) - neutral)
         prior, pull = np.append(prior, known), np.append(pull, towards)
         if key is not None:
             self._bases[key] = base
-        wide = cross_validate(second, elsewhere, prior, pull, len(index))
+        wide = cross_validate(second, elsewhere, prior, pull, size)
         if wide.own < _SAME:
             return None
-        values = neutral + wide.solution[len(index) :]
+        values = neutral + wide.solution[size:]
         bounds = zip(coordinates, values, neutral, strict=True)
         beyond = np.array([
             (v < c.lower - _ROUNDED and n <= c.lower) or (v > c.upper + _ROUNDED and n >= c.upper)
@@ -158,7 +182,7 @@ class Scorer:
             # What would leave its bounds where it does nothing stays there, as in a fit.
             inside = np.flatnonzero(~beyond)
             fewer = self.score(
-                columns[:, inside], [coordinates[i] for i in inside], neutral[inside],
+                effect, columns[:, inside], [coordinates[i] for i in inside], neutral[inside],
                 searched=searched, without=without, back=back, noise=noise,
             )  # fmt: skip
             if fewer is None:
@@ -183,8 +207,31 @@ class Scorer:
             correlation = {g: noise / self.base.level[g] ** 2 for g in groups}
             common |= correlation
         return _compare(base, wide, correlation, common, groups,
-                        wide.determined + searched, tuple(float(v) for v in values),
-                        admissible)  # fmt: skip
+                        columns.shape[1] + searched, tuple(float(v) for v in values),
+                        admissible, effect.everywhere)  # fmt: skip
+
+    def _beside(self, effect: Effect, groups: tuple[Group, ...]) -> list[FloatArray]:
+        """Columns (rows,) of what does in each joint by itself what the effect does in several."""
+        there = {e.label for e in self.base.state.every}
+        found = []
+        for name in effect.over:
+            for joint in dict.fromkeys(joint for kind, joint in groups if kind == TORQUE):
+                own = effect_class(name)(joint)
+                if own.label in there:
+                    continue
+                if own.label not in self._own:
+                    self._own[own.label] = self._unit(own)
+                column = self._own[own.label]
+                if column is not None:
+                    found.append(column)
+        return found
+
+    def _unit(self, effect: Effect) -> FloatArray | None:
+        system, state = self.system, self.base.state.with_effect(effect)
+        coordinates = effect_coordinates(effect, len(state.every) - 1, system.logs[0].rate)
+        predicted = system.measured - self.base.residual
+        columns = jacobian(system, state, predicted, coordinates)[1]
+        return columns[:, 0] if columns.size else None
 
     def noise_of(self, effect: Effect) -> float | None:
         """Of a ripple, the power of a sample's noise beside its line; None of others."""
@@ -236,11 +283,13 @@ def _compare(
     correlation: Mapping[Group, float],
     common: Mapping[Group, float],
     groups: tuple[Group, ...],
-    added: float,
+    added: int,
     values: tuple[float, ...],
     admissible: bool,
+    everywhere: bool,
 ) -> Score:
     gain = rank = bic = removed = total = effective = 0.0
+    spoils = False
     differences: dict[int, float] = {}
     raw: dict[int, float] = {}
     for group in groups:
@@ -255,7 +304,8 @@ def _compare(
         inside = max(base.inside[group], _TINY) / max(wide.inside[group], _TINY)
         bic += 0.5 * samples * np.log(inside)
         removed, total = removed + before - after, total + before
-        admissible = admissible and (added <= _MANY or after <= _SPOILT * before)
+        admissible = admissible and not (everywhere and after > before)
+        spoils = spoils or (added > _MANY and after > _SPOILT * before)
         for (g, number), x in base.outside.items():
             if g == group:
                 # In logarithms one bad stretch does not outvote the others; without, stretches
@@ -272,17 +322,25 @@ def _compare(
     sure = max(confidence(np.array(list(x.values()))) for x in (differences, raw))
     return Score(
         gain=float(gain), rank=float(rank), bic=float(bic), share=removed / max(total, _TINY),
-        confidence=sure, values=values, admissible=admissible, groups=groups,
+        confidence=sure, values=values, admissible=admissible, spoils=spoils, groups=groups,
         differences=differences, numbers=added,
     )  # fmt: skip
 
 
-def passes(score: Score, ripple: bool = False) -> bool:
-    """Whether a candidate may be claimed: penalised, held out, and on every stretch."""
+def passes(score: Score, ripple: bool = False, there: bool = False) -> bool:
+    """Whether a candidate may be claimed: penalised, held out, and on every stretch.
+
+    Args:
+        score: its score.
+        ripple: whether it is a line.
+        there: whether it is in the fit already.
+    """
+    least = _LEAST_BIC * (_STAYS if there else 1.0)
     enough = ripple or score.share >= _LEAST_SHARE
     return (
-        score.admissible and score.bic > _LEAST_BIC and score.gain > 0.0
+        score.admissible and score.bic > least and score.gain > 0.0
         and score.confidence >= _LEAST_CONFIDENCE and enough
+        and (there or not score.spoils)
     )  # fmt: skip
 
 
@@ -296,8 +354,8 @@ def necessity(scorer: Scorer, index: int) -> Score | None:
     columns = current.columns[:, own]
     values = np.array([c.value for c in coordinates])
     noise = scorer.noise_of(current.state.effects[index])
-    return scorer.score(columns, coordinates, values - part, without=own, back=columns @ part,
-                        noise=noise)  # fmt: skip
+    return scorer.score(current.state.effects[index], columns, coordinates, values - part,
+                        without=own, back=columns @ part, noise=noise)  # fmt: skip
 
 
 def contribution(current: Fit, index: int) -> tuple[list[int], FloatArray]:
@@ -328,7 +386,7 @@ def indistinguishable(score: Score, other: Score) -> bool:
     """
     if other.rank >= score.rank - _TIE:
         return True
-    if other.numbers > score.numbers + 1.0:
+    if other.numbers > score.numbers + 1:
         return False
     shared = sorted(set(score.differences) | set(other.differences))
     lead = np.array([

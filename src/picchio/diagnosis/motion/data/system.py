@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,6 +75,8 @@ class System:
             np.zeros(0)
         )  # fmt: skip
         self.block = self._blocks()
+        self._reported: tuple[tuple[tuple[str, float], ...], ...] = ()
+        self._begun: dict[tuple[Hashable, ...], FloatArray | None] = {}
 
     def _blocks(self) -> np.ndarray:
         """(rows,) in which stretch of which record a row lies."""
@@ -85,7 +87,14 @@ class System:
         return found
 
     def of(self, group: Group) -> list[Segment]:
-        """The segments of a group."""
+        """The segments of a group.
+
+        Args:
+            group: kind and joint.
+
+        Returns:
+            record by record.
+        """
         return [s for s in self.segments if s.group == group]
 
     def predict(
@@ -116,11 +125,45 @@ class System:
         return out
 
     def around(self, effects: Sequence[Effect]) -> list[Around]:
-        """What all effects together do to each one's term, record by record."""
+        """What all effects together do to each one's term.
+
+        Args:
+            effects: all that act.
+
+        Returns:
+            record by record.
+        """
         return [predictor.around(effects) for predictor in self.predictors]
 
+    def bodies(self, effects: Sequence[Effect], fewer: Sequence[Effect]) -> list[FloatArray]:
+        """What the bodies of some effects take more than those of fewer.
+
+        Args:
+            effects: the ones.
+            fewer: the others.
+
+        Returns:
+            (rows,) N m or N, joint by joint.
+        """
+        parts = []
+        for more, less in zip(self.around(effects), self.around(fewer), strict=True):
+            parts.append({j: x - less.body[j] for j, x in more.body.items()})
+        joints = dict.fromkeys(joint for kind, joint in self.groups if kind == TORQUE)
+        return [
+            self._rows(j, [{TORQUE: {j: each[j]}, RIPPLE: {}, WINDUP: {}} for each in parts])
+            for j in joints if all(j in each for each in parts)
+        ]  # fmt: skip
+
     def by_scale(self, around: Sequence[Around], joint: str) -> FloatArray:
-        """(rows,) derivative by the factor on a joint's rigid-body torque."""
+        """Derivative by the factor on a joint's rigid-body torque.
+
+        Args:
+            around: of `System.around`.
+            joint: its name.
+
+        Returns:
+            (rows,) N m or N.
+        """
         return self._rows(
             joint, [p.by_scale(a, joint) for p, a in zip(self.predictors, around, strict=True)]
         )
@@ -128,7 +171,34 @@ class System:
     def by_parameter(
         self, around: Sequence[Around], effect: Effect, other: Effect, name: str, step: float
     ) -> FloatArray | None:
-        """(rows,) derivative by an effect's parameter, as `Predictor.by_parameter` has it."""
+        """Derivative by an effect's parameter, as `Predictor.by_parameter` has it.
+
+        Those of bodies from nothing are kept, as a search asks for them again and again.
+
+        Args:
+            around: of `System.around`.
+            effect: as it is.
+            other: the same with that parameter moved.
+            name: the parameter.
+            step: by which it was moved.
+
+        Returns:
+            (rows,); None where the whole prediction has to be made twice.
+        """
+        reported = tuple((*a.gains.items(), *a.delays.items()) for a in around)
+        starts = not effect.linear and effect == type(effect)(effect.target)
+        if not starts or any(a.loaded for a in around):
+            return self._derivative(around, effect, other, name, step)
+        if reported != self._reported:
+            self._reported, self._begun = reported, {}
+        key = (effect.key, other.key, step)
+        if key not in self._begun:
+            self._begun[key] = self._derivative(around, effect, other, name, step)
+        return self._begun[key]
+
+    def _derivative(
+        self, around: Sequence[Around], effect: Effect, other: Effect, name: str, step: float
+    ) -> FloatArray | None:
         found: list[Readings] = []
         for predictor, each in zip(self.predictors, around, strict=True):
             readings = predictor.by_parameter(each, effect, other, name, step)

@@ -105,7 +105,6 @@ class Validated:
         outside: (group, stretch) -> power left there by the solution of all other stretches.
         count: (group, stretch) -> rows.
         own: the largest part of an added column that the others can't make up.
-        determined: how many of the added columns' numbers the rows determine.
     """
 
     solution: FloatArray
@@ -113,7 +112,6 @@ class Validated:
     outside: Mapping[tuple[Group, int], float]
     count: Mapping[tuple[Group, int], int]
     own: float
-    determined: float
 
 
 def cross_validate(
@@ -156,18 +154,7 @@ def cross_validate(
         inside[b.group] = inside.get(b.group, 0.0) + own
         outside[place] = outside.get(place, 0.0) + foreign
         count[place] = count.get(place, 0) + b.rows
-    return Validated(
-        solution, inside, outside, count, _own(normal, base), _determined(normal, prior, base)
-    )
-
-
-def _determined(normal: FloatArray, prior: FloatArray, base: int) -> float:
-    """How many of the added columns' numbers the rows determine, rather than what is known."""
-    if not np.any(prior[base:]):
-        return float(len(prior) - base)
-    spread = np.array([stable_solve(normal, np.eye(len(prior))[k])[k]
-                       for k in range(base, len(prior))])  # fmt: skip
-    return float(np.sum(1.0 - np.clip(prior[base:] * spread, 0.0, 1.0)))
+    return Validated(solution, inside, outside, count, _own(normal, base))
 
 
 def _own(normal: FloatArray, count: int) -> float:

@@ -33,8 +33,8 @@ _ALIKE = 0.9
 _ROUNDS = 12
 _NEAR = 0.05  # orders
 _WITHIN = 3.0  # standard deviations
-_MANY = 3  # numbers
-_COMMON = 8  # of `Effect.usual`: from there on it is what drives report wrongly, or rarer
+_MANY = 2  # numbers
+_RARE = 8  # of `Effect.usual`: from there on it is what drives report wrongly, or rarer
 _CONTENDERS = 4
 _TINY = 1e-300
 _TOLD_APART = 0.1  # orders: no chance hit of a whole number
@@ -63,14 +63,9 @@ def select(
 ) -> tuple[Fit, list[Step]]:
     """Search forwards and backwards until nothing changes.
 
-    The order: ripple, and what it tells of timing; everything else but elasticity, what has many
-    numbers last; elasticity, which needs the torque that the gears transmit; ripple again; then
-    what is no longer needed goes, and everything is tried once more.
-
-    Wrong bodies look like wrong gains and offsets of what the drives report, and those are found
-    first. So it is searched in another order as well: only what every robot has (friction, rotors,
-    a payload), then what has many numbers, then the rest. Where that finds such a cause, the
-    better fit of the two is taken, by Schwarz' criterion.
+    The order: ripple, and what it tells of timing; everything else but elasticity; bodies and
+    whatever else has many numbers (`_bodies`); elasticity, which needs the torque that the gears
+    transmit; ripple again; then what is no longer needed goes, and everything is tried once more.
 
     Args:
         system: the training equations.
@@ -83,40 +78,61 @@ def select(
     rest = {n: k for n, k in kinds.items() if not (k.periodic or k.elastic)}
     broad = {n: k for n, k in rest.items() if len(k.parameters) > _MANY}
     slow = {n: k for n, k in rest.items() if n not in broad}
-    common = {n: k for n, k in slow.items() if not k.needs and k.usual < _COMMON}
-    last = [(elastic, 3), (ripple, _ROUNDS)]
-    total = 2 * len(last) + 2 * _AGAIN + 6
-    done = 0
+    steps: list[Step] = []
 
-    def through(current: Fit, stages: list, steps: list[Step]) -> Fit:
-        nonlocal done
-        for pool, rounds in stages:
-            progress(done, total)
-            done += 1
-            current = _forward(system, current, pool, kinds, rounds, steps)
-        return current
+    def forward(current: Fit, pool: Mapping[str, type[Effect]], rounds: int) -> Fit:
+        return _forward(system, current, pool, kinds, rounds, steps)
 
-    def settled(current: Fit, steps: list[Step]) -> tuple[Fit, list[Step]]:
-        current = through(current, last, steps)
-        for _ in range(_AGAIN):
-            current = eliminate(system, current)
-            before = [e.label for e in current.state.effects]
-            for pool in (slow, broad, elastic):
-                current = _forward(system, current, pool, kinds, 3, steps)
-            if before == [e.label for e in current.state.effects]:
-                break
-        return eliminate(system, current), steps
+    def bodies(current: Fit) -> Fit:
+        return _bodies(system, current, broad, slow, forward)
 
-    first: list[Step] = []
-    begun = through(fit(system, start), [(ripple, 2)], first)
-    one = list(first)
-    found = settled(through(begun, [(slow, _ROUNDS), (broad, _ROUNDS)], one), one)
-    two = list(first)
-    other = through(begun, [(common, _ROUNDS), (broad, _ROUNDS)], two)
-    if not any(e.name in broad for e in other.state.effects):
+    stages: list[Callable[[Fit], Fit]] = [
+        lambda now: forward(now, ripple, 2), lambda now: forward(now, slow, _ROUNDS), bodies,
+        lambda now: forward(now, elastic, 3), lambda now: forward(now, ripple, _ROUNDS),
+    ]  # fmt: skip
+    current = fit(system, start)
+    for number, stage in enumerate(stages):
+        progress(number, len(stages) + _AGAIN)
+        current = stage(current)
+    for number in range(_AGAIN):
+        progress(len(stages) + number, len(stages) + _AGAIN)
+        current = eliminate(system, current)
+        before = [e.label for e in current.state.effects]
+        for pool in (slow, broad, elastic):
+            current = forward(current, pool, 3)
+        if before == [e.label for e in current.state.effects]:
+            break
+    return eliminate(system, current), steps
+
+
+def _bodies(
+    system: System,
+    current: Fit,
+    broad: Mapping[str, type[Effect]],
+    slow: Mapping[str, type[Effect]],
+    forward: Callable[[Fit, Mapping[str, type[Effect]], int], Fit],
+) -> Fit:
+    """The fit with what has many numbers.
+
+    Wrong bodies look like wrong gains and offsets of what the drives report, and those are found
+    first. So bodies are looked for without these as well, which then have to be found again; the
+    better fit of the two is kept, by Schwarz' criterion.
+    """
+    found = forward(current, broad, _ROUNDS)
+    state = current.state
+    for index, effect in reversed(list(enumerate(state.effects))):
+        if effect.needs or (effect.usual >= _RARE and not effect.periodic):
+            fixed = state.fixed - {effect.target}
+            state = replace(state.without(index), fixed=fixed)
+    if state is current.state:
         return found
-    again = settled(through(other, [(slow, _ROUNDS)], two), two)
-    return min(found, again, key=lambda each: _cost(system, each[0], again[0].correlation))
+    bare = fit(system, state)
+    several = {n: k for n, k in broad.items() if k.target_kind != "joint"}
+    other = forward(bare, several, _ROUNDS)
+    if len(other.state.effects) == len(bare.state.effects):
+        return found
+    other = forward(other, slow, _ROUNDS)
+    return min(found, other, key=lambda each: _cost(system, each, other.correlation))
 
 
 def _forward(system: System, current: Fit, pool: Mapping[str, type[Effect]],
@@ -182,12 +198,10 @@ def _broad(pair: Scored) -> bool:
 
 
 def _cost(system: System, each: Fit, correlation: Mapping[Group, float]) -> float:
-    """Schwarz' criterion, halved; a number that is known beforehand is none."""
+    """Schwarz' criterion, halved."""
     samples = {g: len_of(system, g) / correlation[g] for g in system.groups}
-    known = np.array([c.precision for c in each.coordinates])
-    numbers = float(np.sum(1.0 - np.clip(known * each.std**2, 0.0, 1.0)))
     misfit = sum(n * math.log(max(each.level[g], _TINY)) for g, n in samples.items())
-    return misfit + 0.5 * numbers * math.log(max(sum(samples.values()), 2.0))
+    return misfit + 0.5 * len(each.coordinates) * math.log(max(sum(samples.values()), 2.0))
 
 
 def lock(system: System, current: Fit) -> Fit:
@@ -215,8 +229,10 @@ def score_all(system: System, base: Fit, kinds: Mapping[str, type[Effect]]) -> l
     scorer = Scorer(system, base)
     found = []
     for candidate in candidates(system, base, dict(kinds)):
-        score = scorer.score(candidate.columns, candidate.coordinates, candidate.neutral,
-                             searched=candidate.searched, noise=candidate.noise)  # fmt: skip
+        score = scorer.score(
+            candidate.effect, candidate.columns, candidate.coordinates, candidate.neutral,
+            searched=candidate.searched, noise=candidate.noise,
+        )  # fmt: skip
         if score is not None:
             found.append((score, candidate))
     return sorted(found, key=lambda pair: -pair[0].rank)
@@ -273,17 +289,18 @@ def _take_over(system: System, base: Fit, state: State, candidate: Candidate) ->
 
 
 def eliminate(system: System, current: Fit) -> Fit:
-    """Take out, the newest among them, what is no longer needed."""
+    """Take out what is no longer needed, what bends to anything by its many numbers first."""
     while current.state.effects:
         scorer = Scorer(system, current)
         tried = []
         for index, effect in enumerate(current.state.effects):
             score = necessity(scorer, index)
-            if score is None or not passes(score, effect.periodic):
-                tried.append((-np.inf if score is None else score.gain, index))
+            if score is None or not passes(score, effect.periodic, there=True):
+                few = score is not None and score.numbers <= _MANY
+                tried.append((few, -np.inf if score is None else score.gain, index))
         if not tried:
             return current
-        current = fit(system, current.state.without(min(tried)[1]))
+        current = fit(system, current.state.without(min(tried)[2]))
     return current
 
 
@@ -328,8 +345,10 @@ def alternatives(
         without = replace(current, state=state, residual=residual)
         near = effect.target if effect.target_kind == "joint" else None
         for candidate in candidates(system, without, slow, near):
-            other = scorer.score(candidate.columns, candidate.coordinates, candidate.neutral,
-                                 searched=candidate.searched, without=own, back=back)  # fmt: skip
+            other = scorer.score(
+                candidate.effect, candidate.columns, candidate.coordinates, candidate.neutral,
+                searched=candidate.searched, without=own, back=back,
+            )  # fmt: skip
             if other is None or not passes(other) or not set(other.groups) & set(score.groups):
                 continue
             same = candidate.label == (effect.name, effect.target)

@@ -29,6 +29,9 @@ class CoupledDrive(Effect):
     )  # fmt: skip
     meaning = "belts or bevel gears: the motor of a wrist's joint turns with the joint before it"
     usual = 7
+    over = ("viscous_friction", "coulomb_friction", "joint_inertia")
+    beside = ("inertia",)
+    everywhere = True
     source = "Gautier, Janot, Vandanjon, IEEE Trans. Control Systems Technology 21(2), 2013 (TX40)"
 
     def motion(self, motion: Motion) -> None:

@@ -31,6 +31,7 @@ class PayloadBody(Effect):
     usual = 1
     mark = "added mass"
     refines = "payload"
+    over = ("joint_inertia",)
     takes = "motion"
 
     def _ten(self) -> FloatArray:
