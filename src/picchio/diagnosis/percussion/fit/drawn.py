@@ -22,7 +22,6 @@ from picchio.diagnosis.percussion.fit.least_squares import (
     prior_weights,
 )
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.tolerance.linearise import set_aside
 from picchio.model.effects.effect import Effect, Latent
 
 # What numbers that are drawn anew in every record cost: they come from one distribution.
