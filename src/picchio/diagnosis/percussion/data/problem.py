@@ -358,6 +358,30 @@ class Problem:
         found = residual_under(record, model, moved.record, moved.effects, end)
         return found if moved.shift is None else found - moved.shift[:, : found.shape[1]]
 
+    def renew(self) -> None:
+        """Have other processes see what was moved: they have it as it was when they began."""
+        if self.helpers is not None:
+            self.helpers.renew()
+
+    @contextmanager
+    def set_aside(self) -> Iterator[None]:
+        """Within the block nothing is integrated out: what is not exact is where it is taken to be.
+
+        Returns:
+            a context manager.
+        """
+        kept = self.marginal, self.moved
+        self.marginal = None
+        if self.moved:
+            self.moved = {name: replace(each, shift=None) for name, each in self.moved.items()}
+            self.renew()
+        try:
+            yield
+        finally:
+            self.marginal, self.moved = kept
+            if self.moved:
+                self.renew()
+
     @contextmanager
     def pinned(self, effects: Iterable[Effect]) -> Iterator[None]:
         """Within the block, samples near edges are those of this model, whatever is tried.

@@ -322,7 +322,7 @@ def fit_latent(problem: Problem, start: Fit, effect: Effect, rival: float = np.i
     known_in = set(current_hidden(start.hypothesis, effect.label))
     if latent.times and not {r.name for r in start.records} <= known_in:
         # What is not exact would make up for blows that are elsewhere.
-        with set_aside(problem):
+        with problem.set_aside():
             plain = fit(problem, start.hypothesis, start.records, start.end, iterations=0)
             begun = blow_by_blow(problem, plain, effect)
             begun = fit(problem, begun, start.records, start.end, iterations=2).hypothesis

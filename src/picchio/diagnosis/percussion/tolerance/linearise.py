@@ -170,7 +170,7 @@ def _unless_little(problem: Problem, found: Fit) -> Fit:
 
     Slopes about a model that is far off lead astray: what is wrong is looked for without them.
     """
-    with set_aside(problem):
+    with problem.set_aside():
         plain = fit(problem, found.hypothesis, found.records, None, with_jacobian=True)
     if found.chi_square < _LITTLE * plain.chi_square:
         return found
@@ -211,7 +211,7 @@ class About:
         problem.marginal, problem.sizes, problem.moved = self.marginal, self.sizes, self.moved
         problem.idle = self.idle
         if not known:
-            _renew(problem)
+            problem.renew()
 
 
 @contextmanager
@@ -232,23 +232,6 @@ def about_another(problem: Problem, other: About | None = None) -> Iterator[None
         yield
     finally:
         kept.restore(problem)
-
-
-@contextmanager
-def set_aside(problem: Problem) -> Iterator[None]:
-    """Within the block nothing is integrated out: what is not exact is where it is taken to be.
-
-    Args:
-        problem: data and noise.
-
-    Returns:
-        a context manager.
-    """
-    with about_another(problem):
-        if problem.sizes:
-            _move(problem, problem.sizes, shifted=False)
-        problem.marginal = None
-        yield
 
 
 def _at_stated(problem: Problem, found: Fit, end: float | None) -> Hypothesis:
@@ -326,10 +309,4 @@ def _move(problem: Problem, sizes: dict[str, FloatArray], shifted: bool = True) 
             there, effects = nudged(record, slopes.moved(size))
             shift = slopes.columns @ size if shifted else None
             problem.moved[record.name] = Moved(there, effects, shift)
-    _renew(problem)
-
-
-def _renew(problem: Problem) -> None:
-    """Other processes have the problem as it was when they were started: all but its marginal."""
-    if problem.helpers is not None:
-        problem.helpers.renew()
+    problem.renew()
