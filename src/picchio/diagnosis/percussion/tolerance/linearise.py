@@ -12,13 +12,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Moved, Problem
-from picchio.diagnosis.percussion.fit.least_squares import (
-    Fit,
-    fit,
-    jacobian,
-    prior_cost,
-    prior_weights,
-)
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, jacobian, prior_cost
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.tolerance.marginal import Marginal
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, inexact, nudged
@@ -74,7 +68,7 @@ def linearise(
         jacobian(problem, here, problem.records, end, raw, way * steps) for way in (0.5, -0.5)
     )
     jacobians = [0.5 * (a + b) for a, b in zip(ahead, behind, strict=True)]
-    shared, absorbed = _without(problem, slopes, jacobians, here, {r.name for r in fitted})
+    shared, absorbed = _without(problem, slopes, jacobians, {r.name for r in fitted})
     unknowns = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
     problem.marginal = Marginal(shared, dict(zip(unknowns, absorbed, strict=True)))
     _move(problem, problem.sizes)
@@ -84,17 +78,17 @@ def _without(
     problem: Problem,
     slopes: Mapping[str, Slopes],
     jacobians: Sequence[FloatArray],
-    here: Hypothesis,
     fitted: Set[str],
 ) -> tuple[dict[str, Slopes], FloatArray]:
     """The slopes without what a fit's unknowns take up of the shared ones; that, (unknowns, k).
 
-    As the fit does it: by the records that are fitted, their own numbers integrated out, and by
-    what is known beforehand. Records held out then show just what the fit could not know.
+    As the fit does it: by the records that are fitted, their own numbers integrated out. Records
+    held out then show just what the fit could not know.
     """
     names = [r.name for r in problem.records]
     flat = {n: slopes[n].columns.reshape(-1, slopes[n].columns.shape[2]) for n in names}
-    normal, right = np.diag(prior_weights(here) ** 2), 0.0
+    normal: FloatArray | float = 0.0
+    right: FloatArray | float = 0.0
     for name, jacobian_of in zip(names, jacobians, strict=True):
         if name in fitted:
             own = slopes[name].own
