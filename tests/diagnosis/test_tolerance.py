@@ -13,6 +13,7 @@ import trial
 import picchio
 from picchio.campaign.tables import Tolerance
 from picchio.core.processes import one_thread
+from picchio.diagnosis.percussion.criteria.exceeded import exceeded
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.criteria.remainder import Remainder, decisive_gain
 from picchio.diagnosis.percussion.data.problem import Problem
@@ -195,3 +196,19 @@ def test_a_better_fit_is_decisive_only_if_little_is_left_of_it():
     # What is known beforehand counts in full, whatever the remainder.
     assert decisive_gain(left(0.0, 90.0), left(0.0, 40.0)) == pytest.approx(50.0, abs=3.0)
     assert decisive_gain(left(0.0, 90.0), left(0.0)) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_tolerances_that_make_up_for_a_turned_sensor_are_improbable(wrong_everywhere):
+    robot, campaign = wrong_everywhere
+    turned = {"rx": 0.06, "ry": -0.05, "rz": 0.05}
+    cause = ("sensor_misalignment", "accelerometer.tool", turned)
+    other, _ = worlds.make(ARM, seed=4, records=9, mismatch=1.0, causes=[cause])
+    found = {}
+    for name, each in (("nothing", campaign), ("turned", other)):
+        problem = Problem(robot, each)
+        with one_thread():
+            raw = fit_growing(problem, Hypothesis.baseline(robot, each.tolerance))
+            found[name] = exceeded(problem, settled(problem, raw, problem.records))
+    assert not found["nothing"].improbable
+    assert found["turned"].improbable
+    assert "sensor_angle" in found["turned"].told()
