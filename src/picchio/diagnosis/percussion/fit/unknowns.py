@@ -21,6 +21,8 @@ from picchio.robot.flexible_robot import FlexibleRobot
 TOLERATED = 3.8
 _AMONG_EXACT = 2.0
 FITTED = ("stiffness", "damping_ratio", "force")
+# A value so near to an end of what is tolerated, transformed, stands at it.
+AT_END = 1e-6
 _STEP_LOG = 1e-3
 _STEP_LINEAR = 1e-2
 
@@ -69,6 +71,14 @@ class Unknown:
             u: the transformed unknown.
         """
         return math.exp(u) if self.logarithmic else self.scale
+
+    def is_inside(self, u: float) -> bool:
+        """Whether it is free to move either way.
+
+        Args:
+            u: the transformed unknown.
+        """
+        return self.lower + AT_END < u < self.upper - AT_END
 
     @property
     def step(self) -> float:
@@ -131,6 +141,18 @@ class Hypothesis:
     def labels(self) -> frozenset[str]:
         """Labels of the causes."""
         return frozenset(effect.label for effect in self.causes)
+
+    @property
+    def at_ends(self) -> frozenset[str]:
+        """Labels of the nuisances that stand at an end of what is tolerated: they ask for more."""
+        pairs = zip(self.unknowns(), self.vector(), strict=True)
+        return frozenset(
+            label
+            for unknown, u in pairs
+            if unknown.effect < self.n_nuisances
+            and (label := self.effects[unknown.effect].label) not in self.freed
+            and not unknown.is_inside(u)
+        )
 
     def plus(self, effect: Effect) -> Hypothesis:
         """With one more cause; a nuisance becomes one by being freed.

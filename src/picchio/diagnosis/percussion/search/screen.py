@@ -87,8 +87,6 @@ _FIRST = 0.6
 _CHANCE = 4.0
 # A trial that changes the data by so many times what is left beyond noise is tried smaller, too.
 _LARGE = 3.0
-# A value so near to an end of what is tolerated, transformed, stands at it.
-_AT_END = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,10 +121,7 @@ class Projector:
         norms = np.linalg.norm(jacobian, axis=0)
         # What stands at its bound is no longer free to explain anything.
         vector = fit.hypothesis.vector()
-        inside = [
-            u.lower + _AT_END < x < u.upper - _AT_END
-            for u, x in zip(fit.hypothesis.unknowns(), vector, strict=True)
-        ]
+        inside = [u.is_inside(x) for u, x in zip(fit.hypothesis.unknowns(), vector, strict=True)]
         keep = (norms > 0.0) & np.array(inside, dtype=bool)
         q, r = np.linalg.qr(jacobian[:, keep] / norms[keep])
         good = np.abs(r.diagonal()) > 1e-8
@@ -229,11 +224,7 @@ class Screen:
         """What a value that leaves its tolerance no longer costs; the least, where it asks to."""
         known = self.fit.hypothesis
         freed = max(prior_cost(known) - prior_cost(known.plus(effect)), 0.0)
-        for unknown, here in zip(known.unknowns(), known.vector(), strict=True):
-            ends = unknown.lower + _AT_END, unknown.upper - _AT_END
-            if known.effects[unknown.effect].label == effect.label and not ends[0] < here < ends[1]:
-                freed = max(freed, TOLERATED**2)
-        return freed
+        return max(freed, TOLERATED**2) if effect.label in known.at_ends else freed
 
     def _latent(self, starts: Sequence[Effect]) -> Suspect:
         """What an effect's hidden numbers could explain; `starts` is it as its trials have it."""

@@ -159,10 +159,14 @@ class Search:
     def explains_enough(self, found: Fit) -> bool:
         """Whether what a fit with causes leaves is no more than a remainder that is allowed.
 
+        It does not where a nuisance is held back by the end of its tolerance: that one may be what
+        is wrong, and the causes stand in for it.
+
         Args:
             found: the fit.
         """
-        if not allowed(self.problem) or not found.hypothesis.causes:
+        hypothesis = found.hypothesis
+        if not allowed(self.problem) or not hypothesis.causes or hypothesis.at_ends:
             return False
         return Remainder.of(found).may_be_named(Remainder.of(self.baseline))
 

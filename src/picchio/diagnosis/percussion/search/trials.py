@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -144,7 +144,8 @@ def try_candidates(
         if cause:
             suspects = _rivals(suspects, cause)
         long_fits = 2 * LONG_FITS if wide else LONG_FITS
-        chosen = _short_list(suspects, 3 * short_list if wide else short_list)
+        size = 3 * short_list if wide else short_list
+        chosen = _short_list(suspects, size, start.hypothesis.at_ends)
         promised = max((s.gain for s in suspects), default=0.0)
         little = wide or promised < _HALF * screen.total
         if early is not None and not cause and little:
@@ -246,10 +247,13 @@ def _long_trials(
     return sorted(trials, key=lambda t: t.score)
 
 
-def _short_list(suspects: Sequence[Suspect], size: int) -> list[Suspect]:
+def _short_list(
+    suspects: Sequence[Suspect], size: int, asking: Collection[str] = ()
+) -> list[Suspect]:
     """The best, but no more than three of one effect: others deserve a hearing, too.
 
-    Whatever explains exactly as much as one of them is there as well: it may be the same thing.
+    Whatever explains exactly as much as one of them is there as well: it may be the same thing. So
+    is what is `asking` to leave its tolerance: how far it would go no slope tells.
     """
 
     def twins(one: Suspect, other: Suspect) -> bool:
@@ -257,7 +261,8 @@ def _short_list(suspects: Sequence[Suspect], size: int) -> list[Suspect]:
 
     chosen: list[Suspect] = []
     for suspect in suspects:
-        if len(chosen) >= size and not any(twins(suspect, s) for s in chosen):
+        late = len(chosen) >= size and not any(twins(suspect, s) for s in chosen)
+        if late and suspect.label not in asking:
             continue
         same = sum(1 for s in chosen if s.effect.name == suspect.effect.name)
         if same < 3 and suspect.gain > 0.0:
