@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ from picchio.diagnosis.motion.diagnosis import diagnose_motion
 from picchio.diagnosis.percussion.conclude.causes import fitted_correlation
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis, diagnose_percussion
 from picchio.diagnosis.percussion.search.candidates import not_looked_for
-from picchio.diagnosis.result import Diagnosis
+from picchio.diagnosis.result import Cause, Diagnosis
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import effect_class
 from picchio.model.model import Model
@@ -124,9 +124,10 @@ def diagnose(
         moves = answer.details.get("motion")
         if known is not None and moves is not None:
             known = known.beside(moves.correlation)
+        life = _percussion_life(hit, answer, work)
         answer = replace(
             answer, correlation=known, not_looked_for=not_looked_for(hit.problem),
-            life=_percussion_life(hit, answer, work),
+            causes=_worst_first(answer.causes, life), life=life,
         )  # fmt: skip
     files = [*loaded.files, *records.files]
     folder = None if records.folder is None else records.folder.name
@@ -189,6 +190,13 @@ def _percussion_life(
     except InputError as error:  # what took minutes to find is told all the same
         warn_user(f"the life could not be computed: {error}")
         return None
+
+
+def _worst_first(causes: Sequence[Cause], life: Mapping[str, Any] | None) -> tuple[Cause, ...]:
+    """Causes in the order of what they do to the life, where that is known."""
+    order = [(row["effect"], row["target"]) for row in (life or {}).get("causes", ())]
+    known = {pair: place for place, pair in enumerate(order)}
+    return tuple(sorted(causes, key=lambda c: known.get((c.effect, c.target), len(known))))
 
 
 def _named(

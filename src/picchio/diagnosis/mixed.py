@@ -260,8 +260,9 @@ def _with_alternatives(percussion: PercussionDiagnosis) -> Iterator[PercussionDi
     for hypothesis, pairs in zip(percussion.others, said.alternatives, strict=True):
         whole = refit(problem, hypothesis, problem.records)
         sure = min(c.confidence for c in said.causes)
+        tolerated = problem.campaign.tolerance.model_dump()
         causes = tuple(
-            Cause(e.name, e.target, sure, fitted_values(problem, whole, e))
+            Cause(e.name, e.target, sure, fitted_values(problem, whole, e), e.tolerances(tolerated))
             for e in whole.hypothesis.causes
         )
         others = (

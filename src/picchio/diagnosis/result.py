@@ -33,6 +33,7 @@ hardly ever are without being told as a set.
 """
 
 FORMAT = "picchio-diagnosis/1"
+_HARDLY = 1e-4  # of the signal, RMS, that is not worth a sentence
 _SHOWN = 3  # causes that one line names
 Verdict = Literal["nothing-wrong", "named", "ambiguous", "partial", "unexplained"]
 VERDICTS: dict[str, str] = {
@@ -78,16 +79,22 @@ class Cause:
         target: the joint, link, axis, channel group, "tool" or "robot".
         confidence: 0 to 1, from score differences with one pose (or record) left out at a time.
         parameters: name -> value.
+        tolerances: how many standard deviations of what `[tolerance]` allows it is off by; None
+            where nothing of the kind is tolerated.
     """
 
     effect: str
     target: str
     confidence: float
     parameters: Mapping[str, Value] = field(default_factory=dict)
+    tolerances: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""
-        return asdict(self)
+        found = asdict(self)
+        if self.tolerances is None:
+            del found["tolerances"]
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,15 +230,34 @@ class Left:
         nrmse: of the signal, RMS.
         within_tolerance: whether a model that is right may leave as much (1 % of the signal).
         by_pose: pose -> the same, of its records.
+        by_frequency: such as "3.1-9.4 Hz" -> what is left there, of all of the signal, RMS.
     """
 
     nrmse: float
     within_tolerance: bool
     by_pose: Mapping[str, float]
+    by_frequency: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""
-        return {**asdict(self), "by_pose": dict(self.by_pose)}
+        return asdict(self)
+
+    @property
+    def told(self) -> str:
+        """A sentence without its stop."""
+        if self.nrmse < _HARDLY:
+            return "beside noise and tolerances next to nothing is left"
+        most = [
+            f"at {max(shares, key=lambda each: shares[each])}"
+            for shares in (self.by_frequency, self.by_pose)
+            if len(shares) > 1
+        ]
+        where = f", most of it {' and '.join(most)}" if most else ""
+        small = "" if self.within_tolerance else "; a model that is right leaves at most 1 %"
+        return (
+            f"beside noise and tolerances {100.0 * self.nrmse:.2g} % of the signal is left"
+            f"{where}{small}"
+        )
 
 
 @dataclass(frozen=True, repr=False)
@@ -346,6 +372,16 @@ class Diagnosis(Result):
         }
         text = self.note or VERDICTS[self.verdict]
         return sheet(self._headline(), facts, columns if rows else (), rows, f"{text}.")
+
+
+def in_tolerances(cause: Cause) -> str:
+    """How far a cause is off by what is tolerated, as a phrase.
+
+    Args:
+        cause: of which something of the kind is tolerated.
+    """
+    size = cause.tolerances or 0.0
+    return f"off by {size:.{0 if size >= 10.0 else 1}f} times its tolerance"
 
 
 # Other sets of causes, told by what they have in place of what.

@@ -134,7 +134,7 @@ _STATUS = {
 
 def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
     """Print verdict, causes, gain, life and what to measure next, for which a plan was asked."""
-    from picchio.diagnosis.result import VERDICTS, differences, in_words
+    from picchio.diagnosis.result import VERDICTS, differences, in_tolerances, in_words
     from picchio.model.effects.registry import effect_class
 
     out = console()
@@ -153,6 +153,9 @@ def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
         out.print(table(columns, rows, ruled=False, head_style="dim"))
         for name in dict.fromkeys(cause.effect for cause in found.causes):
             out.print(f"  {name}: {effect_class(name).meaning}")
+        for cause in found.causes:
+            if cause.tolerances is not None:
+                out.print(f"  {cause.effect} of {cause.target}: {in_tolerances(cause)}")
     for each in differences(found):
         out.print(f"  these data cannot tell it from {in_words(each)}")
     helped = (
@@ -174,12 +177,15 @@ def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
             f"{100 * gain.baseline_nrmse:.3g} % to {100 * gain.extended_nrmse:.3g} % of the "
             f"signal; noise alone is {100 * gain.noise_floor_nrmse:.3g} %{share}."
         )
+    if found.remainder is not None:
+        out.print(f"  {found.remainder.told}")
     _show_channels(found.extra.get("channels") or ())
     for told in found.shared:
         if told["status"] in _STATUS:
             out.print(f"  {told['effect']} of {told['target']}: {_STATUS[told['status']]}")
     if found.life is not None:
         _show_life(found.life)
+        _show_what_to_mend(found.life)
         _show_other_lives(found, found.life.get("alternatives") or ())
     ask = found.next_measurement
     if ask:
@@ -234,6 +240,22 @@ def _show_life(life: Mapping[str, Any]) -> None:
             "assess --uncertainty)",
             style="dim",
         )
+
+
+def _show_what_to_mend(life: Mapping[str, Any]) -> None:
+    """What each of several causes does to the life."""
+    from picchio.diagnosis.life import matters
+
+    for place, row in enumerate(life.get("causes") or ()):
+        what = f"{row['effect']} of {row['target']}"
+        if not matters(row, life):
+            console().print(f"  {what} does not change the life")
+            continue
+        told = row.get("why") or (
+            f"rivets {format_count(row['rivets_to_failure'])}, "
+            f"utilisation {100 * row['utilisation']:.4g} %"
+        )
+        console().print(f"  {'mend first ' if place == 0 else ''}{what}; after that: {told}")
 
 
 def _show_other_lives(found: Diagnosis, lives: Sequence[Mapping[str, Any]]) -> None:

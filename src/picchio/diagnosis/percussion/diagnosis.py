@@ -102,6 +102,7 @@ class PercussionDiagnosis:
             before=nominal_spread(robot, self.problem.campaign.tolerance),
             after=fitted_spread(self.extended),
             others=[other.effects for other in self.others],
+            causes=[(cause.effect, cause.target) for cause in self.diagnosis.causes],
         )
 
 

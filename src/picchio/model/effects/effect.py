@@ -155,6 +155,8 @@ class Effect(ABC):
         among: fields of `Evidence`: the channel groups at which it may be at work.
         tolerance: the key of `[tolerance]` that says how far its `scale` may be from 1 without
             being a cause; empty where nothing is tolerated.
+        exceeds: the key of `[tolerance]` that it goes beyond where it is a cause, if that is not
+            `tolerance`; empty where nothing of the kind is tolerated.
         sidecar: the key of a sidecar that its value belongs to: "stiffness" or "rotor_inertia" of
             a joint, "damping_ratio" of all, "mass" of the tool; empty where a sidecar has no place
             for it.
@@ -196,6 +198,7 @@ class Effect(ABC):
     takes: ClassVar[str] = ""
     among: ClassVar[tuple[str, ...]] = ("groups",)
     tolerance: ClassVar[str] = ""
+    exceeds: ClassVar[str] = ""
     sidecar: ClassVar[str] = ""
     urdf: ClassVar[Mapping[str, str]] = {}
     needs: ClassVar[str] = ""
@@ -308,6 +311,25 @@ class Effect(ABC):
         every = np.zeros(max(len(numbers), index.max(initial=0) + 1))
         every[: len(numbers)] = numbers
         return np.asarray(every[index])
+
+    def tolerances(self, tolerated: Mapping[str, float]) -> float | None:
+        """By how many standard deviations of what is tolerated it is away from doing nothing.
+
+        Args:
+            tolerated: key of `[tolerance]` -> standard deviation: relative of a factor, else SI.
+
+        Returns:
+            None where nothing of the kind is tolerated.
+        """
+        sigma = tolerated.get(self.exceeds or self.tolerance, 0.0)
+        if sigma <= 0.0:
+            return None
+        away = [
+            math.log(self.values[p.name] / p.neutral) if p.logarithmic and p.neutral > 0.0
+            else self.values[p.name] - p.neutral
+            for p in self.parameters
+        ]  # fmt: skip
+        return math.hypot(*away) / sigma
 
     def to_dict(self) -> dict[str, Any]:
         """As in a model file."""

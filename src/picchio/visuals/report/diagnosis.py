@@ -11,11 +11,12 @@ import numpy as np
 from markupsafe import Markup
 
 from picchio.core.provenance import provenance
+from picchio.diagnosis.life import matters
 from picchio.diagnosis.motion.conclude.during_blows import BlowEffects, MotionLife
 from picchio.diagnosis.motion.data.system import System
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 from picchio.diagnosis.percussion.follow_up.records import when
-from picchio.diagnosis.result import Cause, Diagnosis, Value, differences, in_words
+from picchio.diagnosis.result import Cause, Diagnosis, Value, differences, in_tolerances, in_words
 from picchio.model.effects.registry import catalogue
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import format_count
@@ -118,6 +119,7 @@ def _percussion(found: PercussionDiagnosis, also_motion: bool) -> dict[str, Any]
         "life": _life_rows(diagnosis.life),
         "life_joints": _life_by_joint(diagnosis.life),
         "life_sets": _life_by_set(diagnosis),
+        "life_causes": _life_by_cause(diagnosis.life),
         "ask": _ask(diagnosis),
         "sets": [_set_words(each) for each in diagnosis.alternatives],
         "shared": _shared(diagnosis),
@@ -261,10 +263,11 @@ def _card(robot: FlexibleRobot, cause: Cause) -> dict[str, Any]:
     kind = catalogue()[cause.effect]
     meanings = _DERIVED | {p.name: p.meaning for p in kind.parameters}
     place = place_in_words(robot, cause.effect, cause.target)
+    off = "" if cause.tolerances is None else f" It is {in_tolerances(cause)}."
     return {
         "title": f"{words(cause.effect)}, {cause.target}",
         "lines": [f"{capitalised(kind.meaning)}.",
-                  f"It sits {place}. Confidence {_confidence(cause)}\N{NO-BREAK SPACE}%."],
+                  f"It sits {place}. Confidence {_confidence(cause)}\N{NO-BREAK SPACE}%.{off}"],
         "heads": [],
         "rows": [(words(name), _value_text(v), meanings.get(name, ""))
                  for name, v in _shown(cause).items()],
@@ -369,6 +372,21 @@ def _life_by_set(diagnosis: Diagnosis) -> list[tuple[str, str, str, str]]:
             str(side.get("limiting_joint") or _DASH),
         )
         for pairs, side in sets
+    ]
+
+
+def _life_by_cause(life: Mapping[str, Any] | None) -> list[tuple[str, str, str]]:
+    """Cause; rivets and utilisation once it alone is mended, the one that matters most first."""
+    rows = (life or {}).get("causes") or ()
+    if life is None or not any(matters(row, life) for row in rows):
+        return []
+    return [
+        (
+            f"{words(row['effect'])}, {row['target']}",
+            _life_cell("rivets_to_failure", row.get("why", row.get("rivets_to_failure"))),
+            _life_cell("utilisation", row.get("utilisation"), "why" not in row),
+        )
+        for row in rows
     ]
 
 

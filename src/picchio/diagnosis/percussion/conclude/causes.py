@@ -40,12 +40,14 @@ def fitted_causes(
     """
     unsettled = {trial.fit.hypothesis.labels for trial in refuted}
     rivals = [r for r in rivals if r.fit.hypothesis.labels not in unsettled]
+    tolerated = search.problem.campaign.tolerance.model_dump()
     return tuple(
         Cause(
             effect.name,
             effect.target,
             _confidence(search, rivals, effect, whole, refuted),
             fitted_values(search.problem, whole, effect),
+            effect.tolerances(tolerated),
         )
         for effect in whole.hypothesis.causes
     )

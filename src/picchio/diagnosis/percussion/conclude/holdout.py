@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from picchio.diagnosis.percussion.criteria.remainder import ALLOWED
+from picchio.diagnosis.percussion.criteria.whiteness import excess_by_band
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.fit.drawn import current_hidden, fit_latent, with_hidden
 from picchio.diagnosis.percussion.fit.least_squares import fit
@@ -71,7 +72,8 @@ def held_out_remainder(
     hypothesis = _own_latent(problem, hypothesis, judged)
     excess: dict[int, float] = {}
     signal: dict[int, float] = {}
-    for record, residual in zip(judged, problem.residuals(hypothesis.effects, judged), strict=True):
+    residuals = problem.residuals(hypothesis.effects, judged)
+    for record, residual in zip(judged, residuals, strict=True):
         own = float((residual**2).sum() - residual.size)
         excess[record.pose] = excess.get(record.pose, 0.0) + own
         signal[record.pose] = signal.get(record.pose, 0.0) + signal_power([record])
@@ -81,7 +83,14 @@ def held_out_remainder(
         return float(np.sqrt(left / max(sum(signal[p] for p in poses), 1e-300)))
 
     whole = share(list(excess))
-    return Left(whole, whole <= ALLOWED, {f"pose {p + 1}": share([p]) for p in sorted(excess)})
+    all_signal = max(sum(signal.values()), 1e-300)
+    bands = excess_by_band(problem, judged, residuals)
+    return Left(
+        whole,
+        whole <= ALLOWED,
+        {f"pose {p + 1}": share([p]) for p in sorted(excess)},
+        {band: float(np.sqrt(left / all_signal)) for band, left in bands.items()},
+    )
 
 
 def _mean_square(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit
 
 _BANDS = 8
@@ -111,10 +111,8 @@ def whiteness_test(problem: Problem, found: Fit) -> Evidence:
     poses: list[Level] = []
     for group, entries in powers.items():
         error = 2.0 * float(np.mean(errors[group])) / np.sqrt(_channels_of(problem, group))
-        lowest = min(float(f[0]) for _, f, _ in entries)
-        high = min(top, max(float(f[-1]) for _, f, _ in entries))
-        edges = np.geomspace(max(lowest, 0.5), high, _BANDS + 1)
-        edges[0] = 0.0
+        edges = _edges(top, [f for _, f, _ in entries])
+        high = float(edges[-1])
         colour = _colour(problem, group)
         for low, up in zip(edges[:-1], edges[1:], strict=True):
             picked = [s[(f > low) & (f <= up)] for _, f, s in entries]
@@ -125,6 +123,43 @@ def whiteness_test(problem: Problem, found: Fit) -> Evidence:
             unsure = float(np.hypot(error, colour(0.5 * high)))
             poses += _level(group, f"pose {pose + 1}", picked, unsure)
     return Evidence(tuple(bands), tuple(poses), total / max(count, 1))
+
+
+def _edges(top: float, frequencies: Sequence[FloatArray]) -> FloatArray:
+    """(bands + 1,) Hz: from nothing to where the arm no longer answers, or the records end."""
+    lowest = min(float(f[0]) for f in frequencies)
+    high = min(top, max(float(f[-1]) for f in frequencies))
+    edges = np.geomspace(max(lowest, 0.5), high, _BANDS + 1)
+    edges[0] = 0.0
+    return np.asarray(edges)
+
+
+def excess_by_band(
+    problem: Problem, records: Sequence[MeasuredRecord], residuals: Sequence[FloatArray]
+) -> dict[str, float]:
+    """By how much chi-square is above that of noise, in each band of frequencies.
+
+    Args:
+        problem: the data.
+        records: some of its records.
+        residuals: (channels, m) of each, whitened.
+
+    Returns:
+        such as "3.1-9.4 Hz" -> the excess, at least 0; its sum is by and large that of all samples.
+    """
+    spectra = []
+    for record, residual in zip(records, residuals, strict=True):
+        frequency = np.fft.rfftfreq(residual.shape[1], record.setup.samples.step)[1:-1]
+        power = np.abs(np.fft.rfft(residual, axis=1)[:, 1:-1]) ** 2 / residual.shape[1]
+        spectra.append((frequency, 2.0 * (power - 1.0).sum(axis=0)))
+    top = float(problem.natural_frequencies.max()) * _ANSWERS
+    edges = _edges(top, [f for f, _ in spectra])
+    return {
+        f"{low:.3g}-{up:.3g} Hz": max(
+            sum(float(own[(f > low) & (f <= up)].sum()) for f, own in spectra), 0.0
+        )
+        for low, up in zip(edges[:-1], edges[1:], strict=True)
+    }
 
 
 def _colour(problem: Problem, group: str) -> Callable[[float], float]:

@@ -21,6 +21,7 @@ class ForceDirection(Effect):
         for axis in "xyz"
     )
     meaning = "the tool does not hit along the stated direction"
+    exceeds = "direction"
     mark = "turned arrow"
     tried = tuple({f"r{axis}": 0.08} for axis in "xyz")  # rad, about each axis
 

@@ -21,6 +21,7 @@ class PulseJitter(Effect):
     target_kind = "tool"
     parameters = (Parameter("std", "s", lower=0.0, upper=1.0, meaning="spread of the times"),)
     meaning = "the blows come irregularly"
+    exceeds = "blow_time"
     latent = Latent("shift of each blow, s", spread="std", step=2e-4, times=True)
     takes = "bursts"
     tried = ({},)  # on time: the shifts are looked for blow by blow

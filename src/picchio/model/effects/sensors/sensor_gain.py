@@ -16,6 +16,7 @@ class SensorGain(Effect):
     among = ("groups", "forces")
     parameters = (factor("gain", 0.01, 100.0, "reading over truth"),)
     meaning = "wrong sensitivity or calibration"
+    exceeds = "sensor_gain"
     tried = ({"gain": 1.1},)
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:

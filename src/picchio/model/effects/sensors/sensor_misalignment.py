@@ -22,6 +22,7 @@ class SensorMisalignment(Effect):
         for axis in "xyz"
     )
     meaning = "the sensor is mounted a little askew"
+    exceeds = "sensor_angle"
     tried = tuple({f"r{axis}": 0.05} for axis in "xyz")  # rad, about each axis
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:

@@ -15,6 +15,7 @@ class LinkMass(Effect):
     target_kind = "link"
     parameters = (factor("scale", 0.05, 20.0, "true mass over the URDF's"),)
     meaning = "the link's mass and inertia are not the URDF's"
+    exceeds = "link_mass"
     mark = "link mass"
     tried = ({"scale": 1.12},)
 

@@ -17,6 +17,7 @@ class ToolOffset(Effect):
         for axis in "xyz"
     )
     meaning = "the tool's tip is not where the model has it"
+    exceeds = "tool_point"
     mark = "offset"
     tried = tuple({axis: 0.03} for axis in "xyz")  # the fit then moves all three
 
