@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # How many sums of inertias are kept: those of a robot with many small masses, each tried in turn.
 _KEPT_TOTALS = 512
-_KEPT_PLANTS = 4
+_KEPT_PLANTS = 256
 _KEPT_BESIDE = 32
 
 

@@ -36,12 +36,15 @@ from picchio.vibration.integration.integrate import (
     integrate,
     make_plan,
 )
+from picchio.vibration.integration.sensitivity import MotionChanges, motion_changes
 
 # Filters need the motion this finely, s.
 _FILTER_STEP = 1e-4
 # How many results are kept: of a record; of what the records of a campaign have in common.
 _KEPT = 6
 _KEPT_IN_COMMON = 48
+# By so much a coordinate is moved to see what a reader makes of it, rad and rad/s.
+_SLIGHTLY = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +80,25 @@ class Struck:
     def force(self) -> PiecewiseForce:
         """The force they make."""
         return self.unit.scaled(self.peak)
+
+
+@dataclass(frozen=True, eq=False)
+class _Taken:
+    """How a channel group is read: its sensor, the samples of the motion, and how it goes on.
+
+    Attributes:
+        chain: the sensor, with what its kind always has.
+        samples: of the motion.
+        at_jumps: the acceleration at a jump of the force.
+        lead: samples before the record, for filters to settle.
+        factor: samples of the motion to one of the record.
+    """
+
+    chain: SensorChain
+    samples: Samples
+    at_jumps: AtJumps
+    lead: int
+    factor: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,43 +168,18 @@ class PercussionSetup:
         self, model: Model, chain: SensorChain, members: Sequence[Channel]
     ) -> dict[str, FloatArray]:
         kind = members[0].kind
-        if kind.ac_corner and chain.highpass is None:
-            chain = replace(chain, highpass=kind.ac_corner)
-        samples = self._shifted(chain)
-        lead, factor = 0, 1
-        if chain.filters:
-            factor = max(1, int(np.ceil(samples.step / _FILTER_STEP - 1e-9)))
-            # Samples before a steady record, for filters to settle.
-            lead = int(min(2.0 / samples.step, 20000)) if self.steady else 0
-            fine = samples.step / factor
-            samples = Samples(
-                samples.start - lead * samples.step, fine, factor * (samples.count + lead - 1) + 1
-            )
-        at_jumps: AtJumps = "after"
-        if chain.filters:
-            at_jumps = "moments" if chain.smooth else "mean"
+        taken = self._taken(members[0], chain)
         assert kind.reader is not None
         values = kind.reader(
             Reading(
                 members[0].subject,
-                samples,
+                taken.samples,
                 lambda: self.struck(model).force,
-                lambda: self._motion(model, samples, at_jumps),
+                lambda: self._motion(model, taken.samples, taken.at_jumps),
                 chain.place if chain.place.any() else None,
             )
         )
-        if chain.filters:
-            filtered = apply_filters(chain, values, samples.step)
-            values = np.ascontiguousarray(filtered[:, factor * lead :: factor])
-        if kind.axes:
-            values = chain.gain * (chain.turn @ values)
-            rows = {c.name: values[AXES.index(c.axis or "x")] for c in members}
-        elif kind.of == "joint":
-            names = self.geometry.robot.flexible_names
-            values = chain.gain * values
-            rows = {c.name: values[names.index(c.subject or "")] for c in members}
-        else:
-            rows = {c.name: chain.gain * values[0] for c in members}
+        rows = self._behind(taken, members, values)
         if np.isfinite(chain.limit):
             rows = {name: np.clip(row, -chain.limit, chain.limit) for name, row in rows.items()}
         for frequency, cosine, sine in chain.hum:
@@ -190,6 +187,86 @@ class PercussionSetup:
             line = cosine * np.cos(phase) + sine * np.sin(phase)
             rows = {name: row + line for name, row in rows.items()}
         return rows
+
+    def _taken(self, channel: Channel, chain: SensorChain) -> _Taken:
+        if channel.kind.ac_corner and chain.highpass is None:
+            chain = replace(chain, highpass=channel.kind.ac_corner)
+        samples = self._shifted(chain)
+        if not chain.filters:
+            return _Taken(chain, samples, "after", 0, 1)
+        factor = max(1, int(np.ceil(samples.step / _FILTER_STEP - 1e-9)))
+        # Samples before a steady record, for filters to settle.
+        lead = int(min(2.0 / samples.step, 20000)) if self.steady else 0
+        fine = samples.step / factor
+        samples = Samples(
+            samples.start - lead * samples.step, fine, factor * (samples.count + lead - 1) + 1
+        )
+        return _Taken(chain, samples, "moments" if chain.smooth else "mean", lead, factor)
+
+    def _behind(
+        self, taken: _Taken, members: Sequence[Channel], values: FloatArray
+    ) -> dict[str, FloatArray]:
+        """The channels of a group behind its filters: (..., count) of a reader's (..., rows, k)."""
+        kind, chain = members[0].kind, taken.chain
+        if chain.filters:
+            filtered = apply_filters(chain, values, taken.samples.step)
+            values = np.ascontiguousarray(filtered[..., taken.factor * taken.lead :: taken.factor])
+        if kind.axes:
+            values = chain.gain * (chain.turn @ values)
+            return {c.name: values[..., AXES.index(c.axis or "x"), :] for c in members}
+        values = chain.gain * values
+        if kind.of == "joint":
+            names = self.geometry.robot.flexible_names
+            return {c.name: values[..., names.index(c.subject or ""), :] for c in members}
+        return {c.name: values[..., 0, :] for c in members}
+
+    def changes(
+        self, model: Model, pairs: Sequence[tuple[Model, Model]]
+    ) -> dict[str, FloatArray] | None:
+        """By how much every channel changes between models whose structures differ little.
+
+        To first order, without integrating anew (`motion_changes`).
+
+        Args:
+            model: about which; its blows and sensors are those of all.
+            pairs: (before, after) of each change.
+
+        Returns:
+            (pairs, count) of each channel, SI; None where the motion is not linear, is steady, or
+            a sensor is at its limit.
+        """
+        sensors = model.sensors(self.conditions)
+        chains = {group: sensors.get(group) for group in self._members}
+        if self.steady or any(np.isfinite(chain.limit) for chain in chains.values()):
+            return None
+        struck = self.struck(model)
+        system = self._system(model, struck.blows)
+        around = [[self._system(m, struck.blows) for m in pair] for pair in pairs]
+        made: dict[tuple[Samples, AtJumps], MotionChanges] = {}
+        out: dict[str, FloatArray] = {}
+        for group, members in self._members.items():
+            chain, taken = chains[group], self._taken(members[0], chains[group])
+            key = taken.samples, taken.at_jumps
+            if key not in made:
+                found = motion_changes(
+                    system,
+                    self._plan(struck, system, *key),
+                    taken.samples.count,
+                    [(before, after) for before, after in around],
+                )
+                if found is None:
+                    return None
+                made[key] = found
+            by_position, by_velocity, by_acceleration = _slopes_of(
+                members[0], chain, system, struck.force
+            )
+            weights = (
+                by_position @ made[key].position
+                + by_velocity @ made[key].velocity
+                + by_acceleration @ made[key].acceleration
+            )
+            out |= self._behind(taken, members, weights @ made[key].series)
+        return out
 
     def struck(self, model: Model) -> Struck:
         """The blows with the model's effects in them, and the force they make.
@@ -237,15 +314,44 @@ class PercussionSetup:
             system = self._system(model, struck.blows)
             if self.steady:
                 return system, integrate(system, struck.force, samples, at_jumps=at_jumps)
-            # Most effects leave the steps as they are.
-            step = default_step(system)
-            plan = self.in_common.plans.get(
-                (struck.unit, samples, step, at_jumps),
-                lambda: make_plan(struck.unit, samples, step, at_jumps=at_jumps),
-            )
-            return system, follow(system, plan.scaled(struck.peak), samples.count)
+            plan = self._plan(struck, system, samples, at_jumps)
+            return system, follow(system, plan, samples.count)
 
         return self._motions.get(key, make)
+
+    def _plan(
+        self, struck: Struck, system: VibratingSystem, samples: Samples, at_jumps: AtJumps
+    ) -> Plan:
+        # Most effects leave the steps as they are.
+        step = default_step(system)
+        plan = self.in_common.plans.get(
+            (struck.unit, samples, step, at_jumps),
+            lambda: make_plan(struck.unit, samples, step, at_jumps=at_jumps),
+        )
+        return plan.scaled(struck.peak)
+
+
+def _slopes_of(
+    channel: Channel, chain: SensorChain, system: VibratingSystem, force: PiecewiseForce
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(rows, N) each: what a reader makes of position, velocity and acceleration, at rest."""
+    n = len(system.coordinates)
+    # Readers look at one sample at a time: each sample moves one number.
+    steps = np.repeat([_SLIGHTLY, _SLIGHTLY, 1.0], n)
+    moved = np.concatenate([np.diag(steps), np.zeros((1, 3 * n))])
+    motion = CoordinateMotion(moved[:, :n], moved[:, n : 2 * n], moved[:, 2 * n :])
+    assert channel.kind.reader is not None
+    values = channel.kind.reader(
+        Reading(
+            channel.subject,
+            Samples(0.0, 1.0, 3 * n + 1),
+            lambda: force,
+            lambda: (system, motion),
+            chain.place if chain.place.any() else None,
+        )
+    )
+    found = (values[:, :-1] - values[:, -1:]) / steps
+    return found[:, :n], found[:, n : 2 * n], found[:, 2 * n :]
 
 
 _SECONDS_A_DAY = 86400.0

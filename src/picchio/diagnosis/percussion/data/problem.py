@@ -358,6 +358,47 @@ class Problem:
         found = residual_under(record, model, moved.record, moved.effects, end)
         return found if moved.shift is None else found - moved.shift[:, : found.shape[1]]
 
+    def changes(
+        self,
+        effects: Iterable[Effect],
+        pairs: Sequence[tuple[Iterable[Effect], Iterable[Effect]]],
+        records: Sequence[MeasuredRecord],
+        end: float | None,
+    ) -> list[list[FloatArray]] | None:
+        """By how much `residuals` change between models whose structures differ a little.
+
+        Args:
+            effects: about which model.
+            pairs: the effects before and after each change.
+            records: of which.
+            end: s, look no further.
+
+        Returns:
+            per pair an array (channels, m) a record, to first order; None where that is not known
+            without integrating.
+        """
+        wanted = tuple(effects)
+        model = self.model.with_effects(wanted)
+        around = [tuple(map(self.model.with_effects, pair)) for pair in pairs]
+        found = []
+        for record in records:
+            moved = self.moved.get(record.name)
+            there, more = (record, ()) if moved is None else (moved.record, moved.effects)
+
+            def under(one: Model, more: tuple[Effect, ...] = more) -> Model:
+                return replace(one, effects=(*one.effects, *more)) if more else one
+
+            both = [(under(one), under(other)) for one, other in around]
+            changes = residual_changes(record, model, there, under(model), both, end)
+            if changes is None or not np.isfinite(changes).all():
+                return None
+            found.append(changes)
+        of_pairs = [[each[k] for each in found] for k in range(len(pairs))]
+        if self.marginal is None:
+            return of_pairs
+        names, labels = [r.name for r in records], [effect.label for effect in wanted]
+        return [self.marginal.whitened(each, names, labels) for each in of_pairs]
+
     def renew(self) -> None:
         """Have other processes see what was moved: they have it as it was when they began."""
         if self.helpers is not None:
@@ -451,6 +492,52 @@ def residual_under(
     """
     kept = _kept_edges(record, record.until(end), model)
     return residual(there, replace(model, effects=(*model.effects, *more)), end, lambda: kept)
+
+
+def residual_changes(
+    record: MeasuredRecord,
+    model: Model,
+    there: MeasuredRecord,
+    about: Model,
+    pairs: Sequence[tuple[Model, Model]],
+    end: float | None = None,
+) -> FloatArray | None:
+    """By how much a record's whitened residual changes where only the structure changes a little.
+
+    Args:
+        record: as stated; with `model` it says which samples are known.
+        model: without small changes.
+        there: the record with its changes.
+        about: the model with its changes: about which the residual is linear.
+        pairs: the models before and after each change; all else is as in `about`.
+        end: s, up to when.
+
+    Returns:
+        (pairs, channels, m), to first order; None where that is not known without integrating.
+    """
+    from picchio.diagnosis.percussion.data.residual_kernel import whitened
+
+    setup = there.until(end)
+    if any(e.latent and e.latent.linear and setup.name not in e.hidden for e in model.effects):
+        return None
+    found = setup.changes(about, pairs)
+    if found is None:
+        return None
+    masked = _kept_edges(record, record.until(end), model)
+    count = setup.samples.count
+    still, room, known = np.zeros(count), np.empty(count), np.zeros(0, bool)
+    out = np.empty((len(pairs), len(record.values), count))
+    for i, channel in enumerate(record.channels):
+        free = setup.steady or channel.kind.free_offset
+        jumps = masked is not None and channel.kind.jumps
+        unknown = masked[channel.group] if masked is not None and jumps else known
+        for k, change in enumerate(found[channel.name]):
+            offset = -float(change.mean()) if free else 0.0
+            whitened(
+                still, change, offset, unknown, still,
+                *record.noise[channel.name].model.filters, room, out[k, i],
+            )  # fmt: skip
+    return out
 
 
 def residual(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -289,8 +289,13 @@ def jacobian(
     at: list[FloatArray],
     steps: FloatArray | None = None,
     first: Sequence[FloatArray] | None = None,
+    *,
+    both: bool = False,
 ) -> list[FloatArray]:
-    """D residual / d unknowns of every record by differences, (channels x m, unknowns).
+    """D residual / d unknowns of every record, (channels x m, unknowns).
+
+    Of the structure's unknowns by how its modes change, where the motion is linear; of others by
+    differences.
 
     Args:
         problem: data and noise.
@@ -300,31 +305,88 @@ def jacobian(
         at: the residuals there.
         steps: (unknowns,) of the differences; the unknowns' own where None.
         first: the first columns, where they are known.
+        both: half a step to either side, exact to the second order.
     """
-    vector, unknowns = hypothesis.vector(), hypothesis.unknowns()
-    columns: list[list[FloatArray]] = [[] for _ in records]
+    unknowns = hypothesis.unknowns()
     known = first[0].shape[1] if first else 0
-    for k, unknown in enumerate(unknowns[known:], start=known):
+    columns: dict[int, list[FloatArray]] = {
+        k: [part[:, k] for part in first or ()] for k in range(known)
+    }
+    columns |= _by_modes(problem, hypothesis, range(known, len(unknowns)), records, end)
+    for k, unknown in enumerate(unknowns):
+        if k in columns:
+            continue
         step = unknown.step if steps is None else float(steps[k])
-        if vector[k] + step > unknown.upper:
-            step = -step
-        moved = vector.copy()
-        moved[k] += step
-        try:
-            there = problem.residuals(hypothesis.at(moved).effects, records, end)
-        except InputError:  # no model there, such as springs that gravity overturns
-            step = -step
-            moved[k] = vector[k] + step
-            there = problem.residuals(hypothesis.at(moved).effects, records, end)
-        for i, (a, b) in enumerate(zip(there, at, strict=True)):
-            columns[i].append(((a - b) / step).ravel())
-    found = [
-        np.stack(c, axis=1) if c else np.zeros((a.size, 0))
-        for c, a in zip(columns, at, strict=True)
+        ahead = _difference(problem, hypothesis, k, 0.5 * step if both else step, records, end, at)
+        if both:
+            back = _difference(problem, hypothesis, k, -0.5 * step, records, end, at)
+            ahead = [0.5 * (a + b) for a, b in zip(ahead, back, strict=True)]
+        columns[k] = ahead
+    return [
+        np.stack([columns[k][i] for k in range(len(unknowns))], axis=1)
+        if unknowns
+        else np.zeros((part.size, 0))
+        for i, part in enumerate(at)
     ]
-    if first:
-        found = [np.concatenate(pair, axis=1) for pair in zip(first, found, strict=True)]
-    return found
+
+
+def _by_modes(
+    problem: Problem,
+    hypothesis: Hypothesis,
+    wanted: Iterable[int],
+    records: Sequence[MeasuredRecord],
+    end: float | None,
+) -> dict[int, list[FloatArray]]:
+    """The columns of the structure's unknowns among those wanted; none where that is not so."""
+    unknowns, vector = hypothesis.unknowns(), hypothesis.vector()
+    found: dict[int, tuple[float, tuple[Hypothesis, Hypothesis]]] = {}
+    for k in wanted:
+        unknown = unknowns[k]
+        if hypothesis.effects[unknown.effect].where != "structure":
+            continue
+        ends = [
+            min(max(vector[k] + way * unknown.step, unknown.lower), unknown.upper)
+            for way in (-0.5, 0.5)
+        ]
+        if ends[0] < ends[1]:
+            before, after = (hypothesis.at(np.where(np.arange(len(vector)) == k, e, vector))
+                             for e in ends)  # fmt: skip
+            found[k] = ends[1] - ends[0], (before, after)
+    if not found:
+        return {}
+    pairs = [(before.effects, after.effects) for _, (before, after) in found.values()]
+    looked = partial(problem.changes, hypothesis.effects, pairs, records, end)
+    changes = attempt("slopes by modes", looked)
+    if changes is None:
+        return {}
+    return {
+        k: [part.ravel() / apart for part in change]
+        for (k, (apart, _)), change in zip(found.items(), changes, strict=True)
+    }
+
+
+def _difference(
+    problem: Problem,
+    hypothesis: Hypothesis,
+    k: int,
+    step: float,
+    records: Sequence[MeasuredRecord],
+    end: float | None,
+    at: Sequence[FloatArray],
+) -> list[FloatArray]:
+    """One column by a difference; the other way at a bound, or where there is no model."""
+    vector, unknown = hypothesis.vector(), hypothesis.unknowns()[k]
+    if not unknown.lower <= vector[k] + step <= unknown.upper:
+        step = -step
+    moved = vector.copy()
+    moved[k] += step
+    try:
+        there = problem.residuals(hypothesis.at(moved).effects, records, end)
+    except InputError:  # no model there, such as springs that gravity overturns
+        step = -step
+        moved[k] = vector[k] + step
+        there = problem.residuals(hypothesis.at(moved).effects, records, end)
+    return [((a - b) / step).ravel() for a, b in zip(there, at, strict=True)]
 
 
 def fine_steps(parts: Sequence[FloatArray], unknowns: Sequence[Unknown]) -> FloatArray:

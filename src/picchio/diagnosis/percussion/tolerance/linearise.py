@@ -63,11 +63,7 @@ def linearise(
     _move(problem, problem.sizes, shifted=False)
     problem.marginal = None
     raw = problem.unmarginalised(effects, None, end)
-    steps = np.array([u.step for u in here.unknowns()])
-    ahead, behind = (
-        jacobian(problem, here, problem.records, end, raw, way * steps) for way in (0.5, -0.5)
-    )
-    jacobians = [0.5 * (a + b) for a, b in zip(ahead, behind, strict=True)]
+    jacobians = jacobian(problem, here, problem.records, end, raw, both=True)
     shared, absorbed = _without(problem, slopes, jacobians, {r.name for r in fitted})
     unknowns = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
     problem.marginal = Marginal(shared, dict(zip(unknowns, absorbed, strict=True)))

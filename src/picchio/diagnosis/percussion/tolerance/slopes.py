@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence, Set
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.attempt import attempt
-from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, residual_under
+from picchio.diagnosis.percussion.data.problem import (
+    MeasuredRecord,
+    Problem,
+    residual_changes,
+    residual_under,
+)
 from picchio.diagnosis.percussion.fit.parallel import worker_pool
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, Inexact, inexact, nudged
 from picchio.model.effects.effect import Effect
+from picchio.model.model import Model
 
 # By so many standard deviations a number is moved to see what it does; one of the structure, which
 # changes frequencies, by less, and a joint by so many rad. A blow that is moved by less than what
@@ -95,11 +102,7 @@ def all_slopes(
         poses.setdefault(record.pose, []).append(record)
 
     def at_pose(pose: int) -> list[np.ndarray]:
-        # Records of one pose share what its geometry costs.
-        found = []
-        for record in poses[pose]:
-            found.append(_of_record(problem, record, tuple(effects), every[record.name], end, both))
-        return found
+        return _of_records(problem, poses[pose], tuple(effects), every, end, both)
 
     with problem.pinned(effects), worker_pool(problem.workers, {"slopes": at_pose}) as mapped:
         found = mapped("slopes", poses)
@@ -124,37 +127,112 @@ def _idle(slopes: Iterable[Slopes]) -> frozenset[str]:
     return frozenset(name for name, found in power.items() if found < _IDLE**2)
 
 
-def _of_record(
+def _of_records(
+    problem: Problem,
+    records: Sequence[MeasuredRecord],
+    effects: tuple[Effect, ...],
+    every: Mapping[str, Sequence[Inexact]],
+    end: float | None,
+    both: bool,
+) -> list[np.ndarray]:
+    """(channels, samples, columns) of each of a pose's records, in single precision."""
+    begun = [_number_by_number(problem, r, effects, every[r.name], end, both) for r in records]
+    found: list[list[FloatArray]] = [[] for _ in records]
+    with np.errstate(all="ignore"):
+        # In turns: records of a pose share the plant that a number asks for.
+        for turn in zip_longest(*begun, fillvalue=()):
+            for own, columns in zip(found, turn, strict=True):
+                own += columns
+    return [_packed(own) for own in found]
+
+
+def _packed(found: Sequence[FloatArray]) -> np.ndarray:
+    """Columns (channels, samples) together; what is no number is nothing."""
+    columns = np.stack(found, axis=-1)
+    columns[~np.isfinite(columns)] = 0.0
+    return columns.astype(np.float32)
+
+
+def _number_by_number(
     problem: Problem,
     record: MeasuredRecord,
     effects: tuple[Effect, ...],
     every: Sequence[Inexact],
     end: float | None,
     both: bool,
-) -> np.ndarray:
-    """(channels, samples, columns) in single precision."""
+) -> Iterator[list[FloatArray]]:
+    """The columns of each number in turn."""
     sizes = problem.sizes.get(record.name)
     here = {}
     if sizes is not None and problem.marginal is not None:
         here = {one.name: (one, v) for one, v in problem.marginal.slopes[record.name].moved(sizes)}
     # A pose asks for a geometry of its own, in which moved masses would have to be found anew.
     still = {name: pair for name, pair in here.items() if pair[0].where != "structure"}
-    found: list[FloatArray] = []
-    with np.errstate(all="ignore"):
-        about = {
-            False: (here, _moved_residual(problem, record, effects, here.values(), end)),
-            True: (still, _moved_residual(problem, record, effects, still.values(), end)),
-        }
-        for one in every:
-            there, base = about[one.where == POSE]
-            ahead = _columns(problem, record, effects, base, one, there, end, both)
-            if both and one.where == "structure":
-                behind = _columns(problem, record, effects, base, one, there, end, both, -1.0)
-                ahead = [0.5 * (a + b) for a, b in zip(ahead, behind, strict=True)]
-            found += ahead
-    columns = np.stack(found, axis=-1) if found else np.zeros((*base.shape, 0))
-    columns[~np.isfinite(columns)] = 0.0
-    return columns.astype(np.float32)
+    about = {
+        False: (here, _moved_residual(problem, record, effects, here.values(), end)),
+        True: (still, _moved_residual(problem, record, effects, still.values(), end)),
+    }
+    turned: dict[int, tuple[float, list[FloatArray]]] = {}
+    quickly = _of_structure(problem, record, effects, every, list(here.values()), end)
+    for one in every:
+        if one.name in quickly:
+            yield [quickly[one.name]]
+            continue
+        if one.where == POSE:  # its zero and its repeatability turn a joint alike
+            index, sigma = one.change
+            if index not in turned:
+                turned[index] = (
+                    sigma,
+                    _columns(
+                        problem, record, effects, about[True][1], one, about[True][0], end, both
+                    ),
+                )
+            known, columns = turned[index]
+            yield [sigma / known * column for column in columns]
+            continue
+        there, base = about[False]
+        ahead = _columns(problem, record, effects, base, one, there, end, both)
+        if both and one.where == "structure":
+            behind = _columns(problem, record, effects, base, one, there, end, both, -1.0)
+            ahead = [0.5 * (a + b) for a, b in zip(ahead, behind, strict=True)]
+        yield ahead
+    if not every:
+        yield [np.zeros((*about[False][1].shape, 0))]
+
+
+def _of_structure(
+    problem: Problem,
+    record: MeasuredRecord,
+    effects: tuple[Effect, ...],
+    every: Sequence[Inexact],
+    here: Sequence[tuple[Inexact, FloatArray]],
+    end: float | None,
+) -> dict[str, FloatArray]:
+    """Columns (channels, m) of the numbers of the structure, without integrating; none if not so.
+
+    Both ways: what they do to the matrices is exact to the second order.
+    """
+    numbers = [one for one in every if one.where == "structure"]
+    model = problem.model.with_effects(effects)
+
+    def moved(one: Inexact, step: float) -> Model:
+        return _under(model, nudged(record, [*here, (one, np.array([step]))])[1])
+
+    def found() -> FloatArray | None:
+        there, more = nudged(record, here)
+        pairs = [(moved(one, -_STRUCTURE), moved(one, _STRUCTURE)) for one in numbers]
+        return residual_changes(record, model, there, _under(model, more), pairs, end)
+
+    changes = attempt("slopes", found)
+    if changes is None:
+        return {}
+    return {
+        one.name: change / (2.0 * _STRUCTURE) for one, change in zip(numbers, changes, strict=True)
+    }
+
+
+def _under(model: Model, more: Sequence[Effect]) -> Model:
+    return replace(model, effects=(*model.effects, *more))
 
 
 def _columns(

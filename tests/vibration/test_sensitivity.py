@@ -1,0 +1,97 @@
+"""Changes of a motion without integrating anew, held against scipy's own state-space simulation."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import StateSpace, lsim
+
+import picchio
+from picchio.excitation.pulse_train import HalfSineTrain
+from picchio.model.expansion import WideChain
+from picchio.model.geometry import Geometry
+from picchio.model.model import Model
+from picchio.vibration.integration.integrate import Samples, make_plan
+from picchio.vibration.integration.sensitivity import motion_changes
+
+FINE = 20  # scipy's steps to one sample: it takes the force as straight between its steps
+
+
+def simulated(system, force, samples):
+    """Position, velocity, acceleration (count, N) of the linear part, by scipy."""
+    n = len(system.coordinates)
+    inverse = np.linalg.inv(system.mass)
+    held = inverse @ np.hstack([system.stiffness, system.damping])
+    state = np.block([[np.zeros((n, n)), np.eye(n)], [-held]])
+    push = np.concatenate([np.zeros(n), inverse @ system.force])[:, None]
+    fine = np.arange(FINE * (samples.count - 1) + 1) * samples.step / FINE
+    out = np.vstack([np.eye(2 * n), -held])
+    through = np.concatenate([np.zeros(2 * n), push[n:, 0]])[:, None]
+    _, y, _ = lsim(StateSpace(state, push, out, through), force(fine), fine)
+    return [part[::FINE] for part in (y[:, :n], y[:, n : 2 * n], y[:, 2 * n :])]
+
+
+@pytest.fixture(scope="module")
+def plant_of():
+    robot = picchio.load_robot("ur10")
+    pose = np.array([0.3, -1.1, 1.4, -0.5, 0.7, 0.2])
+    geometry = Geometry(WideChain(robot), pose)
+    return lambda: Model(robot).plant(geometry)
+
+
+def heavier(plant, size):
+    plant.add_mass(0.1 * size, "wrist_1_link", (0.02, 0.1, 0.0))
+
+
+def softer(plant, size):
+    plant.springs["elbow_joint"] *= np.exp(0.02 * size)
+
+
+def damped(plant, size):
+    plant.damping_scale *= np.exp(0.1 * size)
+
+
+def aside(plant, size):
+    plant.force_offset = plant.force_offset + np.array([0.0, 0.004 * size, 0.0])
+
+
+@pytest.mark.parametrize("change", [heavier, softer, damped, aside])
+def test_a_change_is_what_two_simulations_of_scipy_differ_by(plant_of, change):
+    direction = np.array([0.6, 0.0, 0.8])
+    samples = Samples(0.0, 1e-3, 400)
+    # Half-sines have no jumps, at which scipy's steps would have to end.
+    force = HalfSineTrain(force=300.0, period=0.05, width=0.008).burst(4)
+
+    def built(size):
+        plant = plant_of()
+        change(plant, size)
+        return plant.build(direction)
+
+    small = 0.01
+    system, before, after = built(0.0), built(-small), built(small)
+    plan = make_plan(force, samples, 2.5e-4)
+    found = motion_changes(system, plan, samples.count, [(before, after), (before, system)])
+    for one, other, weights in zip(
+        simulated(before, force, samples),
+        simulated(after, force, samples),
+        (found.position, found.velocity, found.acceleration),
+        strict=True,
+    ):
+        expected = other - one
+        assert (
+            np.abs((weights[0] @ found.series).T - expected).max() < 2e-3 * np.abs(expected).max()
+        )
+        halves = (weights[1] @ found.series).T
+        assert np.abs(halves - 0.5 * expected).max() < 2e-2 * np.abs(expected).max()
+
+
+def test_where_a_joint_has_slack_there_is_no_such_change(plant_of):
+    from picchio.model.system import Element, ElementKind
+
+    plant = plant_of()
+    system = plant.build(np.array([0.0, 0.0, 1.0]))
+    row = np.zeros((1, len(system.coordinates)))
+    slack = replace(system, elements=(Element(ElementKind.CUBIC, (1e9,)),), rows=row)
+    force = HalfSineTrain(force=300.0, period=0.05, width=0.008).burst(1)
+    plan = make_plan(force, Samples(0.0, 1e-3, 50), 1e-3)
+    assert motion_changes(slack, plan, 50, [(system, system)]) is None
