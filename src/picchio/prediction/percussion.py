@@ -223,17 +223,18 @@ class PercussionSetup:
     def changes(
         self, model: Model, pairs: Sequence[tuple[Model, Model]]
     ) -> dict[str, FloatArray] | None:
-        """By how much every channel changes between models whose structures differ little.
+        """By how much every channel changes between models that differ little.
 
-        To first order, without integrating anew (`motion_changes`).
+        To first order, without integrating anew (`motion_changes`): models may differ in their
+        structure, in the direction of the blows and in how hard all of them are.
 
         Args:
-            model: about which; its blows and sensors are those of all.
+            model: about which; the sensors are those of all.
             pairs: (before, after) of each change.
 
         Returns:
-            (pairs, count) of each channel, SI; None where the motion is not linear, is steady, or
-            a sensor is at its limit.
+            (pairs, count) of each channel, SI, not a number where the blows differ in another way;
+            None where the motion is not linear, is steady, or a sensor is at its limit.
         """
         sensors = model.sensors(self.conditions)
         chains = {group: sensors.get(group) for group in self._members}
@@ -241,7 +242,16 @@ class PercussionSetup:
             return None
         struck = self.struck(model)
         system = self._system(model, struck.blows)
-        around = [[self._system(m, struck.blows) for m in pair] for pair in pairs]
+        blows = [[self.struck(m) for m in pair] for pair in pairs]
+        around = [
+            (self._system(one, ours.blows), self._system(other, theirs.blows))
+            for (one, other), (ours, theirs) in zip(pairs, blows, strict=True)
+        ]
+        louder = np.array([
+            (after.peak - before.peak) / struck.peak
+            if before.unit is struck.unit and after.unit is struck.unit else np.nan
+            for before, after in blows
+        ])  # fmt: skip
         made: dict[tuple[Samples, AtJumps], MotionChanges] = {}
         out: dict[str, FloatArray] = {}
         for group, members in self._members.items():
@@ -252,7 +262,8 @@ class PercussionSetup:
                     system,
                     self._plan(struck, system, *key),
                     taken.samples.count,
-                    [(before, after) for before, after in around],
+                    around,
+                    louder,
                 )
                 if found is None:
                     return None

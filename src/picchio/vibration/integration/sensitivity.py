@@ -41,6 +41,7 @@ def motion_changes(
     plan: Plan,
     count: int,
     pairs: Sequence[tuple[VibratingSystem, VibratingSystem]],
+    louder: FloatArray | None = None,
 ) -> MotionChanges | None:
     """By how much the motion from rest changes between systems that differ little.
 
@@ -49,6 +50,7 @@ def motion_changes(
         plan: the steps, as `follow` takes them.
         count: of samples.
         pairs: (before, after) of each change, with the same coordinates.
+        louder: (changes,) by what share of the plan's the force changes as well.
 
     Returns:
         one change a pair; None where a system is not linear or its modes are not independent.
@@ -84,6 +86,8 @@ def motion_changes(
     weights = quotient.astype(complex)
     index = np.arange(2 * n)
     weights[:, index, index] += push @ back[:, n:].T - quotient.sum(axis=2)
+    if louder is not None:
+        weights[:, index, index] += louder[:, None] * driven
     on_series = modes @ weights
     on_slopes = modes @ np.where(alike, among * driven, 0.0)
 

@@ -364,8 +364,8 @@ class Problem:
         pairs: Sequence[tuple[Iterable[Effect], Iterable[Effect]]],
         records: Sequence[MeasuredRecord],
         end: float | None,
-    ) -> list[list[FloatArray]] | None:
-        """By how much `residuals` change between models whose structures differ a little.
+    ) -> list[list[FloatArray] | None]:
+        """By how much `residuals` change between models that differ a little.
 
         Args:
             effects: about which model.
@@ -374,8 +374,8 @@ class Problem:
             end: s, look no further.
 
         Returns:
-            per pair an array (channels, m) a record, to first order; None where that is not known
-            without integrating.
+            per pair an array (channels, m) a record, to first order; None for a pair of which
+            that is not known without integrating.
         """
         wanted = tuple(effects)
         model = self.model.with_effects(wanted)
@@ -390,14 +390,18 @@ class Problem:
 
             both = [(under(one), under(other)) for one, other in around]
             changes = residual_changes(record, model, there, under(model), both, end)
-            if changes is None or not np.isfinite(changes).all():
-                return None
+            if changes is None:
+                return [None] * len(pairs)
             found.append(changes)
-        of_pairs = [[each[k] for each in found] for k in range(len(pairs))]
-        if self.marginal is None:
-            return of_pairs
         names, labels = [r.name for r in records], [effect.label for effect in wanted]
-        return [self.marginal.whitened(each, names, labels) for each in of_pairs]
+        out: list[list[FloatArray] | None] = []
+        for k in range(len(pairs)):
+            own = [each[k] for each in found]
+            known = all(math.isfinite(part.sum()) for part in own)
+            if known and self.marginal is not None:
+                own = self.marginal.whitened(own, names, labels)
+            out.append(own if known else None)
+        return out
 
     def renew(self) -> None:
         """Have other processes see what was moved: they have it as it was when they began."""
@@ -502,18 +506,19 @@ def residual_changes(
     pairs: Sequence[tuple[Model, Model]],
     end: float | None = None,
 ) -> FloatArray | None:
-    """By how much a record's whitened residual changes where only the structure changes a little.
+    """By how much a record's whitened residual changes between models that differ a little.
 
     Args:
         record: as stated; with `model` it says which samples are known.
         model: without small changes.
         there: the record with its changes.
         about: the model with its changes: about which the residual is linear.
-        pairs: the models before and after each change; all else is as in `about`.
+        pairs: the models before and after each change.
         end: s, up to when.
 
     Returns:
-        (pairs, channels, m), to first order; None where that is not known without integrating.
+        (pairs, channels, m), to first order; not a number, or None for all, where that is not
+        known without integrating (`PercussionSetup.changes`).
     """
     from picchio.diagnosis.percussion.data.residual_kernel import whitened
 

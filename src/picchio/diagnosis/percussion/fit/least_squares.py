@@ -281,6 +281,10 @@ def fits_without(best: Fit, refit: Callable[[Hypothesis], Fit]) -> list[Fit]:
 # Jacobians of residuals: by differences, from a fit nearby, or updated from step to step.
 
 
+# What may change the motion without a change of its steps.
+_BY_MODES = ("structure", "blows")
+
+
 def jacobian(
     problem: Problem,
     hypothesis: Hypothesis,
@@ -294,8 +298,7 @@ def jacobian(
 ) -> list[FloatArray]:
     """D residual / d unknowns of every record, (channels x m, unknowns).
 
-    Of the structure's unknowns by how its modes change, where the motion is linear; of others by
-    differences.
+    By how modes and force change, where that is all and the motion is linear; else by differences.
 
     Args:
         problem: data and noise.
@@ -337,12 +340,12 @@ def _by_modes(
     records: Sequence[MeasuredRecord],
     end: float | None,
 ) -> dict[int, list[FloatArray]]:
-    """The columns of the structure's unknowns among those wanted; none where that is not so."""
+    """The columns of those wanted that are known without integrating anew."""
     unknowns, vector = hypothesis.unknowns(), hypothesis.vector()
     found: dict[int, tuple[float, tuple[Hypothesis, Hypothesis]]] = {}
     for k in wanted:
         unknown = unknowns[k]
-        if hypothesis.effects[unknown.effect].where != "structure":
+        if hypothesis.effects[unknown.effect].where not in _BY_MODES:
             continue
         ends = [
             min(max(vector[k] + way * unknown.step, unknown.lower), unknown.upper)
@@ -356,12 +359,11 @@ def _by_modes(
         return {}
     pairs = [(before.effects, after.effects) for _, (before, after) in found.values()]
     looked = partial(problem.changes, hypothesis.effects, pairs, records, end)
-    changes = attempt("slopes by modes", looked)
-    if changes is None:
-        return {}
+    changes = attempt("slopes by modes", looked) or [None] * len(pairs)
     return {
         k: [part.ravel() / apart for part in change]
         for (k, (apart, _)), change in zip(found.items(), changes, strict=True)
+        if change is not None
     }
 
 

@@ -27,6 +27,8 @@ from picchio.model.model import Model
 _STEP = 0.1
 _STRUCTURE = 0.05
 _TURN = 5e-6
+# What may change the motion without a change of its steps.
+_BY_MODES = ("structure", "blows")
 # What moves all records together by less than this, in units of the noise, need not be looked at.
 _IDLE = 0.01
 
@@ -173,7 +175,7 @@ def _number_by_number(
         True: (still, _moved_residual(problem, record, effects, still.values(), end)),
     }
     turned: dict[int, tuple[float, list[FloatArray]]] = {}
-    quickly = _of_structure(problem, record, effects, every, list(here.values()), end)
+    quickly = _by_modes(problem, record, effects, every, list(here.values()), end)
     for one in every:
         if one.name in quickly:
             yield [quickly[one.name]]
@@ -200,7 +202,7 @@ def _number_by_number(
         yield [np.zeros((*about[False][1].shape, 0))]
 
 
-def _of_structure(
+def _by_modes(
     problem: Problem,
     record: MeasuredRecord,
     effects: tuple[Effect, ...],
@@ -208,11 +210,11 @@ def _of_structure(
     here: Sequence[tuple[Inexact, FloatArray]],
     end: float | None,
 ) -> dict[str, FloatArray]:
-    """Columns (channels, m) of the numbers of the structure, without integrating; none if not so.
+    """Columns (channels, m) of the numbers of which they are known without integrating anew.
 
     Both ways: what they do to the matrices is exact to the second order.
     """
-    numbers = [one for one in every if one.where == "structure"]
+    numbers = [one for one in every if one.where in _BY_MODES and not one.each_blow]
     model = problem.model.with_effects(effects)
 
     def moved(one: Inexact, step: float) -> Model:
