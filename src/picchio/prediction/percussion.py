@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -45,6 +45,8 @@ _KEPT = 6
 _KEPT_IN_COMMON = 48
 # By so much a coordinate is moved to see what a reader makes of it, rad and rad/s.
 _SLIGHTLY = 1e-6
+# Relative difference of rounding.
+_SAME = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +82,20 @@ class Struck:
     def force(self) -> PiecewiseForce:
         """The force they make."""
         return self.unit.scaled(self.peak)
+
+    def alike(self, other: Struck) -> bool:
+        """Whether the two forces are the same but for their size.
+
+        Args:
+            other: blows that may be harder, or along another direction.
+        """
+        if self.unit is other.unit:
+            return True
+        names = [f.name for f in fields(self.unit)]
+        pairs = [(getattr(self.unit, name), getattr(other.unit, name)) for name in names]
+        return all(
+            np.shape(a) == np.shape(b) and np.allclose(a, b, rtol=_SAME, atol=0.0) for a, b in pairs
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,7 +265,7 @@ class PercussionSetup:
         ]
         louder = np.array([
             (after.peak - before.peak) / struck.peak
-            if before.unit is struck.unit and after.unit is struck.unit else np.nan
+            if before.alike(struck) and after.alike(struck) else np.nan
             for before, after in blows
         ])  # fmt: skip
         made: dict[tuple[Samples, AtJumps], MotionChanges] = {}

@@ -229,7 +229,9 @@ def _by_modes(
     if changes is None:
         return {}
     return {
-        one.name: change / (2.0 * _STRUCTURE) for one, change in zip(numbers, changes, strict=True)
+        one.name: change / (2.0 * _STRUCTURE)
+        for one, change in zip(numbers, changes, strict=True)
+        if np.isfinite(change.sum())
     }
 
 
