@@ -16,14 +16,14 @@ from picchio.core.processes import one_thread
 from picchio.diagnosis.percussion.criteria.exceeded import exceeded
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.criteria.remainder import Remainder, decisive_gain
-from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.data.problem import Problem, residual_under
 from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
-from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.tolerance.linearise import linearise, settled
+from picchio.diagnosis.percussion.tolerance.linearise import linearise, recentre, settled
 from picchio.diagnosis.percussion.tolerance.marginal import Marginal
-from picchio.diagnosis.percussion.tolerance.nudges import Inexact, inexact, principal
-from picchio.diagnosis.percussion.tolerance.slopes import Slopes
+from picchio.diagnosis.percussion.tolerance.nudges import Inexact, inexact, nudged, principal
+from picchio.diagnosis.percussion.tolerance.slopes import Slopes, all_slopes
 from picchio.model.geometry import Geometry
 from picchio.model.model import Model
 from worlds import campaign as worlds
@@ -128,6 +128,36 @@ def test_the_mass_of_all_is_told_by_no_record(wrong_everywhere):
     for label in ("joint_stiffness:joint_1", "joint_stiffness:joint_3", "force_amplitude:tool"):
         assert taken[label] == pytest.approx(-0.01, rel=1e-3)
     assert taken["modal_damping:robot"] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_slopes_about_moved_numbers_are_what_differences_are(wrong_everywhere):
+    """Also of what stands moved already, such as a rise time: moved on, not moved twice."""
+    robot, campaign = wrong_everywhere
+    problem = Problem(robot, campaign)
+    record, end = problem.records[0], 0.16
+    with one_thread():
+        begun = fit_growing(problem, Hypothesis.baseline(robot, campaign.tolerance), windows=(end,))
+        linearise(problem, begun.hypothesis, problem.records, end)
+        found = fit(problem, begun.hypothesis, problem.records, end, iterations=4)
+        here = recentre(problem, found)
+        sizes = {
+            one.name: (one, size)
+            for one, size in problem.marginal.slopes[record.name].moved(problem.sizes[record.name])
+        }
+        slopes = all_slopes(problem, here.effects, end)[record.name]
+        model = problem.model.with_effects(here.effects)
+
+        def moved(one, step):
+            there = [pair for name, pair in sizes.items() if name != one.name]
+            size = sizes[one.name][1] + step
+            return residual_under(record, model, *nudged(record, [*there, (one, size)]), end)
+
+        for one, column in zip(slopes.what, np.moveaxis(slopes.columns, -1, 0), strict=True):
+            if one.each_blow or one.where == "pose":
+                continue
+            expected = (moved(one, 0.02) - moved(one, -0.02)) / 0.04
+            apart = np.linalg.norm(column - expected)
+            assert apart < 0.02 * np.linalg.norm(expected) + 0.05, one.name
 
 
 def test_a_world_that_is_a_little_wrong_leaves_noise(wrong_everywhere):

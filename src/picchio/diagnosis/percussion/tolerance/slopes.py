@@ -175,7 +175,7 @@ def _number_by_number(
         True: (still, _moved_residual(problem, record, effects, still.values(), end)),
     }
     turned: dict[int, tuple[float, list[FloatArray]]] = {}
-    quickly = _by_modes(problem, record, effects, every, list(here.values()), end)
+    quickly = _by_modes(problem, record, effects, every, here, end)
     for one in every:
         if one.name in quickly:
             yield [quickly[one.name]]
@@ -207,7 +207,7 @@ def _by_modes(
     record: MeasuredRecord,
     effects: tuple[Effect, ...],
     every: Sequence[Inexact],
-    here: Sequence[tuple[Inexact, FloatArray]],
+    here: Mapping[str, tuple[Inexact, FloatArray]],
     end: float | None,
 ) -> dict[str, FloatArray]:
     """Columns (channels, m) of the numbers of which they are known without integrating anew.
@@ -218,10 +218,10 @@ def _by_modes(
     model = problem.model.with_effects(effects)
 
     def moved(one: Inexact, step: float) -> Model:
-        return _under(model, nudged(record, [*here, (one, np.array([step]))])[1])
+        return _under(model, nudged(record, _moved_on(here, one, 0, step))[1])
 
     def found() -> FloatArray | None:
-        there, more = nudged(record, here)
+        there, more = nudged(record, list(here.values()))
         pairs = [(moved(one, -_STRUCTURE), moved(one, _STRUCTURE)) for one in numbers]
         return residual_changes(record, model, there, _under(model, more), pairs, end)
 
@@ -233,6 +233,18 @@ def _by_modes(
         for one, change in zip(numbers, changes, strict=True)
         if np.isfinite(change.sum())
     }
+
+
+def _moved_on(
+    here: Mapping[str, tuple[Inexact, FloatArray]], one: Inexact, blow: int, step: float
+) -> list[tuple[Inexact, FloatArray]]:
+    """What is moved, with one number a little further."""
+    if one.where == "structure" or one.name not in here:
+        # What is moved already stays as it is, and so need not be found anew.
+        return [*here.values(), (one, step * np.eye(blow + 1)[blow])]
+    size = here[one.name][1].copy()
+    size[blow] += step
+    return [pair for name, pair in here.items() if name != one.name] + [(one, size)]
 
 
 def _under(model: Model, more: Sequence[Effect]) -> Model:
@@ -254,16 +266,9 @@ def _columns(
     step = way * _STRUCTURE if one.where == "structure" else _STEP
     if one.where == POSE:
         step = _TURN / one.change[1]
-    others = [pair for pair in here.values() if pair[0].name != one.name]
 
     def change(blow: int) -> FloatArray:
-        if one.where == "structure" or one.name not in here:
-            # What is moved already stays as it is, and so need not be found anew.
-            there = [*here.values(), (one, step * np.eye(blow + 1)[blow])]
-        else:
-            size = here[one.name][1].copy()
-            size[blow] += step
-            there = [*others, (one, size)]
+        there = _moved_on(here, one, blow, step)
         moved = attempt(one.name, lambda: _moved_residual(problem, record, effects, there, end))
         return np.zeros_like(base) if moved is None else (moved - base) / step
 
