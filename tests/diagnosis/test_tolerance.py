@@ -157,7 +157,7 @@ def test_slopes_about_moved_numbers_are_what_differences_are(wrong_everywhere):
                 continue
             expected = (moved(one, 0.02) - moved(one, -0.02)) / 0.04
             apart = np.linalg.norm(column - expected)
-            assert apart < 0.02 * np.linalg.norm(expected) + 0.05, one.name
+            assert apart < 0.05 * np.linalg.norm(expected) + 0.05, one.name
 
 
 def test_a_world_that_is_a_little_wrong_leaves_noise(wrong_everywhere):
