@@ -30,6 +30,7 @@ from picchio.cli.output import (
     console,
     count_of,
     deliver,
+    notice_first,
     progress,
     styled,
     table,
@@ -191,10 +192,11 @@ def assess(
         from picchio.visuals.report.cover import embedded
 
         embedded(logo)  # refused before any work
-    loaded = picchio.load_robot(
-        robot, flex=flex, tool=tool, reducers=reducers or (), payload=payload, reach=reach,
-        drive_class=drive_class,
-    )  # fmt: skip
+    with notice_first(json):
+        loaded = picchio.load_robot(
+            robot, flex=flex, tool=tool, reducers=reducers or (), payload=payload, reach=reach,
+            drive_class=drive_class,
+        )  # fmt: skip
     work = task_of(loaded, task, payload=payload)
     check_targets((json, report), [*loaded.files, *work.files, sn_curve, logo])
     options: dict[str, Any] = {
