@@ -1,6 +1,6 @@
 """How well the drive priors foretell a robot that was left out; and the command that refits them.
 
-    python benchmarks/drive_priors.py [--json FILE]    # leave one robot out, arm by arm
+    python benchmarks/drive_priors.py [--chains 3]     # leave one robot out, arm by arm
     python benchmarks/drive_priors.py --nested         # would the others choose its predictors?
     python benchmarks/drive_priors.py --refit          # write fitted.json anew
 
@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import combinations
@@ -25,11 +26,13 @@ import numpy as np
 
 from picchio.core.files import atomic_write
 from picchio.robot.drives import facts
-from picchio.robot.drives.hierarchy import predict
+from picchio.robot.drives.hierarchy import Draws, predict
 from picchio.robot.drives.predictors import OF_STIFFNESS, QUANTITIES
 from picchio.robot.drives.priors import Mixture, moments, probability_below, quantiles
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
+
+Names = tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -65,14 +68,16 @@ def log_density(mixture: Mixture, point: np.ndarray) -> float:
     return float(np.logaddexp.reduce(fits))
 
 
-def foretold(
-    others: list[facts.MeasuredRobot], robot: facts.MeasuredRobot, kept: tuple[str, ...]
-) -> Mixture:
-    """The stiffness of a robot's measured joints, ln N m/rad, by all others alone."""
+def foretold(draws: Sequence[Draws], robot: facts.MeasuredRobot, kept: Names) -> Mixture:
+    """The stiffness of a robot's measured joints, ln N m/rad, by fits to others.
+
+    Several chains are pooled: the more of them, the less is left to chance.
+    """
     rows = np.flatnonzero(np.isfinite(robot.truth))
     group = replace(facts.stiffness_beside(robot.group, kept), kind=None)
-    weights, means, covs = predict(facts.fit_stiffness(others, kept), group)
-    return weights, means[:, rows], covs[:, rows][:, :, rows]
+    columns = zip(*(predict(each, group) for each in draws), strict=True)
+    weights, means, covs = (np.concatenate(column) for column in columns)
+    return weights / len(draws), means[:, rows], covs[:, rows][:, :, rows]
 
 
 def nested(robots: list[facts.MeasuredRobot]) -> None:
@@ -80,12 +85,13 @@ def nested(robots: list[facts.MeasuredRobot]) -> None:
     names = {"stiffness": OF_STIFFNESS, "every": QUANTITIES}
     measured = [k for k, robot in enumerate(robots) if np.isfinite(robot.truth).any()]
     inner = {name: dict.fromkeys(measured, 0.0) for name in names}
-    for a, b in combinations(measured, 2):
-        others = [one for i, one in enumerate(robots) if i not in (a, b)]
+    for pair in combinations(measured, 2):
+        others = [one for i, one in enumerate(robots) if i not in pair]
         for name, kept in names.items():
-            for out, left in ((a, b), (b, a)):
+            draws = [facts.fit_stiffness(others, kept)]
+            for out, left in (pair, pair[::-1]):
                 truth = robots[left].truth[np.isfinite(robots[left].truth)]
-                inner[name][out] += log_density(foretold(others, robots[left], kept), truth)
+                inner[name][out] += log_density(foretold(draws, robots[left], kept), truth)
     print("log density of the other robots, each left out; chosen without the robot named")
     chosen = []
     for k in measured:
@@ -95,13 +101,15 @@ def nested(robots: list[facts.MeasuredRobot]) -> None:
     print(f"chosen: {OF_STIFFNESS} by {chosen.count('stiffness')} of {len(chosen)}")
 
 
-def leave_one_out(robots: list[facts.MeasuredRobot], kept: tuple[str, ...]) -> list[Left]:
+def leave_one_out(robots: list[facts.MeasuredRobot], kept: Names, chains: int = 1) -> list[Left]:
     found = []
     for k, robot in enumerate(robots):
         rows = np.flatnonzero(np.isfinite(robot.truth))
         if not len(rows):
             continue
-        mixture = foretold([one for i, one in enumerate(robots) if i != k], robot, kept)
+        others = [one for i, one in enumerate(robots) if i != k]
+        draws = [facts.fit_stiffness(others, kept, seed) for seed in range(chains)]
+        mixture = foretold(draws, robot, kept)
         weights = mixture[0]
         truth = robot.truth[rows]
         low, high = quantiles(mixture, (0.05, 0.95))
@@ -142,6 +150,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--refit", action="store_true", help="write fitted.json")
     parser.add_argument("--nested", action="store_true", help="are the predictors the others'?")
+    parser.add_argument("--chains", type=int, default=1, help="pooled in every fit")
     parser.add_argument("--json", type=Path, help="write what is printed")
     options = parser.parse_args()
     robots = facts.measured_robots(load)
@@ -154,7 +163,7 @@ def main() -> None:
     if options.nested:
         nested(robots)
         return
-    left = leave_one_out(robots, OF_STIFFNESS)
+    left = leave_one_out(robots, OF_STIFFNESS, options.chains)
     print("N m/rad; interval: 90 %; factor: estimate over truth")
     for one in left:
         print(f"{one.robot.name} ({one.robot.evidence.split(';')[0]})")
@@ -168,7 +177,7 @@ def main() -> None:
     found = {"as shipped": summary(left)}
     alone = {name: (name,) for name in QUANTITIES}
     for name, kept in {"every": QUANTITIES, **alone, "none": ()}.items():
-        found[name] = summary(leave_one_out(robots, kept))
+        found[name] = summary(leave_one_out(robots, kept, options.chains))
     print(f"\n{'predictors':16}  joint  robot  together  coverage (bootstrap)  50 %  factor")
     for name, one in found.items():
         low, high = one["coverage_bootstrap_95"]

@@ -246,7 +246,7 @@ def read_one(score: np.ndarray, error: float, outcome: np.ndarray, rng: Any) -> 
 
 def read_many(
     sampler: Sampler, cov: np.ndarray, columns: list[int], error: np.ndarray, endless: bool,
-    rng: Any, readings: int = 32, worlds: int = 256,
+    rng: Any, readings: int = 24, worlds: int = 256,
 ) -> float:  # fmt: skip
     """The mean width over drawn readings of several values, the rest conditioned on each."""
     read = cov[np.ix_(columns, columns)] + np.diag(np.maximum(error, 1e-6) ** 2)

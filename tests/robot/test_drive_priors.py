@@ -88,7 +88,7 @@ def test_wrists_are_told_worse_and_errors_hang_together() -> None:
     assert correlation[0, names.index("damping_ratio.joint_1")] == 0.0
     assert correlation[0, names.index("strength.repeated_peak_torque.joint_1")] == 0.0
     assert root_of(names, found.posterior()).shape == (18, 18)
-    assert "ring at" in found.joints[0].reasons[1]
+    assert "would ring at" in found.joints[0].reasons[1]
     assert json.dumps(found.to_dict())
     assert "wrist" in found._repr_html_()
 

@@ -300,6 +300,7 @@ def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
                 )
     if task.note:
         poses = task.operations[0].poses
+        out.print("    the poses in rad, of a slide in m:")
         for k, pose in enumerate(poses):
             out.print(f"    pose {k + 1}: {', '.join(f'{q:.3g}' for q in pose)}")
     out.print()

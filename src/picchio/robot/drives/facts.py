@@ -137,16 +137,19 @@ def effort_beside(group: Group) -> Group:
     return Group(group.values[:, columns], group.place, nothing)
 
 
-def fit_stiffness(robots: Sequence[MeasuredRobot], names: Sequence[str] = OF_STIFFNESS) -> Draws:
+def fit_stiffness(
+    robots: Sequence[MeasuredRobot], names: Sequence[str] = OF_STIFFNESS, seed: int = 0
+) -> Draws:
     """The distribution of stiffness beside the predictors'.
 
     Args:
         robots: of the data, or some of them.
         names: of the predictors.
+        seed: of the chain.
     """
     groups = [stiffness_beside(robot.group, names) for robot in robots]
     return fit(groups, classes=len(CLASSES), class_spread=class_spread(), draws=_DRAWS,
-               sweeps=_SWEEPS)  # fmt: skip
+               sweeps=_SWEEPS, seed=seed)  # fmt: skip
 
 
 def refit(robots: Sequence[MeasuredRobot]) -> Fitted:

@@ -428,8 +428,8 @@ def _strength_reasons(
         else "no effort limit is known: it is foretold from what the joint moves and holds"
     )
     return [
-        f"{told}; effort limits are taken to lie between a reducer's rated torque and its limit "
-        f"for repeated peaks, which is {ratio:.2g} times as high in the catalogues"
+        f"{told}; it is taken to lie between the reducer's rated torque and its limit for repeated "
+        f"peaks, and catalogues have the latter {ratio:.2g} times as high"
     ]
 
 
@@ -450,14 +450,14 @@ def _reasons(
     ]
     if np.isfinite(payload := found.values[0, -1]) and k:
         known.append(f"{meaning['payload']}, {math.exp(payload):.3g} kg")
-    said = [f"from {'; '.join(known)}" if known else "from its place in the arm alone"]
+    said = [f"from {'; '.join(known)}" if known else "from the size of the rest of the arm"]
     inertia = row[QUANTITIES.index("inertia")]
     if np.isfinite(inertia):
         hertz = math.sqrt(stiffness / math.exp(inertia)) / (2.0 * math.pi)
         low, high, robots = fit.rings["arm" if k else "first"]
         said.append(
-            f"with the arm stretched it would ring at {hertz:.2g} Hz alone; joints like this "
-            f"that were measured do at {low:.2g} to {high:.2g} Hz in {robots} robots"
+            f"as the only soft joint of the stretched arm it would ring at {hertz:.2g} Hz; those "
+            f"that were measured, in {robots} robots, at {low:.2g} to {high:.2g} Hz"
         )
     if found.place[k, 1]:
         said.append("a wrist: what URDFs give there tells little, hence the wide range")

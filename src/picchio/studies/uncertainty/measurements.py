@@ -202,8 +202,8 @@ class FittedWorlds:
 
 def _design(moved: FloatArray, terms: NDArray[np.intp]) -> FloatArray:
     """(m, t): the terms' values."""
-    with_one = np.column_stack([moved, np.ones(len(moved))])
-    return np.asarray(with_one[:, terms[:, 0]] * with_one[:, terms[:, 1]])
+    values = np.vstack([moved.T, np.ones(len(moved))])  # a value a row: gathered at once
+    return np.asarray((values[terms[:, 0]] * values[terms[:, 1]]).T)
 
 
 def _width(values: FloatArray) -> float:
