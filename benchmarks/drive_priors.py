@@ -1,6 +1,7 @@
 """How well the drive priors foretell a robot that was left out; and the command that refits them.
 
-    python benchmarks/drive_priors.py [--json FILE]    # leave one robot out, arm by arm
+    python benchmarks/drive_priors.py [--chains 3]     # leave one robot out, arm by arm
+    python benchmarks/drive_priors.py --nested         # would the others choose its predictors?
     python benchmarks/drive_priors.py --refit          # write fitted.json anew
 
 Each robot with measured stiffness is left out in turn; everything is fitted to the others; its
@@ -14,8 +15,10 @@ from __future__ import annotations
 import argparse
 import json
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -23,15 +26,13 @@ import numpy as np
 
 from picchio.core.files import atomic_write
 from picchio.robot.drives import facts
-from picchio.robot.drives.hierarchy import predict
-from picchio.robot.drives.predictors import QUANTITIES
+from picchio.robot.drives.hierarchy import Draws, predict
+from picchio.robot.drives.predictors import OF_STIFFNESS, QUANTITIES
 from picchio.robot.drives.priors import Mixture, moments, probability_below, quantiles
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
 
-ALONE = {"inertia": ("inertia", "wrist_inertia")} | {
-    name: (name,) for name in QUANTITIES if not name.endswith("inertia")
-}
+Names = tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -59,13 +60,6 @@ def load(name: str) -> FlexibleRobot:
         return load_robot(name, allow_rigid=True)
 
 
-def seen_by(robot: facts.MeasuredRobot, kept: tuple[str, ...]) -> facts.MeasuredRobot:
-    """The robot with the other predictors hidden."""
-    values = robot.group.values.copy()
-    values[:, [2 + k for k, name in enumerate(QUANTITIES) if name not in kept]] = np.nan
-    return replace(robot, group=replace(robot.group, values=values))
-
-
 def log_density(mixture: Mixture, point: np.ndarray) -> float:
     weights, means, covs = mixture
     away = point - means
@@ -74,16 +68,49 @@ def log_density(mixture: Mixture, point: np.ndarray) -> float:
     return float(np.logaddexp.reduce(fits))
 
 
-def leave_one_out(robots: list[facts.MeasuredRobot], kept: tuple[str, ...]) -> list[Left]:
+def foretold(draws: Sequence[Draws], robot: facts.MeasuredRobot, kept: Names) -> Mixture:
+    """The stiffness of a robot's measured joints, ln N m/rad, by fits to others.
+
+    Several chains are pooled: the more of them, the less is left to chance.
+    """
+    rows = np.flatnonzero(np.isfinite(robot.truth))
+    group = replace(facts.stiffness_beside(robot.group, kept), kind=None)
+    columns = zip(*(predict(each, group) for each in draws), strict=True)
+    weights, means, covs = (np.concatenate(column) for column in columns)
+    return weights / len(draws), means[:, rows], covs[:, rows][:, :, rows]
+
+
+def nested(robots: list[facts.MeasuredRobot]) -> None:
+    """For each robot left out: which predictors the others choose, by leaving out one of them."""
+    names = {"stiffness": OF_STIFFNESS, "every": QUANTITIES}
+    measured = [k for k, robot in enumerate(robots) if np.isfinite(robot.truth).any()]
+    inner = {name: dict.fromkeys(measured, 0.0) for name in names}
+    for pair in combinations(measured, 2):
+        others = [one for i, one in enumerate(robots) if i not in pair]
+        for name, kept in names.items():
+            draws = [facts.fit_stiffness(others, kept)]
+            for out, left in (pair, pair[::-1]):
+                truth = robots[left].truth[np.isfinite(robots[left].truth)]
+                inner[name][out] += log_density(foretold(draws, robots[left], kept), truth)
+    print("log density of the other robots, each left out; chosen without the robot named")
+    chosen = []
+    for k in measured:
+        chosen.append(max(names, key=lambda name: inner[name][k]))
+        scores = ", ".join(f"{name} {inner[name][k]:7.2f}" for name in names)
+        print(f"  {robots[k].name:20} {scores}   {chosen[-1]}")
+    print(f"chosen: {OF_STIFFNESS} by {chosen.count('stiffness')} of {len(chosen)}")
+
+
+def leave_one_out(robots: list[facts.MeasuredRobot], kept: Names, chains: int = 1) -> list[Left]:
     found = []
     for k, robot in enumerate(robots):
         rows = np.flatnonzero(np.isfinite(robot.truth))
         if not len(rows):
             continue
-        others = [seen_by(one, kept) for i, one in enumerate(robots) if i != k]
-        fit = facts.fit_stiffness(others)
-        weights, means, covs = predict(fit, replace(seen_by(robot, kept).group, kind=None))
-        mixture = weights, means[:, rows], covs[:, rows][:, :, rows]
+        others = [one for i, one in enumerate(robots) if i != k]
+        draws = [facts.fit_stiffness(others, kept, seed) for seed in range(chains)]
+        mixture = foretold(draws, robot, kept)
+        weights = mixture[0]
         truth = robot.truth[rows]
         low, high = quantiles(mixture, (0.05, 0.95))
         each = [
@@ -122,6 +149,8 @@ def summary(left: list[Left]) -> dict[str, Any]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--refit", action="store_true", help="write fitted.json")
+    parser.add_argument("--nested", action="store_true", help="are the predictors the others'?")
+    parser.add_argument("--chains", type=int, default=1, help="pooled in every fit")
     parser.add_argument("--json", type=Path, help="write what is printed")
     options = parser.parse_args()
     robots = facts.measured_robots(load)
@@ -131,7 +160,10 @@ def main() -> None:
             file.write(facts.to_json(facts.refit(robots)))
         print(f"{path}: fitted to {len(robots)} robots")
         return
-    left = leave_one_out(robots, QUANTITIES)
+    if options.nested:
+        nested(robots)
+        return
+    left = leave_one_out(robots, OF_STIFFNESS, options.chains)
     print("N m/rad; interval: 90 %; factor: estimate over truth")
     for one in left:
         print(f"{one.robot.name} ({one.robot.evidence.split(';')[0]})")
@@ -142,9 +174,10 @@ def main() -> None:
             inside = "in" if low <= truth <= high else "OUT"
             print(f"  {one.rows[k] + 1}  estimate {estimate:9.3g}  ({low:8.2g} .. {high:8.2g})"
                   f"  truth {truth:9.3g}  factor {estimate / truth:5.2f}  {inside}")  # fmt: skip
-    found = {"all": summary(left)}
-    for name, kept in {**ALONE, "none": ()}.items():
-        found[name] = summary(leave_one_out(robots, kept))
+    found = {"as shipped": summary(left)}
+    alone = {name: (name,) for name in QUANTITIES}
+    for name, kept in {"every": QUANTITIES, **alone, "none": ()}.items():
+        found[name] = summary(leave_one_out(robots, kept, options.chains))
     print(f"\n{'predictors':16}  joint  robot  together  coverage (bootstrap)  50 %  factor")
     for name, one in found.items():
         low, high = one["coverage_bootstrap_95"]

@@ -37,8 +37,10 @@ def test_assess_says_first_what_it_assumes(bare, tmp_path, capsys):
     page, out = tmp_path / "r.html", tmp_path / "a.json"
     assert run(["assess", str(bare), "--payload", "10", "--report", str(page),
                 "--json", str(out)]) == 0  # fmt: skip
-    said = told(capsys)
+    printed = capsys.readouterr()
+    said = " ".join(printed.out.split())
     assert said.startswith("Estimated: nobody measured the stiffness, damping and strength")
+    assert "Estimated" not in printed.err
     assert "No task was given, so one is assumed: 12 blows a rivet of 98.1 N, the weight" in said
     assert said.index("pose 5:") < said.index("The joints, P10 to P90")
     assert "What to measure first" in said
@@ -112,14 +114,35 @@ def test_a_map_and_its_plot_say_it(bare, tmp_path, capsys):
     path, out = tmp_path / "m.nc", tmp_path / "m.json"
     command = ["map", str(bare), "--joint-grid", "2", "--out", str(path), "--json", str(out)]
     assert run(command) == 0
-    assert json.loads(out.read_text())["estimated"]
-    assert told(capsys).startswith("Estimated: nobody measured")
+    content = json.loads(out.read_text())
+    assert content["estimated"]
+    said = capsys.readouterr()
+    assert said.out.startswith("Estimated: nobody measured") and "Estimated" not in said.err
+    assert "P10 to P90" in said.out
     from picchio.studies.maps.stored import open_map
 
     with open_map(path) as found:
         ax = plot_workspace_map(found, "joint_2")
+        torque = found["peak_torque_quantiles"].values
+        pose = found["pose"].values[5]
     assert "estimated" in ax.get_title(loc="left")
     assert any(patch.get_hatch() for patch in ax.patches)
+    assert (torque[..., 0] < torque[..., 1]).all() and (torque[..., 1] < torque[..., 2]).all()
+    # Against the envelope of the same drawn robots: exact in time and direction.
+    envelope = picchio.envelope(picchio.load_robot(bare), pose, BLOWS)
+    np.testing.assert_allclose(torque[5][:, [0, 2]], envelope.peak_interval("torque"), rtol=0.02)
+    told_by = content["joints"][1]["estimate"]
+    assert told_by["peak_torque"]["P90"] <= torque[:, 1, 2].max()
+    assert told_by["peak_deflection"]["P10"] < told_by["peak_deflection"]["P90"]
+
+
+def test_a_map_of_known_springs_has_no_band(tmp_path):
+    from picchio.studies.maps.places import joint_grid
+
+    robot = picchio.load_robot("fanuc_like_3dof")
+    with picchio.workspace_map(robot, joint_grid(robot, 2), BLOWS, tmp_path / "m.nc") as found:
+        assert not {"level", "peak_torque_quantiles"} & set(found.dataset.variables)
+        assert not any("p90" in column for column in found.to_frame().columns)
 
 
 def test_hatched_bars_reach_from_p10_to_p90(bare):
@@ -169,3 +192,16 @@ def test_what_a_life_allows_is_by_the_estimated_drives(bare):
     # A yes by estimates is no promise.
     easy = picchio.allowable(robot, harder(1e-4), 1e4, gravity_balanced=True)
     assert easy.met and easy.answer.startswith("Probably: ") and not easy.yes
+
+
+def test_what_a_slide_bears_is_estimated_from_its_effort_limit(capsys):
+    assert run(["assess", "emps"]) == 0
+    said = told(capsys)
+    assert said.startswith("Estimated: nobody measured the strength of the drives of emps")
+    assert "no end" in said and "%" in said
+    assert "what the drive of slide bears, from its maker" in said and "--reducer" not in said
+    robot = picchio.load_robot("emps")
+    (joint,) = robot.flexible_joints
+    spread = robot.spreads["strength.repeated_peak_torque.slide"]
+    assert joint.effort_limit < joint.strength.repeated_peak_torque < 3.0 * joint.effort_limit
+    assert spread.size == pytest.approx(np.log(2.5), rel=0.1)

@@ -76,7 +76,7 @@ def test_what_is_written_reads_well(tmp_path: Path) -> None:
     (tmp_path / "bare.urdf").write_text(ARM)
     flex, task = picchio.start(tmp_path / "bare.urdf").save(tmp_path)
     text = flex.read_text()
-    assert all(len(line) <= 88 for line in [*text.splitlines(), *task.read_text().splitlines()])
+    assert all(len(line) <= 80 for line in [*text.splitlines(), *task.read_text().splitlines()])
     assert "# Left rigid: sliding joints, since no drive of one was measured: slide." in text
     assert "# Stiffness: from the inertia it carries" in text
     assert '[joint."joint.2"]' in text

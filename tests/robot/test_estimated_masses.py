@@ -93,3 +93,17 @@ def test_nothing_to_estimate_masses_by_is_refused(tmp_path):
     )
     with pytest.raises(InputError, match=r"no joint that moves the tool moves a mass.*--flex"):
         load_robot(path)
+
+
+def test_a_gripper_without_masses_is_no_arm(tmp_path):
+    path = tmp_path / "finger.urdf"
+    path.write_text(
+        '<robot name="finger"><link name="palm"/><link name="tip"/>'
+        '<joint name="knuckle" type="revolute"><parent link="palm"/><child link="tip"/>'
+        '<origin xyz="0 0 0.03"/><axis xyz="1 0 0"/>'
+        '<limit effort="10" velocity="2" lower="0" upper="1"/></joint>'
+        '<link name="pad"/><joint name="end" type="fixed"><parent link="tip"/>'
+        '<child link="pad"/><origin xyz="0 0.03 0"/></joint></robot>'
+    )
+    with pytest.raises(InputError, match="no masses, and 30 mm from joint to joint are no arm"):
+        load_robot(path)

@@ -14,7 +14,8 @@ from picchio.core.errors import InputError
 from picchio.fatigue.counting.counter import rainflow
 from picchio.robot.joint import Strength
 from picchio.studies.rivet.poses import damage_at
-from picchio.studies.uncertainty.measurements import expected_width
+from picchio.studies.uncertainty.drawn import Drawn
+from picchio.studies.uncertainty.measurements import FittedWorlds
 
 PEAK = 900.0
 BEARS = {"repeated_peak_torque": PEAK, "repeated_peak_torque_spread": 1.6, "estimated": True}
@@ -145,9 +146,25 @@ def test_a_wanted_life_counts_estimated_drives(bare) -> None:
 
 def test_a_measurement_leaves_what_normal_theory_says() -> None:
     rng = np.random.default_rng(3)
-    x, rest = rng.standard_normal((2, 8192))
+    moved = rng.standard_normal((512, 3))
+    x, y, rest = moved.T
     width = 2.0 * 1.2815515655446004
-    # The outcome's variance is 4 x^2 + 1; x is read with an error of 0.5.
-    left = math.sqrt(1.0 + 4.0 * 0.25 / 1.25)
-    read = x + 0.5 * rng.standard_normal(8192)
-    assert expected_width(2.0 * x + rest, read[:, None]) == pytest.approx(width * left, rel=0.03)
+    # log10 of the utilisation is 2 x + y + rest / 2, of variance 5.25; of two parts, one is idle.
+    used = 10.0 ** np.stack([2.0 * x + y + 0.5 * rest, np.full(512, -30.0)])
+    drawn = Drawn(np.full((2, 512), np.inf), used, used, used, np.full((2, 512), np.nan))
+    worlds = FittedWorlds.of(moved, drawn, endless=True)
+    for columns, error, variance in (
+        ([], [], 5.25),
+        ([0], [0.5], 5.25 - 4.0 / 1.25),  # read with an error
+        ([0, 1], [1e-6, 1e-6], 0.25),
+    ):
+        left = worlds.expected_width(np.eye(3), columns, np.array(error))
+        assert left == pytest.approx(width * math.sqrt(variance), rel=0.03)
+    # Two equal parts: the larger one counts, and knowing one of them narrows little.
+    used = 10.0 ** np.stack([x, y])
+    worlds = FittedWorlds.of(moved, drawn._replace(used=used), endless=True)
+    now = worlds.expected_width(np.eye(3), [], np.zeros(0))
+    larger = np.maximum(*rng.standard_normal((2, 10**6)))
+    assert now == pytest.approx(np.subtract(*np.quantile(larger, [0.9, 0.1])), rel=0.03)
+    one, both = (worlds.expected_width(np.eye(3), c, np.full(len(c), 1e-6)) for c in ([0], [0, 1]))
+    assert both < 0.02 * now < 0.5 * now < one < now

@@ -19,11 +19,12 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
 from picchio.robot.varied import robot_with
 from picchio.studies.assessment.run import assess
+from picchio.studies.rivet.pose import ModelAtPose
 from picchio.studies.rivet.variation import WornParts
-from picchio.studies.tasks import Task, task_from_dict
+from picchio.studies.tasks import Task, load_task, task_from_dict
 from picchio.studies.uncertainty.inputs import DEFAULT_INPUTS, inputs_of
 from picchio.studies.uncertainty.run import uncertain_life
-from picchio.studies.uncertainty.sampler import Sampler
+from picchio.studies.uncertainty.sampler import Sampler, _Draw
 
 STRAIGHT = SNCurve(name="straight", strength=60e6, cycles=1e6, slopes=(5.0,))
 STEEL = dataclasses.replace(
@@ -235,3 +236,22 @@ def test_a_drawn_world_is_assess_on_the_changed_robot(
     drawn = Sampler(model, task, stress, inputs_of(model, task, stress, {}, [])).run(rows)
     np.testing.assert_allclose(drawn.yielding.T, yielding, rtol=1e-5)
     np.testing.assert_allclose(drawn.geared[1], geared, rtol=1e-5)
+
+
+def test_a_drawn_stiffness_may_lie_far_beyond_an_effects_bounds() -> None:
+    """A mode that is not underdamped is computed by a whole model, whatever its springs are."""
+    robot = load_robot("fanuc_like_3dof")
+    assert robot.task_path is not None
+    task = load_task(robot.task_path, robot)
+    model = Model.of(robot)
+    given = {"stiffness": Uncertain(1.0, 1.0), "damping_ratio": Uncertain(1.0, 1.0)}
+    sampler = Sampler.of(model, task, WornParts.of(robot, None), given, [])
+    score = np.zeros((2, len(sampler.inputs)))
+    which = {each.key: i for i, each in enumerate(sampler.inputs)}
+    score[:, which["stiffness"]] = np.log([60.0, 1.0 / 3000.0])
+    score[:, which["damping_ratio"]] = np.log(50.0)  # 1.5: overdamped
+    assert (sampler.run(score).used > 0.0).all()
+    draw = _Draw.of(sampler, score, np.ones(2))
+    for d, factor in enumerate((60.0, 1.0 / 3000.0)):
+        at = ModelAtPose(draw._model(d), task.operations[0].poses[0])
+        np.testing.assert_allclose(at.stiffness, factor * robot.stiffness, rtol=1e-9)

@@ -8,6 +8,7 @@ import re
 import shlex
 import sys
 import textwrap
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from picchio.cli.layout import FittedTable, Row
 from picchio.cli.waiting import waiting
-from picchio.core.errors import InputError, OutputError
+from picchio.core.errors import InputError, OutputError, PicchioWarning
 from picchio.core.files import atomic_write, is_stream
 from picchio.core.results import json_pieces
 
@@ -50,6 +51,19 @@ def say_warning(message: str) -> None:
     if line not in _said:
         _said.append(line)
         print(f"picchio: warning: {printable(line)}", file=sys.stderr)
+
+
+@contextmanager
+def notice_first(target: str | None) -> Iterator[None]:
+    """Meanwhile no warning that drives are estimates: it heads what is printed.
+
+    Args:
+        target: of `--json`; where stdout holds the JSON alone, the warning stays.
+    """
+    with warnings.catch_warnings():
+        if target != "-":
+            warnings.filterwarnings("ignore", "Estimated: ", PicchioWarning)
+        yield
 
 
 def console() -> Console:

@@ -25,6 +25,18 @@ def stress_per_torque(joints: Iterable[Joint], without: float = math.nan) -> Flo
     return np.array([joint.per_torque if joint.worn else without for joint in joints])
 
 
+def shaft_stress_per_torque(joints: Iterable[Joint]) -> FloatArray:
+    """As `stress_per_torque`, of shafts alone.
+
+    Args:
+        joints: n of them.
+
+    Returns:
+        (n,) 1/m^3; NaN for a joint without a shaft.
+    """
+    return np.array([joint.per_torque if joint.shaft else math.nan for joint in joints])
+
+
 def shear_stress(torque: npt.ArrayLike, shaft: Shaft) -> FloatArray:
     """Shear stress at the shaft's surface under a torque: tau = T r / Jp.
 

@@ -18,6 +18,8 @@ from picchio.robot.urdf.tree import Inertial
 
 # Of a joint, what its vibration depends on.
 _SPRINGS = ("stiffness", "damping_ratio")
+CASES = 64
+"""Robots that are drawn where springs are estimates, for a band beside the most likely values."""
 
 
 def robot_with(robot: FlexibleRobot, values: Iterable[tuple[Spread, Number]]) -> FlexibleRobot:
@@ -85,6 +87,19 @@ def drawn_robots(robot: FlexibleRobot, count: int, seed: int = 0) -> Iterator[Fl
     for row in np.random.default_rng(seed).standard_normal((count, len(spreads))) @ root:
         values = [(one, one.at(float(score))) for one, score in zip(spreads, row, strict=True)]
         yield robot_with(robot, values)
+
+
+def cases_of(robot: FlexibleRobot) -> Iterator[FlexibleRobot]:
+    """`CASES` drawn robots where a stiffness or damping is an estimate; else none.
+
+    Args:
+        robot: whose values may have spreads.
+
+    Yields:
+        each, its values known exactly; always the same ones.
+    """
+    if any(one.estimated for one in springs_of(robot)):
+        yield from drawn_robots(robot, CASES)
 
 
 def _weighed(body: Inertial | None, spread: Spread, value: Any) -> Inertial:

@@ -16,19 +16,19 @@ from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
 from picchio.excitation.excitation import Excitation
-from picchio.fatigue.shaft_stress import stress_per_torque
+from picchio.fatigue.shaft_stress import shaft_stress_per_torque
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.units import JointUnits, column, units_of
-from picchio.robot.varied import drawn_robots, springs_of
+from picchio.robot.varied import cases_of
 from picchio.studies.rivet.pose import ModelAtPose
 from picchio.vibration.closed_form.response import Response, described, peak_deflections
 
 FORMAT = "picchio-envelope/1"
 Quantity = Literal["deflection", "torque", "stress"]
 QUANTITIES: tuple[Quantity, ...] = ("deflection", "torque", "stress")
-# Drawn robots where values are estimates; between these quantiles 80 % of them lie.
-_CASES, ENDS = 64, (0.1, 0.9)
+# Between these quantiles 80 % of drawn robots lie.
+ENDS = (0.1, 0.9)
 _TIMES = 1024  # of a drawn case's curve
 
 
@@ -299,7 +299,7 @@ def envelope(
         peak_tool_displacement=tool,
         worst_tool_direction=direction,
         torque_factor=np.array(at.stiffness),
-        stress_factor=at.stiffness * stress_per_torque(model.robot.flexible_joints),
+        stress_factor=at.stiffness * shaft_stress_per_torque(model.robot.flexible_joints),
         response=response,
         notes=model.without_load(),
         cases=curves,
@@ -313,16 +313,16 @@ def _cases(
 ) -> tuple[FloatArray, FloatArray]:
     """Of drawn robots, where springs are estimates: g_j(t) (c, n, 3, t) and stiffness (c, n)."""
     n = len(model.robot.flexible_joints)
-    if not any(one.estimated for one in springs_of(model.robot)):
-        return np.empty((0, n, 3, 0)), np.empty((0, n))
     curves, stiffness = [], []
-    for robot in drawn_robots(model.robot, _CASES):
+    for robot in cases_of(model.robot):
         at = ModelAtPose(replace(model, robot=robot), pose)
         response = at.response(excitation, hits)
         force, slowest = response.force, 1.0 / at.natural_frequencies[0]
         end = force.end if response.periodic else float(force.start[-1]) + slowest
         curves.append(response.unit_deflection(np.linspace(0.0, end, _TIMES)))
         stiffness.append(at.stiffness)
+    if not curves:
+        return np.empty((0, n, 3, 0)), np.empty((0, n))
     return np.array(curves), np.array(stiffness)
 
 

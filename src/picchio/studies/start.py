@@ -29,9 +29,9 @@ Every rivet takes a train of blows. Along each axis the robot sets one rivet in 
 poses, and then begins again. `picchio formats task` lists all that may stand here."""
 _POSES = """\
 Five poses drawn with seed {seed}: within the joints' limits, in front of the robot and
-above the plane it stands on, neither stretched nor folded, away from singular ones. Whether
-its links touch one another was told from its joints alone, not from meshes. rad (m where a
-joint slides){order}.
+above the plane it stands on, neither stretched nor folded, away from singular ones. No mesh
+was looked at: check that its links do not touch one another. In rad (m where a joint
+slides){order}.
 
 In place of `poses`, `points = [[x, y, z], ...]` says in m where the tool shall be, and
 picchio finds the poses."""

@@ -30,6 +30,7 @@ from picchio.cli.output import (
     console,
     count_of,
     deliver,
+    notice_first,
     progress,
     styled,
     table,
@@ -191,10 +192,11 @@ def assess(
         from picchio.visuals.report.cover import embedded
 
         embedded(logo)  # refused before any work
-    loaded = picchio.load_robot(
-        robot, flex=flex, tool=tool, reducers=reducers or (), payload=payload, reach=reach,
-        drive_class=drive_class,
-    )  # fmt: skip
+    with notice_first(json):
+        loaded = picchio.load_robot(
+            robot, flex=flex, tool=tool, reducers=reducers or (), payload=payload, reach=reach,
+            drive_class=drive_class,
+        )  # fmt: skip
     work = task_of(loaded, task, payload=payload)
     check_targets((json, report), [*loaded.files, *work.files, sn_curve, logo])
     options: dict[str, Any] = {
@@ -298,6 +300,7 @@ def show(found: Assessment, task: Task, terms: tuple[Term, ...] = ()) -> None:
                 )
     if task.note:
         poses = task.operations[0].poses
+        out.print("    the poses in rad, of a slide in m:")
         for k, pose in enumerate(poses):
             out.print(f"    pose {k + 1}: {', '.join(f'{q:.3g}' for q in pose)}")
     out.print()

@@ -20,7 +20,15 @@ from picchio.cli.options import (
     WidthOption,
     numbers,
 )
-from picchio.cli.output import check_targets, console, deliver, progress, styled, table
+from picchio.cli.output import (
+    check_targets,
+    console,
+    deliver,
+    notice_first,
+    progress,
+    styled,
+    table,
+)
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -128,7 +136,8 @@ def map_(
     import picchio
     from picchio.studies.tasks import blows_of, hits_of_rivet
 
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+    with notice_first(json):
+        loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     check_targets((out, json), [*loaded.files, points, surface])
     where = _places(loaded, plane, at, box, points, surface, joint_grid, spacing, bounds)
     if direction is None:
@@ -205,19 +214,31 @@ def _show(summary: dict[str, Any]) -> None:
         f"  {summary['excitation']}; {summary['response']}, "
         f"{along.get(summary['direction'], 'along ' + summary['direction'])}"
     )
-    # Stresses rank joints; where not every joint has a shaft, torques do.
-    shafts = all(joint["peak_shear_stress"] is not None for joint in summary["joints"])
-    limit = "most stress" if shafts else "most torque"
+    # Stresses rank joints; of drives, shares of what they bear; else torques.
+    stresses = [joint["peak_shear_stress"] for joint in summary["joints"]]
+    limit = "most stress" if None not in stresses else "most torque"
+    if summary["estimated"]:
+        limit = "nearest to\nits limit"
     units = [units_of(joint["kind"]) for joint in summary["joints"]]
+
+    def told(joint: dict[str, Any], key: str, scale: float) -> str:
+        if "estimate" not in joint:
+            return f"{scale * joint[key]:.4g}"
+        ends = joint["estimate"][key]
+        return f"{scale * ends['P10']:.3g} to {scale * ends['P90']:.3g}"
+
     small, peaks = column(
         [u.small for u in units],
-        [f"{1e3 * joint['peak_deflection']:.4g}" for joint in summary["joints"]],
+        [told(joint, "peak_deflection", 1e3) for joint in summary["joints"]],
     )
     load, torques = column(
-        [u.load for u in units], [f"{joint['peak_torque']:.4g}" for joint in summary["joints"]]
+        [u.load for u in units], [told(joint, "peak_torque", 1.0) for joint in summary["joints"]]
     )
-    heads = ["joint", f">largest\ndeflection\n{small}", f">torque\nthere\n{load}",
-             ">stress\nthere\nMPa", ">where\nm", f">{limit},\n% of\nposes"]  # fmt: skip
+    heads = ["joint", f">largest\ndeflection\n{small}", f">torque\nthere\n{load}", ">where\nm",
+             f">{limit},\n% of\nposes"]  # fmt: skip
+    stressed = any(stress is not None for stress in stresses)
+    if stressed:
+        heads.insert(3, ">stress\nthere\nMPa")
     if counted:
         heads.append(">damage of\na rivet,\nat most")
     rows = []
@@ -227,12 +248,13 @@ def _show(summary: dict[str, Any]) -> None:
             joint["name"],
             peaks[k],
             torques[k],
-            "-" if stress is None else f"{stress / 1e6:.4g}",
-            ", ".join(f"{round(c, 3) + 0.0:.3f}" for c in joint["position"]),
+            *(["-" if stress is None else f"{stress / 1e6:.4g}"] if stressed else []),
+            ", ".join(f"{round(c, 3) + 0.0:.3f}" for c in joint.get("estimate", joint)["position"]),
             f"{100 * joint['limits_poses'] / summary['poses']:.1f}",
         ]
         rows.append([*cells, "-" if damage is None else f"{damage:.3g}"][: len(heads)])
-    out.print(table(heads, rows))
+    title = "P10 to P90, where P90 is largest" if "estimate" in summary["joints"][0] else None
+    out.print(table(heads, rows, title=title))
     if counted:
         none = all(joint.get("damage_per_rivet", 0.0) == 0.0 for joint in summary["joints"])
         out.print(

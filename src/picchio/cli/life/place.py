@@ -19,7 +19,15 @@ from picchio.cli.options import (
     ToolOption,
     numbers,
 )
-from picchio.cli.output import check_targets, console, deliver, progress, styled, table
+from picchio.cli.output import (
+    check_targets,
+    console,
+    deliver,
+    notice_first,
+    progress,
+    styled,
+    table,
+)
 from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.studies.assessment.result import format_count
 
@@ -92,7 +100,8 @@ def place(
     if far is not None:
         far[3] = math.radians(far[3])
     rates = None if period_range is None else numbers(period_range, "--period-range", 2)
-    loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+    with notice_first(json):
+        loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
     work = task_of(loaded, task)
     check_targets((json, out), [*loaded.files, *work.files, sn_curve])
     with progress("steps of the search") as tick:

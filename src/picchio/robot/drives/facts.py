@@ -11,7 +11,7 @@ import json
 import math
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -21,7 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from picchio.robot.drives.hierarchy import Draws, Group, fit
-from picchio.robot.drives.predictors import QUANTITIES, Predictors, places, predictors
+from picchio.robot.drives.predictors import (
+    OF_EFFORT,
+    OF_STIFFNESS,
+    QUANTITIES,
+    Predictors,
+    places,
+    predictors,
+)
 from picchio.robot.drives.reducer import Reducer, all_reducers
 
 if TYPE_CHECKING:
@@ -29,10 +36,13 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+_TARGETS = 2  # columns of stiffness, an arm's and a wrist's
 CLASSES = ("strain-wave", "cycloidal", "planetary")
 """Of drives, as far as the data have them."""
-_DRAWS = 100
-_DIGITS = 4
+# Of the sampler: with fewer sweeps, scores of robots left out differ from seed to seed by as much
+# as the predictors differ among themselves.
+_DRAWS, _SWEEPS = 200, 6000
+_DIGITS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +51,7 @@ class MeasuredRobot:
 
     Attributes:
         name: of the robot.
-        group: (n, 9) logarithms: stiffness in N m/rad of an arm's joints and of a wrist's, then
+        group: (n, 8) logarithms: stiffness in N m/rad of an arm's joints and of a wrist's, then
             the predictors; NaN where not known.
         evidence: how its stiffness was found; "" if it was not.
         source: of what is known of it.
@@ -66,7 +76,8 @@ class Fitted:
     """What is known of drives in general.
 
     Attributes:
-        stiffness: draws of its distribution beside the predictors'.
+        stiffness: draws of its distribution beside those of `OF_STIFFNESS`.
+        effort: draws of the effort limit's beside those of `OF_EFFORT`.
         damping: draws of the damping ratio's.
         shares: by robot, stiffness of a joint over its reducer's by the catalogue.
         rings: by place ("first", "arm"), the lowest and highest frequency of a measured joint
@@ -74,6 +85,7 @@ class Fitted:
     """
 
     stiffness: Draws
+    effort: Draws
     damping: Draws
     shares: tuple[float, ...]
     rings: Mapping[str, tuple[float, float, int]]
@@ -88,7 +100,7 @@ def group_of(found: Predictors, stiffness: Array | None = None, kind: int | None
         kind: index of its class in `CLASSES`, or None.
     """
     asked = found.place[:, 1].astype(np.intp)
-    columns = np.full((len(asked), 2), np.nan)
+    columns = np.full((len(asked), _TARGETS), np.nan)
     if stiffness is not None:
         columns[np.arange(len(asked)), asked] = stiffness
     return Group(np.hstack([columns, found.values]), found.place, asked, kind)
@@ -103,15 +115,41 @@ def measured_robots(load: Callable[[str], FlexibleRobot]) -> list[MeasuredRobot]
     return [_measured(entry, load) for entry in _facts()["robot"]]
 
 
-def fit_stiffness(robots: Sequence[MeasuredRobot]) -> Draws:
+def stiffness_beside(group: Group, names: Sequence[str] = OF_STIFFNESS) -> Group:
+    """A robot's table with the predictors of its stiffness alone.
+
+    Args:
+        group: of `group_of`.
+        names: of the predictors.
+    """
+    columns = [0, 1, *(_TARGETS + QUANTITIES.index(name) for name in names)]
+    return replace(group, values=group.values[:, columns])
+
+
+def effort_beside(group: Group) -> Group:
+    """A robot's table with its effort limits as what is asked for, beside their predictors.
+
+    Args:
+        group: of `group_of`.
+    """
+    columns = [_TARGETS + QUANTITIES.index(name) for name in ("effort", *OF_EFFORT)]
+    nothing = np.zeros_like(group.asked)
+    return Group(group.values[:, columns], group.place, nothing)
+
+
+def fit_stiffness(
+    robots: Sequence[MeasuredRobot], names: Sequence[str] = OF_STIFFNESS, seed: int = 0
+) -> Draws:
     """The distribution of stiffness beside the predictors'.
 
     Args:
         robots: of the data, or some of them.
+        names: of the predictors.
+        seed: of the chain.
     """
-    groups = [robot.group for robot in robots]
-    spread = class_spread()
-    return fit(groups, classes=len(CLASSES), class_spread=spread, draws=_DRAWS)
+    groups = [stiffness_beside(robot.group, names) for robot in robots]
+    return fit(groups, classes=len(CLASSES), class_spread=class_spread(), draws=_DRAWS,
+               sweeps=_SWEEPS, seed=seed)  # fmt: skip
 
 
 def refit(robots: Sequence[MeasuredRobot]) -> Fitted:
@@ -125,7 +163,8 @@ def refit(robots: Sequence[MeasuredRobot]) -> Fitted:
     """
     return Fitted(
         _rounded(fit_stiffness(robots)),
-        _rounded(fit(damping_groups(), draws=_DRAWS)),
+        _rounded(fit([effort_beside(one.group) for one in robots], draws=_DRAWS, sweeps=_SWEEPS)),
+        _rounded(fit(damping_groups(), draws=_DRAWS, sweeps=_SWEEPS)),
         tuple(robot.reducer_share for robot in robots if robot.reducer_share is not None),
         {place: _rings(robots, place) for place in ("first", "arm")},
     )
@@ -189,11 +228,11 @@ def facts_hash() -> str:
 def fitted() -> Fitted:
     """What ships."""
     data = json.loads((_folder() / "fitted.json").read_text(encoding="utf-8"))
-    one, other = (
+    stiffness, effort, damping = (
         Draws(int(data[name].pop("targets")), **{k: _array(v) for k, v in data[name].items()})
-        for name in ("stiffness", "damping")
+        for name in ("stiffness", "effort", "damping")
     )
-    return Fitted(one, other, tuple(data["shares"]),
+    return Fitted(stiffness, effort, damping, tuple(data["shares"]),
                   {place: tuple(row) for place, row in data["rings"].items()})  # fmt: skip
 
 
@@ -234,7 +273,7 @@ def _measured(entry: Mapping[str, Any], load: Callable[[str], FlexibleRobot]) ->
 
 
 def _rings(robots: Sequence[MeasuredRobot], place: str) -> tuple[float, float, int]:
-    inertia = 2 + QUANTITIES.index("inertia")
+    inertia = _TARGETS + QUANTITIES.index("inertia")
     found = []
     for robot in robots:
         first = robot.group.place[:, 0] > 0.0

@@ -191,29 +191,25 @@ def fit(
     return Draws(targets, *(np.array(column) for column in zip(*kept, strict=True)))
 
 
-def predict(draws: Draws, group: Group, also: int | None = None) -> tuple[Array, Array, Array]:
+def predict(draws: Draws, group: Group, *, given: bool = False) -> tuple[Array, Array, Array]:
     """What is asked for of a robot's joints, given what is known of the rest, as a mixture.
 
     Args:
         draws: of the posterior.
-        group: the robot; the quantities that can be asked for are not read.
-        also: another quantity that is asked for of every joint; where it is known, it is that.
+        group: the robot.
+        given: read also the quantities that can be asked for: those of a joint that are known
+            stand as they are, and tell of the others. Else they are not read.
 
     Returns:
-        weights (k,), means (k, n) and covariances (k, n, n) of the parts; 2 n with another
-        quantity, which stands behind.
+        weights (k,), means (k, n) and covariances (k, n, n) of the parts.
     """
     n = len(group.values)
-    joint = np.arange(n)
-    asked = group.asked
-    if also is not None:
-        asked, joint = np.concatenate([asked, np.full(n, also)]), np.tile(joint, 2)
+    joint, asked = np.arange(n), group.asked
     there = ~np.isnan(group.values)
-    there[:, : draws.targets] = False
+    there[:, : draws.targets] &= given
     rows, columns = np.nonzero(there)
     data = group.values[rows, columns]
     same, own_row = rows[:, None] == rows, joint[:, None] == rows
-    together, shifted = joint[:, None] == joint, np.arange(len(asked)) < n
     means, covs = [], []
     for k in range(len(draws.mean)):
         a, b = draws.size[k], draws.joint_size[k]
@@ -224,14 +220,14 @@ def predict(draws: Draws, group: Group, also: int | None = None) -> tuple[Array,
         cross = between[np.ix_(asked, columns)] + own_row * within[np.ix_(asked, columns)]
         gain = np.linalg.solve(cov, cross.T).T
         means.append(centre[joint, asked] + gain @ (data - centre[rows, columns]))
-        own = between[np.ix_(asked, asked)] + together * within[np.ix_(asked, asked)]
+        own = between[np.ix_(asked, asked)] + np.eye(n) * within[np.ix_(asked, asked)]
         covs.append(own - gain @ cross.T)
     kinds = range(draws.share.shape[1]) if group.kind is None else [group.kind]
     weight = draws.share[:, kinds] / draws.share[:, kinds].sum(axis=1, keepdims=True)
-    moved = np.array(means)[:, None] + draws.shift[:, kinds, None] * shifted
+    moved = np.array(means)[:, None] + draws.shift[:, kinds, None]
     return (
         (weight / len(weight)).ravel(),
-        moved.reshape(-1, len(asked)),
+        moved.reshape(-1, n),
         np.repeat(np.array(covs), len(kinds), axis=0),
     )
 

@@ -17,18 +17,21 @@ Array = NDArray[np.float64]
 
 QUANTITIES = (
     "inertia",
-    "wrist_inertia",
     "gravity_torque",
     "lever",
     "effort",
     "speed",
     "payload",
 )
-"""The predictors, in the order of the columns; `meaning` has them in words."""
+"""What is read of a joint, in the order of the columns; `meaning` has it in words."""
+OF_STIFFNESS = ("inertia", "gravity_torque", "payload")
+"""Of these, what foretells the stiffness. Levers and limits made the prediction worse, as robots
+that were left out tell (`python benchmarks/drive_priors.py --nested`)."""
+OF_EFFORT = ("inertia", "gravity_torque", "lever", "speed", "payload")
+"""What foretells an effort limit that is not known."""
 
 meaning = {
     "inertia": "the inertia it carries when the arm is stretched",
-    "wrist_inertia": "the inertia that the URDF gives its wrist",
     "gravity_torque": "the arm's own weight that it holds when stretched",
     "lever": "the tool's distance from its axis",
     "effort": "its effort limit",
@@ -47,8 +50,8 @@ class Predictors:
 
     Attributes:
         names: of the joints.
-        values: (n, 7) natural logarithms in the order of `QUANTITIES`: kg m^2, kg m^2, N m, m,
-            N m, rad/s, kg; NaN where not known.
+        values: (n, 6) natural logarithms in the order of `QUANTITIES`: kg m^2, N m, m, N m, rad/s,
+            kg; NaN where not known.
         place: (n, 2) zeros and ones: the first joint, a joint of the wrist.
     """
 
@@ -77,9 +80,10 @@ def predictors(
 
     Inertia is the largest diagonal entry of the mass matrix, gravity's torque and the tool's
     distance from the axis the largest magnitudes, over 400 poses within the limits (within half a
-    turn where there are none). Of a wrist, gravity's torque is left out: what a URDF has there
-    depends on the tool that it leaves out. A limit of zero is one that the file does not know.
-    The payload is the robot's: it stands with the first joint, once.
+    turn where there are none). Of a wrist, inertia and gravity's torque are left out: what a URDF
+    has there depends on the tool, and often on the wrist, that it leaves out. A limit of zero is
+    one that the file does not know. The payload is the robot's: it stands with the first joint,
+    once.
 
     Args:
         robot: it may be rigid.
@@ -120,7 +124,6 @@ def predictors(
     columns = np.stack(
         [
             np.where(wrist, 0.0, inertia[chain]),
-            np.where(wrist, inertia[chain], 0.0),
             np.where(wrist | (gravity[chain] < _NOTHING * gravity.max()), 0.0, gravity[chain]),
             np.where(lever < _NOTHING * lever.max(), 0.0, lever),
             [joint.effort for joint in joints],

@@ -18,9 +18,23 @@ from numpy.typing import NDArray
 
 from picchio.core.errors import InputError
 from picchio.core.results import Result
-from picchio.robot.drives.facts import CLASSES, Fitted, catalogue_stiffness, fitted, group_of
+from picchio.robot.drives.facts import (
+    CLASSES,
+    Fitted,
+    catalogue_stiffness,
+    effort_beside,
+    fitted,
+    group_of,
+    stiffness_beside,
+)
 from picchio.robot.drives.hierarchy import Group, predict
-from picchio.robot.drives.predictors import QUANTITIES, Predictors, meaning, predictors
+from picchio.robot.drives.predictors import (
+    OF_STIFFNESS,
+    QUANTITIES,
+    Predictors,
+    meaning,
+    predictors,
+)
 from picchio.robot.drives.reducer import Reducer, load_reducer
 from picchio.robot.drives.strength import peak_over_effort, rated_torque, torque_ratios
 from picchio.robot.spread import Posterior
@@ -30,7 +44,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-UNITS = ("kg m^2", "kg m^2", "N m", "m", "N m", "rad/s", "kg")
+UNITS = dict(zip(QUANTITIES, ("kg m^2", "N m", "m", "N m", "rad/s", "kg"), strict=True))
 KNOWN_CLASSES = (*CLASSES, "direct", "ball-screw")
 """The classes that may be given; of the last two no joint was measured."""
 
@@ -237,14 +251,22 @@ def drive_priors(
     fit = fitted()
     group = group_of(found, kind=CLASSES.index(kind) if kind in CLASSES else None)
     n = len(found.names)
-    mixture = predict(fit.stiffness, group, also=2 + QUANTITIES.index("effort"))
+    mixture = predict(fit.stiffness, stiffness_beside(group))
     for joint, one in named.items():
         if (stiffness := catalogue_stiffness(one)) is not None:
             mixture = with_reducer(mixture, found.names.index(joint), stiffness, fit.shares)
-    mixture = _with_strength(mixture, found, named, kind)
-    both, torque_covariance = moments(mixture)
-    mean, covariance = both[:n], torque_covariance[:n, :n]
-    low, middle, high = np.exp(quantiles(mixture, (0.05, 0.5, 0.95)))
+    strength = repeated_peaks(predict(fit.effort, effort_beside(group), given=True), kind)
+    strength = _with_reducers(strength, found, named)
+    mean, covariance = moments(mixture)
+    torque_mean, torques = moments(strength)
+    # An error of the stiffness says nothing of one of the strength: they are fitted apart.
+    torque_covariance = np.zeros((2 * n, 2 * n))
+    torque_covariance[:n, :n], torque_covariance[n:, n:] = covariance, torques
+    low, middle, high = (
+        np.exp(np.concatenate(ends))
+        for ends in zip(*(quantiles(each, (0.05, 0.5, 0.95)) for each in (mixture, strength)),
+                        strict=True)
+    )  # fmt: skip
     nothing = Group(np.full((n, 1), np.nan), np.zeros((n, 0)), np.zeros(n, dtype=np.intp))
     damping = predict(fit.damping, nothing)
     damping_mean, damping_covariance = moments(damping)
@@ -252,7 +274,7 @@ def drive_priors(
     spread = np.exp(np.sqrt(np.diag(covariance)))
     damping_spread = np.exp(np.sqrt(np.diag(damping_covariance)))
     share = fit.stiffness.share.mean(axis=0)
-    torque_spread = np.exp(np.sqrt(np.diag(torque_covariance)[n:]))
+    torque_spread = np.exp(np.sqrt(np.diag(torques)))
     joints = []
     for k, name in enumerate(found.names):
         reducer, peak = named.get(name), float(middle[n + k])
@@ -268,7 +290,7 @@ def drive_priors(
             tuple(_strength_reasons(found, k, kind, reducer)), kind is None or kind in CLASSES,
         ))  # fmt: skip
     return DrivePriors(
-        robot.name, tuple(joints), mean, covariance, both[n:], torque_covariance, damping_mean,
+        robot.name, tuple(joints), mean, covariance, torque_mean, torque_covariance, damping_mean,
         damping_covariance, kind,
         {one: float(share[k]) for k, one in enumerate(CLASSES)} if kind is None else {kind: 1.0},
         {name: "no prismatic drive was measured" for name, joint in robot.tree.joints.items()
@@ -369,18 +391,24 @@ def with_reducer(
     return new / new.sum(), means + column * middle[:, None], covs + changed
 
 
-def _with_strength(
-    mixture: Mixture, found: Predictors, named: Mapping[str, Reducer], kind: str | None
-) -> Mixture:
-    """A mixture of stiffness and effort limit as one of stiffness and repeated-peak torque."""
-    weights, means, covs = mixture
-    n = len(found.names)
-    middle, spread = peak_over_effort(n, kind)
+def repeated_peaks(effort: Mixture, kind: str | None) -> Mixture:
+    """A mixture of a robot's effort limits, ln N m, as one of its limits for repeated peaks.
+
+    Args:
+        effort: of the n limits.
+        kind: class of the reducers, or None.
+    """
+    weights, means, covs = effort
+    middle, spread = peak_over_effort(means.shape[1], kind)
+    return weights, means + middle, covs + spread
+
+
+def _with_reducers(strength: Mixture, found: Predictors, named: Mapping[str, Reducer]) -> Mixture:
+    """Limits for repeated peaks where some are known from reducers."""
+    weights, means, covs = strength
     means, covs = means.copy(), covs.copy()
-    means[:, n:] += middle
-    covs[:, n:, n:] += spread
     for name, reducer in named.items():
-        k = n + found.names.index(name)
+        k = found.names.index(name)
         means[:, k] = math.log(reducer.repeated_peak_torque)
         covs[:, k, :] = covs[:, :, k] = 0.0
     return weights, means, covs
@@ -400,8 +428,8 @@ def _strength_reasons(
         else "no effort limit is known: it is foretold from what the joint moves and holds"
     )
     return [
-        f"{told}; effort limits are taken to lie between a reducer's rated torque and its limit "
-        f"for repeated peaks, which is {ratio:.2g} times as high in the catalogues"
+        f"{told}; it is taken to lie between the reducer's rated torque and its limit for repeated "
+        f"peaks, and catalogues have the latter {ratio:.2g} times as high"
     ]
 
 
@@ -416,23 +444,23 @@ def _reasons(
     """What a joint's values rest on."""
     row = found.values[k]
     known = [
-        f"{meaning[name]}, {math.exp(row[i]):.3g} {UNITS[i]}"
-        for i, name in enumerate(QUANTITIES)
-        if np.isfinite(row[i])
+        f"{meaning[name]}, {math.exp(value):.3g} {UNITS[name]}"
+        for name in OF_STIFFNESS
+        if np.isfinite(value := row[QUANTITIES.index(name)])
     ]
     if np.isfinite(payload := found.values[0, -1]) and k:
         known.append(f"{meaning['payload']}, {math.exp(payload):.3g} kg")
-    said = [f"from {'; '.join(known)}" if known else "from its place in the arm alone"]
+    said = [f"from {'; '.join(known)}" if known else "from the size of the rest of the arm"]
     inertia = row[QUANTITIES.index("inertia")]
     if np.isfinite(inertia):
         hertz = math.sqrt(stiffness / math.exp(inertia)) / (2.0 * math.pi)
         low, high, robots = fit.rings["arm" if k else "first"]
         said.append(
-            f"with the arm stretched it would ring at {hertz:.2g} Hz alone; joints like this "
-            f"that were measured do at {low:.2g} to {high:.2g} Hz in {robots} robots"
+            f"as the only soft joint of the stretched arm it would ring at {hertz:.2g} Hz; those "
+            f"that were measured, in {robots} robots, at {low:.2g} to {high:.2g} Hz"
         )
     if found.place[k, 1]:
-        said.append("a wrist: the inertias that URDFs give there tell little, hence the wide range")
+        said.append("a wrist: what URDFs give there tells little, hence the wide range")
     if reducer is not None and (own := catalogue_stiffness(reducer)) is not None:
         robots = len(fit.shares)
         many = "one robot" if robots == 1 else f"{robots} robots"

@@ -22,6 +22,8 @@ from picchio.robot.drives.reducer import Reducer, all_reducers
 
 Array = NDArray[np.float64]
 
+# No drive of a slide was measured, nor a pair of its limits read: taken as twice as uncertain.
+_SLIDES = 2.0
 # How much of the variance is common to a robot's joints: nobody published enough pairs to tell.
 _COMMON = 0.5
 
@@ -82,3 +84,20 @@ def rated_torque(peak: float, kind: str | None, reducer: Reducer | None) -> tupl
         return reducer.rated_torque, 1.0
     ratios = torque_ratios(kind)
     return peak / ratios.peak_over_rated, ratios.rated_spread
+
+
+def slide_strength(effort: float) -> tuple[float, float]:
+    """What the drive of a slide probably bears, by its effort limit alone.
+
+    As of a reducer: the effort limit lies between what counts as rated and the limit for repeated
+    peaks; but twice as uncertain, a judgement. A ball screw or a rack mostly bears more than its
+    motor can give, a belt may not.
+
+    Args:
+        effort: N, positive.
+
+    Returns:
+        N, the median of the limit for repeated peaks, and its spread, a factor.
+    """
+    half = 0.5 * math.log(torque_ratios().peak_over_rated)
+    return effort * math.exp(half), math.exp(_SLIDES * half)

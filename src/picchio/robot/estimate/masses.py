@@ -19,9 +19,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
 from picchio.robot.dynamics.rigid_model import RigidModel
 from picchio.robot.link import LinkEntry
-from picchio.robot.masses.check import weighs
+from picchio.robot.masses.check import WAYS_OUT, weighs
 from picchio.robot.urdf.normalised import normalise
 from picchio.robot.urdf.shapes import placement
 from picchio.robot.urdf.tree import MOVABLE, ZERO, Inertial
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 AT_ONE_METRE, GROWTH, TAPER, LEAST_LENGTH = 15.5, 3.0, 0.938, 0.469
 SPREAD = 2.4
 """A factor: how far the inertias about joints of arms left out of the fit are off."""
+_SHORTEST = 0.1
+"""m from joint to joint: what is shorter is a gripper or a finger, far from all arms of the fit."""
 _RADIUS = 0.04  # of gyration about a link's own axis, over the arm's length
 _DIGITS = 3
 
@@ -47,6 +50,9 @@ def estimated_masses(robot: FlexibleRobot) -> dict[str, LinkEntry]:
     Returns:
         by link, as a sidecar has them; empty where the URDF or a sidecar gives masses, and where
         nothing has a length.
+
+    Raises:
+        InputError: the chain is far too short for an arm.
     """
     tree = robot.tree
     chain = tree.chain(robot.tool_frame)
@@ -58,6 +64,12 @@ def estimated_masses(robot: FlexibleRobot) -> dict[str, LinkEntry]:
     size = float(lengths.sum())
     if not size > 0.0:
         return {}
+    if size < _SHORTEST:
+        raise InputError(
+            f"the URDF gives no masses, and {1e3 * size:.2g} mm from joint to joint are no arm "
+            "whose masses could be estimated",
+            key="link", hint=WAYS_OUT,
+        )  # fmt: skip
     source = (
         f"estimated: the URDF gives no masses; arms of {size:.2g} m from joint to joint weigh "
         f"about {AT_ONE_METRE * size**GROWTH:.2g} kg, and taper"

@@ -6,6 +6,7 @@ here, so that both give the same life.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ import numpy as np
 from picchio.core.errors import InputError
 from picchio.robot.annotations.sidecar import JointEntry, Sidecar, spreads_of
 from picchio.robot.drives.priors import DrivePriors, JointPrior, drive_priors
+from picchio.robot.drives.strength import slide_strength
 from picchio.robot.estimate.masses import SPREAD, estimated_masses, weighted
 from picchio.robot.joint import Strength
 from picchio.robot.link import LinkEntry
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 
 _TORQUES = ("repeated_peak_torque", "rated_torque", "momentary_peak_torque")
 _DIGITS = 3
+_POSSIBLE = (1e-2, 1e11)  # N m/rad, stiffnesses that a sidecar takes, and a little to spare
 _NEARLY = 0.99  # off the diagonal, where rounding left a matrix that no variables can have
 
 
@@ -65,6 +68,13 @@ def estimated_sidecar(
     if not kept:
         raise InputError("no joint that moves the tool moves a mass", key="link",
                          hint=WAYS_OUT)  # fmt: skip
+    for one in priors.joints:
+        if one.name in kept and not _POSSIBLE[0] < one.stiffness < _POSSIBLE[1]:
+            raise InputError(
+                f"the masses beyond {one.name} cannot be: they would take a drive of "
+                f"{one.stiffness:.1g} N m/rad",
+                key="link", hint=WAYS_OUT,
+            )  # fmt: skip
     return as_sidecar(robot, priors, reducers, links, kept)
 
 
@@ -105,6 +115,33 @@ def as_sidecar(
         tool=Tool(frame=robot.tool_frame),
         posterior=None if posterior is None else _rounded(posterior),
     )
+
+
+def slide_entries(robot: FlexibleRobot, names: Collection[str]) -> dict[str, JointEntry]:
+    """What the drives of flexible slides bear, estimated from their effort limits.
+
+    Args:
+        robot: whose they are.
+        names: joints of which it is not known.
+
+    Returns:
+        by joint, those that slide and have an effort limit.
+    """
+    found = {}
+    for joint in robot.flexible_joints:
+        if joint.kind != "prismatic" or joint.name not in names:
+            continue
+        if not math.isfinite(joint.effort_limit):
+            continue
+        peak, spread = slide_strength(joint.effort_limit)
+        bears = Strength(repeated_peak_torque=rounded(peak),
+                         repeated_peak_torque_spread=rounded(spread), estimated=True)  # type: ignore[call-arg] # fmt: skip
+        source = (
+            f"from its effort limit, {joint.effort_limit:.3g} N, alone: no drive of a slide was "
+            "measured, so the range is a judgement"
+        )
+        found[joint.name] = JointEntry(strength=bears, source=source)
+    return found
 
 
 def rounded(value: float) -> float:

@@ -14,7 +14,7 @@ from picchio.robot.annotations.sidecar import FORMAT, JointEntry, Sidecar, given
 from picchio.robot.link import LinkEntry
 from picchio.robot.spread import Posterior, value_of
 
-WIDTH = 88
+WIDTH = 79
 NINE_IN_TEN = 1.645
 """Standard deviations either side of the middle that hold 90 % of a normal distribution."""
 

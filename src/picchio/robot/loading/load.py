@@ -112,7 +112,7 @@ def _estimate(robot: FlexibleRobot, known: Mapping[str, Any]) -> Sidecar | None:
     Raises:
         InputError: no joint is flexible, and nothing can be estimated.
     """
-    from picchio.robot.estimate.sidecar import estimated_sidecar
+    from picchio.robot.estimate.sidecar import estimated_sidecar, slide_entries
 
     drives = [joint for joint in robot.flexible_joints if is_drive(joint.name)]
     if not drives:
@@ -132,14 +132,16 @@ def _estimate(robot: FlexibleRobot, known: Mapping[str, Any]) -> Sidecar | None:
     bare = {joint.name for joint in drives if joint.worn is None and joint.reducer is None}
     if not bare:
         return None
+    slides = slide_entries(robot, bare)
     try:
         whole = estimated_sidecar(robot, **known)
     except InputError as error:
         if error.key in known:
             raise
-        return None  # the verdict says that nothing is known of what they bear
-    joints = {name: JointEntry(strength=entry.strength, source=entry.source)
-              for name, entry in whole.joint.items() if name in bare}  # fmt: skip
+        # Of the others the verdict says that nothing is known of what they bear.
+        return Sidecar(joint=slides) if slides else None
+    joints = slides | {name: JointEntry(strength=entry.strength, source=entry.source)
+                       for name, entry in whole.joint.items() if name in bare}  # fmt: skip
     kept = {f"strength.repeated_peak_torque.{name}" for name in joints}
     posterior = None if whole.posterior is None else whole.posterior.among(kept)
     return Sidecar(joint=joints, posterior=posterior) if joints else None

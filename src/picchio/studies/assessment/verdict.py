@@ -286,11 +286,11 @@ def _failure(part: _Part) -> str:
 
 
 def _risk(part: _Part) -> str:
-    keeps = "keeps" if part.margin >= 1.0 else "exceeds"
+    keeps = "stays within" if part.margin >= 1.0 else "exceeds"
     values = "the most likely values" if part.joint.estimated else "the stated values"
     return (
-        f"The {part.name} {keeps} its {part.limit} at {values}, but these are uncertain: it "
-        f"is at {part.used}, and 10 % of the cases are beyond that"
+        f"At {values} the {part.name} {keeps} its {part.limit}, but these are uncertain: it is at "
+        f"{part.used} in 80 % of the cases, and above that in 10 %"
     )
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -10,9 +11,10 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.excitation.excitation import Excitation
-from picchio.fatigue.shaft_stress import stress_per_torque
+from picchio.fatigue.shaft_stress import shaft_stress_per_torque, stress_per_torque
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.varied import cases_of
 from picchio.studies.maps.places import Listed, Places
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.poses import damage_at, peaks_at
@@ -98,6 +100,8 @@ def _worst(cost, start: FloatArray) -> tuple[FloatArray, FloatArray]:  # type: i
 
 
 Columns = dict[str, FloatArray]
+LEVELS = {"P10": 0.1, "P50": 0.5, "P90": 0.9}
+"""The quantiles of an estimated robot's map, by name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +126,13 @@ class MapJob:
     hits: int | None
     damage: int | None = None
 
+    @cached_property
+    def cases(self) -> tuple[Model, ...]:
+        """Drawn robots, where a spring is an estimate and no place is integrated in time."""
+        if self.model.nonlinear:
+            return ()
+        return tuple(replace(self.model, robot=one) for one in cases_of(self.model.robot))
+
     def compute(self, first: int, last: int) -> Columns:
         """Rows of the places first to last - 1: one row a point and branch, none out of reach."""
         robot = self.model.robot
@@ -137,8 +148,10 @@ class MapJob:
         )
         position = tool_places(robot, poses)
         torque = stiffness * found.peak_deflection
-        stress = torque * stress_per_torque(robot.flexible_joints)
-        rank = np.where(np.isfinite(stress).all(axis=1)[:, None], stress, torque)
+        stress = torque * shaft_stress_per_torque(robot.flexible_joints)
+        # Of drives, what stands for the stress is the share of what they bear.
+        load = torque * stress_per_torque(robot.flexible_joints)
+        rank = np.where(np.isfinite(load).all(axis=1)[:, None], load, torque)
         columns = {
             "place": place,
             "position": position,
@@ -152,11 +165,25 @@ class MapJob:
             "worst_direction": found.direction,
             "limiting_joint": np.nan_to_num(rank, nan=-np.inf).argmax(axis=1).astype(np.int32),
         }
+        if self.cases:
+            columns |= self._band(poses, direction)
         if self.damage is not None:
             columns["damage_per_rivet"], columns["damage_direction"] = damage_of(
                 self.model, poses, self.excitation, self.damage, direction, found.direction
             )
         return columns
+
+    def _band(self, poses: FloatArray, direction: FloatArray | None) -> Columns:
+        """Quantiles of the drawn robots' peaks, (p, n, 3); each in its own worst direction."""
+        peaks = []
+        for case in self.cases:
+            found, stiffness = peaks_at(
+                case, poses, self.excitation, hits=self.hits, direction=direction
+            )
+            peaks.append((found.peak_deflection, stiffness * found.peak_deflection))
+        ends = np.quantile(np.array(peaks), list(LEVELS.values()), axis=0)
+        deflection, torque = np.moveaxis(ends, 0, -1)
+        return {"peak_deflection_quantiles": deflection, "peak_torque_quantiles": torque}
 
     def _direction(self, place: FloatArray) -> FloatArray | None:
         if self.direction == "worst":

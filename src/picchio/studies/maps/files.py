@@ -41,10 +41,25 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "limiting_joint": (("point",), "1", "index of the joint with the largest stress or torque"),
     "damage_per_rivet": (("point", "joint"), "1", "Miner's sum of a rivet, cycles by rainflow"),
     "damage_direction": (("point", "joint", "xyz"), "1", "unit vector of the force for it"),
+    "peak_deflection_quantiles": (
+        ("point", "joint", "level"),
+        "rad",
+        "peak_deflection of drawn robots, where springs are estimates (of slides: m)",
+    ),
+    "peak_torque_quantiles": (
+        ("point", "joint", "level"),
+        "N*m",
+        "peak_torque of drawn robots, where springs are estimates (of slides: N)",
+    ),
 }
 
-EXTRA = ("damage_per_rivet", "damage_direction")
-"""Only in maps that were asked for it."""
+EXTRA = (
+    "damage_per_rivet",
+    "damage_direction",
+    "peak_deflection_quantiles",
+    "peak_torque_quantiles",
+)
+"""Damage only in maps that were asked for it; quantiles only of robots that are estimated."""
 
 
 def join_chunks(target: Path, chunks: Iterable[Columns], attributes: dict[str, Any]) -> None:
@@ -57,9 +72,11 @@ def join_chunks(target: Path, chunks: Iterable[Columns], attributes: dict[str, A
     _remove(part)
     writer = _ZarrWriter if target.suffix == ".zarr" else _NetcdfWriter
     rows = 0
-    names = {name: attributes[name] for name in ("joint", "coordinate")} | {"xyz": list("xyz")}
+    labelled = ("joint", "coordinate", "level")
+    names = {name: attributes[name] for name in labelled if attributes.get(name)}
+    names["xyz"] = list("xyz")
     labels = {name: np.array(values, dtype=object) for name, values in names.items()}
-    others = {k: v for k, v in attributes.items() if k not in names}
+    others = {k: v for k, v in attributes.items() if k not in labelled}
     try:
         with writing(target):
             with writer(part, labels, others) as out:

@@ -13,6 +13,7 @@ from picchio.core.errors import InputError
 from picchio.core.html import sheet
 from picchio.core.results import TableResult
 from picchio.robot.units import column, units_of
+from picchio.studies.maps.chunk import LEVELS
 from picchio.studies.maps.stored import attribute_of, values_of
 from picchio.vibration.closed_form.response import described
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     import xarray
 
 _SLICE = 1_000_000
+_BANDS = ("peak_deflection_quantiles", "peak_torque_quantiles")
 
 
 def joint_kinds(found: xarray.Dataset) -> list[str]:
@@ -93,10 +95,23 @@ class WorkspaceMap(TableResult):
         return self.dataset
 
     def to_frame(self) -> pandas.DataFrame:
-        """The joints' largest values, a row a joint; the map itself is `to_xarray()`."""
+        """The joints' largest values, a row a joint; the map itself is `to_xarray()`.
+
+        Of an estimated robot also the quantiles where a joint's P90 is largest, rad and N m (m
+        and N of slides), in columns such as `peak_torque_p10`.
+        """
         import pandas
 
-        return pandas.DataFrame(self._content()["joints"]).set_index("name")
+        rows = [
+            {key: value for key, value in joint.items() if key != "estimate"}
+            | {
+                f"{key}_{level.lower()}": value
+                for key in ("peak_deflection", "peak_torque")
+                for level, value in joint.get("estimate", {}).get(key, {}).items()
+            }
+            for joint in self._content()["joints"]
+        ]
+        return pandas.DataFrame(rows).set_index("name")
 
     def _headline(self) -> str:
         robot = attribute_of(self.dataset, "robot")
@@ -122,6 +137,25 @@ class WorkspaceMap(TableResult):
         }
         return sheet(f"Workspace map of {content['robot']}", facts, columns, rows,
                      ". ".join(content["notes"]))  # fmt: skip
+
+    def _likely(self, best: list[dict[str, Any]], first: int, rows: slice) -> None:
+        """Of an estimated robot, where each joint's P90 is largest: its quantiles there."""
+        found = self.dataset
+        ends, torque = (values_of(found, name, 3, rows) for name in _BANDS)
+        for name, values in zip(_BANDS, (ends, torque), strict=True):
+            if values.shape[1:] != (len(best), len(LEVELS)) or np.isnan(values).any():
+                raise _damaged(found, name)
+        for j, entry in enumerate(best):
+            k = int(ends[:, j, -1].argmax())
+            before = entry.get("estimate")
+            if before is None or ends[k, j, -1] > before["peak_deflection"]["P90"]:
+                row = slice(first + k, first + k + 1)
+                entry["estimate"] = {
+                    "peak_deflection": dict(zip(LEVELS, ends[k, j].tolist(), strict=True)),
+                    "peak_torque": dict(zip(LEVELS, torque[k, j].tolist(), strict=True)),
+                    "position": values_of(found, "position", 2, row)[0],
+                    "pose": values_of(found, "pose", 2, row)[0],
+                }
 
     def _content(self) -> dict[str, Any]:
         """The largest values of every joint and where they are, read a slice at a time."""
@@ -160,6 +194,8 @@ class WorkspaceMap(TableResult):
                         "pose": values_of(found, "pose", 2, row)[0],
                         "worst_direction": values_of(found, "worst_direction", 3, row)[0, j],
                     }
+            if _BANDS[0] in found:
+                self._likely(best, first, rows)
             if "damage_per_rivet" in found:
                 for entry, damage in zip(best, read("damage_per_rivet", rows).T, strict=True):
                     if np.isfinite(damage).any():

@@ -154,7 +154,5 @@ def uncertain_life(
             joint.name: float(share)
             for joint, share in zip(model.robot.flexible_joints, first, strict=True)
         },
-        measure_first=measure_first(
-            model.robot, sampler.inputs, every, flat.robots_life, flat.robots_use
-        ),
+        measure_first=measure_first(model.robot, sampler.inputs, every, flat, root @ root),
     )

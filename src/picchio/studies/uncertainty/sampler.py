@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -32,6 +33,8 @@ from picchio.studies.uncertainty.drawn import Drawn, interval
 from picchio.studies.uncertainty.inputs import OF_JOINTS, Input, inputs_of
 from picchio.studies.uncertainty.result import LifeScan
 
+# Of a stiffness at once, by an effect.
+_MOST_SCALED = 49.0
 # Rows of a batch; steps of a scan.
 _BATCH, _SCAN = 20_000, 41
 
@@ -432,11 +435,13 @@ class _Draw:
         model, robot = self.sampler.model, self.robot(d)
         factors = zip(robot.flexible_joints, self.damping[d], strict=True)
         joints = tuple(replace(j, damping_ratio=f * j.damping_ratio) for j, f in factors)
-        # Factors go onto the springs as the effects leave them.
+        # Factors go onto the springs as the effects leave them; one effect takes no more than 50.
         effects = [
-            JointStiffness(joint.name, scale=float(factor))
+            JointStiffness(joint.name, scale=float(factor) ** (1.0 / parts))
             for joint, factor in zip(joints, self.stiffness[d], strict=True)
             if factor != 1.0
+            for parts in [math.ceil(abs(math.log(factor)) / math.log(_MOST_SCALED))]
+            for _ in range(parts)
         ]
         varied = replace(model, robot=replace(robot, flexible_joints=joints))
         return replace(varied, effects=(*model.effects, *effects)) if effects else varied
