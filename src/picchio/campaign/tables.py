@@ -79,6 +79,15 @@ def _finite_leaves(value: Any) -> Any:
     return value
 
 
+def _joint_map(value: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
+    for joint, row in value.items():
+        if not [name for name in row if name != OFFSET]:
+            raise ValueError(f"{joint} follows no angle of the controller")
+    return value
+
+
+OFFSET = "offset"
+JointMap = Annotated[dict[str, dict[str, Finite]], AfterValidator(_joint_map)]
 InsideFile = Annotated[str, AfterValidator(_inside)]
 DataFile = Annotated[str, AfterValidator(_inside), AfterValidator(_data_file)]
 Direction = Annotated[list[Finite], Field(min_length=3, max_length=3), AfterValidator(_direction)]
@@ -175,8 +184,13 @@ class RecordTable(StrictModel):
 
     Attributes:
         file: CSV or Parquet file, relative to the campaign's folder.
-        kind: "percussion" (the robot stands, the tool hits) or "motion" (it moves, nothing hits).
-        pose: rad or m, by joint name or in the robot's joint order; percussion only.
+        kind: "percussion" (the robot stands, the tool hits), "motion" (it moves, nothing hits)
+            or "static" (a row a loading: weights and pulls, and what moved).
+        pose: rad or m, by joint name or in the robot's joint order; not of motion. Of a static
+            record: of the joints that have no column.
+        joint_map: static only: how the angles of the controller become the URDF's. For each
+            joint that differs: the factors of the columns `pose.<name>` whose sum it is, such as
+            `joint_3 = { joint_2 = -1, joint_3 = -1 }`, and an `offset` (rad or m) that is added.
         direction: world, of any length; percussion only.
         excitation: keys that override the campaign's `[excitation]`.
         hits: blows of the burst, overriding `[excitation]`.
@@ -190,8 +204,9 @@ class RecordTable(StrictModel):
     """
 
     file: DataFile
-    kind: Literal["percussion", "motion"] = "percussion"
+    kind: Literal["percussion", "motion", "static"] = "percussion"
     pose: Pose | None = None
+    joint_map: JointMap | None = None
     direction: Direction | None = None
     excitation: CampaignExcitation | None = None
     hits: Hits | None = None
@@ -212,7 +227,8 @@ class RecordTable(StrictModel):
     def percussion_keys(self) -> list[str]:
         """The keys given here that only a percussion record has a use for."""
         names = ("pose", "direction", "excitation", "hits", "force", "period", "width", "preload")
-        return [name for name in names if getattr(self, name) is not None]
+        of_static = {"static": ("pose",)}.get(self.kind, ())
+        return [name for name in names if name not in of_static and getattr(self, name) is not None]
 
 
 class CampaignTable(StrictModel):
