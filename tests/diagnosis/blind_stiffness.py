@@ -86,6 +86,34 @@ def static_trial(worlds, count: int, first: int = 0, **options) -> list[Judged]:
     return judged
 
 
+def frf_campaign(world) -> Campaign:
+    """The world's functions as a campaign, a record each."""
+    records = [
+        Record.from_columns(f"f{k:02d}.csv", columns, kind="frf", **table)
+        for k, (columns, table) in enumerate(world.records)
+    ]
+    return Campaign.from_records(records, robot=world.robot)
+
+
+def frf_trial(worlds, count: int, first: int = 0, sizes=SIZES) -> tuple[list, list]:
+    """So many campaigns; stiffness, and damping ratios, judged alike."""
+    stiffness, damping = [], []
+    for seed in range(first, first + count):
+        world = worlds.draw(sizes[seed % len(sizes)], seed)
+        found = picchio.identify(world.robot, frf_campaign(world))
+        for k, joint in enumerate(found.joints):
+            for kind, one, truth in (
+                (stiffness, joint.stiffness, world.truth[k]),
+                (damping, joint.damping_ratio, world.damping[k]),
+            ):
+                kind.append(Judged(
+                    world.robot, joint.name, seed, math.log(one.value / truth),
+                    math.log(one.high / one.low) / (2.0 * 1.645), one.told,
+                    one.low <= truth <= one.high, math.nan,
+                ))  # fmt: skip
+    return stiffness, damping
+
+
 def summary(judged: list[Judged]) -> dict[str, float]:
     """What issue and report ask for, of all joints and of those that are told."""
     told = [one for one in judged if one.told]
@@ -96,11 +124,11 @@ def summary(judged: list[Judged]) -> dict[str, float]:
         "campaigns": len({(one.robot, one.seed) for one in judged}),
         "joints": len(judged),
         "told": len(told),
-        "told_within_10_percent": float(np.mean(error <= 0.10)),
-        "median_error": float(np.median(error)),
-        "coverage_told": float(np.mean([one.inside for one in told])),
+        "told_within_10_percent": float(np.mean(error <= 0.10)) if told else math.nan,
+        "median_error": float(np.median(error)) if told else math.nan,
+        "coverage_told": float(np.mean([one.inside for one in told])) if told else math.nan,
         "coverage_all": float(np.mean([one.inside for one in judged])),
-        "wrong_confident": len(wrong) / len(told),
+        "wrong_confident": len(wrong) / max(len(told), 1),
         "could_be_told": len(could),
         "told_of_those": float(np.mean([one.told for one in could])) if could else math.nan,
     }

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from picchio.campaign.channels import TIME, parse_channel
+from picchio.campaign.channels import parse_channel
 from picchio.campaign.clock import TOLERANCE
 from picchio.campaign.csv_source import CsvSource, write_csv
 from picchio.campaign.parquet_source import ParquetSource, write_parquet
@@ -20,11 +20,13 @@ from picchio.campaign.tables import (
     CAMPAIGN_FILE,
     FORMAT,
     SUFFIXES,
+    UFF_SUFFIXES,
     CampaignExcitation,
     CampaignTable,
     RecordTable,
     Tolerance,
 )
+from picchio.campaign.uff import frf_source
 from picchio.core.errors import InputError, warn_user
 from picchio.core.files import recover, relative_name, swap_in, umask, writing
 from picchio.core.toml import parse_toml, validate
@@ -225,6 +227,21 @@ def _check_record(record: Record, key: str, file: Path | None) -> None:
     if record.kind != "static" and record.table.joint_map is not None:
         raise InputError(f"only a static record may have it; {record.file} is one of "
                          f"{record.kind}", file=file, key=f"{key}.joint_map")  # fmt: skip
+    of_frf = record.table.frf_keys()
+    if record.kind != "frf" and of_frf:
+        raise InputError(f"only a frequency response function may have it; {record.file} is one of "
+                         f"{record.kind}", file=file, key=f"{key}.{of_frf[0]}")  # fmt: skip
+    if record.kind != "frf" and Path(record.file).suffix in UFF_SUFFIXES:
+        raise InputError("only frequency response functions are read from UFF files as they are",
+                         file=file, key=f"{key}.file", value=record.file,
+                         hint="`picchio import` makes a campaign of time histories")  # fmt: skip
+    if record.kind == "frf":
+        for name in ("pose", "force_direction", "response_direction"):
+            if getattr(record.table, name) is None:
+                raise InputError(f"a frequency response function ({record.file}) needs this key",
+                                 file=file, key=f"{key}.{name}")  # fmt: skip
+        if missing := [name for name in ("real", "imag") if name not in record.channels]:
+            raise record.source.error("has no such column", channel=missing[0])
     if record.kind != "percussion":
         if useless := record.table.percussion_keys():
             text = f"{file}: {key} ({record.file}): a {record.kind} record has no use for "
@@ -284,6 +301,8 @@ def _open(folder: Path, entry: RecordTable, index: int) -> Source:
     path, key = folder / entry.file, f"record[{index}]"
     if not os.path.realpath(path).startswith(os.path.realpath(folder) + os.sep):
         raise InputError("is outside the campaign's folder", file=path, key=f"{key}.file")
+    if path.suffix in UFF_SUFFIXES and entry.kind == "frf":
+        return frf_source(path, key, LAYOUTS["frf"], entry)
     kind = ParquetSource if path.suffix == ".parquet" else CsvSource
     return kind(path, key, LAYOUTS.get(entry.kind))
 
@@ -310,15 +329,18 @@ def _fill(campaign: Campaign, folder: Path, target: Path, suffix: str | None,
         path.write_bytes(content)
     names: list[str] = []
     for record in campaign.records:
-        name = str(PurePosixPath(record.file).with_suffix(suffix)) if suffix else record.file
+        own = ".csv" if PurePosixPath(record.file).suffix in UFF_SUFFIXES else None
+        wanted = suffix or own  # a UFF file is not written
+        name = str(PurePosixPath(record.file).with_suffix(wanted)) if wanted else record.file
         if name.lower() in map(str.lower, names):
             raise InputError("two records would have this name", file=target, value=name)
         names.append(name)
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         channels = list(record.source.channels.values())
-        if record.in_time:
-            channels.insert(0, parse_channel(TIME)[0])
+        layout = record.source.layout
+        if layout.first is not None:
+            channels.insert(0, parse_channel(layout.first, None, layout.kinds)[0])
         write = write_parquet if path.suffix == ".parquet" else write_csv
         write(path, channels, record.chunks())
     (folder / CAMPAIGN_FILE).write_text(_toml(campaign, names, target), encoding="utf-8")

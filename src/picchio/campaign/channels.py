@@ -142,6 +142,14 @@ LOADING_KINDS: tuple[ChannelKind, ...] = (
                 "knows; else each row has a zero of its own, read just before"),
 )  # fmt: skip
 """The columns of a static record: a row a loading, in any order, without a time."""
+FREQUENCY = "frequency"
+FRF_KINDS: tuple[ChannelKind, ...] = (
+    ChannelKind(FREQUENCY, None, ("Hz",), meaning="ascending; the first column"),
+    ChannelKind("real", None, ("1",), meaning="real part, SI: (m/s^2)/N, (m/s)/N or m/N"),
+    ChannelKind("imag", None, ("1",), meaning="imaginary part, likewise"),
+    ChannelKind("coherence", None, ("1",), meaning="0 to 1; what is low counts little"),
+)
+"""The columns of a frequency response function, a row a line."""
 GROUP = "picchio.channels"
 _TIME_KIND = ChannelKind(TIME, None, ("s",), meaning="0 is the first edge of the first blow")
 

@@ -11,7 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from picchio.campaign.channels import LOADING_KINDS, TIME, Channel, parse_channel
+from picchio.campaign.channels import (
+    FREQUENCY,
+    FRF_KINDS,
+    LOADING_KINDS,
+    TIME,
+    Channel,
+    parse_channel,
+)
 from picchio.campaign.clock import TOLERANCE, Clock, ClockCheck
 from picchio.campaign.source import Layout, MemorySource, Source
 from picchio.campaign.tables import FORMAT, CampaignExcitation, CampaignTable, RecordTable
@@ -21,7 +28,10 @@ from picchio.core.toml import validate
 from picchio.excitation.excitation import Excitation
 
 BLOCK = 16384
-LAYOUTS = {"static": Layout(None, LOADING_KINDS)}
+LAYOUTS = {
+    "static": Layout(None, LOADING_KINDS),
+    "frf": Layout(FREQUENCY, FRF_KINDS),
+}
 """What the columns of a record may be, by its kind; of the others a time and channels."""
 
 
@@ -142,7 +152,7 @@ class Record:
 
     @property
     def kind(self) -> str:
-        """What was done: "percussion", "motion" or "static"."""
+        """What was done: "percussion", "motion", "static" or "frf"."""
         return self.table.kind
 
     @property

@@ -175,7 +175,8 @@ def _columns(source: Source, cells: Sequence[str]) -> dict[str, Column]:
         return columns
     if next(iter(columns), None) != first:
         found = cells[0].strip() if cells else ""
-        raise source.error("the first column must be 'time [s]'", value=found)
+        unit = "s" if first == TIME else "Hz"
+        raise source.error(f"the first column must be '{first} [{unit}]'", value=found)
     if len(columns) == 1:
         raise source.error("holds no channel beside the time")
     return columns

@@ -21,7 +21,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from picchio.campaign import tables as campaign
-from picchio.campaign.channels import LOADING_KINDS, kinds
+from picchio.campaign.channels import FRF_KINDS, LOADING_KINDS, kinds
 from picchio.campaign.importing import mapping
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
@@ -172,7 +172,7 @@ def _known() -> tuple[FileFormat, ...]:
         name = format.removeprefix("picchio-").partition("/")[0]
         keys = (_format_key(format), *_keys(table))
         tables.append(FileFormat(name, format, "TOML", "input", meaning, command, keys))
-    return (*tables, _record(), _loadings(), *_contracts(), _map())
+    return (*tables, _record(), *_tests(), *_contracts(), _map())
 
 
 def _format_key(format: str) -> Key:
@@ -193,17 +193,26 @@ def _record() -> FileFormat:
     )  # fmt: skip
 
 
-def _loadings() -> FileFormat:
-    """A static record's columns."""
-    keys = [
-        Key(kind.pattern, "column", " or ".join(kind.units), "", False, kind.meaning)
-        for kind in LOADING_KINDS
-    ]
-    return FileFormat(
-        "loadings", "", "CSV or Parquet", "input",
-        'a record of the kind "static", a row a loading; each header is `channel [unit]`',
-        "identify", tuple(keys),
-    )  # fmt: skip
+def _tests() -> Iterator[FileFormat]:
+    """The columns of records whose rows are no samples in time."""
+    for name, of, meaning, needed in (
+        ("loadings", LOADING_KINDS, 'a record of the kind "static", a row a loading', ()),
+        (
+            "frf",
+            FRF_KINDS,
+            'a record of the kind "frf", a row a line',
+            ("frequency", "real", "imag"),
+        ),
+    ):
+        keys = [
+            Key(kind.pattern, "column", " or ".join(kind.units), "", kind.name in needed,
+                kind.meaning)
+            for kind in of
+        ]  # fmt: skip
+        yield FileFormat(
+            name, "", "CSV or Parquet", "input", f"{meaning}; each header is `channel [unit]`",
+            "identify", tuple(keys),
+        )  # fmt: skip
 
 
 def _map() -> FileFormat:

@@ -10,9 +10,10 @@ and the tails are those of the highest evidence (Laplace's approximation; MacKay
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.optimize import minimize_scalar, nnls
@@ -172,6 +173,56 @@ class Problem:
         return found
 
 
+class Rows(Protocol):
+    """Rows of readings that are fitted together."""
+
+    @property
+    def values(self) -> FloatArray:
+        """(m, r) as measured."""
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """(r,) what each reading is read with."""
+
+    def __len__(self) -> int: ...
+
+
+class Fitted(Protocol):
+    """What `climb` needs of a problem; see `Problem`."""
+
+    @property
+    def tables(self) -> Sequence[Rows]:
+        """The rows."""
+
+    @property
+    def noise(self) -> Mapping[str, float]:
+        """By group, as stated."""
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """What is read with."""
+
+    @property
+    def rows(self) -> int:
+        """Rows in all."""
+
+    @property
+    def springs(self) -> int:
+        """How many numbers, the first, are logarithms that no step may change by much."""
+
+    @property
+    def precision(self) -> FloatArray:
+        """(p, p) of all numbers before the tests."""
+
+    def predict(self, at: FloatArray, known: Sequence[Predicted] | None = None) -> list[Predicted]:
+        """Residuals and their slopes.
+
+        Args:
+            at: (p,) the numbers.
+            known: at a place not far off.
+        """
+
+
 @dataclass(frozen=True, eq=False)
 class Predicted:
     """A table's residual.
@@ -179,14 +230,14 @@ class Predicted:
     Attributes:
         residual: (m, r) m or rad, measured less predicted.
         slope: (m, r, p) of the prediction.
-        own: (m, r, r) covariance of what is drawn for each loading anew.
+        own: (m, r, r) covariance of what is drawn for each loading anew; None for none.
         yielded: what it rests on.
     """
 
     residual: FloatArray
     slope: FloatArray
-    own: FloatArray
-    yielded: Yield
+    own: FloatArray | None
+    yielded: Yield | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +259,7 @@ class Fit:
         data_information: (p, p) of the loadings alone, what is known before them left out.
     """
 
-    problem: Problem
+    problem: Any
     mean: FloatArray
     covariance: FloatArray
     evidence: float
@@ -258,7 +309,7 @@ def fit(problem: Problem, rows: BoolArray | None = None, *, start: Fit | None = 
     best: Fit | None = None
     for tail in tails:
         for at in places if best is None else [best.mean]:
-            found = _climb(problem, at, tail, rows)
+            found = climb(problem, at, tail, rows)
             if best is None or found.evidence > best.evidence:
                 best = found
     assert best is not None
@@ -290,7 +341,7 @@ def _starts(problem: Problem, rows: BoolArray | None) -> list[FloatArray]:
     return found
 
 
-def _split(problem: Problem, rows: BoolArray) -> list[BoolArray]:
+def _split(problem: Fitted, rows: BoolArray) -> list[BoolArray]:
     ends = np.cumsum([len(table) for table in problem.tables])[:-1]
     return np.split(np.asarray(rows), ends)
 
@@ -298,7 +349,7 @@ def _split(problem: Problem, rows: BoolArray) -> list[BoolArray]:
 class _State:
     """The score at one place, for given noise and tails."""
 
-    def __init__(self, problem: Problem, at: FloatArray, tail: float,
+    def __init__(self, problem: Fitted, at: FloatArray, tail: float,
                  keep: Sequence[BoolArray], near: _State | None = None) -> None:  # fmt: skip
         self.problem, self.at, self.tail, self.keep = problem, at, tail, keep
         self.parts: list[Predicted] = problem.predict(at, None if near is None else near.parts)
@@ -313,12 +364,13 @@ class _State:
         curved = np.zeros((p, p))
         for table, part, keep in zip(problem.tables, self.parts, self.keep, strict=True):
             size = np.array([noise[problem.groups.index(group)] for group in table.groups])
-            covariance = part.own + np.diag(size**2)
-            lower = np.linalg.cholesky(covariance)
-            logdet = 2.0 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
-            white = np.linalg.solve(
-                lower, np.concatenate([part.slope, part.residual[..., None]], axis=-1)
-            )
+            both = np.concatenate([part.slope, part.residual[..., None]], axis=-1)
+            if part.own is None:
+                white, logdet = both / size[:, None], 2.0 * np.log(size).sum()
+            else:
+                lower = np.linalg.cholesky(part.own + np.diag(size**2))
+                logdet = 2.0 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
+                white = np.linalg.solve(lower, both)
             slope, toward = white[..., :-1], white[..., -1]
             square = (toward**2).sum(axis=1)
             r, v = table.values.shape[1], self.tail
@@ -346,7 +398,20 @@ class _State:
         return score
 
 
-def _climb(problem: Problem, at: FloatArray, tail: float, rows: BoolArray | None) -> Fit:
+def climb(
+    problem: Fitted, at: FloatArray, tail: float = math.inf, rows: BoolArray | None = None
+) -> Fit:
+    """The most probable numbers near a place, with the noise of the highest evidence.
+
+    Args:
+        problem: what is fitted.
+        at: (p,) where to begin.
+        tail: degrees of freedom of the rows' errors; infinite: normal.
+        rows: (rows,) which of them count; all if None.
+
+    Returns:
+        the fit.
+    """
     keep = _split(problem, np.ones(problem.rows, bool) if rows is None else rows)
     stated = np.log([max(problem.noise[group], _LEAST_NOISE) for group in problem.groups])
     noise = stated.copy()
@@ -384,7 +449,8 @@ def _climb(problem: Problem, at: FloatArray, tail: float, rows: BoolArray | None
     return _made(problem, state, tail, noise, keep, stated, whole(state, noise))
 
 
-def _newton(problem: Problem, state: _State, tail: float, keep: Sequence[BoolArray],
+def _newton(
+    problem: Fitted, state: _State, tail: float, keep: Sequence[BoolArray],
             noise: FloatArray) -> _State:  # fmt: skip
     size = np.exp(noise)
     score = state.weigh(size)
@@ -407,7 +473,8 @@ def _newton(problem: Problem, state: _State, tail: float, keep: Sequence[BoolArr
     return state
 
 
-def _made(problem: Problem, state: _State, tail: float, noise: FloatArray,
+def _made(
+    problem: Fitted, state: _State, tail: float, noise: FloatArray,
           keep: Sequence[BoolArray], stated: FloatArray, score: float) -> Fit:  # fmt: skip
     p = len(state.at)
     precise = state.information + problem.precision

@@ -100,7 +100,8 @@ def held_out(found: Fit, parts: IndexArray) -> HeldOut:
                 continue
             residual, slope = predicted[k].residual[keep], predicted[k].slope[keep]
             size = np.array([other.noise[group] for group in table.groups])
-            spread = predicted[k].own[keep] + np.diag(size**2)
+            own = predicted[k].own
+            spread = np.diag(size**2) + (0.0 if own is None else own[keep])
             spread = spread + slope @ other.covariance @ slope.swapaxes(1, 2)
             scores[rows] = _log_density(residual, spread, other.tails)
             for group in problem.groups:

@@ -8,15 +8,12 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from picchio.campaign.campaign import Campaign
 from picchio.campaign.loadings import read_loadings
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
-from picchio.core.toml import validate
-from picchio.diagnosis.entries import joint_entry, standing_entries, tool_entry
 from picchio.diagnosis.identified import FORMAT, Identification, Identified, IdentifiedJoint, Method
 from picchio.diagnosis.result import Cause, Value
 from picchio.diagnosis.stiffness.fit import Problem
@@ -24,9 +21,8 @@ from picchio.diagnosis.stiffness.joints import Told, stiffness_of
 from picchio.diagnosis.stiffness.prior import Suspect, prior_of, suspects
 from picchio.diagnosis.stiffness.select import Answer, select
 from picchio.diagnosis.stiffness.statics import Table, make_table
+from picchio.diagnosis.stiffness.written import sidecar
 from picchio.model.expansion import WideChain
-from picchio.robot.annotations.sidecar import FORMAT as SIDECAR
-from picchio.robot.annotations.sidecar import Sidecar, spreads_of
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import is_drive
 
@@ -143,57 +139,10 @@ class StaticIdentification(Identification):
 
     def sidecar_text(self) -> str:
         """See `Identification`; a joint that is not told has a wide spread."""
-        import tomlkit
-
-        document = tomlkit.document()
-        document.add(tomlkit.comment("Stiffness from static loadings, each with its spread."))
-        for source in provenance(self.campaign.files)["inputs"]:
-            document.add(tomlkit.comment(f"{source['file']} sha256 {source['sha256']}"))
-        for line in self.remarks:
-            document.add(tomlkit.comment(line))
-        document.update(self._table())
-        return tomlkit.dumps(document)
-
-    def _table(self) -> dict[str, Any]:
-        robot = self.robot
-        size = np.sqrt(np.diag(self.answer.covariance))
-        entries = {}
-        for joint in robot.flexible_joints:
-            if not is_drive(joint.name):
-                continue
-            entry = entries[joint.name] = joint_entry(robot, joint)
-            k = robot.flexible_names.index(joint.name)
-            found = self.joints[[j.name for j in self.joints].index(joint.name)].stiffness
-            for key in ("stiffness_std", "stiffness_curve"):
-                entry.pop(key, None)
-            if entry.pop("estimated", False):  # the damping still is
-                entry.setdefault("damping_ratio_spread", 2.0)
-            entry |= {
-                "stiffness": found.value, "stiffness_spread": float(math.exp(size[k])),
-                "source": f"picchio identify on {self.source}: {found.why}",
-            }  # fmt: skip
-        table: dict[str, Any] = {
-            "format": SIDECAR, "description": f"{robot.name}, identified", "joint": entries,
-            "tool": tool_entry(robot), **standing_entries(robot),
-        }  # fmt: skip
-        known = [one.name for one in spreads_of(validate(table, Sidecar, format=SIDECAR))]
-        return {**table, **self._posterior(known)}
-
-    def _posterior(self, known: list[str]) -> dict[str, Any]:
-        """How the stiffnesses hang together, and of all else what was known before."""
-        every = [f"stiffness.{joint.name}" for joint in self.robot.flexible_joints]
-        kept = [k for k, name in enumerate(every) if name in known]
-        size = np.sqrt(np.diag(self.answer.covariance))[kept]
-        matrix = self.answer.covariance[np.ix_(kept, kept)] / np.outer(size, size)
-        matrix = np.clip(0.5 * (matrix + matrix.T), -1.0, 1.0)
-        np.fill_diagonal(matrix, 1.0)
-        names, parts = [every[k] for k in kept], [matrix]
-        others = [name for name in known if name not in names]
-        before = self.robot.posterior.among(others) if self.robot.posterior else None
-        if before is not None:
-            names += before.names
-            parts.append(np.array(before.correlation))
-        return {"posterior": {"names": names, "correlation": block_diag(*parts).tolist()}}
+        return sidecar(
+            self.robot, self.joints, self.source, self.campaign.files, self.remarks,
+            self.answer.covariance,
+        )  # fmt: skip
 
     def _content(self) -> Mapping[str, Any]:
         left, alone = self.answer.left_out, self.answer.alone
