@@ -1,10 +1,12 @@
 """Joint stiffness from nothing: blind trials, and a real arm under static loads.
 
     python benchmarks/stiffness.py --blind 200 [--first 1000] [--json FILE]
+    python benchmarks/stiffness.py --frf 200 [--first 2000] [--json FILE]
     python benchmarks/stiffness.py --real DATA [--repeats 5] [--json FILE]
 
 Blind: campaigns of `tests/worlds/loads.py`, arms with 3, 6 and 7 joints in turn, stiffness off by
-up to a factor of four, everything slightly wrong. Real: DATA is the folder of measured data; 43
+up to a factor of four, everything slightly wrong; with --frf those of `tests/worlds/frfs.py`, 18
+frequency response functions each. Real: DATA is the folder of measured data; 43
 loadings of a FANUC R-2000iC (`r2000ic-static`), published stiffness against plain least squares
 and against `picchio identify`; then each cause that may leave a fifth of the signal unexplained,
 judged on loadings left out: ten folds, so many times as `--repeats` says.
@@ -40,7 +42,7 @@ TESTS = Path(__file__).resolve().parent.parent / "tests"
 sys.path[:0] = [str(TESTS), str(TESTS / "diagnosis")]
 import blind_stiffness  # noqa: E402
 
-from worlds import loads  # noqa: E402
+from worlds import frfs, loads  # noqa: E402
 
 ROBOT = "fanuc_r2000ic"
 
@@ -59,6 +61,19 @@ def blind(count: int, first: int) -> dict[str, Any]:
         print(f"{name:24s} {value:.4g}")
     print(f"processor time a campaign  {(time.process_time() - start) / count:.2f} s")
     return {"blind": found, "joints": [vars(one) for one in judged]}
+
+
+def responses(count: int, first: int) -> dict[str, Any]:
+    start = time.process_time()
+    stiffness, damping = blind_stiffness.frf_trial(frfs, count, first)
+    found = {}
+    for what, judged in (("stiffness", stiffness), ("damping", damping)):
+        found[what] = blind_stiffness.summary(judged)
+        print(what)
+        for name, value in found[what].items():
+            print(f"  {name:24s} {value:.4g}")
+    print(f"processor time a campaign  {(time.process_time() - start) / count:.2f} s")
+    return {"frf": found}
 
 
 def read(folder: Path) -> Campaign:
@@ -155,6 +170,7 @@ def show(words: str, row: dict[str, float], base: dict[str, float]) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--blind", type=int, default=0)
+    parser.add_argument("--frf", type=int, default=0)
     parser.add_argument("--first", type=int, default=1000)
     parser.add_argument("--real", type=Path)
     parser.add_argument("--repeats", type=int, default=5)
@@ -165,6 +181,8 @@ def main() -> None:
         found |= real(given.real, given.repeats)
     if given.blind:
         found |= blind(given.blind, given.first)
+    if given.frf:
+        found |= responses(given.frf, given.first)
     if given.json is not None:
         with atomic_write(given.json) as stream:
             json.dump(found, stream, indent=1)

@@ -52,7 +52,7 @@ def data_sets(path: Path) -> list[dict[str, Any]]:
 
 
 def place(data: Mapping[str, Any], of: str) -> str:
-    """Node and direction of a function's response or reference, such as "12+X".
+    """The node and the direction of a function's response or reference, such as "12+X".
 
     Args:
         data: the data set.

@@ -220,6 +220,9 @@ class Fitted(Protocol):
         Args:
             at: (p,) the numbers.
             known: at a place not far off.
+
+        Returns:
+            one for each table.
         """
 
 
@@ -447,6 +450,19 @@ def climb(
             break
         last = now
     return _made(problem, state, tail, noise, keep, stated, whole(state, noise))
+
+
+def score(problem: Fitted, at: FloatArray, like: Fit) -> float:
+    """The negative log posterior of some numbers, but for a constant.
+
+    Args:
+        problem: what is fitted.
+        at: (p,) the numbers.
+        like: whose noise and tails count.
+    """
+    keep = _split(problem, np.ones(problem.rows, bool))
+    noise = np.array([like.noise[group] for group in problem.groups])
+    return _State(problem, at, like.tails, keep).weigh(noise)
 
 
 def _newton(

@@ -13,17 +13,21 @@ from picchio.campaign.campaign import Campaign
 from picchio.core.arrays import FloatArray
 from picchio.core.provenance import provenance
 from picchio.diagnosis.identified import FORMAT, Identification, Identified, IdentifiedJoint, Method
-from picchio.diagnosis.stiffness.fit import Fit, climb
+from picchio.diagnosis.stiffness.fit import Fit, climb, score
 from picchio.diagnosis.stiffness.joints import MOST_HALF, Told, stiffness_of
 from picchio.diagnosis.stiffness.modes import starts
 from picchio.diagnosis.stiffness.prior import prior_of
-from picchio.diagnosis.stiffness.responses import FrfProblem, make_problem
+from picchio.diagnosis.stiffness.responses import Damping, FrfProblem, make_problem
 from picchio.diagnosis.stiffness.written import sidecar
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import is_drive
 
 _TAILS = 6.0  # degrees of freedom of the lines' errors
 _FAR = 0.3  # residual over the functions beyond which the answer is doubted
+REMAINDER = 0.01
+"""What a model that is right may leave of the functions, as a share of them."""
+_LOOKS, _BASINS, _STRIDE, _GAIN = 3, 4, 0.12, 2.0  # at other basins; ln of stiffness; ln evidence
+_STRAY, _INCREDIBLE = 1.5, 3.0  # standard deviations before the tests
 _DECISIVE = 5.0  # in log evidence, for a convention of the damping
 _WORDS = {
     "modal": "one ratio for each mode, the joints' weighted by strain energy",
@@ -58,6 +62,7 @@ class FrfIdentification(Identification):
         campaign: the functions.
         fit: the most probable numbers.
         half: standard deviations to either end of a 90 % interval.
+        covariance: (2 n, 2 n) of the logarithms of stiffness and damping ratios.
         left: residual over the functions, each line over its scale.
         before: the same of the stated values.
         convention: of the damping that the functions follow: "modal" or "joint".
@@ -67,6 +72,7 @@ class FrfIdentification(Identification):
     campaign: Campaign
     fit: Fit
     half: float
+    covariance: FloatArray
     left: float
     before: float
     convention: str
@@ -95,10 +101,9 @@ class FrfIdentification(Identification):
 
     def sidecar_text(self) -> str:
         """See `Identification`; a joint that is not told has a wide spread."""
-        n = self.fit.problem.joints
         return sidecar(
             self.robot, self.joints, self.source, self.campaign.files, self.remarks,
-            self.fit.covariance[: 2 * n, : 2 * n], damping=True,
+            self.covariance, damping=True,
         )  # fmt: skip
 
     def _content(self) -> Mapping[str, Any]:
@@ -145,33 +150,101 @@ def identify_frf(
     say("frequency responses: modes")
     problem = make_problem(robot, list(campaign), campaign.tolerance, prior_of(robot))
     begin = starts(problem)
-    best: Fit | None = None
-    for at in begin:
-        say("frequency responses: springs and damping")
-        if best is not None and np.abs(at[: problem.joints] - _springs(best)).max() < 0.02:
-            continue
-        found = climb(problem, at, _TAILS)
-        if best is None or found.evidence > best.evidence:
-            best = found
-    assert best is not None  # there is always the stated robot to begin at
-    say("frequency responses: the other damping")
-    other_problem = replace(problem, convention="joint")
-    at = best.mean[: len(other_problem.precision)].copy()
-    other = climb(other_problem, at, _TAILS)
-    gain = best.evidence - other.evidence
-    convention = "modal" if gain >= 0.0 else "joint"
-    fit = best if gain >= 0.0 else other
+    say("frequency responses: springs and damping")
+    plain = problem.bare()
+    bare = max(
+        (climb(plain, at[: problem.springs], _TAILS) for at in begin),
+        key=lambda found: found.evidence,
+    )  # fmt: skip
+    bare = _settled(plain, bare)
+    other = climb(problem.bare(convention="joint"), bare.mean, _TAILS)
+    gain = bare.evidence - other.evidence
+    convention: Damping = "modal" if gain >= -_DECISIVE else "joint"
+    say("frequency responses: with all that is never exact")
+    whole = replace(problem, convention=convention)
+    at = np.zeros(len(whole.precision))
+    at[: problem.springs] = (bare if convention == "modal" else other).mean
+    fit = climb(whole, at, _TAILS)
+    # Without nuisances a joint hardly seen makes up for what masses and places are off by.
+    known = np.concatenate([problem.prior.std, problem.damping_std])
+    strays = np.abs(at[: problem.springs]) > _STRAY * known
+    if strays.any():
+        at[: problem.springs][strays] = 0.0
+        fit = max(fit, climb(whole, at, _TAILS), key=lambda found: found.evidence)
+    fit = _settled(whole, fit)
     stated = np.zeros(len(problem.precision))
-    joints = _joints(robot, fit, best)
+    covariance = _with_remainder(fit)
+    modal = (fit, covariance) if convention == "modal" else (bare, _with_remainder(bare))
+    joints = _joints(robot, fit, covariance, *modal)
     source = "memory" if campaign.folder is None else campaign.folder.resolve().name
     return FrfIdentification(
-        robot, source, joints, campaign, fit, fit.half(), _left(fit.problem, fit.mean),
-        _left(problem, stated), convention, abs(gain),
+        robot, source, joints, campaign, fit, fit.half(), covariance, _left(fit.problem, fit.mean),
+        _left(problem, stated), convention,
+        gain if convention == "modal" else -gain,
     )  # fmt: skip
 
 
-def _springs(fit: Fit) -> FloatArray:
-    return np.asarray(fit.mean[: fit.problem.joints])
+def _settled(problem: FrfProblem, fit: Fit) -> Fit:
+    """The fit, or a better one far from it."""
+    for _ in range(_LOOKS):
+        better = _elsewhere(problem, fit)
+        if better is None:
+            break
+        fit = better
+    return fit
+
+
+def _with_remainder(fit: Fit) -> FloatArray:
+    """The covariance (2 n, 2 n) of springs and damping, with what a model never follows.
+
+    Thousands of lines make a fit surer than its model is right: a remainder of a hundredth of the
+    functions, as a diagnosis allows it, passes for any change of the numbers that looks like it. It
+    is taken to lie along each number's own slope by a cosine that may be anything from -1 to 1.
+    """
+    problem: FrfProblem = fit.problem
+    count = 2 * problem.joints
+    parts = problem.predict(fit.mean)
+    relative = []
+    for part, table in zip(parts, problem.tables, strict=True):
+        size = float(np.sqrt(np.mean(np.abs(table.measured) ** 2)))
+        slope = part.slope[..., :count] * (table.scale / size)[:, None, None]
+        relative.append(slope.reshape(-1, count) / math.sqrt(len(table) * len(parts)))
+    seen = np.concatenate(relative)
+    ridge = np.diag(np.concatenate([problem.prior.std, problem.damping_std]) ** -2.0)
+    # Per hundredth of the functions; a number that none shows keeps its prior's spread.
+    alone = np.linalg.inv(seen.T @ seen + REMAINDER**2 / 3.0 * ridge)
+    added = REMAINDER**2 / 3.0 * np.diag(alone)
+    return np.asarray(fit.covariance[:count, :count] + np.diag(added))
+
+
+def _elsewhere(problem: FrfProblem, fit: Fit) -> Fit | None:
+    """A better fit with one joint far from where it is; None where there is none.
+
+    A joint that the functions hardly show may have ended at a false mode. Everything else held, its
+    stiffness is tried over the whole prior; what looks better is fitted anew.
+    """
+    n = problem.joints
+    held = problem.bare(fit.mean, problem.convention)
+    here = fit.mean[: 2 * n]
+    now = score(held, here, fit)
+    tried: list[tuple[float, FloatArray]] = []
+    for k in range(n):
+        reach = 2.5 * problem.prior.std[k]
+        grid = np.arange(-reach, reach + 1e-9, _STRIDE)
+        places = np.tile(here, (len(grid), 1))
+        places[:, k] = grid
+        scores = np.array([score(held, place, fit) for place in places])
+        inner = np.r_[False, (scores[1:-1] < scores[:-2]) & (scores[1:-1] <= scores[2:]), False]
+        far = np.abs(grid - here[k]) > 2.0 * _STRIDE
+        tried += [(float(scores[i]), places[i]) for i in np.flatnonzero(inner & far)]
+    tried.sort(key=lambda pair: pair[0])
+    for _, place in tried[:_BASINS]:
+        found = climb(held, place, fit.tails)
+        if score(held, found.mean, fit) < now - _GAIN:
+            other = climb(problem, np.concatenate([found.mean, fit.mean[2 * n :]]), fit.tails)
+            if other.evidence > fit.evidence + _GAIN:
+                return other
+    return None
 
 
 def _left(problem: FrfProblem, at: FloatArray) -> float:
@@ -183,7 +256,9 @@ def _left(problem: FrfProblem, at: FloatArray) -> float:
     return math.sqrt(float(np.mean(np.square(shares))))
 
 
-def _joints(robot: FlexibleRobot, fit: Fit, modal: Fit) -> tuple[IdentifiedJoint, ...]:
+def _joints(
+    robot: FlexibleRobot, fit: Fit, covariance: FloatArray, modal: Fit, of_modal: FloatArray
+) -> tuple[IdentifiedJoint, ...]:
     problem: FrfProblem = fit.problem
     n = problem.joints
     names = (
@@ -194,15 +269,19 @@ def _joints(robot: FlexibleRobot, fit: Fit, modal: Fit) -> tuple[IdentifiedJoint
     )
     known = np.diag(fit.data_information)[:n] + np.diag(np.linalg.inv(problem.prior.covariance))
     told = Told(
-        fit.mean[:n], fit.covariance[:n, :n], problem.prior.std, 1.0 / np.sqrt(known), fit.half(),
+        fit.mean[:n], covariance[:n, :n], problem.prior.std, 1.0 / np.sqrt(known), fit.half(),
         names, fit.covariance, tuple(_moved(fit, k) for k in range(n)), ("",) * n, np.zeros(n),
     )  # fmt: skip
     found = stiffness_of(robot.flexible_joints, told)
+    for k, away in enumerate(np.abs(fit.mean[:n]) / problem.prior.std):
+        if away > _INCREDIBLE:
+            why = "far from all that was thought possible before: it makes up for something else"
+            found[k] = replace(found[k], told=False, why=why)
     half, joints = modal.half(), []
     for k, joint in enumerate(robot.flexible_joints):
         if not is_drive(joint.name):
             continue
-        size = float(modal.std[n + k])
+        size = float(math.sqrt(of_modal[n + k, n + k]))
         value = float(problem.damping_ratio[k] * math.exp(modal.mean[n + k]))
         reach = math.exp(half * size)
         sure = 0.5 * (reach - 1.0 / reach) <= MOST_HALF and size < 0.5 * problem.damping_std[k]

@@ -9,8 +9,8 @@ v = Z^-1 J_f^T d and u likewise of the sensor.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -89,6 +89,7 @@ class Standing:
         masses: (k, n, n) what a standard deviation of each number that is never exact adds to it.
         spring: (n,) N m/rad, as stated.
         responses: measured here.
+        factors: (n,) on the modes' damping ratios, by ascending frequency.
     """
 
     mass: FloatArray
@@ -96,6 +97,7 @@ class Standing:
     masses: FloatArray
     spring: FloatArray
     responses: tuple[Response, ...]
+    factors: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +127,7 @@ class FrfProblem:
     by_mode: float
     gravity_std: float
     convention: Damping = "modal"
-    noise = {"frf": 1.0}  # noqa: RUF012
+    noise: Mapping[str, float] = field(default_factory=lambda: {"frf": 1.0})
     groups = ("frf",)
     zeros = ()
     causes = ()
@@ -164,6 +166,47 @@ class FrfProblem:
         found[n : 2 * n, n : 2 * n] = np.diag(self.damping_std**-2)
         return found
 
+    def bare(self, at: FloatArray | None = None, convention: Damping = "modal") -> FrfProblem:
+        """The same with everything but springs and damping held: many times faster.
+
+        Args:
+            at: (p,) the numbers at which it is held; as told if None.
+            convention: of the damping.
+
+        Returns:
+            the problem of 2 n numbers.
+        """
+        n = self.joints
+        first = 2 * n + len(self.steps)
+        off = np.zeros(len(self.steps)) if at is None else at[2 * n : first]
+        pull = 0.0
+        if self.gravity_std > 0.0:
+            pull = self.gravity_std * float(off[self.steps.index("gravity_stiffness")])
+
+        def plain(one: Response) -> Response:
+            none, gain = np.zeros((0, n)), float(np.exp(off @ one.gains))
+            return replace(
+                one, measured=one.measured / gain, scale=one.scale / gain,
+                push=one.push + off @ one.pushes, sight=one.sight + off @ one.sights,
+                tilt=one.tilt + off @ one.tilts, pushes=none, sights=none, tilts=none,
+                gains=np.zeros(0),
+            )  # fmt: skip
+
+        standings = []
+        for k, standing in enumerate(self.standings):
+            own = np.zeros(self.modal)
+            if at is not None:
+                own = at[first + self.modal * k : first + self.modal * (k + 1)]
+            factors = np.exp(self.by_mode * own) if self.modal else np.ones(n)
+            standings.append(replace(
+                standing, mass=standing.mass + np.tensordot(off, standing.masses, 1),
+                gravity=(1.0 + pull) * standing.gravity, masses=np.zeros((0, n, n)),
+                responses=tuple(map(plain, standing.responses)),
+                factors=standing.factors * factors,
+            ))  # fmt: skip
+        return replace(self, standings=tuple(standings), steps=(), by_mode=0.0, gravity_std=0.0,
+                       convention=convention)  # fmt: skip
+
     def damping(
         self, standing: Standing, springs: FloatArray, ratio: FloatArray, modes: FloatArray
     ) -> FloatArray:
@@ -178,16 +221,22 @@ class FrfProblem:
         if self.convention == "joint":
             # As if each joint swung alone: c = 2 zeta k / w.
             return np.diag(2.0 * ratio * np.sqrt(springs * standing.mass.diagonal()))
-        if not len(modes):
+        factors = standing.factors * modes if len(modes) else standing.factors
+        if (factors == 1.0).all():
             return modal_damping_matrix(standing.mass, springs, ratio)
         squared, shapes = _modes(standing.mass, np.diag(springs))
         energy = springs[:, None] * shapes**2
-        own = (ratio @ energy / energy.sum(axis=0)) * modes
+        own = (ratio @ energy / energy.sum(axis=0)) * factors
         weighted = standing.mass @ shapes
         return np.asarray((weighted * (2.0 * own * np.sqrt(squared))) @ weighted.T)
 
     def predict(self, at: FloatArray, known: Sequence[Predicted] | None = None) -> list[Predicted]:
-        """As `Fitted`: real and imaginary parts, over the lines' scale."""
+        """The real and imaginary parts over the lines' scale, measured less predicted.
+
+        Args:
+            at: (p,) the numbers.
+            known: not used: everything is computed anew.
+        """
         n, found = self.joints, []
         scale = np.exp(np.clip(at[: 2 * n], -12.0, 12.0))
         ratio = self.damping_ratio * scale[n:]
@@ -319,6 +368,7 @@ def make_problem(
         responses = tuple(_response_of(robot, one, pose, tolerance, index) for one in own)
         standings.append(Standing(
             mass, robot.gravity_stiffness(pose), masses, robot.state(pose).stiffness, responses,
+            np.ones(len(flex)),
         ))  # fmt: skip
     spread = [robot.spreads.get(f"damping_ratio.{joint.name}") for joint in robot.flexible_joints]
     width = np.array([one.size if one is not None and one.log and one.size > 0.0 else UNKNOWN
