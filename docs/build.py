@@ -25,6 +25,7 @@ GUIDES = {
     "motion": "Motion records",
     "placement": "Placement",
     "priors": "Drive priors",
+    "stiffness": "Stiffness from nothing",
     "paper": "The paper, reproduced",
     "performance": "Performance",
     "blind_trial": "The blind trial",

@@ -10,21 +10,23 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from picchio.campaign.channels import TIME, parse_channel
+from picchio.campaign.channels import parse_channel
 from picchio.campaign.clock import TOLERANCE
 from picchio.campaign.csv_source import CsvSource, write_csv
 from picchio.campaign.parquet_source import ParquetSource, write_parquet
-from picchio.campaign.record import Record
+from picchio.campaign.record import LAYOUTS, Record
 from picchio.campaign.source import Source
 from picchio.campaign.tables import (
     CAMPAIGN_FILE,
     FORMAT,
     SUFFIXES,
+    UFF_SUFFIXES,
     CampaignExcitation,
     CampaignTable,
     RecordTable,
     Tolerance,
 )
+from picchio.campaign.uff import frf_source
 from picchio.core.errors import InputError, warn_user
 from picchio.core.files import recover, relative_name, swap_in, umask, writing
 from picchio.core.toml import parse_toml, validate
@@ -133,6 +135,28 @@ class Campaign:
         columns = ("record", "kind", "force along", "channels")
         return sheet(f"Campaign of {len(rows)} records", facts, columns, rows)
 
+    def in_time(self, of: str) -> Campaign:
+        """The records whose rows are samples in time; a warning tells those that are left out.
+
+        Args:
+            of: who has no use for the others, in words.
+
+        Raises:
+            InputError: none is left.
+        """
+        kept = tuple(record for record in self.records if record.in_time)
+        if len(kept) == len(self.records):
+            return self
+        others = sorted({record.kind for record in self.records if not record.in_time})
+        text = f"{of} has no use for {' and '.join(others)} records"
+        if not kept:
+            file = self.folder / CAMPAIGN_FILE if self.folder is not None else None
+            raise InputError(f"{text}, and there are no others", file=file, key="record",
+                             hint="`picchio identify` reads them")  # fmt: skip
+        warn_user(f"{text}: {len(self.records) - len(kept)} are left out")
+        table = self.table.model_copy(update={"record": [record.table for record in kept]})
+        return replace(self, table=table, records=kept)
+
     def check_samples(self) -> None:
         """Read every sample once, in constant memory.
 
@@ -200,9 +224,27 @@ class Campaign:
 
 
 def _check_record(record: Record, key: str, file: Path | None) -> None:
-    if record.kind == "motion":
+    if record.kind != "static" and record.table.joint_map is not None:
+        raise InputError(f"only a static record may have it; {record.file} is one of "
+                         f"{record.kind}", file=file, key=f"{key}.joint_map")  # fmt: skip
+    of_frf = record.table.frf_keys()
+    if record.kind != "frf" and of_frf:
+        raise InputError(f"only a frequency response function may have it; {record.file} is one of "
+                         f"{record.kind}", file=file, key=f"{key}.{of_frf[0]}")  # fmt: skip
+    if record.kind != "frf" and Path(record.file).suffix in UFF_SUFFIXES:
+        raise InputError("only frequency response functions are read from UFF files as they are",
+                         file=file, key=f"{key}.file", value=record.file,
+                         hint="`picchio import` makes a campaign of time histories")  # fmt: skip
+    if record.kind == "frf":
+        for name in ("pose", "force_direction", "response_direction"):
+            if getattr(record.table, name) is None:
+                raise InputError(f"a frequency response function ({record.file}) needs this key",
+                                 file=file, key=f"{key}.{name}")  # fmt: skip
+        if missing := [name for name in ("real", "imag") if name not in record.channels]:
+            raise record.source.error("has no such column", channel=missing[0])
+    if record.kind != "percussion":
         if useless := record.table.percussion_keys():
-            text = f"{file}: {key} ({record.file}): a motion record has no use for "
+            text = f"{file}: {key} ({record.file}): a {record.kind} record has no use for "
             warn_user(text + ", ".join(useless))
         return
     for name in ("pose", "direction"):
@@ -259,7 +301,10 @@ def _open(folder: Path, entry: RecordTable, index: int) -> Source:
     path, key = folder / entry.file, f"record[{index}]"
     if not os.path.realpath(path).startswith(os.path.realpath(folder) + os.sep):
         raise InputError("is outside the campaign's folder", file=path, key=f"{key}.file")
-    return ParquetSource(path, key) if path.suffix == ".parquet" else CsvSource(path, key)
+    if path.suffix in UFF_SUFFIXES and entry.kind == "frf":
+        return frf_source(path, key, LAYOUTS["frf"], entry)
+    kind = ParquetSource if path.suffix == ".parquet" else CsvSource
+    return kind(path, key, LAYOUTS.get(entry.kind))
 
 
 def _check_target(target: Path, overwrite: bool) -> None:
@@ -284,14 +329,18 @@ def _fill(campaign: Campaign, folder: Path, target: Path, suffix: str | None,
         path.write_bytes(content)
     names: list[str] = []
     for record in campaign.records:
-        name = str(PurePosixPath(record.file).with_suffix(suffix)) if suffix else record.file
+        own = ".csv" if PurePosixPath(record.file).suffix in UFF_SUFFIXES else None
+        wanted = suffix or own  # a UFF file is not written
+        name = str(PurePosixPath(record.file).with_suffix(wanted)) if wanted else record.file
         if name.lower() in map(str.lower, names):
             raise InputError("two records would have this name", file=target, value=name)
         names.append(name)
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        time, _ = parse_channel(TIME)
-        channels = [time, *record.source.channels.values()]
+        channels = list(record.source.channels.values())
+        layout = record.source.layout
+        if layout.first is not None:
+            channels.insert(0, parse_channel(layout.first, None, layout.kinds)[0])
         write = write_parquet if path.suffix == ".parquet" else write_csv
         write(path, channels, record.chunks())
     (folder / CAMPAIGN_FILE).write_text(_toml(campaign, names, target), encoding="utf-8")
@@ -307,6 +356,18 @@ def _other_files(campaign: Campaign) -> dict[str, bytes]:
         for path in folder.glob(f"*{MAPPING_FILE}"):
             found[path.name] = path.read_bytes()
     return found
+
+
+def _inline(value: Any) -> Any:
+    """Tables on one line, those within them, too."""
+    import tomlkit
+
+    if not isinstance(value, dict):
+        return value
+    table = tomlkit.inline_table()
+    for key, part in value.items():
+        table[key] = _inline(part)
+    return table
 
 
 def _toml(campaign: Campaign, names: list[str], target: Path) -> str:
@@ -330,10 +391,7 @@ def _toml(campaign: Campaign, names: list[str], target: Path) -> str:
     for entry in content["record"]:
         table = tomlkit.table()
         for key in sorted(entry, key=lambda name: name != "file"):
-            table[key] = entry[key]
-            if isinstance(entry[key], dict):
-                table[key] = tomlkit.inline_table()
-                table[key].update(entry[key])
+            table[key] = _inline(entry[key])
         entries.append(table)
     document["record"] = entries
     return tomlkit.dumps(document)

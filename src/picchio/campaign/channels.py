@@ -8,6 +8,7 @@ has axes: `force`, `deflection.joint_1`, `accelerometer.tool.x`. To add a kind, 
 from __future__ import annotations
 
 import difflib
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from typing import Literal
@@ -124,6 +125,31 @@ KINDS: list[ChannelKind] = [
                 unused="it is a condition, not an answer of the robot", condition=True,
                 plausible=((-60.0, 250.0, "K, or raw counts?"),)),
 ]  # fmt: skip
+LOADING_KINDS: tuple[ChannelKind, ...] = (
+    ChannelKind("pose", "joint", ("rad", "m"), meaning="where the joint stands, link side"),
+    ChannelKind("force", None, ("N",), True, "on the tool, world axes"),
+    ChannelKind("weight", None, ("N",), meaning="in place of the force: hung on the tool"),
+    ChannelKind("point", None, ("m",), True, "where the force acts, tool frame; else its origin, "
+                "or where the sidecar's [tool] has the tool's point"),
+    ChannelKind("displacement", "frame", ("m",), True, "of the frame's origin against the "
+                "unloaded pose, world axes"),
+    ChannelKind("dial", None, ("m",), meaning="what a dial gauge at the tool reads, likewise"),
+    ChannelKind("dial_direction", None, ("1",), True, "the way in which it reads more, world axes; "
+                "of any length"),
+    ChannelKind("dial_point", None, ("m",), True, "where it touches, tool frame; else its origin"),
+    ChannelKind("deflection", "joint", ("rad", "m"), meaning="link less motor side, likewise"),
+    ChannelKind("set", None, ("1",), meaning="a number: rows of one set share a zero that nobody "
+                "knows; else each row has a zero of its own, read just before"),
+)  # fmt: skip
+"""The columns of a static record: a row a loading, in any order, without a time."""
+FREQUENCY = "frequency"
+FRF_KINDS: tuple[ChannelKind, ...] = (
+    ChannelKind(FREQUENCY, None, ("Hz",), meaning="ascending; the first column"),
+    ChannelKind("real", None, ("1",), meaning="real part, SI: (m/s^2)/N, (m/s)/N or m/N"),
+    ChannelKind("imag", None, ("1",), meaning="imaginary part, likewise"),
+    ChannelKind("coherence", None, ("1",), meaning="0 to 1; what is low counts little"),
+)
+"""The columns of a frequency response function, a row a line."""
 GROUP = "picchio.channels"
 _TIME_KIND = ChannelKind(TIME, None, ("s",), meaning="0 is the first edge of the first blow")
 
@@ -182,18 +208,21 @@ def patterns() -> list[str]:
 
 
 @cache
-def parse_channel(name: str, unit: str | None = None) -> tuple[Channel, Conversion]:
+def parse_channel(
+    name: str, unit: str | None = None, among: tuple[ChannelKind, ...] = ()
+) -> tuple[Channel, Conversion]:
     """The channel of this name, and how values in `unit` become its SI unit.
 
     Args:
         name: such as "deflection.joint_1" or "time".
         unit: as the file states it; the kind's first SI unit where it is None.
+        among: the kinds that there are; those of a record in time where empty.
 
     Raises:
         InputError: no such kind of channel, a joint or axis missing, a unit of another dimension.
     """
     problem: InputError | None = None
-    for kind in [_TIME_KIND, *kinds()]:
+    for kind in among or (_TIME_KIND, *kinds()):
         parts = _split(name, kind)
         if parts is None:
             continue
@@ -205,12 +234,14 @@ def parse_channel(name: str, unit: str | None = None) -> tuple[Channel, Conversi
         return Channel(name, kind, *parts, target), convert
     if problem is not None:
         raise problem.placed(key=name)
-    raise _unknown(name)
+    raise _unknown(name, among or kinds())
 
 
 def _split(name: str, kind: ChannelKind) -> tuple[str | None, str | None] | None:
     """Subject and axis, or None where the name is not of this kind."""
     word, dot, rest = name.partition(".")
+    if kind.of is None and kind.axes:
+        return (None, rest) if word == kind.name and rest in AXES else None
     if word != kind.name or (kind.of is None) == bool(dot):
         return None
     if not kind.axes:
@@ -219,23 +250,31 @@ def _split(name: str, kind: ChannelKind) -> tuple[str | None, str | None] | None
     return (subject, axis) if subject and axis in AXES else None
 
 
-def _unknown(name: str) -> InputError:
-    alike = [kind.pattern for kind in kinds() if kind.name == name.partition(".")[0]]
+def _unknown(name: str, among: Iterable[ChannelKind]) -> InputError:
+    known = list(among)
+    alike = [kind.pattern for kind in known if kind.name == name.partition(".")[0]]
     if alike:
         return InputError(f"a channel of this kind is named {' or '.join(alike)}", value=name)
-    close = difflib.get_close_matches(name.partition(".")[0], [kind.name for kind in kinds()], n=1)
+    close = difflib.get_close_matches(name.partition(".")[0], [kind.name for kind in known], n=1)
     hint = f"did you mean {close[0]!r}?" if close else None
-    return InputError("unknown channel", value=name, choices=patterns(), hint=hint)
+    choices = [kind.pattern for kind in known]
+    return InputError("unknown channel", value=name, choices=choices, hint=hint)
 
 
-def parse_header(cell: str) -> tuple[Channel, Conversion]:
-    """A column's header, `channel [unit]`.
+def parse_header(cell: str, among: tuple[ChannelKind, ...] = ()) -> tuple[Channel, Conversion]:
+    """A column's header, `channel [unit]`; a pure number needs no unit.
+
+    Args:
+        cell: the header.
+        among: see `parse_channel`.
 
     Raises:
         InputError: no unit in brackets, or as `parse_channel`.
     """
     text = cell.strip()
     name, bracket, rest = text.partition("[")
+    if not bracket and any(k.units == ("1",) and _split(text, k) for k in among):
+        return parse_channel(text, None, among)
     if not bracket or not rest.endswith("]") or "[" in rest:
         raise InputError("a column's header must be 'channel [unit]'", value=text)
-    return parse_channel(name.strip(), rest[:-1].strip())
+    return parse_channel(name.strip(), rest[:-1].strip(), among)

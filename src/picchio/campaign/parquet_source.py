@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from picchio.campaign.channels import Channel
-from picchio.campaign.source import Block, Column, FileSource, Samples
+from picchio.campaign.source import Block, Column, FileSource, Layout, Samples
 from picchio.core.errors import InputError
 from picchio.core.processes import memory_size
 
@@ -30,8 +30,8 @@ class ParquetSource(FileSource):
 
     row_word = "row"
 
-    def __init__(self, path: Path, key: str = "record") -> None:
-        super().__init__(path, key)
+    def __init__(self, path: Path, key: str = "record", layout: Layout | None = None) -> None:
+        super().__init__(path, key, layout)
         arrow, _ = _pyarrow()
         for name, column in self.columns.items():
             kind = self._schema.types[column.index]

@@ -11,9 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from picchio.campaign.channels import TIME, Channel, parse_channel
+from picchio.campaign.channels import (
+    FREQUENCY,
+    FRF_KINDS,
+    LOADING_KINDS,
+    TIME,
+    Channel,
+    parse_channel,
+)
 from picchio.campaign.clock import TOLERANCE, Clock, ClockCheck
-from picchio.campaign.source import MemorySource, Source
+from picchio.campaign.source import Layout, MemorySource, Source
 from picchio.campaign.tables import FORMAT, CampaignExcitation, CampaignTable, RecordTable
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
@@ -21,6 +28,11 @@ from picchio.core.toml import validate
 from picchio.excitation.excitation import Excitation
 
 BLOCK = 16384
+LAYOUTS = {
+    "static": Layout(None, LOADING_KINDS),
+    "frf": Layout(FREQUENCY, FRF_KINDS),
+}
+"""What the columns of a record may be, by its kind; of the others a time and channels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +82,36 @@ class Record:
         return cls(_table(file, table), MemorySource(found, {**channels, TIME: time}, file))
 
     @classmethod
+    def from_columns(
+        cls,
+        file: str,
+        columns: Mapping[str, FloatArray],
+        /,
+        *,
+        units: Mapping[str, str] | None = None,
+        **table: Any,
+    ) -> Record:
+        """A record in memory whose rows are no samples in time, such as a static one.
+
+        Args:
+            file: the name it will have in a campaign, such as "loads.csv".
+            columns: {name: (m,)} in SI.
+            units: as `from_arrays`.
+            **table: the other keys of `[[record]]`, `kind` among them.
+
+        Raises:
+            InputError: an unknown column or key, arrays that don't fit.
+        """
+        entry = _table(file, table)
+        layout = LAYOUTS.get(entry.kind, Layout())
+        found = [
+            parse_channel(name, (units or {}).get(name), layout.kinds)[0]
+            for name in columns
+            if name != layout.first
+        ]
+        return cls(entry, MemorySource(found, columns, file, layout))
+
+    @classmethod
     def from_function(
         cls,
         file: str,
@@ -110,8 +152,13 @@ class Record:
 
     @property
     def kind(self) -> str:
-        """What was done: "percussion" or "motion"."""
+        """What was done: "percussion", "motion", "static" or "frf"."""
         return self.table.kind
+
+    @property
+    def in_time(self) -> bool:
+        """Whether its rows are samples in time."""
+        return self.source.layout.first == TIME
 
     @property
     def pose(self) -> dict[str, float] | list[float] | None:
@@ -121,7 +168,7 @@ class Record:
     @property
     def direction(self) -> FloatArray | None:
         """(3,) unit vector, world; None for motion."""
-        if self.table.direction is None or self.kind == "motion":
+        if self.table.direction is None or self.kind != "percussion":
             return None
         direction = np.array(self.table.direction, dtype=np.float64)
         return direction / np.linalg.norm(direction)
@@ -152,7 +199,7 @@ class Record:
         Raises:
             InputError: a key of the excitation is missing or out of range.
         """
-        if self.kind == "motion" or not self.excitation.blows.model_dump(exclude_none=True):
+        if self.kind != "percussion" or not self.excitation.blows.model_dump(exclude_none=True):
             return None
         file = self.folder / "campaign.toml" if self.folder is not None else None
         return self.excitation.blows.build(file=file, key=f"{self.source.key}.excitation")
@@ -188,7 +235,8 @@ class Record:
             size: at most so many samples a block.
 
         Yields:
-            {"time": (m,) s, name: (m,) in the channel's SI unit}, float64.
+            {"time": (m,) s, name: (m,) in the channel's SI unit}, float64; without the time
+            where the record's rows are no samples in time.
 
         Raises:
             InputError: a sample that is missing, not finite or out of time, with its line.
@@ -199,6 +247,11 @@ class Record:
         for name in names:
             if name != TIME:
                 self.channel(name)
+        if not self.in_time:
+            column = self.source.layout.first
+            wanted = [*([column] if column else []), *names]
+            yield from (block for _, block in self.source.blocks(wanted, size))
+            return
         check = ClockCheck(self.source, self.clock_tolerance)
         for first, block in self.source.blocks([TIME, *dict.fromkeys(names)], size):
             check.feed(block[TIME], first)
@@ -232,18 +285,14 @@ class Record:
             check.feed(block[TIME], first)
         return check.finish()
 
-    def check_samples(self) -> Clock:
+    def check_samples(self) -> None:
         """Read everything once, in constant memory.
-
-        Returns:
-            the clock.
 
         Raises:
             InputError: as `chunks`.
         """
         for _ in self.chunks():
             pass
-        return self.clock
 
 
 def _table(file: str, table: Mapping[str, Any]) -> RecordTable:

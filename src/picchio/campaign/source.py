@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from picchio.campaign.channels import TIME, Channel, parse_header
+from picchio.campaign.channels import TIME, Channel, ChannelKind, parse_header
 from picchio.campaign.units import Conversion
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
@@ -28,10 +28,24 @@ class Column:
     convert: Conversion
 
 
+@dataclass(frozen=True)
+class Layout:
+    """What the columns of a file may be.
+
+    Attributes:
+        first: the column that comes first and ascends; None where rows have no order.
+        kinds: of the columns; those of a record in time where empty.
+    """
+
+    first: str | None = TIME
+    kinds: tuple[ChannelKind, ...] = ()
+
+
 class Source(ABC):
     """The samples of one record.
 
     Attributes:
+        layout: what its columns may be.
         key: the record's name in messages, such as "record[2]".
         path: its file; None in memory.
         channels: by name, without the time, in the file's order.
@@ -39,6 +53,7 @@ class Source(ABC):
         time_scale: s, the unit that the time is stored in.
     """
 
+    layout: Layout = Layout()
     key: str
     path: Path | None
     channels: Mapping[str, Channel]
@@ -100,20 +115,24 @@ class FileSource(Source):
     Args:
         path: the file; its columns' names are read at once, its samples when needed.
         key: the record's name in messages.
+        layout: what its columns may be.
 
     Attributes:
-        columns: by channel name, the time first.
+        columns: by channel name, the first of them first.
 
     Raises:
         InputError: missing, empty, not of this kind, or the names are wrong.
     """
 
-    def __init__(self, path: Path, key: str = "record") -> None:
+    def __init__(self, path: Path, key: str = "record", layout: Layout | None = None) -> None:
         self.path: Path = path
         self.key = key
+        self.layout = layout or Layout()
         self.columns = _columns(self, self.names())
-        self.time_scale = self.columns[TIME].convert.scale
-        self.channels = {name: c.channel for name, c in self.columns.items() if name != TIME}
+        first = self.layout.first
+        if first is not None:
+            self.time_scale = self.columns[first].convert.scale
+        self.channels = {name: c.channel for name, c in self.columns.items() if name != first}
 
     def checked_path(self) -> Path:
         """The file, once it is sure that it is there and no pipe.
@@ -141,7 +160,7 @@ def _columns(source: Source, cells: Sequence[str]) -> dict[str, Column]:
     columns: dict[str, Column] = {}
     for index, cell in enumerate(cells):
         try:
-            channel, convert = parse_header(cell)
+            channel, convert = parse_header(cell, source.layout.kinds)
         except InputError as error:
             where = f"{source.key}, column {index + 1}" + (f", {error.key}" if error.key else "")
             raise error.placed(file=source.path, key=where) from None
@@ -151,9 +170,13 @@ def _columns(source: Source, cells: Sequence[str]) -> dict[str, Column]:
                 channel=channel.name,
             )
         columns[channel.name] = Column(index, channel, convert)
-    if next(iter(columns), None) != TIME:
-        first = cells[0].strip() if cells else ""
-        raise source.error("the first column must be 'time [s]'", value=first)
+    first = source.layout.first
+    if first is None:
+        return columns
+    if next(iter(columns), None) != first:
+        found = cells[0].strip() if cells else ""
+        unit = "s" if first == TIME else "Hz"
+        raise source.error(f"the first column must be '{first} [{unit}]'", value=found)
     if len(columns) == 1:
         raise source.error("holds no channel beside the time")
     return columns
@@ -166,6 +189,7 @@ class MemorySource(Source):
         channels: those of the record, without the time.
         arrays: {name: (m,) SI}, the time among them; or a function that returns it.
         key: the record's name in messages.
+        layout: what its columns may be.
 
     Raises:
         InputError: arrays of several lengths, a channel without array, fewer than two samples.
@@ -178,8 +202,10 @@ class MemorySource(Source):
         channels: Sequence[Channel],
         arrays: Mapping[str, FloatArray] | Callable[[], Mapping[str, FloatArray]],
         key: str = "record",
+        layout: Layout | None = None,
     ) -> None:
         self.key = key
+        self.layout = layout or Layout()
         self.channels = {channel.name: channel for channel in channels}
         self._arrays: dict[str, FloatArray] | None = None
         self._make = arrays if callable(arrays) else lambda: arrays
@@ -191,15 +217,19 @@ class MemorySource(Source):
         if self._arrays is None:
             made = self._make()
             found: dict[str, FloatArray] = {}
-            for name in (TIME, *self.channels):
+            first = (self.layout.first,) if self.layout.first is not None else ()
+            shape: tuple[int, ...] | None = None
+            for name in (*first, *self.channels):
                 if name not in made:
                     raise self.error("has no array", channel=name)
                 values = np.array(made[name], dtype=np.float64)
                 if values.ndim != 1:
                     raise self.error("must be a one-dimensional array", channel=name,
                                      value=values.shape)  # fmt: skip
-                if values.shape != (length := np.shape(made[TIME])):
-                    raise self.error(f"must have as many samples as the time ({length[0]})",
+                shape = values.shape if shape is None else shape
+                if values.shape != shape:
+                    other = "the time" if first else "the first column"
+                    raise self.error(f"must have as many samples as {other} ({shape[0]})",
                                      channel=name, value=values.size)  # fmt: skip
                 self.require_finite(name, values, 0)
                 values.flags.writeable = False
@@ -210,5 +240,5 @@ class MemorySource(Source):
     def blocks(self, names: Sequence[str], size: int) -> Iterator[Block]:
         """Views of the arrays."""
         arrays = self.arrays()
-        for first in range(0, arrays[TIME].size, size):
+        for first in range(0, next(iter(arrays.values())).size, size):
             yield first, {name: arrays[name][first : first + size] for name in names}

@@ -11,13 +11,14 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator
 
 from picchio.campaign.clock import FASTEST, SLOWEST
-from picchio.core.toml import Finite, Name, NotNegative, Positive, StrictModel
+from picchio.core.toml import Finite, FiniteVector, Name, NotNegative, Positive, StrictModel
 from picchio.excitation.piecewise import Hits
 from picchio.excitation.table import ExcitationTable
 
 FORMAT = "picchio-campaign/1"
 CAMPAIGN_FILE = "campaign.toml"
 SUFFIXES = (".csv", ".parquet")
+UFF_SUFFIXES = (".uff", ".unv", ".uf")
 _ABSOLUTE_ZERO = -273.15
 
 
@@ -31,8 +32,9 @@ def _inside(value: str) -> str:
 
 
 def _data_file(value: str) -> str:
-    if PurePosixPath(value).suffix not in SUFFIXES:
-        raise ValueError(f"must be one of {', '.join(SUFFIXES)}")
+    known = (*SUFFIXES, *UFF_SUFFIXES)
+    if PurePosixPath(value).suffix not in known:
+        raise ValueError(f"must be one of {', '.join(known)}")
     return value
 
 
@@ -79,6 +81,15 @@ def _finite_leaves(value: Any) -> Any:
     return value
 
 
+def _joint_map(value: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
+    for joint, row in value.items():
+        if not [name for name in row if name != OFFSET]:
+            raise ValueError(f"{joint} follows no angle of the controller")
+    return value
+
+
+OFFSET = "offset"
+JointMap = Annotated[dict[str, dict[str, Finite]], AfterValidator(_joint_map)]
 InsideFile = Annotated[str, AfterValidator(_inside)]
 DataFile = Annotated[str, AfterValidator(_inside), AfterValidator(_data_file)]
 Direction = Annotated[list[Finite], Field(min_length=3, max_length=3), AfterValidator(_direction)]
@@ -175,8 +186,24 @@ class RecordTable(StrictModel):
 
     Attributes:
         file: CSV or Parquet file, relative to the campaign's folder.
-        kind: "percussion" (the robot stands, the tool hits) or "motion" (it moves, nothing hits).
-        pose: rad or m, by joint name or in the robot's joint order; percussion only.
+        kind: "percussion" (the robot stands, the tool hits), "motion" (it moves, nothing hits)
+            "static" (a row a loading: weights and pulls, and what moved) or "frf" (a row a
+            line of one frequency response function).
+        pose: rad or m, by joint name or in the robot's joint order; not of motion. Of a static
+            record: of the joints that have no column.
+        force_direction: frf only: the way of the force, world, of any length.
+        force_point: m, frf only: where it acts, in `force_frame`; else where the tool's force does.
+        force_frame: frf only: the frame of that point; the tool's where it is left out.
+        response_direction: frf only: the way in which the sensor reads, world, of any length.
+        response_point: m, frf only: where it sits, in `response_frame`; else at its origin.
+        response_frame: frf only: the frame that carries it; the tool's where it is left out.
+        quantity: frf only: accelerance ((m/s^2)/N, an accelerometer's, tilt included), mobility
+            ((m/s)/N) or receptance (m/N).
+        response: frf only: which function of a UFF file, by response node and direction: "12+X".
+        reference: frf only: likewise, by reference node and direction.
+        joint_map: static only: how the angles of the controller become the URDF's. For each
+            joint that differs: the factors of the columns `pose.<name>` whose sum it is, such as
+            `joint_3 = { joint_2 = -1, joint_3 = -1 }`, and an `offset` (rad or m) that is added.
         direction: world, of any length; percussion only.
         excitation: keys that override the campaign's `[excitation]`.
         hits: blows of the burst, overriding `[excitation]`.
@@ -190,8 +217,18 @@ class RecordTable(StrictModel):
     """
 
     file: DataFile
-    kind: Literal["percussion", "motion"] = "percussion"
+    kind: Literal["percussion", "motion", "static", "frf"] = "percussion"
     pose: Pose | None = None
+    joint_map: JointMap | None = None
+    force_direction: Direction | None = None
+    force_point: FiniteVector | None = None
+    force_frame: Name | None = None
+    response_direction: Direction | None = None
+    response_point: FiniteVector | None = None
+    response_frame: Name | None = None
+    quantity: Literal["accelerance", "mobility", "receptance"] | None = None
+    response: Name | None = None
+    reference: Name | None = None
     direction: Direction | None = None
     excitation: CampaignExcitation | None = None
     hits: Hits | None = None
@@ -212,6 +249,13 @@ class RecordTable(StrictModel):
     def percussion_keys(self) -> list[str]:
         """The keys given here that only a percussion record has a use for."""
         names = ("pose", "direction", "excitation", "hits", "force", "period", "width", "preload")
+        kept = ("pose",) if self.kind in ("static", "frf") else ()
+        return [name for name in names if name not in kept and getattr(self, name) is not None]
+
+    def frf_keys(self) -> list[str]:
+        """The keys given here that only a frequency response function has a use for."""
+        names = [name for name in type(self).model_fields
+                 if name.startswith(("force_", "response", "reference", "quantity"))]  # fmt: skip
         return [name for name in names if getattr(self, name) is not None]
 
 

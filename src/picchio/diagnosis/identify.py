@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from picchio.campaign.campaign import Campaign, load_campaign
-from picchio.campaign.tables import Tolerance
+from picchio.campaign.tables import CAMPAIGN_FILE, Tolerance
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.processes import one_thread
-from picchio.core.results import TableResult
-from picchio.core.toml import StrictModel, validate
+from picchio.core.registry import classes_in, is_concrete, with_entry_points
+from picchio.core.toml import validate
 from picchio.diagnosis.diagnose import diagnose
+from picchio.diagnosis.entries import joint_entry, standing_entries, tool_entry
+from picchio.diagnosis.identified import FORMAT, Identification, Identified, IdentifiedJoint, Method
 from picchio.diagnosis.result import Cause, Diagnosis, Value, unit_of
 from picchio.model.effects.registry import effect_class
 from picchio.model.effects.structure.joint_stiffness import JointStiffness
@@ -29,73 +31,37 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import Joint, is_drive
 from picchio.robot.loading.load import load_robot
 from picchio.robot.spread import ESTIMATED
-from picchio.robot.tool import Mounting
 
-FORMAT = "picchio-identification/1"
-# Half of a two-sided 90 % interval, standard deviations.
-_HALF = 1.645
 # A spread below this share of the tolerance comes from the records, not from the tolerance.
 _TOLD = 0.5
-
-
-@dataclass(frozen=True)
-class Identified:
-    """One number of a joint.
-
-    Attributes:
-        value, low, high: SI; the interval is 90 %, two-sided.
-        told: whether the records tell it, or only the nominal value and its tolerance do.
-        why: a sentence.
-    """
-
-    value: float
-    low: float
-    high: float
-    told: bool
-    why: str
-
-    @classmethod
-    def of(cls, value: float, std: float, told: bool, why: str) -> Identified:
-        """From a standard deviation.
-
-        Args:
-            value: in SI.
-            std: standard deviation, same unit.
-            told: whether the data constrain it.
-            why: the reason where they don't.
-        """
-        return cls(value, max(value - _HALF * std, 0.0), value + _HALF * std, told, why)
-
-
-@dataclass(frozen=True)
-class IdentifiedJoint:
-    """A joint's stiffness (N m/rad or N/m) and damping ratio."""
-
-    name: str
-    stiffness: Identified
-    damping_ratio: Identified
+GROUP = "picchio.identification"
+_METHOD: Any = Method
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(TableResult):
-    """What `identify` found; its table is the joints.
+class Diagnosed(Identification):
+    """What a diagnosis of percussion or motion records says of the joints.
 
     Attributes:
-        robot: as it was before.
         diagnosis: what the numbers are from.
-        source: where the data are from, such as the campaign's name.
-        joints: every flexible joint.
         tolerance: how well the campaign takes the nominal values to be known.
     """
 
-    INDEX = "joint"
-    UNITS: ClassVar = {f"stiffness_{part}": "N*m/rad" for part in ("value", "low", "high")}
-
-    robot: FlexibleRobot
     diagnosis: Diagnosis
-    source: str
-    joints: tuple[IdentifiedJoint, ...]
     tolerance: Tolerance
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """How many causes were found."""
+        count = len(self.diagnosis.causes)
+        return (f"{count} cause{'' if count == 1 else 's'} found.",)
+
+    @property
+    def doubt(self) -> str:
+        """That the diagnosis has an answer, and it is not one."""
+        verdict = self.diagnosis.verdict
+        partly = verdict in ("partial", "ambiguous")
+        return f"the diagnosis is {verdict!r}: look at picchio diagnose, too" if partly else ""
 
     def sidecar_text(self) -> str:
         """The robot's sidecar with the values that were found in it, for `--flex`.
@@ -140,18 +106,65 @@ class Identification(TableResult):
         }
 
     def _headline(self) -> str:
-        told = sum(joint.stiffness.told for joint in self.joints)
-        return f"stiffness of {told} of {len(self.joints)} joints; {self.diagnosis._headline()}"
+        return f"{self._told()}; {self.diagnosis._headline()}"
 
-    def _rows(self) -> list[dict[str, Any]]:
-        return [
-            {
-                "joint": joint.name,
-                **{f"stiffness_{k}": v for k, v in asdict(joint.stiffness).items()},
-                **{f"damping_ratio_{k}": v for k, v in asdict(joint.damping_ratio).items()},
-            }
-            for joint in self.joints
-        ]
+
+class ByDiagnosis(Method):
+    """The extended model's values, from percussion or motion records, or both."""
+
+    name = "diagnosis"
+    kinds = frozenset({"percussion", "motion"})
+    needs_springs = frozenset({"percussion"})
+
+    def identify(
+        self,
+        robot: FlexibleRobot,
+        campaign: Campaign,
+        *,
+        workers: int | None = None,
+        progress: Callable[[str], None] | None = None,
+    ) -> Identification:
+        """As `diagnose`."""
+        found = diagnose(robot, campaign, workers=workers, progress=progress)
+        return identification(campaign, found)
+
+
+@cache
+def methods() -> dict[str, Method]:
+    """Every way to find the joints' numbers, by its name: those of `picchio.identification`, too.
+
+    Raises:
+        InputError: an entry point that cannot be loaded, or is none.
+    """
+    own: list[type[Method]] = [ByDiagnosis, *classes_in("picchio.diagnosis.stiffness", _METHOD)]
+    found: dict[str, type[Method]] = with_entry_points(
+        GROUP, "method of identification", own, lambda value: is_concrete(value, _METHOD),
+        lambda way: way.name,
+    )  # fmt: skip
+    return {name: way() for name, way in found.items()}
+
+
+def method_for(campaign: Campaign) -> Method:
+    """The way to identify with all of a campaign's records.
+
+    Args:
+        campaign: the records.
+
+    Raises:
+        InputError: there is none for all of them together.
+    """
+    kinds = {record.kind for record in campaign}
+    ways = list(methods().values())
+    for way in ways:
+        if kinds <= way.kinds:
+            return way
+    sets = [" and ".join(sorted(way.kinds)) for way in ways]
+    file = campaign.folder / CAMPAIGN_FILE if campaign.folder is not None else None
+    raise InputError(
+        "these kinds of records are not identified together", file=file, key="record[].kind",
+        value=" and ".join(sorted(kinds)), choices=sets,
+        hint="identify them one after the other, with --flex the sidecar of the first",
+    )  # fmt: skip
 
 
 @one_thread()
@@ -164,7 +177,10 @@ def identify(
     workers: int | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Identification:
-    """The stiffness and damping of every joint, from percussion or motion records, or both.
+    """The stiffness and damping of every joint, from tests made for it or from other records.
+
+    Static loadings tell it from nothing (`picchio.diagnosis.stiffness`); of percussion and motion
+    records a diagnosis says how the robot differs from its nominal values.
 
     Args:
         robot: the nominal robot, its name or its file.
@@ -175,15 +191,28 @@ def identify(
         progress: told what is being done.
 
     Raises:
-        InputError: as `diagnose`.
+        InputError: as `diagnose`; kinds of records that are not identified together.
     """
     records = load_campaign(campaign)
-    moves = any(record.kind == "motion" for record in records)
-    loaded = load_robot(robot, flex=flex, tool=tool, allow_rigid=moves)
-    return identification(records, diagnose(loaded, records, workers=workers, progress=progress))
+    way = method_for(records)
+    loaded = load_robot(robot, flex=flex, tool=tool, allow_rigid=not needs_springs(records))
+    return way.identify(loaded, records, workers=workers, progress=progress)
 
 
-def identification(campaign: Campaign, found: Diagnosis) -> Identification:
+def needs_springs(campaign: Campaign) -> bool:
+    """Whether these records can only be identified with a robot that has flexible joints.
+
+    Args:
+        campaign: the records.
+
+    Raises:
+        InputError: as `method_for`.
+    """
+    kinds = {record.kind for record in campaign}
+    return kinds <= method_for(campaign).needs_springs
+
+
+def identification(campaign: Campaign, found: Diagnosis) -> Diagnosed:
     """What a diagnosis of these records says of every joint.
 
     Args:
@@ -202,7 +231,7 @@ def identification(campaign: Campaign, found: Diagnosis) -> Identification:
         for joint in robot.flexible_joints
         if is_drive(joint.name)
     )
-    return Identification(robot, found, source, joints, tolerance)
+    return Diagnosed(robot, source, joints, found, tolerance)
 
 
 def _is_of(cause: Cause, tolerance: str) -> bool:
@@ -269,12 +298,10 @@ def _sidecar(
     if not diagnosis.causes:
         raise InputError(f"the diagnosis is {diagnosis.verdict!r}: there is nothing to write")
     drives = [joint for joint in robot.flexible_joints if is_drive(joint.name)]
-    joints = {joint.name: _joint(robot, joint) for joint in drives}
+    joints = {joint.name: joint_entry(robot, joint) for joint in drives}
     table: dict[str, Any] = {"format": SIDECAR, "description": f"{robot.name}, identified"}
     remarks: list[str] = []
-    # Without a mass there is neither its centre nor an inertia.
-    left_out = {"source"} if robot.tool.mass > 0.0 else {"source", "com", "inertia"}
-    tool = robot.tool.model_dump(mode="json", exclude=left_out, exclude_none=True)
+    tool = tool_entry(robot)
     ratios = {joint.name: abs(joint.gear_ratio or 0.0) for joint in drives}
     told: dict[str, tuple[str, str, str]] = {}  # a value's name -> what it was fitted as
     for cause in diagnosis.causes:
@@ -322,7 +349,7 @@ def _sidecar(
         entry["source"] = f"{entry['source']}; {said}" if "source" in entry else said
         _tell(entry, "damping_ratio", found)
         told[f"damping_ratio.{joint.name}"] = (ModalDamping.name, "robot", "scale")
-    table |= {"joint": joints, "tool": tool, **_standing(robot)}
+    table |= {"joint": joints, "tool": tool, **standing_entries(robot)}
     known = spreads_of(validate(table, Sidecar, format=SIDECAR))
     posterior = _posterior(robot, diagnosis, told, [spread.name for spread in known])
     return {**table, **posterior}, remarks
@@ -348,43 +375,6 @@ def _posterior(
     matrix = block_diag(*(matrix for _, matrix in parts))
     names = [name for names, _ in parts for name in names]
     return {"posterior": {"names": names, "correlation": matrix.tolist()}}
-
-
-def _joint(robot: FlexibleRobot, joint: Joint) -> dict[str, Any]:
-    """A joint as it is now, with where its stiffness is from."""
-    found: dict[str, Any] = {"stiffness": joint.stiffness, "damping_ratio": joint.damping_ratio}
-    if joint.stiffness_curve is not None:
-        del found["stiffness"]
-    for key in ("stiffness_curve", "rotor_inertia", "gear_ratio", "shaft", "strength", "balancer"):
-        if (value := getattr(joint, key)) is not None:
-            model = isinstance(value, StrictModel)
-            found[key] = value.model_dump(exclude_none=True) if model else value
-    if joint.reducer is not None:
-        found["reducer"] = joint.reducer.name
-    if joint.estimated:
-        found["estimated"] = True
-    for spread in robot.spreads.values():
-        if spread.table == "joint" and spread.owner == joint.name and len(spread.path) == 1:
-            usual = spread.estimated and math.isclose(spread.size, math.log(ESTIMATED))
-            found |= {} if usual else {f"{spread.path[0]}_spread": math.exp(spread.size)}
-    if joint.estimated:  # not of values that are no estimates, whatever source they are from
-        sure = [key for key in ("stiffness", "damping_ratio") if key in found
-                and f"{key}.{joint.name}" not in robot.spreads]  # fmt: skip
-        found |= {f"{key}_spread": 1.0 for key in sure}
-    origin = robot.origins.get(f"{joint.name}.stiffness")
-    if origin:
-        found["source"] = origin
-    return found
-
-
-def _standing(robot: FlexibleRobot) -> dict[str, Any]:
-    """Gun and mounting, where they are not the usual."""
-    found: dict[str, Any] = {}
-    if robot.gun is not None:
-        found["gun"] = robot.gun.model_dump(exclude_none=True)
-    if robot.mounting != Mounting():
-        found["base"] = robot.mounting.model_dump(exclude_none=True)
-    return found
 
 
 def _stiffness(robot: FlexibleRobot, cause: Cause) -> Value:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from picchio.core.arrays import FloatArray
+from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.robot.dynamics.rigid_model import unit_inertia
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -260,6 +260,36 @@ class WideChain:
         own = robot.rigid.gravity_gradient(pose)[np.ix_(robot.flexible_index, robot.flexible_index)]
         slope[:n, :n] += robot.gravity_stiffness(pose) - own
         return gravity, slope
+
+    @property
+    def order(self) -> IndexArray:
+        """(c,) of the coordinates: one that carries another has the smaller number."""
+        return np.argmax(self._columns != 0.0, axis=0)
+
+    def placed(self, pose: FloatArray, link: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """How the origin of a link's frame moves, to first order, and where it is.
+
+        Args:
+            pose: (nv,) rad or m.
+            link: its name.
+
+        Returns:
+            (6, c) m/rad and 1, linear, then angular, world axes; (3,) m, world; (3, 3), the
+            frame's axes in the world.
+
+        Raises:
+            InputError: no such link.
+        """
+        joint, placement = self._frame(link)
+        model = self._model
+        data = model.createData()
+        pin.computeJointJacobians(model, data, self._q(pose))
+        full = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
+        jacobian = np.array(full).reshape(6, model.nv) @ self._columns
+        lever = data.oMi[joint].rotation @ placement.translation
+        jacobian[:3] += _CROSS @ lever @ jacobian[3:]
+        at = data.oMi[joint] * placement
+        return jacobian, np.array(at.translation), np.array(at.rotation)
 
     def motion(self, pose: FloatArray, link: str) -> Motion:
         """How the origin of a link's frame moves, to second order.

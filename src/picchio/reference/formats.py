@@ -21,7 +21,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from picchio.campaign import tables as campaign
-from picchio.campaign.channels import kinds
+from picchio.campaign.channels import FRF_KINDS, LOADING_KINDS, kinds
 from picchio.campaign.importing import mapping
 from picchio.core.errors import InputError
 from picchio.core.html import sheet
@@ -172,7 +172,7 @@ def _known() -> tuple[FileFormat, ...]:
         name = format.removeprefix("picchio-").partition("/")[0]
         keys = (_format_key(format), *_keys(table))
         tables.append(FileFormat(name, format, "TOML", "input", meaning, command, keys))
-    return (*tables, _record(), *_contracts(), _map())
+    return (*tables, _record(), *_tests(), *_contracts(), _map())
 
 
 def _format_key(format: str) -> Key:
@@ -191,6 +191,28 @@ def _record() -> FileFormat:
         "one measured record; each column's header is `channel [unit]`",
         "check, diagnose, identify", tuple(keys),
     )  # fmt: skip
+
+
+def _tests() -> Iterator[FileFormat]:
+    """The columns of records whose rows are no samples in time."""
+    for name, of, meaning, needed in (
+        ("loadings", LOADING_KINDS, 'a record of the kind "static", a row a loading', ()),
+        (
+            "frf",
+            FRF_KINDS,
+            'a record of the kind "frf", a row a line',
+            ("frequency", "real", "imag"),
+        ),
+    ):
+        keys = [
+            Key(kind.pattern, "column", " or ".join(kind.units), "", kind.name in needed,
+                kind.meaning)
+            for kind in of
+        ]  # fmt: skip
+        yield FileFormat(
+            name, "", "CSV or Parquet", "input", f"{meaning}; each header is `channel [unit]`",
+            "identify", tuple(keys),
+        )  # fmt: skip
 
 
 def _map() -> FileFormat:
@@ -222,8 +244,11 @@ def _expanded(path: str, line: str, shared: dict[str, Any]) -> Iterator[tuple[st
     if not line.startswith("@"):
         yield path.lstrip("."), line
         return
-    for tail, inner in shared[line[1:]].items():
-        yield from _expanded(path + tail, inner, shared)
+    maybe = line.startswith("@?")  # a group that is not always there
+    for tail, inner in shared[line[1:].removeprefix("?")].items():
+        for found, text in _expanded(path + tail, inner, shared):
+            kind, mark, rest = text.partition("; ")
+            yield found, f"{kind.removesuffix('?')}?{mark}{rest}" if maybe else text
 
 
 def _contract_key(path: str, line: str) -> Key:

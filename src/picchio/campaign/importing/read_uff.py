@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,15 +9,14 @@ from typing import Any
 import numpy as np
 
 from picchio.campaign.importing.isolated import Limits
-from picchio.campaign.importing.raw import Names, RawChannel, RawFile, reason
+from picchio.campaign.importing.raw import Names, RawChannel, RawFile
+from picchio.campaign.uff import data_sets, place
 from picchio.core.errors import InputError, warn_user
 
 LIMITS = Limits(memory_a_byte=32.0)
 # Function types of data set 58 that are histories in time: general, and time response.
 _TIME_HISTORIES = (0, 1)
 _TIME_ABSCISSA = (0, 17)
-_DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ",
-               -1: "-X", -2: "-Y", -3: "-Z", -4: "-RX", -5: "-RY", -6: "-RZ"}  # fmt: skip
 _NO_UNIT = ("", "none", "unknown")
 
 
@@ -32,20 +28,7 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
     Raises:
         InputError: pyuff is missing, the file is no UFF, or holds no time history.
     """
-    try:
-        import pyuff
-    except ImportError:
-        raise InputError("UFF files need pyuff", hint="pip install 'picchio[import]'") from None
-    try:
-        # pyuff prints as it reads.
-        with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            found = pyuff.UFF(str(path)).read_sets()
-    except MemoryError:
-        raise
-    except Exception as error:  # pyuff raises bare Exceptions
-        raise InputError(f"is not a readable universal file: {reason(error)}", file=path) from None
-    sets = [found] if isinstance(found, dict) else list(found)
+    sets = data_sets(path)
     unique = Names()
     channels: dict[str, RawChannel] = {}
     skipped = 0
@@ -68,8 +51,7 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
 
 
 def _channel(data: dict[str, Any], unique: Names, path: Path) -> RawChannel:
-    direction = _DIRECTIONS.get(int(data.get("rsp_dir", 0)), "")
-    name = unique(f"{int(data.get('rsp_node', 0))}{direction}")
+    name = unique(place(data, "rsp"))
     values = np.asarray(data["data"])
     if values.dtype.kind == "c":
         raise InputError("holds complex numbers; only time histories can be imported",

@@ -1,9 +1,9 @@
-"""`picchio identify`: the values that a diagnosis found, written back as a sidecar."""
+"""`picchio identify`: the joints' numbers from measured records, written as a sidecar."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -19,13 +19,17 @@ from picchio.cli.options import (
 from picchio.cli.output import (
     check_targets,
     console,
-    count_of,
     deliver,
     say_warning,
+    styled,
+    table,
     telling,
 )
 from picchio.core.errors import InputError
 from picchio.core.files import write_text
+
+if TYPE_CHECKING:
+    from picchio.diagnosis.identified import Identification
 
 
 @app.command(
@@ -43,30 +47,42 @@ def identify(
 ) -> None:
     """Stiffness and damping from measured data, as a sidecar.
 
-    The values are those of the extended model that `picchio diagnose` finds, each with its source
-    and its uncertainty.
+    Static loadings (a weight or a pull, and what moved) tell the stiffness from nothing, with its
+    spread and why it is no better known. Of percussion and motion records the values are those of
+    the extended model that `picchio diagnose` finds.
     """
     import picchio
+    from picchio.diagnosis.identify import needs_springs
 
     if str(out) == "-":
         raise InputError("must be a file", key="--out", value=str(out))
     check_targets((out, json), [flex])
     campaign = picchio.load_campaign(data)
-    moves = any(record.kind == "motion" for record in campaign)
     loaded = picchio.load_robot(
-        robot, flex=flex, tool=tool, reducers=reducers or (), allow_rigid=moves
-    )
+        robot, flex=flex, tool=tool, reducers=reducers or (),
+        allow_rigid=not needs_springs(campaign),
+    )  # fmt: skip
     files = [*loaded.files, *campaign.files]
     check_targets([out], files)
     check_targets([json], [*files, out])
     with telling("reading the data") as say:
         found = picchio.identify(loaded, campaign, progress=say)
     write_text(out, found.sidecar_text())
-    verdict, causes = found.diagnosis.verdict, found.diagnosis.causes
-    if verdict in ("partial", "ambiguous"):
-        say_warning(f"the diagnosis is {verdict!r}: look at picchio diagnose, too")
-    deliver(
-        found.to_dict(),
-        json,
-        lambda: console().print(f"{count_of(len(causes), 'cause')} found."),
-    )
+    if found.doubt:
+        say_warning(found.doubt)
+    deliver(found.to_dict(), json, lambda: show_identified(found))
+
+
+def show_identified(found: Identification) -> None:
+    """Print every joint's stiffness with its interval, why, and what else the answer says."""
+    out, rows = console(), []
+    for joint in found.joints:
+        k = joint.stiffness
+        mark = "yes" if k.told else styled("no", style="dim")
+        rows.append([joint.name, f"{k.value:.4g}", f"{k.low:.3g} to {k.high:.3g}", mark])
+    unit = "stiffness\nN m/rad, N/m"
+    out.print(table(("joint", f">{unit}", ">90 % interval", "told"), rows))
+    for joint in found.joints:
+        out.print(f"  {joint.name}: {joint.stiffness.why}")
+    for line in found.remarks:
+        out.print(line)

@@ -1,0 +1,136 @@
+"""What measured records say of a robot's joints: the answer of every way to find it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar
+
+from picchio.campaign.campaign import Campaign
+from picchio.core.results import TableResult
+from picchio.robot.flexible_robot import FlexibleRobot
+
+FORMAT = "picchio-identification/1"
+# Half of a two-sided 90 % interval, standard deviations.
+_HALF = 1.645
+
+
+@dataclass(frozen=True)
+class Identified:
+    """One number of a joint.
+
+    Attributes:
+        value, low, high: SI; the interval is 90 %, two-sided.
+        told: whether the records tell it, or only the nominal value and its tolerance do.
+        why: a sentence.
+    """
+
+    value: float
+    low: float
+    high: float
+    told: bool
+    why: str
+
+    @classmethod
+    def of(cls, value: float, std: float, told: bool, why: str) -> Identified:
+        """From a standard deviation.
+
+        Args:
+            value: in SI.
+            std: standard deviation, same unit.
+            told: whether the data constrain it.
+            why: the reason where they don't.
+        """
+        return cls(value, max(value - _HALF * std, 0.0), value + _HALF * std, told, why)
+
+
+@dataclass(frozen=True)
+class IdentifiedJoint:
+    """A joint's stiffness (N m/rad or N/m) and damping ratio."""
+
+    name: str
+    stiffness: Identified
+    damping_ratio: Identified
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(TableResult):
+    """What `identify` found; its table is the joints.
+
+    Attributes:
+        robot: as it was before.
+        source: where the data are from, such as the campaign's name.
+        joints: every flexible joint.
+    """
+
+    INDEX = "joint"
+    UNITS: ClassVar = {f"stiffness_{part}": "N*m/rad" for part in ("value", "low", "high")}
+
+    robot: FlexibleRobot
+    source: str
+    joints: tuple[IdentifiedJoint, ...]
+
+    @abstractmethod
+    def sidecar_text(self) -> str:
+        """The robot's sidecar with the values that were found in it, for `--flex`.
+
+        Values have their spreads, and `[posterior]` says how these hang together; everything else
+        of the joints stays as it was.
+        """
+
+    @property
+    @abstractmethod
+    def remarks(self) -> tuple[str, ...]:
+        """What else to say of the answer, a line each."""
+
+    @property
+    def doubt(self) -> str:
+        """Why to look twice at it; empty where there is no reason."""
+        return ""
+
+    def _told(self) -> str:
+        told = sum(joint.stiffness.told for joint in self.joints)
+        return f"stiffness of {told} of {len(self.joints)} joints"
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [
+            {
+                "joint": joint.name,
+                **{f"stiffness_{k}": v for k, v in asdict(joint.stiffness).items()},
+                **{f"damping_ratio_{k}": v for k, v in asdict(joint.damping_ratio).items()},
+            }
+            for joint in self.joints
+        ]
+
+
+class Method(ABC):
+    """A way to find the joints' numbers from some kinds of records.
+
+    Attributes:
+        name: of the way.
+        kinds: of the records that it takes, any mix of them.
+        needs_springs: kinds with which every robot needs flexible joints.
+    """
+
+    name: ClassVar[str]
+    kinds: ClassVar[frozenset[str]]
+    needs_springs: ClassVar[frozenset[str]]
+
+    @abstractmethod
+    def identify(
+        self,
+        robot: FlexibleRobot,
+        campaign: Campaign,
+        *,
+        workers: int | None = None,
+        progress: Callable[[str], None] | None = None,
+    ) -> Identification:
+        """What the records say of every joint.
+
+        Args:
+            robot: the nominal one.
+            campaign: records of these kinds.
+            workers: processes; as many as cores if None.
+            progress: told what is being done.
+        """

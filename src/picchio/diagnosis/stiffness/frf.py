@@ -1,0 +1,302 @@
+"""Joint stiffness and damping from frequency response functions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from picchio.campaign.campaign import Campaign
+from picchio.core.arrays import FloatArray
+from picchio.core.provenance import provenance
+from picchio.diagnosis.identified import FORMAT, Identification, Identified, IdentifiedJoint, Method
+from picchio.diagnosis.stiffness.fit import Fit, climb, score
+from picchio.diagnosis.stiffness.joints import MOST_HALF, Told, stiffness_of
+from picchio.diagnosis.stiffness.modes import starts
+from picchio.diagnosis.stiffness.prior import prior_of
+from picchio.diagnosis.stiffness.responses import Damping, FrfProblem, make_problem
+from picchio.diagnosis.stiffness.written import sidecar
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.joint import is_drive
+
+_TAILS = 6.0  # degrees of freedom of the lines' errors
+_FAR = 0.3  # residual over the functions beyond which the answer is doubted
+REMAINDER = 0.01
+"""What a model that is right may leave of the functions, as a share of them."""
+_LOOKS, _BASINS, _STRIDE, _GAIN = 3, 4, 0.12, 2.0  # at other basins; ln of stiffness; ln evidence
+_STRAY, _INCREDIBLE = 1.5, 3.0  # standard deviations before the tests
+_DECISIVE = 5.0  # in log evidence, for a convention of the damping
+_WORDS = {
+    "modal": "one ratio for each mode, the joints' weighted by strain energy",
+    "joint": "a dashpot in each joint",
+}
+
+
+class ByResponses(Method):
+    """Springs and damping fitted to frequency response functions, from nothing."""
+
+    name = "frf"
+    kinds = frozenset({"frf"})
+    needs_springs = frozenset({"frf"})
+
+    def identify(
+        self,
+        robot: FlexibleRobot,
+        campaign: Campaign,
+        *,
+        workers: int | None = None,
+        progress: Callable[[str], None] | None = None,
+    ) -> Identification:
+        """As `identify_frf`."""
+        return identify_frf(robot, campaign, progress=progress)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FrfIdentification(Identification):
+    """What frequency response functions say of the joints.
+
+    Attributes:
+        campaign: the functions.
+        fit: the most probable numbers.
+        half: standard deviations to either end of a 90 % interval.
+        covariance: (2 n, 2 n) of the logarithms of stiffness and damping ratios.
+        left: residual over the functions, each line over its scale.
+        before: the same of the stated values.
+        convention: of the damping that the functions follow: "modal" or "joint".
+        decided: log evidence for it over the other.
+    """
+
+    campaign: Campaign
+    fit: Fit
+    half: float
+    covariance: FloatArray
+    left: float
+    before: float
+    convention: str
+    decided: float
+
+    @property
+    def doubt(self) -> str:
+        """That the model does not follow the functions."""
+        if self.left < _FAR:
+            return ""
+        return (
+            f"{100 * self.left:.2g} % of the functions are left unexplained: a joint-spring model "
+            "does not follow them, and the intervals do not know that"
+        )
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is left, and which convention the damping follows."""
+        sure = "" if self.decided > _DECISIVE else ", though the other one does about as well"
+        return (
+            f"{len(list(self.campaign))} functions, {self.fit.problem.rows} lines. With the stated "
+            f"values {100 * self.before:.3g} % of them is left, with those found "
+            f"{100 * self.left:.3g} %; nothing was held out.",
+            f"Damping: {_WORDS[self.convention]}{sure} (log evidence {self.decided:+.1f}).",
+        )
+
+    def sidecar_text(self) -> str:
+        """See `Identification`; a joint that is not told has a wide spread."""
+        return sidecar(
+            self.robot, self.joints, self.source, self.campaign.files, self.remarks,
+            self.covariance, damping=True,
+        )  # fmt: skip
+
+    def _content(self) -> Mapping[str, Any]:
+        return {
+            "format": FORMAT,
+            "robot": self.robot.name,
+            "method": ByResponses.name,
+            "joints": [asdict(joint) for joint in self.joints],
+            "also": [],
+            "residual": {"before": self.before, "after": self.left, "held_out": []},
+            "damping": {"convention": self.convention, "evidence": self.decided},
+            "noise": {"frf": {"std": self.fit.noise["frf"], "unit": "1"}},
+            "provenance": provenance([*self.robot.files, *self.campaign.files]),
+        }
+
+    def _headline(self) -> str:
+        return f"{self._told()} told by {self.fit.problem.rows} lines"
+
+
+def identify_frf(
+    robot: FlexibleRobot,
+    campaign: Campaign,
+    *,
+    progress: Callable[[str], None] | None = None,
+) -> FrfIdentification:
+    """Stiffness and damping of every joint from frequency response functions, from nothing.
+
+    Modes are matched by frequency and shape first; from the best of these starts the functions
+    themselves are fitted, each line by its coherence, with masses, poses, places, directions and
+    gains as numbers of their own within `[tolerance]`.
+
+    Args:
+        robot: flexible, its stiffness stated or estimated.
+        campaign: records of the kind "frf".
+        progress: told what is being done.
+
+    Returns:
+        values, intervals and reasons.
+
+    Raises:
+        InputError: a function that cannot be read, or that names a frame that is not there.
+    """
+    say = progress or (lambda text: None)
+    say("frequency responses: modes")
+    problem = make_problem(robot, list(campaign), campaign.tolerance, prior_of(robot))
+    begin = starts(problem)
+    say("frequency responses: springs and damping")
+    plain = problem.bare()
+    bare = max(
+        (climb(plain, at[: problem.springs], _TAILS) for at in begin),
+        key=lambda found: found.evidence,
+    )  # fmt: skip
+    bare = _settled(plain, bare)
+    other = climb(problem.bare(convention="joint"), bare.mean, _TAILS)
+    gain = bare.evidence - other.evidence
+    convention: Damping = "modal" if gain >= -_DECISIVE else "joint"
+    say("frequency responses: with all that is never exact")
+    whole = replace(problem, convention=convention)
+    at = np.zeros(len(whole.precision))
+    at[: problem.springs] = (bare if convention == "modal" else other).mean
+    fit = climb(whole, at, _TAILS)
+    # Without nuisances a joint hardly seen makes up for what masses and places are off by.
+    known = np.concatenate([problem.prior.std, problem.damping_std])
+    strays = np.abs(at[: problem.springs]) > _STRAY * known
+    if strays.any():
+        at[: problem.springs][strays] = 0.0
+        fit = max(fit, climb(whole, at, _TAILS), key=lambda found: found.evidence)
+    fit = _settled(whole, fit)
+    stated = np.zeros(len(problem.precision))
+    covariance = _with_remainder(fit)
+    modal = (fit, covariance) if convention == "modal" else (bare, _with_remainder(bare))
+    joints = _joints(robot, fit, covariance, *modal)
+    source = "memory" if campaign.folder is None else campaign.folder.resolve().name
+    return FrfIdentification(
+        robot, source, joints, campaign, fit, fit.half(), covariance, _left(fit.problem, fit.mean),
+        _left(problem, stated), convention,
+        gain if convention == "modal" else -gain,
+    )  # fmt: skip
+
+
+def _settled(problem: FrfProblem, fit: Fit) -> Fit:
+    """The fit, or a better one far from it."""
+    for _ in range(_LOOKS):
+        better = _elsewhere(problem, fit)
+        if better is None:
+            break
+        fit = better
+    return fit
+
+
+def _with_remainder(fit: Fit) -> FloatArray:
+    """The covariance (2 n, 2 n) of springs and damping, with what a model never follows.
+
+    Thousands of lines make a fit surer than its model is right: a remainder of a hundredth of the
+    functions, as a diagnosis allows it, passes for any change of the numbers that looks like it. It
+    is taken to lie along each number's own slope by a cosine that may be anything from -1 to 1.
+    """
+    problem: FrfProblem = fit.problem
+    count = 2 * problem.joints
+    parts = problem.predict(fit.mean)
+    relative = []
+    for part, table in zip(parts, problem.tables, strict=True):
+        size = float(np.sqrt(np.mean(np.abs(table.measured) ** 2)))
+        slope = part.slope[..., :count] * (table.scale / size)[:, None, None]
+        relative.append(slope.reshape(-1, count) / math.sqrt(len(table) * len(parts)))
+    seen = np.concatenate(relative)
+    ridge = np.diag(np.concatenate([problem.prior.std, problem.damping_std]) ** -2.0)
+    # Per hundredth of the functions; a number that none shows keeps its prior's spread.
+    alone = np.linalg.inv(seen.T @ seen + REMAINDER**2 / 3.0 * ridge)
+    added = REMAINDER**2 / 3.0 * np.diag(alone)
+    return np.asarray(fit.covariance[:count, :count] + np.diag(added))
+
+
+def _elsewhere(problem: FrfProblem, fit: Fit) -> Fit | None:
+    """A better fit with one joint far from where it is; None where there is none.
+
+    A joint that the functions hardly show may have ended at a false mode. Everything else held, its
+    stiffness is tried over the whole prior; what looks better is fitted anew.
+    """
+    n = problem.joints
+    held = problem.bare(fit.mean, problem.convention)
+    here = fit.mean[: 2 * n]
+    now = score(held, here, fit)
+    tried: list[tuple[float, FloatArray]] = []
+    for k in range(n):
+        reach = 2.5 * problem.prior.std[k]
+        grid = np.arange(-reach, reach + 1e-9, _STRIDE)
+        places = np.tile(here, (len(grid), 1))
+        places[:, k] = grid
+        scores = np.array([score(held, place, fit) for place in places])
+        inner = np.r_[False, (scores[1:-1] < scores[:-2]) & (scores[1:-1] <= scores[2:]), False]
+        far = np.abs(grid - here[k]) > 2.0 * _STRIDE
+        tried += [(float(scores[i]), places[i]) for i in np.flatnonzero(inner & far)]
+    tried.sort(key=lambda pair: pair[0])
+    for _, place in tried[:_BASINS]:
+        found = climb(held, place, fit.tails)
+        if score(held, found.mean, fit) < now - _GAIN:
+            other = climb(problem, np.concatenate([found.mean, fit.mean[2 * n :]]), fit.tails)
+            if other.evidence > fit.evidence + _GAIN:
+                return other
+    return None
+
+
+def _left(problem: FrfProblem, at: FloatArray) -> float:
+    """The residual of all functions over themselves, each function alike."""
+    shares = []
+    for part, table in zip(problem.predict(at), problem.tables, strict=True):
+        left = np.linalg.norm(part.residual * table.scale[:, None])
+        shares.append(float(left / np.linalg.norm(table.measured)))
+    return math.sqrt(float(np.mean(np.square(shares))))
+
+
+def _joints(
+    robot: FlexibleRobot, fit: Fit, covariance: FloatArray, modal: Fit, of_modal: FloatArray
+) -> tuple[IdentifiedJoint, ...]:
+    problem: FrfProblem = fit.problem
+    n = problem.joints
+    names = (
+        *(f"the stiffness of {name}" for name in robot.flexible_names),
+        *(f"the damping of {name}" for name in robot.flexible_names),
+        *problem.steps,
+        *("a mode's damping" for _ in range(problem.modal * len(problem.standings))),
+    )
+    known = np.diag(fit.data_information)[:n] + np.diag(np.linalg.inv(problem.prior.covariance))
+    told = Told(
+        fit.mean[:n], covariance[:n, :n], problem.prior.std, 1.0 / np.sqrt(known), fit.half(),
+        names, fit.covariance, tuple(_moved(fit, k) for k in range(n)), ("",) * n, np.zeros(n),
+    )  # fmt: skip
+    found = stiffness_of(robot.flexible_joints, told)
+    for k, away in enumerate(np.abs(fit.mean[:n]) / problem.prior.std):
+        if away > _INCREDIBLE:
+            why = "far from all that was thought possible before: it makes up for something else"
+            found[k] = replace(found[k], told=False, why=why)
+    half, joints = modal.half(), []
+    for k, joint in enumerate(robot.flexible_joints):
+        if not is_drive(joint.name):
+            continue
+        size = float(math.sqrt(of_modal[n + k, n + k]))
+        value = float(problem.damping_ratio[k] * math.exp(modal.mean[n + k]))
+        reach = math.exp(half * size)
+        sure = 0.5 * (reach - 1.0 / reach) <= MOST_HALF and size < 0.5 * problem.damping_std[k]
+        why = "as the modes show it" if sure else f"within a factor of {reach:.2g}"
+        ratio = Identified(value, value / reach, value * reach, bool(sure), why)
+        joints.append(IdentifiedJoint(joint.name, found[k], ratio))
+    return tuple(joints)
+
+
+def _moved(fit: Fit, k: int) -> str:
+    """Which function tells a joint most, in words."""
+    total = float(fit.information[:, k].sum())
+    if not total > 1.0:
+        return ""
+    ends = np.cumsum([len(table) for table in fit.problem.tables])[:-1]
+    shares = [float(part.sum()) for part in np.split(fit.information[:, k], ends)]
+    best = int(np.argmax(shares))
+    return f"told most by {fit.problem.tables[best].file} ({100 * shares[best] / total:.2g} %)"

@@ -1,0 +1,523 @@
+"""Frequency response functions of an arm on its joint springs, and how they change with everything.
+
+About a pose, with the motor sides held, Z(w) = K + dg/dq - w^2 M + i w C, and a force along d at a
+point that moves with J_f gives a reading H = (J_s^T e)^T Z^-1 (J_f^T d) along e at the sensor,
+times (i w)^2 of an accelerometer, i w of a velocity (Ewins, Modal Testing (2000), ch. 2). An
+accelerometer also turns in gravity. The slope by any number of Z is -u^T (dZ/dp) v, with
+v = Z^-1 J_f^T d and u likewise of the sensor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from picchio.campaign.channels import FREQUENCY
+from picchio.campaign.record import Record
+from picchio.campaign.tables import Tolerance
+from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.core.errors import InputError
+from picchio.diagnosis.stiffness.fit import Predicted
+from picchio.diagnosis.stiffness.prior import UNKNOWN, Prior
+from picchio.diagnosis.stiffness.statics import moved
+from picchio.model.linear_system import modal_damping_matrix
+from picchio.robot.flexible_robot import FlexibleRobot
+
+Damping = Literal["modal", "joint"]
+_TURN = 1e-4  # rad or m, of the differences by the pose
+_ARM = 0.05  # m, at which masses are put to shift a centre or to change an inertia
+_MOST_LINES = 240  # of a function; more are thinned out
+_WITHOUT = 0.02  # relative deviation of a line without coherence, to begin with
+_FLOOR = 1e-3  # of the largest line: nothing is measured better than that
+_POWER = {"receptance": 0, "mobility": 1, "accelerance": 2}
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """One measured function.
+
+    Attributes:
+        file: the record's name.
+        omega: (m,) rad/s.
+        measured: (m,) SI.
+        scale: (m,) what a line's standard deviation is in units of the fitted noise, SI.
+        power: of i w.
+        push: (n,) m, J_f^T d.
+        sight: (n,) m, J_s^T e.
+        tilt: (n,) m/s^2, what the sensor reads of gravity for a unit turn of each joint.
+        pushes, sights: (k, n) by how much a standard deviation of each of its pose's k numbers
+            changes these.
+        tilts: (k, n) likewise.
+        gains: (k,) likewise, of the whole function, relative.
+    """
+
+    file: str
+    omega: FloatArray
+    measured: ComplexArray
+    scale: FloatArray
+    power: int
+    push: FloatArray
+    sight: FloatArray
+    tilt: FloatArray
+    pushes: FloatArray
+    sights: FloatArray
+    tilts: FloatArray
+    gains: FloatArray
+
+    @property
+    def values(self) -> FloatArray:
+        """(m, 2) real and imaginary part over the lines' scale."""
+        return np.stack([self.measured.real, self.measured.imag], axis=1) / self.scale[:, None]
+
+    groups: tuple[str, ...] = ("frf", "frf")
+
+    def __len__(self) -> int:
+        return len(self.omega)
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """The arm at one pose, and the functions measured there.
+
+    Attributes:
+        mass: (n, n) kg m^2.
+        gravity: (n, n) N m/rad, dg/dq.
+        masses: (k, n, n) what a standard deviation of each number that is never exact adds to it.
+        spring: (n,) N m/rad, as stated.
+        responses: measured here.
+        factors: (n,) on the modes' damping ratios, by ascending frequency.
+    """
+
+    mass: FloatArray
+    gravity: FloatArray
+    masses: FloatArray
+    spring: FloatArray
+    responses: tuple[Response, ...]
+    factors: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class FrfProblem:
+    """The functions of all poses, and what is known before.
+
+    The numbers: the logarithms of the n stiffnesses and of the n damping ratios over the stated
+    ones; then what is never exact, in standard deviations; then, for each pose, what its modes'
+    damping ratios are off by.
+
+    Attributes:
+        standings: a pose each.
+        prior: of the stiffness.
+        damping_ratio: (n,) as stated.
+        damping_std: (n,) of the logarithm.
+        steps: names of what is never exact.
+        by_mode: relative deviation of each mode's damping ratio, drawn once a pose.
+        gravity_std: relative deviation of gravity's stiffness.
+        convention: of the damping: "modal", or dashpots in the joints, "joint".
+    """
+
+    standings: tuple[Standing, ...]
+    prior: Prior
+    damping_ratio: FloatArray
+    damping_std: FloatArray
+    steps: tuple[str, ...]
+    by_mode: float
+    gravity_std: float
+    convention: Damping = "modal"
+    noise: Mapping[str, float] = field(default_factory=lambda: {"frf": 1.0})
+    groups = ("frf",)
+    zeros = ()
+    causes = ()
+
+    @property
+    def joints(self) -> int:
+        """How many yield."""
+        return len(self.damping_ratio)
+
+    @property
+    def springs(self) -> int:
+        """Logarithms that no step may change by much."""
+        return 2 * self.joints
+
+    @cached_property
+    def tables(self) -> tuple[Response, ...]:
+        """Every function, pose by pose."""
+        return tuple(one for standing in self.standings for one in standing.responses)
+
+    @cached_property
+    def rows(self) -> int:
+        """Lines in all."""
+        return sum(len(one) for one in self.tables)
+
+    @cached_property
+    def modal(self) -> int:
+        """How many numbers the modes of one pose have."""
+        return self.joints if self.convention == "modal" and self.by_mode > 0.0 else 0
+
+    @cached_property
+    def precision(self) -> FloatArray:
+        """(p, p) of all numbers before the tests."""
+        n = self.joints
+        found = np.eye(2 * n + len(self.steps) + self.modal * len(self.standings))
+        found[:n, :n] = np.linalg.inv(self.prior.covariance)
+        found[n : 2 * n, n : 2 * n] = np.diag(self.damping_std**-2)
+        return found
+
+    def bare(self, at: FloatArray | None = None, convention: Damping = "modal") -> FrfProblem:
+        """The same with everything but springs and damping held: many times faster.
+
+        Args:
+            at: (p,) the numbers at which it is held; as told if None.
+            convention: of the damping.
+
+        Returns:
+            the problem of 2 n numbers.
+        """
+        n = self.joints
+        first = 2 * n + len(self.steps)
+        off = np.zeros(len(self.steps)) if at is None else at[2 * n : first]
+        pull = 0.0
+        if self.gravity_std > 0.0:
+            pull = self.gravity_std * float(off[self.steps.index("gravity_stiffness")])
+
+        def plain(one: Response) -> Response:
+            none, gain = np.zeros((0, n)), float(np.exp(off @ one.gains))
+            return replace(
+                one, measured=one.measured / gain, scale=one.scale / gain,
+                push=one.push + off @ one.pushes, sight=one.sight + off @ one.sights,
+                tilt=one.tilt + off @ one.tilts, pushes=none, sights=none, tilts=none,
+                gains=np.zeros(0),
+            )  # fmt: skip
+
+        standings = []
+        for k, standing in enumerate(self.standings):
+            own = np.zeros(self.modal)
+            if at is not None:
+                own = at[first + self.modal * k : first + self.modal * (k + 1)]
+            factors = np.exp(self.by_mode * own) if self.modal else np.ones(n)
+            standings.append(replace(
+                standing, mass=standing.mass + np.tensordot(off, standing.masses, 1),
+                gravity=(1.0 + pull) * standing.gravity, masses=np.zeros((0, n, n)),
+                responses=tuple(map(plain, standing.responses)),
+                factors=standing.factors * factors,
+            ))  # fmt: skip
+        return replace(self, standings=tuple(standings), steps=(), by_mode=0.0, gravity_std=0.0,
+                       convention=convention)  # fmt: skip
+
+    def damping(
+        self, standing: Standing, springs: FloatArray, ratio: FloatArray, modes: FloatArray
+    ) -> FloatArray:
+        """The damping matrix (n, n), N m s/rad.
+
+        Args:
+            standing: the pose.
+            springs: (n,) N m/rad.
+            ratio: (n,) damping ratios of the joints.
+            modes: (n,) factors on the modes' ratios; empty for none.
+        """
+        if self.convention == "joint":
+            # As if each joint swung alone: c = 2 zeta k / w.
+            return np.diag(2.0 * ratio * np.sqrt(springs * standing.mass.diagonal()))
+        factors = standing.factors * modes if len(modes) else standing.factors
+        if (factors == 1.0).all():
+            return modal_damping_matrix(standing.mass, springs, ratio)
+        squared, shapes = _modes(standing.mass, np.diag(springs))
+        energy = springs[:, None] * shapes**2
+        own = (ratio @ energy / energy.sum(axis=0)) * factors
+        weighted = standing.mass @ shapes
+        return np.asarray((weighted * (2.0 * own * np.sqrt(squared))) @ weighted.T)
+
+    def predict(self, at: FloatArray, known: Sequence[Predicted] | None = None) -> list[Predicted]:
+        """The real and imaginary parts over the lines' scale, measured less predicted.
+
+        Args:
+            at: (p,) the numbers.
+            known: not used: everything is computed anew.
+        """
+        n, found = self.joints, []
+        scale = np.exp(np.clip(at[: 2 * n], -12.0, 12.0))
+        ratio = self.damping_ratio * scale[n:]
+        off = at[2 * n : 2 * n + len(self.steps)]
+        for k, standing in enumerate(self.standings):
+            springs = standing.spring * scale[:n]
+            first = 2 * n + len(self.steps) + self.modal * k
+            modes = np.exp(self.by_mode * at[first : first + self.modal])
+            mass = standing.mass + np.tensordot(off, standing.masses, 1)
+            stiff = np.diag(springs) + standing.gravity
+            pull = self.steps.index("gravity_stiffness") if self.gravity_std > 0.0 else None
+            if pull is not None:
+                stiff = stiff + off[pull] * self.gravity_std * standing.gravity
+            damp = self.damping(standing, springs, ratio, modes)
+            p = len(at)
+            d_stiff, d_damp = np.zeros((p, n, n)), np.zeros((p, n, n))
+            d_stiff[np.arange(n), np.arange(n), np.arange(n)] = springs
+            step = 1e-5
+            for j in range(n):
+                factor = np.where(np.arange(n) == j, 1.0 + step, 1.0)
+                d_damp[j] = self.damping(standing, springs * factor, ratio, modes) - damp
+                d_damp[n + j] = self.damping(standing, springs, ratio * factor, modes) - damp
+            for j in range(self.modal):
+                factor = np.where(np.arange(n) == j, 1.0 + step, 1.0)
+                more = self.damping(standing, springs, ratio, modes * factor) - damp
+                d_damp[first + j] = self.by_mode * more
+            d_damp /= step
+            if pull is not None:
+                d_stiff[2 * n + pull] = self.gravity_std * standing.gravity
+            d_mass = np.zeros((p, n, n))
+            d_mass[2 * n : 2 * n + len(self.steps)] = standing.masses
+            parts = (d_stiff.reshape(p, -1), d_damp.reshape(p, -1), d_mass.reshape(p, -1))
+            for response in standing.responses:
+                found.append(self._response(response, off, (stiff, damp, mass), parts))
+        return found
+
+    def _response(
+        self,
+        response: Response,
+        off: FloatArray,
+        system: tuple[FloatArray, FloatArray, FloatArray],
+        parts: tuple[FloatArray, FloatArray, FloatArray],
+    ) -> Predicted:
+        stiff, damp, mass = system
+        w = response.omega[:, None, None]
+        n, p = self.joints, parts[0].shape[0]
+        push = response.push + off @ response.pushes
+        sight, tilt = response.sight + off @ response.sights, response.tilt + off @ response.tilts
+        sides = np.stack([push, sight, tilt], axis=1)
+        solved = np.linalg.solve(stiff - w**2 * mass + 1j * w * damp, sides[None])
+        lead = (1j * response.omega) ** response.power
+        v = solved[:, :, 0]
+        u = lead[:, None] * solved[:, :, 1] + solved[:, :, 2]
+        seen = lead[:, None] * sight + tilt
+        gain = float(np.exp(off @ response.gains))
+        value = gain * np.einsum("mn,mn->m", seen, v)
+        outer = (u[:, :, None] * v[:, None, :]).reshape(len(w), -1)
+        omega = response.omega[:, None]
+        slope = -gain * (
+            outer @ parts[0].T + 1j * omega * (outer @ parts[1].T) - omega**2 * (outer @ parts[2].T)
+        )
+        own = slice(2 * n, 2 * n + len(self.steps))
+        slope[:, own] += gain * (
+            u @ response.pushes.T + lead[:, None] * (v @ response.sights.T) + v @ response.tilts.T
+        )
+        slope[:, own] += value[:, None] * response.gains
+        left = (response.measured - value) / response.scale
+        slope = slope / response.scale[:, None]
+        return Predicted(
+            np.stack([left.real, left.imag], axis=1),
+            np.stack([slope.real, slope.imag], axis=1).reshape(len(w), 2, p),
+            None,
+        )
+
+
+def _modes(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n,) squared rad/s and (n, n) shapes, of unit modal mass."""
+    inverse = np.linalg.inv(np.linalg.cholesky(mass))
+    squared, vectors = np.linalg.eigh(inverse @ stiffness @ inverse.T)
+    return squared, inverse.T @ vectors
+
+
+def make_problem(
+    robot: FlexibleRobot, records: Sequence[Record], tolerance: Tolerance, prior: Prior
+) -> FrfProblem:
+    """What was measured, with all that a prediction needs.
+
+    Args:
+        robot: flexible.
+        records: of the kind "frf".
+        tolerance: how exact masses, poses and places are.
+        prior: of the stiffness.
+
+    Raises:
+        InputError: a frame that is not there; a function that cannot be one.
+    """
+    steps: dict[str, None] = {}
+    bodies = _bodies(robot, tolerance)
+    names = [name for name, _ in bodies]
+    names += [f"pose.{name}" for name in robot.joint_names if tolerance.pose > 0.0]
+    names += [f"tool_point.{axis}" for axis in "xyz" if tolerance.tool_point > 0.0]
+    names += [f"sensor_position.{axis}" for axis in "xyz" if tolerance.sensor_position > 0.0]
+    names += [f"sensor_angle.{axis}" for axis in "xyz" if tolerance.sensor_angle > 0.0]
+    names += ["sensor_gain"] if tolerance.sensor_gain > 0.0 else []
+    names += ["gravity_stiffness"] if tolerance.gravity_stiffness > 0.0 else []
+    if tolerance.direction > 0.0:
+        names += [f"direction.{record.file}.{axis}" for record in records for axis in "xyz"]
+    steps = dict.fromkeys(names)
+    index = {name: k for k, name in enumerate(steps)}
+    poses: dict[tuple[float, ...], list[Record]] = {}
+    for record in records:
+        pose = robot.pose(record.pose or {})
+        poses.setdefault(tuple(pose.tolist()), []).append(record)
+    standings = []
+    for key, own in poses.items():
+        pose = np.array(key)
+        flex = robot.flexible_index
+        square = np.ix_(flex, flex)
+        mass = robot.rigid.mass_matrix(pose)[square]
+        masses = np.zeros((len(index), *mass.shape))
+        for name, added in bodies:
+            heavier = robot.rigid.with_masses(added)
+            masses[index[name]] = heavier.mass_matrix(pose)[square] - mass
+        for k, joint in enumerate(robot.joint_names):
+            if tolerance.pose > 0.0:
+                other = pose + _TURN * np.eye(len(pose))[k]
+                change = robot.rigid.mass_matrix(other)[square] - mass
+                masses[index[f"pose.{joint}"]] = tolerance.pose / _TURN * change
+        responses = tuple(_response_of(robot, one, pose, tolerance, index) for one in own)
+        standings.append(Standing(
+            mass, robot.gravity_stiffness(pose), masses, robot.state(pose).stiffness, responses,
+            np.ones(len(flex)),
+        ))  # fmt: skip
+    spread = [robot.spreads.get(f"damping_ratio.{joint.name}") for joint in robot.flexible_joints]
+    width = np.array([one.size if one is not None and one.log and one.size > 0.0 else UNKNOWN
+                      for one in spread])  # fmt: skip
+    return FrfProblem(
+        tuple(standings), prior, np.maximum(robot.damping_ratio, 1e-3), width, tuple(steps),
+        tolerance.damping_by_mode, tolerance.gravity_stiffness,
+    )  # fmt: skip
+
+
+def _bodies(robot: FlexibleRobot, tolerance: Tolerance) -> list[tuple[str, list]]:
+    """What a standard deviation of mass, centre and inertia of each moving link is, as masses."""
+    found: list[tuple[str, list]] = []
+    moving = {link for joint in robot.flexible_names for link in robot.tree.beyond(joint)}
+    for link in sorted(moving):
+        body = robot.tree.links.get(link)
+        if body is None or not body.mass > 0.0:
+            continue
+        if tolerance.link_mass > 0.0:
+            found.append((f"link_mass.{link}", [(tolerance.link_mass, link, None)]))
+        centre = np.array(body.xyz)
+        for k, axis in enumerate("xyz"):
+            arm = _ARM * np.eye(3)[k]
+            ends = [tuple((centre + arm).tolist()), tuple((centre - arm).tolist())]
+            if tolerance.link_com > 0.0:
+                size = body.mass * tolerance.link_com / (2.0 * _ARM)
+                both = [(size, link, ends[0]), (-size, link, ends[1])]
+                found.append((f"link_com.{link}.{axis}", both))
+            if tolerance.link_inertia > 0.0:
+                # About the two other axes it grows alike: three such make any diagonal change.
+                size = tolerance.link_inertia * body.inertia[(0, 3, 5)[k]] / (2.0 * _ARM**2)
+                put = [(size, link, ends[0]), (size, link, ends[1]),
+                       (-2.0 * size, link, tuple(centre.tolist()))]  # fmt: skip
+                found.append((f"link_inertia.{link}.{axis}", put))
+    return found
+
+
+def _response_of(
+    robot: FlexibleRobot, record: Record, pose: FloatArray, tolerance: Tolerance,
+    index: dict[str, int],
+) -> Response:  # fmt: skip
+    table, columns = record.table, record.read()
+    frequency = columns[FREQUENCY]
+    if not (np.diff(frequency) > 0.0).all() or frequency[0] < 0.0 or len(frequency) < 8:
+        raise record.source.error("needs eight frequencies or more, ascending", channel=FREQUENCY)
+    measured = columns["real"] + 1j * columns["imag"]
+    if not np.abs(measured).max() > 0.0:
+        raise record.source.error("is zero throughout", channel="real")
+    coherence = columns.get("coherence")
+    if coherence is not None and not ((coherence >= -1e-6) & (coherence <= 1.0 + 1e-6)).all():
+        bad = int(np.argmax((coherence < -1e-6) | (coherence > 1.0 + 1e-6)))
+        raise record.source.error("is not within 0 and 1", channel="coherence", sample=bad)
+    share = np.full(len(measured), _WITHOUT)
+    if coherence is not None:
+        # Bendat and Piersol, Random Data (2010), ch. 9, but for the number of averages.
+        known = np.clip(coherence, 1e-3, 1.0 - 1e-6)
+        share = np.sqrt((1.0 - known) / (2.0 * known))
+    scale = share * np.abs(measured) + _FLOOR * float(np.abs(measured).max()) * _WITHOUT
+    kept = frequency > 0.0
+    thin = np.flatnonzero(kept)[:: max(1, int(np.ceil(kept.sum() / _MOST_LINES)))]
+    way = np.array(table.force_direction, dtype=float)
+    along = np.array(table.response_direction, dtype=float)
+    way, along = way / np.linalg.norm(way), along / np.linalg.norm(along)
+    quantity = table.quantity or "accelerance"
+    down = np.array(robot.mounting.gravity, dtype=float)
+
+    def stand(at: FloatArray, push: FloatArray, see: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(6, n) of the force's point and of the sensor's, shifted by (3,) m in their frames."""
+        return (
+            _point(robot, at, table.force_frame, table.force_point, push, True),
+            _point(robot, at, table.response_frame, table.response_point, see, False),
+        )
+
+    def sides(
+        both: tuple[FloatArray, FloatArray], d: FloatArray, e: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """J_f^T d, J_s^T e and what turning in gravity reads: (w x g) . e."""
+        turned = both[1][3:].T @ np.cross(down, e) if quantity == "accelerance" else 0.0
+        return both[0][:3].T @ d, both[1][:3].T @ e, turned * np.ones(both[0].shape[1])
+
+    nothing = np.zeros(3)
+    here = stand(pose, nothing, nothing)
+    own = sides(here, way, along)
+    changes = np.zeros((3, len(index), len(own[0])))
+
+    def put(name: str, other: tuple[FloatArray, ...], factor: float = 1.0) -> None:
+        if name in index:
+            for k in range(3):
+                changes[k, index[name]] = factor * (other[k] - own[k])
+
+    for k, joint in enumerate(robot.joint_names):
+        if f"pose.{joint}" in index:
+            at = pose + _TURN * np.eye(len(pose))[k]
+            put(f"pose.{joint}", sides(stand(at, nothing, nothing), way, along),
+                tolerance.pose / _TURN)  # fmt: skip
+    for k, axis in enumerate("xyz"):
+        unit = np.eye(3)[k]
+        put(f"tool_point.{axis}",
+            sides(stand(pose, tolerance.tool_point * unit, nothing), way, along))  # fmt: skip
+        put(f"sensor_position.{axis}",
+            sides(stand(pose, nothing, tolerance.sensor_position * unit), way, along))  # fmt: skip
+        put(f"sensor_angle.{axis}",
+            sides(here, way, along + tolerance.sensor_angle * np.cross(unit, along)))  # fmt: skip
+        put(f"direction.{record.file}.{axis}",
+            sides(here, way + tolerance.direction * np.cross(unit, way), along))  # fmt: skip
+    gains = np.zeros(len(index))
+    if "sensor_gain" in index:
+        gains[index["sensor_gain"]] = tolerance.sensor_gain
+    return Response(
+        record.file, 2.0 * np.pi * frequency[thin], measured[thin], scale[thin], _POWER[quantity],
+        own[0], own[1], own[2], changes[0], changes[1], changes[2], gains,
+    )  # fmt: skip
+
+
+def _point(robot: FlexibleRobot, pose: FloatArray, frame: str | None,
+           point: tuple[float, float, float] | None, shift: FloatArray,
+           force: bool) -> FloatArray:  # fmt: skip
+    """The Jacobian (6, n) of a point in a frame, shifted (3,) m; of the tool's if none is named."""
+    if frame is None and point is None and force:
+        link = robot.tool_point
+        at = robot.rigid.frame(link)
+    else:
+        link = robot.link_of(frame or robot.tool_frame)
+        at = robot.rigid.frame(link)
+    jacobian = robot.rigid.jacobian(pose, at)[:, robot.flexible_index]
+    turn = robot.rigid.placement(pose, at)[1]
+    return moved(jacobian, turn @ (np.array(point or (0.0, 0.0, 0.0)) + shift))
+
+
+def natural(
+    problem: FrfProblem, standing: Standing, springs: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Squared frequencies (..., n), rad/s, and shapes (..., n, n) of one pose.
+
+    Args:
+        problem: whose pose it is.
+        standing: the pose.
+        springs: (..., n) N m/rad.
+
+    Returns:
+        ascending; a mode a column, of unit modal mass.
+
+    Raises:
+        InputError: the mass matrix is not positive definite.
+    """
+    try:
+        inverse = np.linalg.inv(np.linalg.cholesky(standing.mass))
+    except np.linalg.LinAlgError:
+        raise InputError("the mass matrix is not positive definite at a pose") from None
+    stiff = springs[..., None] * np.eye(problem.joints) + standing.gravity
+    squared, vectors = np.linalg.eigh(inverse @ stiff @ inverse.T)
+    return squared, inverse.T @ vectors

@@ -1,0 +1,345 @@
+"""Joint stiffness from static loadings: weights and pulls, and what moved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.loadings import read_loadings
+from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
+from picchio.core.provenance import provenance
+from picchio.diagnosis.identified import FORMAT, Identification, Identified, IdentifiedJoint, Method
+from picchio.diagnosis.result import Cause, Value
+from picchio.diagnosis.stiffness.fit import Problem
+from picchio.diagnosis.stiffness.joints import Told, stiffness_of
+from picchio.diagnosis.stiffness.prior import Suspect, prior_of, suspects
+from picchio.diagnosis.stiffness.select import Answer, select
+from picchio.diagnosis.stiffness.statics import Table, make_table
+from picchio.diagnosis.stiffness.written import sidecar
+from picchio.model.expansion import WideChain
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.joint import is_drive
+
+_ENCODER = 1e-5  # rad or m, of a joint's deflection, to begin with
+_LIKELY = 0.9  # a probability of a cause from which on no rival is told
+_SHOWN = 0.05  # of a set of causes
+_LINES = 3  # loadings that a reason names
+_UNITS = {"pose": "rad", "tool_point": "m", "sensor_position": "m", "sensor_angle": "rad",
+          "play": "rad"}  # fmt: skip
+_LOOSE = {"static_force": "the scale of the forces", "gravity_stiffness": "gravity's stiffness"}
+
+
+class ByLoads(Method):
+    """Springs fitted to static loadings, from nothing."""
+
+    name = "static"
+    kinds = frozenset({"static"})
+    needs_springs = frozenset({"static"})
+
+    def identify(
+        self,
+        robot: FlexibleRobot,
+        campaign: Campaign,
+        *,
+        workers: int | None = None,
+        progress: Callable[[str], None] | None = None,
+    ) -> Identification:
+        """As `identify_static`."""
+        return identify_static(robot, campaign, progress=progress)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StaticIdentification(Identification):
+    """What static loadings say of the joints' stiffness.
+
+    Attributes:
+        campaign: the loadings.
+        answer: the fit, and what else was tried.
+        half: standard deviations to either end of a 90 % interval.
+        lines: (rows,) where each loading stands: "loads.csv line 4".
+    """
+
+    campaign: Campaign
+    answer: Answer
+    half: float
+    lines: tuple[str, ...]
+
+    @property
+    def outliers(self) -> tuple[str, ...]:
+        """The loadings that fit nothing, by where they stand."""
+        out = self.answer.fit.outliers
+        return tuple(line for line, bad in zip(self.lines, out, strict=True) if bad)
+
+    @property
+    def named(self) -> tuple[Suspect, ...]:
+        """What is beside the joints' springs more likely than not."""
+        answer = self.answer
+        return tuple(s for s in answer.fit.problem.causes if answer.confidence(s) > 0.5)
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """The same, with the numbers of the most probable fit, and each one's probability."""
+        answer = self.answer
+        return tuple(
+            Cause(s.effect, s.target, answer.confidence(s), _parameters(answer, s))
+            for s in self.named
+        )
+
+    @property
+    def sets(self) -> tuple[tuple[float, tuple[Suspect, ...]], ...]:
+        """Probability and content of every set of causes that may be, the likeliest first."""
+        likely = sorted(self.answer.weights.items(), key=lambda pair: -pair[1])
+        return tuple(
+            (weight, tuple(sorted(causes, key=lambda one: one.words)))
+            for causes, weight in likely if weight > _SHOWN
+        )  # fmt: skip
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is left on loadings left out, what else yields, and which rows are outliers."""
+        left, alone = self.answer.left_out, self.answer.alone
+        noise = ", ".join(
+            f"{1e3 * size:.2g} {'mm' if group != 'deflection' else 'mrad'} ({group})"
+            for group, size in self.answer.fit.noise.items()
+        )
+        said = [
+            f"{len(self.lines)} loadings. On loadings left out, {100 * alone.before:.3g} % of the "
+            f"signal is left with the stated stiffness, {100 * alone.nrmse:.3g} % with joint "
+            "springs fitted to the others"
+            + (
+                f", {100 * left.nrmse:.3g} % with what else is most probable."
+                if self.named
+                else "."
+            ),
+            f"Noise, as the fit finds it: {noise}.",
+        ]
+        for cause, one in zip(self.causes, self.named, strict=True):
+            values = ", ".join(
+                f"{name} {v.value:.3g} +- {v.std:.2g} {v.unit}"
+                for name, v in cause.parameters.items()
+            )
+            said.append(
+                f"  {one.words} ({cause.effect} of {cause.target}): {values}; "
+                f"probability {cause.confidence:.2f}"
+            )
+        if self.sets[0][0] < _LIKELY and any(sets for _, sets in self.sets):
+            said.append("What there may be beside joint springs, with its probability:")
+            for weight, sets in self.sets:
+                words = " and ".join(one.words for one in sets) or "joint springs alone"
+                said.append(f"  {weight:.2f} {words}")
+        if self.outliers:
+            said.append(f"Outliers, which hardly count: {', '.join(self.outliers)}.")
+        return tuple(said)
+
+    def sidecar_text(self) -> str:
+        """See `Identification`; a joint that is not told has a wide spread."""
+        return sidecar(
+            self.robot, self.joints, self.source, self.campaign.files, self.remarks,
+            self.answer.covariance,
+        )  # fmt: skip
+
+    def _content(self) -> Mapping[str, Any]:
+        left, alone = self.answer.left_out, self.answer.alone
+        fit = self.answer.fit
+        first = fit.problem.springs
+        return {
+            "format": FORMAT,
+            "robot": self.robot.name,
+            "method": ByLoads.name,
+            "joints": [asdict(joint) for joint in self.joints],
+            "also": [cause.to_dict() for cause in self.causes],
+            "residual": {
+                "before": alone.before, "after": left.nrmse, "joints_alone": alone.nrmse,
+                "held_out": [record.file for record in self.campaign],
+            },
+            "sets": [
+                {"probability": weight,
+                 "causes": [{"effect": s.effect, "target": s.target} for s in sets]}
+                for weight, sets in self.sets
+            ],
+            "outliers": list(self.outliers),
+            "noise": {
+                group: {"std": size, "unit": "rad" if group == "deflection" else "m"}
+                for group, size in fit.noise.items()
+            },
+            "nuisances": {
+                name: {
+                    "value": float(fit.mean[first + k] * fit.problem.size_of(name)),
+                    "std": float(math.sqrt(fit.covariance[first + k, first + k])
+                                 * fit.problem.size_of(name)),
+                    "tolerance": fit.problem.size_of(name),
+                    "unit": _UNITS.get(name.partition(".")[0], "1"),
+                }
+                for k, name in enumerate(fit.problem.steps)
+            },
+            "provenance": provenance([*self.robot.files, *self.campaign.files]),
+        }  # fmt: skip
+
+    def _headline(self) -> str:
+        return f"{self._told()} told by {len(self.lines)} loadings"
+
+
+def identify_static(
+    robot: FlexibleRobot,
+    campaign: Campaign,
+    *,
+    gravity_stiffness: bool = True,
+    search: bool = True,
+    progress: Callable[[str], None] | None = None,
+) -> StaticIdentification:
+    """The stiffness of every joint from static loadings, from nothing.
+
+    Every flexible joint's stiffness, on a logarithmic scale, starts at what the robot's files say
+    with a spread of a factor of four unless they state one, and is fitted together with all that
+    `[tolerance]` says is never exact. Base, bearings, bending links, play and another point of
+    attack are tried, and taken where the loadings ask for them.
+
+    Args:
+        robot: flexible, its stiffness stated or estimated.
+        campaign: static records.
+        gravity_stiffness: whether gravity's change with the deflection counts.
+        search: whether anything beside the joints' springs is tried.
+        progress: told what is being done.
+
+    Returns:
+        values, intervals and reasons.
+
+    Raises:
+        InputError: a record that cannot be read, or that names a joint or frame that is not there.
+    """
+    say = progress or (lambda text: None)
+    say("static loadings: the robot at every pose")
+    chain = WideChain(robot)
+    tables = tuple(
+        make_table(robot, chain, read_loadings(record), campaign.tolerance) for record in campaign
+    )
+    stated = {"displacement": campaign.tolerance.dial, "dial": campaign.tolerance.dial,
+              "deflection": _ENCODER}  # fmt: skip
+    problem = Problem(tables, prior_of(robot), stated, gravity=gravity_stiffness)
+    for table, record in zip(tables, campaign, strict=True):
+        if not np.abs(table.force).max() > 0.0:
+            raise InputError("no loading of this record has a force", file=record.source.path,
+                             key=record.source.key)  # fmt: skip
+    say("static loadings: springs")
+    every = suspects(robot, _lever(tables))
+    # What no loading tells from a joint is not tried: both together are the joint.
+    shadows = [(one, _shadowed(tables, problem.joints, one)) for one in every]
+    answer = select(problem, [one for one, joint in shadows if joint is None] if search else ())
+    lines = tuple(
+        f"{record.file} {record.source.row_word} {row + record.source.first_row}"
+        for record, table in zip(campaign, tables, strict=True)
+        for row in range(len(table))
+    )
+    told = _told(robot, answer, lines, shadows)
+    unseen = "loads that stand still show no damping: the nominal value and its tolerance"
+    width = campaign.tolerance.damping_ratio
+    joints = tuple(
+        IdentifiedJoint(
+            joint.name, one,
+            Identified.of(joint.damping_ratio, joint.damping_ratio * width, False, unseen),
+        )
+        for joint, one in zip(
+            robot.flexible_joints, stiffness_of(robot.flexible_joints, told), strict=True
+        )
+        if is_drive(joint.name)
+    )  # fmt: skip
+    source = "memory" if campaign.folder is None else campaign.folder.resolve().name
+    return StaticIdentification(robot, source, joints, campaign, answer, told.half, lines)
+
+
+def _lever(tables: tuple[Table, ...]) -> float:
+    """m, how far from the base the loads act, about: what a turning base adds over a moving one."""
+    arms = []
+    for table in tables:
+        turns = [table.names.index(f"base.{axis}") for axis in ("rx", "ry", "rz")]
+        arms.append(np.linalg.norm(table.columns.push[:, :3][..., turns], axis=(1, 2)).ravel())
+    return float(max(np.median(np.concatenate(arms)) / math.sqrt(2.0), 1e-3))
+
+
+def _told(robot: FlexibleRobot, answer: Answer, lines: tuple[str, ...],
+          shadowed: Sequence[tuple[Suspect, int | None]]) -> Told:  # fmt: skip
+    fit, n = answer.fit, answer.fit.problem.joints
+    problem = fit.problem
+    spring_names = [f"the stiffness of {name}" for name in robot.flexible_names]
+    spring_names += [one.words for one in fit.problem.causes if one.spring is not None]
+    names = (
+        *spring_names,
+        *(_LOOSE.get(name, name) for name in fit.problem.steps),
+        *("a set's zero" for _ in fit.problem.zeros),
+    )
+    before = np.sqrt(np.diag(fit.covariance))[:n]
+    size = np.sqrt(np.diag(answer.covariance))
+    known = np.diag(fit.data_information)[:n] + np.diag(np.linalg.inv(problem.prior.covariance))
+    return Told(
+        answer.mean, answer.covariance, problem.prior.std, 1.0 / np.sqrt(known), fit.half(), names,
+        fit.covariance, tuple(_moved(fit.information[:, k], lines) for k in range(n)),
+        tuple(
+            next((f"if {one.words}, that is in it" for one, j in shadowed if j == k), "")
+            for k in range(n)
+        ),
+        np.sqrt(np.maximum(size**2 - before**2, 0.0)),
+    )  # fmt: skip
+
+
+def _moved(information: FloatArray, lines: tuple[str, ...]) -> str:
+    """Which loadings tell a joint most, in words."""
+    total = float(information.sum())
+    if not total > 1.0:
+        return ""
+    first = np.argsort(-information, kind="stable")[:_LINES]
+    half = int(np.searchsorted(np.cumsum(np.sort(information)[::-1]), 0.5 * total)) + 1
+    named = [lines[k] for k in first if information[k] > 0.02 * total]
+    file = named[0].split(" ")[0]
+    if all(name.startswith(f"{file} ") for name in named):
+        word = named[0].split(" ")[-2]
+        numbers = ", ".join(name.rsplit(" ", 1)[1] for name in named)
+        text = f"{file} {word}{'s' if len(named) > 1 else ''} {numbers}"
+    else:
+        text = ", ".join(named)
+    return f"{half} of {len(lines)} loadings tell half of it, most of all {text}"
+
+
+def _shadowed(tables: Sequence[Table], joints: int, suspect: Suspect) -> int | None:
+    """The joint that turns the arm as a suspect's spring does in all loadings; None for none."""
+    if suspect.spring is None or len(suspect.spring.coordinates) > 1:
+        return None
+    (name,) = suspect.spring.coordinates
+    for k in range(joints):
+        apart = [
+            min(np.abs(own - other).max(), np.abs(own + other).max()) / max(np.abs(own).max(), 1e-9)
+            for table in tables
+            for own, other in [
+                (table.columns.push[:, :3, k], table.columns.push[:, :3, table.names.index(name)])
+            ]
+        ]
+        if max(apart) < 1e-6:
+            return k
+    return None
+
+
+def _parameters(answer: Answer, suspect: Suspect) -> dict[str, Value]:
+    """The numbers of a cause in the most probable fit."""
+    fit = answer.fit
+    problem = fit.problem
+    size = np.sqrt(np.diag(fit.covariance))
+    first = problem.springs
+
+    def number(name: str, scale: float = 1.0) -> Value:
+        k = first + problem.steps.index(name)
+        unit = problem.size_of(name) * scale
+        return Value(float(fit.mean[k] * unit), float(size[k] * abs(unit)), "m")
+
+    if suspect.spring is not None:
+        k = problem.joints + problem.extra.index(suspect.spring)
+        value = suspect.spring.stiffness * math.exp(fit.mean[k])
+        return {"stiffness": Value(value, value * float(size[k]), suspect.spring.unit)}
+    if suspect.loose:
+        return {name[-1]: number(name) for name, _ in suspect.loose}
+    gap = number(f"play.{suspect.play[0]}")
+    return {"gap": replace(gap, value=abs(gap.value), unit="rad")}

@@ -1,0 +1,134 @@
+"""Blind trials of finding stiffness from nothing: campaigns of the worlds, and how they are judged.
+
+Used by the tests on a few campaigns and by `benchmarks/stiffness.py` on many.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+import picchio
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
+
+SIZES = (3, 6, 7)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One joint of one campaign.
+
+    Attributes:
+        robot, joint: names.
+        seed: of the campaign.
+        error: ln(value / truth).
+        std: of the logarithm, as stated by the interval.
+        told, inside: whether it is told, and whether the 90 % interval has the truth.
+        bound: the least deviation of the logarithm that these readings allow (Cramer and Rao), the
+            prior and what is never exact in; NaN where it was not asked.
+    """
+
+    robot: str
+    joint: str
+    seed: int
+    error: float
+    std: float
+    told: bool
+    inside: bool
+    bound: float
+
+
+def campaign(world) -> Campaign:
+    """The world's columns as a campaign."""
+    record = Record.from_columns("loads.csv", world.columns, kind="static")
+    return Campaign.from_records([record], robot=world.robot)
+
+
+def judge(world, seed: int, found) -> list[Judged]:
+    """Every joint of a campaign against the truth."""
+    bound = lower_bound(world, found)
+    judged = []
+    for k, (joint, truth) in enumerate(zip(found.joints, world.truth, strict=True)):
+        assert joint.name == world.joints[k]
+        s = joint.stiffness
+        judged.append(Judged(
+            world.robot, joint.name, seed, math.log(s.value / truth),
+            math.log(s.high / s.low) / (2.0 * 1.645), s.told, s.low <= truth <= s.high, bound[k],
+        ))  # fmt: skip
+    return judged
+
+
+def lower_bound(world, found) -> np.ndarray:
+    """(n,) least standard deviations at the truth, joint springs alone, the true noise known."""
+    plain = replace(found.answer.fit.problem, causes=())
+    n = plain.joints
+    at = np.zeros(len(plain.precision))
+    at[:n] = np.log(world.truth / world.nominal)
+    information = np.array(plain.precision)
+    for part in plain.predict(at):
+        r = part.residual.shape[1]
+        spread = part.own + max(world.noise, 1e-9) ** 2 * np.eye(r)
+        white = np.linalg.solve(np.linalg.cholesky(spread), part.slope).reshape(-1, len(at))
+        information += white.T @ white
+    return np.sqrt(np.diag(np.linalg.inv(information)))[:n]
+
+
+def static_trial(worlds, count: int, first: int = 0, **options) -> list[Judged]:
+    """So many campaigns of arms with 3, 6 and 7 joints in turn."""
+    judged = []
+    for seed in range(first, first + count):
+        world = worlds.draw(SIZES[seed % 3], seed)
+        found = picchio.identify(world.robot, campaign(world))
+        judged += judge(world, seed, found)
+    return judged
+
+
+def frf_campaign(world) -> Campaign:
+    """The world's functions as a campaign, a record each."""
+    records = [
+        Record.from_columns(f"f{k:02d}.csv", columns, kind="frf", **table)
+        for k, (columns, table) in enumerate(world.records)
+    ]
+    return Campaign.from_records(records, robot=world.robot)
+
+
+def frf_trial(worlds, count: int, first: int = 0, sizes=SIZES) -> tuple[list, list]:
+    """So many campaigns; stiffness, and damping ratios, judged alike."""
+    stiffness, damping = [], []
+    for seed in range(first, first + count):
+        world = worlds.draw(sizes[seed % len(sizes)], seed)
+        found = picchio.identify(world.robot, frf_campaign(world))
+        for k, joint in enumerate(found.joints):
+            for kind, one, truth in (
+                (stiffness, joint.stiffness, world.truth[k]),
+                (damping, joint.damping_ratio, world.damping[k]),
+            ):
+                kind.append(Judged(
+                    world.robot, joint.name, seed, math.log(one.value / truth),
+                    math.log(one.high / one.low) / (2.0 * 1.645), one.told,
+                    one.low <= truth <= one.high, math.nan,
+                ))  # fmt: skip
+    return stiffness, damping
+
+
+def summary(judged: list[Judged]) -> dict[str, float]:
+    """What issue and report ask for, of all joints and of those that are told."""
+    told = [one for one in judged if one.told]
+    error = np.abs([math.expm1(one.error) for one in told])
+    could = [one for one in judged if one.bound <= 0.04]
+    wrong = [one for one in told if abs(one.error) > 3.0 * one.std]
+    return {
+        "campaigns": len({(one.robot, one.seed) for one in judged}),
+        "joints": len(judged),
+        "told": len(told),
+        "told_within_10_percent": float(np.mean(error <= 0.10)) if told else math.nan,
+        "median_error": float(np.median(error)) if told else math.nan,
+        "coverage_told": float(np.mean([one.inside for one in told])) if told else math.nan,
+        "coverage_all": float(np.mean([one.inside for one in judged])),
+        "wrong_confident": len(wrong) / max(len(told), 1),
+        "could_be_told": len(could),
+        "told_of_those": float(np.mean([one.told for one in could])) if could else math.nan,
+    }

@@ -1,0 +1,139 @@
+"""Stiffness and damping from frequency response functions: exact, blind, and what is said."""
+
+import json
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import picchio
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.tables import Tolerance
+from picchio.diagnosis.stiffness.modes import peaks
+from picchio.diagnosis.stiffness.prior import prior_of
+from picchio.diagnosis.stiffness.responses import make_problem
+from picchio.robot.annotations.sidecar import read_sidecar
+
+sys.path.insert(0, str(Path(__file__).parent))
+import blind_stiffness
+
+sys.path.pop(0)
+
+
+@pytest.fixture(scope="module")
+def frfs():
+    """The independent world of responses."""
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+    try:
+        from worlds import frfs
+    finally:
+        sys.path.pop(0)
+    return frfs
+
+
+def exactly(world) -> Campaign:
+    campaign = blind_stiffness.frf_campaign(world)
+    return Campaign.from_records(campaign.records, tolerance=Tolerance.zero().model_dump())
+
+
+def problem(world, tolerance=None):
+    robot = picchio.load_robot(world.robot)
+    records = blind_stiffness.frf_campaign(world).records
+    return make_problem(robot, records, tolerance or Tolerance(), prior_of(robot))
+
+
+@pytest.mark.parametrize("joints", [3, 7])
+def test_the_prediction_is_the_worlds(frfs, joints):
+    world = frfs.draw(joints, 2, exact=True, noise=1e-9)
+    made = problem(world, Tolerance.zero())
+    at = np.zeros(len(made.precision))
+    at[:joints] = np.log(world.truth / world.nominal)
+    at[joints:] = np.log(world.damping / made.damping_ratio)
+    for part, table in zip(made.predict(at), made.tables, strict=True):
+        left = np.linalg.norm(part.residual * table.scale[:, None])
+        assert left < 1e-6 * np.linalg.norm(table.measured)
+
+
+def test_slopes_are_those_of_differences(frfs):
+    made = problem(frfs.draw(3, 4))
+    rng = np.random.default_rng(0)
+    at = 0.3 * rng.standard_normal(len(made.precision))
+    parts = made.predict(at)
+    for k in rng.permutation(len(at))[:25]:
+        step = 1e-5 * (np.arange(len(at)) == k)
+        plus, minus = made.predict(at + step), made.predict(at - step)
+        for part, more, less in zip(parts, plus, minus, strict=True):
+            found = -(more.residual - less.residual) / 2e-5
+            np.testing.assert_allclose(part.slope[..., k], found,
+                                       atol=2e-4 * max(1e-3, np.abs(found).max()))  # fmt: skip
+
+
+def test_stiffness_and_damping_far_off_are_found_exactly(frfs):
+    """Joints at 0.40, 1.9 and 0.55 of their stated stiffness, all else exact: within 1 %."""
+    world = frfs.draw(3, 1, exact=True, noise=0.01, factors=[0.40, 1.9, 0.55])
+    found = picchio.identify(world.robot, exactly(world))
+    for joint, stiffness, ratio in zip(found.joints, world.truth, world.damping, strict=True):
+        assert joint.stiffness.told
+        assert joint.stiffness.value == pytest.approx(stiffness, rel=0.01)
+        assert joint.damping_ratio.value == pytest.approx(ratio, rel=0.01)
+    assert found.convention == "modal" and found.decided > 5.0 and not found.doubt
+
+
+def test_the_damping_that_the_functions_follow_is_told(frfs):
+    world = frfs.draw(3, 1, exact=True, dashpots=True)
+    found = picchio.identify(world.robot, exactly(world))
+    assert found.convention == "joint" and found.decided > 5.0
+    assert "dashpot" in found.remarks[1]
+    values = [joint.stiffness.value for joint in found.joints]
+    np.testing.assert_allclose(values, world.truth, rtol=0.01)
+
+
+def test_peaks_are_the_modes(frfs):
+    world = frfs.draw(3, 1, exact=True, noise=1e-4)
+    made = problem(world, Tolerance.zero())
+    seen = peaks(made.standings[0])
+    springs = np.diag(world.truth) + made.standings[0].gravity
+    squared = np.linalg.eigvals(np.linalg.solve(made.standings[0].mass, springs))
+    modes = np.sort(np.sqrt(squared.real))
+    for omega in seen.omega:
+        assert np.abs(np.log(omega / modes)).min() < 0.1
+
+
+def test_everything_slightly_wrong(frfs):
+    stiffness, damping = blind_stiffness.frf_trial(frfs, 2, first=0, sizes=(3,))
+    assert all(one.told and abs(one.error) < 0.05 for one in stiffness)
+    assert all(abs(one.error) < 0.7 for one in damping)
+
+
+def test_the_command(frfs, tmp_path, in_process):
+    world = frfs.draw(3, 1, exact=True)
+    exactly(world).save(tmp_path / "taps")
+    done = in_process("identify", world.robot, "--data", "taps", "--out", "flex.toml",
+                      "--json", "found.json", cwd=tmp_path)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "Damping: one ratio for each mode" in done.stdout
+    content = json.loads((tmp_path / "found.json").read_text())
+    assert content["damping"]["convention"] == "modal"
+    sidecar = read_sidecar(tmp_path / "flex.toml")
+    assert {f"damping_ratio.{name}" for name in world.joints} <= set(sidecar.posterior.names)
+    robot = picchio.load_robot(world.robot, flex=tmp_path / "flex.toml")
+    np.testing.assert_allclose(robot.stiffness, world.truth, rtol=0.01)
+    assert math.isclose(robot.damping_ratio[0], world.damping[0], rel_tol=0.05)
+
+
+def test_bad_functions_are_named(frfs):
+    world = frfs.draw(3, 1)
+    columns, table = world.records[0]
+    for change, words in (
+        ({"coherence": columns["coherence"] + 0.9}, "coherence.*not within 0 and 1"),
+        ({"frequency": columns["frequency"][::-1]}, "ascending"),
+        ({"real": 0.0 * columns["real"], "imag": 0.0 * columns["imag"]}, "zero throughout"),
+    ):
+        world.records[0] = ({**columns, **change}, table)
+        with pytest.raises(picchio.InputError, match=words):
+            picchio.identify(world.robot, blind_stiffness.frf_campaign(world))
+    world.records[0] = (columns, {**table, "response_frame": "hand"})
+    with pytest.raises(picchio.InputError, match="no such frame"):
+        picchio.identify(world.robot, blind_stiffness.frf_campaign(world))
