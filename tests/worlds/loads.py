@@ -19,7 +19,7 @@ from worlds.robots import load as shipped
 
 ROBOTS = {3: "fanuc_like_3dof", 6: "fanuc_r2000ic", 7: "kinova_gen3"}
 LOADINGS = {3: 15, 6: 30, 7: 35}
-"""As many as twenty minutes take, at forty seconds each, or fewer for fewer joints."""
+"""At forty seconds each, ten to twenty-three minutes of work."""
 DIAL, FACTOR = 1e-5, 4.0  # m, the gauge's stated noise; stiffness is off by up to this factor
 SLIPPED = 3e-4  # m, by which a reading is off where the pull slipped
 
