@@ -15,8 +15,8 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import eig, eigh
 
-from worlds.loads import FACTOR, ROBOTS
-from worlds.robots import load as shipped
+from .loads import FACTOR, ROBOTS
+from .robots import load as shipped
 
 POSES, TAPS = 3, 3  # of each: taps along three directions, each read in two
 BAND = {3: (1.0, 60.0), 6: (2.0, 90.0), 7: (2.0, 160.0)}  # Hz

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from worlds.robots import load as shipped
+from .robots import load as shipped
 
 ROBOTS = {3: "fanuc_like_3dof", 6: "fanuc_r2000ic", 7: "kinova_gen3"}
 LOADINGS = {3: 15, 6: 30, 7: 35}

@@ -25,9 +25,9 @@ from difflib import SequenceMatcher
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from picchio.core.errors import InputError
 from picchio.core.toml import Positive, StrictModel, parse_toml
@@ -38,6 +38,8 @@ Kind = Literal["strain-wave", "cycloidal"]
 
 REDUCER_FORMAT = "picchio-reducers/1"
 _RPM = 2.0 * math.pi / 60.0
+# A life beyond that, h, is none that anybody states.
+_Hours = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False, strict=True)]
 
 
 class OutputBearing(StrictModel):
@@ -143,7 +145,7 @@ class ReducerFile(StrictModel):
     manufacturer: str
     kind: Kind
     rated_speed_rpm: Positive | None = None
-    rated_life_hours: Positive | None = None
+    rated_life_hours: _Hours | None = None
     source: str
     unit: str | None = None
     component_sets: tuple[str, ...] = ()

@@ -32,10 +32,18 @@ def _weights(u):
 
 @njit(cache=True, nogil=True)
 def modal_series(poles, lengths, force0, force1, sample, force_after, y_out, slope_out, force_out):
-    """Y' = pole y + F from rest, and dy/dpole, at the samples; F is straight over every step.
+    """What modes answer to the force, y' = pole y + F from rest, and dy/dpole, at the samples.
 
-    poles (m,) 1/s; lengths s, force0 and force1 N, (K,) of the steps; sample and force_after
-    (K + 1,) as in `Plan`. Into y_out and slope_out (samples, m), force_out (samples,).
+    Args:
+        poles: (m,) 1/s.
+        lengths: (K,) s, of the steps.
+        force0: (K,) N, at the start of each; it is straight over a step.
+        force1: (K,) N, at the end of each.
+        sample: (K + 1,) the sample at each point between steps, or -1, as in `Plan`.
+        force_after: (K + 1,) N, just after each point.
+        y_out: (samples, m) is written.
+        slope_out: (samples, m) is written.
+        force_out: (samples,) is written.
     """
     count = poles.size
     y, slope = np.zeros(count, dtype=np.complex128), np.zeros(count, dtype=np.complex128)
