@@ -31,7 +31,7 @@ from picchio.diagnosis.percussion.search.trials import (
     settled_alike,
     try_candidates,
 )
-from picchio.diagnosis.percussion.tolerance.linearise import settled
+from picchio.diagnosis.percussion.tolerance.linearise import About, about_another, settled
 from picchio.diagnosis.result import BEYOND_DOUBT, Estimate
 from picchio.model.effects.effect import Effect
 
@@ -124,6 +124,9 @@ def _grow(search: Search, stack: ExitStack) -> None:
         search.steps.append(trials)
         best = _chosen(search, trials, wider=not quiet)
         gain = search.pays(here, best.fit, best.about) if best is not None else 0.0
+        if best is not None and best.about is not None and gain <= _CLEAR * search.least:
+            here = _settled_again(search)
+            gain = search.pays(here, best.fit, best.about)
         if best is None or gain < search.least:
             break
         # The slopes of those that were not chosen need not be kept.
@@ -149,6 +152,25 @@ def _grow(search: Search, stack: ExitStack) -> None:
             _settle(search, best.label)
         if len(search.labels) >= MOST_CAUSES:
             break
+
+
+def _settled_again(search: Search) -> Fit:
+    """The fit that stands, settled further, as what would take its place has been.
+
+    Else what looks like a small cause may be no more than a round that it had more.
+    """
+    problem, here = search.problem, search.best
+    with about_another(problem):
+        go_on = partial(settled, problem, here, search.records, rounds=2, anew=False)
+        again = attempt("settled again", go_on)
+        about = About.of(problem)
+    if again is None or again.cost >= here.cost:
+        return here
+    about.restore(problem)
+    if search.baseline is here:
+        search.baseline, search.about = again, about
+    search.best = again
+    return again
 
 
 def _chosen(search: Search, trials: list[Trial], wider: bool) -> Trial | None:
