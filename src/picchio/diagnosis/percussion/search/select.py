@@ -146,12 +146,22 @@ def _grow(search: Search, stack: ExitStack) -> None:
             best.about.restore(problem)
         again = restarted(search, search.best)
         if best.about is None or again is not best.fit:
-            again = settled(problem, again, search.records, rounds=2)
+            again = _settled_if_better(search, again)
         search.best = again
         if known:
             _settle(search, best.label)
         if len(search.labels) >= MOST_CAUSES:
             break
+
+
+def _settled_if_better(search: Search, found: Fit) -> Fit:
+    """A fit about its own inexact numbers; as it was, where it did not find back there."""
+    before = About.of(search.problem)
+    again = settled(search.problem, found, search.records, rounds=2)
+    if again.cost <= found.cost:
+        return again
+    before.restore(search.problem)
+    return found
 
 
 def _settled_again(search: Search) -> Fit:

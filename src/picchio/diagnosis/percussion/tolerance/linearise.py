@@ -12,7 +12,13 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Moved, Problem
-from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, jacobian, prior_cost
+from picchio.diagnosis.percussion.fit.least_squares import (
+    Fit,
+    fit,
+    is_nonsmooth,
+    jacobian,
+    prior_cost,
+)
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.tolerance.marginal import Marginal
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, inexact, nudged
@@ -24,6 +30,7 @@ _FARTHEST = 3.5
 # cost asks for it once more; and by how much more what is not exact is held back where a move to
 # where it seems to be leads nowhere.
 _SHORT = 0.16
+_KINKED = (_SHORT, 0.3, 0.6, None)  # where a small error early is a large one late
 _ROUNDS = 3
 _SETTLED = 0.002
 # Chi-square per sample above which more is wrong than what is not exact.
@@ -136,7 +143,7 @@ def settled(
         _move(problem, {})
         problem.idle = frozenset()  # a cause may set free what stood still without it
     here = start.hypothesis
-    for end in (_SHORT, None):
+    for end in _KINKED if is_nonsmooth(here) else (_SHORT, None):
         before = math.inf
         for _ in range(rounds):
             linearise(problem, here, records, end)
@@ -227,7 +234,7 @@ def about_another(problem: Problem, other: About | None = None) -> Iterator[None
 def _at_stated(problem: Problem, found: Fit, end: float | None) -> Hypothesis:
     """A fit's hypothesis about the numbers as they are stated, and the slopes there."""
     if problem.sizes:
-        problem.sizes, problem.moved = {}, {}
+        _move(problem, {})  # other processes are told as well
         linearise(problem, found.hypothesis, found.records, end)
     return found.hypothesis
 
