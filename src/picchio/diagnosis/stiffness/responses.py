@@ -22,7 +22,7 @@ from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import ComplexArray, FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.stiffness.fit import Predicted
-from picchio.diagnosis.stiffness.prior import UNKNOWN, Prior
+from picchio.diagnosis.stiffness.prior import Prior, damping_std
 from picchio.diagnosis.stiffness.statics import moved
 from picchio.model.linear_system import modal_damping_matrix
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -155,7 +155,7 @@ class FrfProblem:
     @cached_property
     def modal(self) -> int:
         """How many numbers the modes of one pose have."""
-        return self.joints if self.convention == "modal" and self.by_mode > 0.0 else 0
+        return self.joints if self.by_mode > 0.0 else 0
 
     @cached_property
     def precision(self) -> FloatArray:
@@ -218,16 +218,22 @@ class FrfProblem:
             ratio: (n,) damping ratios of the joints.
             modes: (n,) factors on the modes' ratios; empty for none.
         """
+        factors = standing.factors * modes if len(modes) else standing.factors
+        even = bool((factors == 1.0).all())
         if self.convention == "joint":
             # As if each joint swung alone: c = 2 zeta k / w.
-            return np.diag(2.0 * ratio * np.sqrt(springs * standing.mass.diagonal()))
-        factors = standing.factors * modes if len(modes) else standing.factors
-        if (factors == 1.0).all():
+            each = 2.0 * ratio * np.sqrt(springs * standing.mass.diagonal())
+            if even:
+                return np.diag(each)
+        elif even:
             return modal_damping_matrix(standing.mass, springs, ratio)
         squared, shapes = _modes(standing.mass, np.diag(springs))
+        weighted = standing.mass @ shapes
+        if self.convention == "joint":  # how the modes differ, between them, too
+            within = np.sqrt(factors)[:, None] * (shapes.T * each @ shapes) * np.sqrt(factors)
+            return np.asarray(weighted @ within @ weighted.T)
         energy = springs[:, None] * shapes**2
         own = (ratio @ energy / energy.sum(axis=0)) * factors
-        weighted = standing.mass @ shapes
         return np.asarray((weighted * (2.0 * own * np.sqrt(squared))) @ weighted.T)
 
     def predict(self, at: FloatArray, known: Sequence[Predicted] | None = None) -> list[Predicted]:
@@ -370,11 +376,9 @@ def make_problem(
             mass, robot.gravity_stiffness(pose), masses, robot.state(pose).stiffness, responses,
             np.ones(len(flex)),
         ))  # fmt: skip
-    spread = [robot.spreads.get(f"damping_ratio.{joint.name}") for joint in robot.flexible_joints]
-    width = np.array([one.size if one is not None and one.log and one.size > 0.0 else UNKNOWN
-                      for one in spread])  # fmt: skip
     return FrfProblem(
-        tuple(standings), prior, np.maximum(robot.damping_ratio, 1e-3), width, tuple(steps),
+        tuple(standings), prior, np.maximum(robot.damping_ratio, 1e-3), damping_std(robot),
+        tuple(steps),
         tolerance.damping_by_mode, tolerance.gravity_stiffness,
     )  # fmt: skip
 
