@@ -36,6 +36,17 @@ def loads():
 
 
 @pytest.fixture(scope="module")
+def frfs():
+    """The independent world of responses."""
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+    try:
+        from worlds import frfs
+    finally:
+        sys.path.pop(0)
+    return frfs
+
+
+@pytest.fixture(scope="module")
 def planned():
     return picchio.plan(ARM)
 
@@ -227,7 +238,7 @@ def test_the_form_comes_back_filled_in(loads, planned, tmp_path, in_process):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"instruments": ["scale", "ruler"]}, "unknown instrument.*'ruler'.*dial.*tracker"),
+        ({"instruments": ["scale", "ruler"]}, "unknown instrument.*'ruler'.*accelerometer"),
         ({"instruments": ["scale"]}, "make no test.*scale or weight with dial or tracker"),
         ({"budget": "a while"}, "must be a time such as 20min"),
         ({"budget": "0min"}, "must be positive"),
@@ -274,3 +285,30 @@ def test_candidates_know_their_instruments():
     finer = StaticTest().candidates(robot, poses, outcome, 300.0, ("scale", "dial"),
                                     Tolerance(dial=1e-6))  # fmt: skip
     assert (np.abs(finer.slopes[..., :3]) >= np.abs(gauge.slopes[..., :3]) - 1e-12).all()
+
+
+def test_an_arm_hit_as_planned_is_known(frfs):
+    """By functions of an arm whose masses, places and gains are a little wrong."""
+    planned = picchio.plan(ARM, instruments=["hammer", "accelerometer"])
+    assert len(planned.records) >= 4 and planned.choice.after < 0.2 * planned.choice.before
+    asked = [(one.candidate.pose, one.candidate.direction, one.candidate.reads, one.candidate.frame)
+             for one in planned.records]  # fmt: skip
+    world = frfs.draw(3, 3, asked=asked)
+    campaign = picchio.Campaign.from_records([
+        Record.from_columns(f"f{k}.csv", columns, kind="frf", **table)
+        for k, (columns, table) in enumerate(world.records)
+    ])  # fmt: skip
+    found = picchio.identify(world.robot, campaign)
+    robot = planned.robot
+    life = Life.of(robot, picchio.load_task(robot.task_path, robot))
+    both = np.zeros((2, 6))
+    value = [joint.stiffness.value for joint in found.joints]
+    ratio = [joint.damping_ratio.value for joint in found.joints]
+    stated = [joint.damping_ratio for joint in robot.flexible_joints]
+    both[0] = np.log([*np.array(value) / world.nominal, *np.array(ratio) / stated])
+    both[1] = np.log([*world.truth / world.nominal, *world.damping / np.array(stated)])
+    used = life.parts(both)[1].max(axis=0)
+    assert abs(used[0] - used[1]) < 0.2
+    texts = tomllib.loads(planned._campaign())
+    assert [one["file"] for one in texts["record"]] == list(planned.files)
+    assert not planned._forms()

@@ -109,7 +109,9 @@ def _show(found: PlannedTests, to: Path | None) -> None:
             told = ", ".join(f"{value:.4g}" for value, _ in angles(found.robot, one.pose).values())
         before = one.place
         reads = "x, y, z" if one.reads is None else along(one.reads)
-        rows.append([str(k), told, f"{one.force:.3g} N {along(one.direction)}", reads,
+        reads += f" on {one.frame}" if one.frame else ""
+        load = f"{one.force:.3g} N" if one.kind == "static" else "hit"
+        rows.append([str(k), told, f"{load} {along(one.direction)}", reads,
                      f"{record.seconds / 60.0:.1f}"])  # fmt: skip
     if rows:
         out.print(table(("", "pose, deg or mm", "load", "read along", ">min"), rows))

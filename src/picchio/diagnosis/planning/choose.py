@@ -81,6 +81,7 @@ def choose(
     space = Space.of(outcome, kinds)
     candidates = [one for kind in kinds for one in kind.each]
     seconds = [kind.test.seconds for kind in kinds for _ in kind.each]
+    least = {kind.test.name: kind.test.least for kind in kinds}
     free = np.ones(len(candidates), dtype=bool)
     ready: set[tuple[object, ...]] = set()
     records: list[Chosen] = []
@@ -101,9 +102,17 @@ def choose(
             why = "the time is up"
             break
         gain = space.gains()
+        taken = [one.candidate.kind for one in records]
+        few = {name for name in taken if taken.count(name) < least[name]}
+        if few:
+            within &= np.array([one.kind in few for one in candidates])
+            if not within.any():
+                why = "the time is up"
+                break
         best = int(np.where(within, gain / cost, -np.inf).argmax())
         total = left + outcome.rest
-        if total <= 0.0 or math.sqrt(max(1.0 - gain[best] / total, 0.0)) > 1.0 - worth:
+        small = total <= 0.0 or math.sqrt(max(1.0 - gain[best] / total, 0.0)) > 1.0 - worth
+        if small and not few:
             why = (f"one more record would narrow the interval by less than {100 * worth:.2g} %"
                    if total > 0.0 else "nothing is uncertain")  # fmt: skip
             break

@@ -37,7 +37,7 @@ from picchio.studies.tasks import Task
 
 FORMAT = "picchio-test-plan/1"
 PLAN = "plan.toml"
-_POSES, _DRAWN = 40, 120  # tried; drawn, before those that collide are left out
+_POSES, _OWN, _DRAWN = 40, 5, 120  # tried; of the task; drawn, before those that collide are out
 _ROBOTS = 16  # drawn from what is known, at which the records are looked at
 _STRONGEST = 400.0  # N, of a pull by hand
 _UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
@@ -361,7 +361,7 @@ def _possible(instruments: Sequence[str]) -> list[Test]:
 
 def _poses(robot: FlexibleRobot, task: Task, seed: int) -> tuple[FloatArray, list[str]]:
     """(m, nv) to try: the task's own, then drawn ones; to a tenth of a degree or a millimetre."""
-    own = np.concatenate([np.asarray(op.poses) for op in task.operations])[:_POSES]
+    own = np.concatenate([np.asarray(op.poses) for op in task.operations])[:_OWN]
     every = np.concatenate([own, possible_poses(robot, _DRAWN, seed=seed)])
     scale = np.array([told_in(robot, name)[0] for name in robot.joint_names])
     finest = np.where(scale > 500.0, 1.0, 10.0)

@@ -34,6 +34,7 @@ class StaticTest(Test):
     loads = frozenset({"scale", "weight"})
     reads = frozenset({"dial", "tracker"})
     seconds = (60.0, 30.0, 30.0)
+    least = 3
     file = "loads.csv"
 
     def row(

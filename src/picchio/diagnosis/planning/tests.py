@@ -26,6 +26,7 @@ class Possible:
         force: N.
         reads: (3,) unit, world, along which the instrument reads; None where it reads all axes.
         setting: what must be set up anew for it at its pose; equal ones are set up once.
+        frame: that carries the sensor; None: the tool's.
     """
 
     kind: str
@@ -35,6 +36,7 @@ class Possible:
     force: float
     reads: FloatArray | None
     setting: tuple[object, ...]
+    frame: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +65,8 @@ class Test(ABC):
         loads: instruments, one of which is needed to load the arm.
         reads: instruments, one of which is needed to read what it does.
         seconds: for a new pose, for setting up anew at it, and for the record itself.
+        least: records, below which linear slopes tell too little of what may be wrong: noise and
+            outliers, or which mode is which.
         file: of a record in the campaign; with a place for its number if each has its own.
     """
 
@@ -70,6 +74,7 @@ class Test(ABC):
     loads: ClassVar[frozenset[str]]
     reads: ClassVar[frozenset[str]]
     seconds: ClassVar[tuple[float, float, float]]
+    least: ClassVar[int]
     file: ClassVar[str]
 
     def possible(self, instruments: Sequence[str]) -> bool:

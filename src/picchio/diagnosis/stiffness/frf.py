@@ -158,30 +158,55 @@ def identify_frf(
     )  # fmt: skip
     bare = _settled(plain, bare)
     other = climb(problem.bare(convention="joint"), bare.mean, _TAILS)
-    gain = bare.evidence - other.evidence
-    convention: Damping = "modal" if gain >= -_DECISIVE else "joint"
     say("frequency responses: with all that is never exact")
-    whole = replace(problem, convention=convention)
-    at = np.zeros(len(whole.precision))
-    at[: problem.springs] = (bare if convention == "modal" else other).mean
-    fit = climb(whole, at, _TAILS)
-    # Without nuisances a joint hardly seen makes up for what masses and places are off by.
-    known = np.concatenate([problem.prior.std, problem.damping_std])
-    strays = np.abs(at[: problem.springs]) > _STRAY * known
-    if strays.any():
-        at[: problem.springs][strays] = 0.0
-        fit = max(fit, climb(whole, at, _TAILS), key=lambda found: found.evidence)
-    fit = _settled(whole, fit)
-    stated = np.zeros(len(problem.precision))
+    # Which convention holds shows only where modes may differ from it, as they always do a little.
+    modal = _whole(problem, bare.mean)
+    joint = _whole(replace(problem, convention="joint"), other.mean)
+    gain = modal.evidence - joint.evidence
+    convention: Damping = "modal" if gain >= -_DECISIVE else "joint"
+    fit = _settled(*((modal.problem, modal) if convention == "modal" else (joint.problem, joint)))
+    if convention == "modal":
+        modal = fit
     covariance = _with_remainder(fit)
-    modal = (fit, covariance) if convention == "modal" else (bare, _with_remainder(bare))
-    joints = _joints(robot, fit, covariance, *modal)
+    joints = _joints(robot, fit, covariance, modal, _by_modes(modal))
+    stated = np.zeros(len(problem.precision))
     source = "memory" if campaign.folder is None else campaign.folder.resolve().name
     return FrfIdentification(
-        robot, source, joints, campaign, fit, fit.half(), covariance, _left(fit.problem, fit.mean),
+        robot, source, joints, campaign, fit, fit.half(), covariance,
+        _left(fit.problem, fit.mean),
         _left(problem, stated), convention,
         gain if convention == "modal" else -gain,
     )  # fmt: skip
+
+
+def _whole(problem: FrfProblem, begin: FloatArray) -> Fit:
+    """The fit of everything, begun at springs and damping (2 n,) fitted alone."""
+    at = np.zeros(len(problem.precision))
+    at[: problem.springs] = begin
+    fit = climb(problem, at, _TAILS)
+    # Without nuisances a joint hardly seen makes up for what masses and places are off by.
+    known = np.concatenate([problem.prior.std, problem.damping_std])
+    strays = np.abs(begin) > _STRAY * known
+    if strays.any():
+        at[: problem.springs][strays] = 0.0
+        fit = max(fit, climb(problem, at, _TAILS), key=lambda found: found.evidence)
+    return fit
+
+
+def _by_modes(fit: Fit) -> FloatArray:
+    """The covariance (2 n, 2 n) of springs and damping, wider where modes differ more than told.
+
+    Under dashpots in the joints no ratio of the modes holds at all poses: what the modes are then
+    off by is more than their tolerance.
+    """
+    problem: FrfProblem = fit.problem
+    found = _with_remainder(fit)
+    count = problem.modal * len(problem.standings)
+    if not count:
+        return found
+    own = fit.mean[-count:] ** 2 + np.diag(fit.covariance)[-count:]
+    found[problem.joints :, problem.joints :] *= max(1.0, float(own.mean()))
+    return found
 
 
 def _settled(problem: FrfProblem, fit: Fit) -> Fit:
@@ -257,7 +282,11 @@ def _left(problem: FrfProblem, at: FloatArray) -> float:
 
 
 def _joints(
-    robot: FlexibleRobot, fit: Fit, covariance: FloatArray, modal: Fit, of_modal: FloatArray
+    robot: FlexibleRobot,
+    fit: Fit,
+    covariance: FloatArray,
+    modal: Fit,
+    of_modes: FloatArray,
 ) -> tuple[IdentifiedJoint, ...]:
     problem: FrfProblem = fit.problem
     n = problem.joints
@@ -281,7 +310,7 @@ def _joints(
     for k, joint in enumerate(robot.flexible_joints):
         if not is_drive(joint.name):
             continue
-        size = float(math.sqrt(of_modal[n + k, n + k]))
+        size = float(math.sqrt(of_modes[n + k, n + k]))
         value = float(problem.damping_ratio[k] * math.exp(modal.mean[n + k]))
         reach = math.exp(half * size)
         sure = 0.5 * (reach - 1.0 / reach) <= MOST_HALF and size < 0.5 * problem.damping_std[k]

@@ -9,22 +9,21 @@ v = Z^-1 J_f^T d and u likewise of the sensor.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from picchio.campaign.channels import FREQUENCY
 from picchio.campaign.record import Record
 from picchio.campaign.tables import Tolerance
-from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.core.arrays import ComplexArray, FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.stiffness.fit import Predicted
 from picchio.diagnosis.stiffness.prior import Prior, damping_std
 from picchio.diagnosis.stiffness.statics import moved
-from picchio.model.linear_system import modal_damping_matrix
 from picchio.robot.flexible_robot import FlexibleRobot
 
 Damping = Literal["modal", "joint"]
@@ -87,6 +86,9 @@ class Standing:
         mass: (n, n) kg m^2.
         gravity: (n, n) N m/rad, dg/dq.
         masses: (k, n, n) what a standard deviation of each number that is never exact adds to it.
+        products: (q, n, n) likewise, with the product of two numbers: a centre of mass that is off
+            to either side makes a light wrist turn more slowly.
+        pairs: (q, 2) which two.
         spring: (n,) N m/rad, as stated.
         responses: measured here.
         factors: (n,) on the modes' damping ratios, by ascending frequency.
@@ -95,9 +97,33 @@ class Standing:
     mass: FloatArray
     gravity: FloatArray
     masses: FloatArray
+    products: FloatArray
+    pairs: IndexArray
     spring: FloatArray
     responses: tuple[Response, ...]
     factors: FloatArray
+
+    def mass_at(self, off: FloatArray) -> FloatArray:
+        """The mass matrix (n, n).
+
+        Args:
+            off: (k,) numbers that are never exact, in standard deviations.
+        """
+        both = off[self.pairs].prod(axis=1)
+        added = np.tensordot(off, self.masses, 1) + np.tensordot(both, self.products, 1)
+        return np.asarray(self.mass + added)
+
+    def mass_slopes(self, off: FloatArray) -> FloatArray:
+        """(k, n, n) its derivatives by the numbers.
+
+        Args:
+            off: as above.
+        """
+        found = self.masses.copy()
+        for own, other in ((0, 1), (1, 0)):
+            part = off[self.pairs[:, other], None, None] * self.products
+            np.add.at(found, self.pairs[:, own], part)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,8 +225,9 @@ class FrfProblem:
                 own = at[first + self.modal * k : first + self.modal * (k + 1)]
             factors = np.exp(self.by_mode * own) if self.modal else np.ones(n)
             standings.append(replace(
-                standing, mass=standing.mass + np.tensordot(off, standing.masses, 1),
+                standing, mass=standing.mass_at(off),
                 gravity=(1.0 + pull) * standing.gravity, masses=np.zeros((0, n, n)),
+                products=np.zeros((0, n, n)), pairs=np.zeros((0, 2), dtype=np.intp),
                 responses=tuple(map(plain, standing.responses)),
                 factors=standing.factors * factors,
             ))  # fmt: skip
@@ -208,33 +235,36 @@ class FrfProblem:
                        convention=convention)  # fmt: skip
 
     def damping(
-        self, standing: Standing, springs: FloatArray, ratio: FloatArray, modes: FloatArray
+        self,
+        mass: FloatArray,
+        springs: FloatArray,
+        ratio: FloatArray,
+        factors: FloatArray,
     ) -> FloatArray:
-        """The damping matrix (n, n), N m s/rad.
+        """The damping matrices (..., n, n), N m s/rad.
 
         Args:
-            standing: the pose.
-            springs: (n,) N m/rad.
-            ratio: (n,) damping ratios of the joints.
-            modes: (n,) factors on the modes' ratios; empty for none.
+            mass: (..., n, n) kg m^2.
+            springs: (..., n) N m/rad.
+            ratio: (..., n) damping ratios of the joints.
+            factors: (..., n) on the modes' ratios.
         """
-        factors = standing.factors * modes if len(modes) else standing.factors
-        even = bool((factors == 1.0).all())
+        inverse = np.linalg.inv(np.linalg.cholesky(mass))
+        back = inverse.swapaxes(-1, -2)
+        squared, vectors = np.linalg.eigh((inverse * springs[..., None, :]) @ back)
+        shapes = back @ vectors
+        weighted = mass @ shapes
         if self.convention == "joint":
-            # As if each joint swung alone: c = 2 zeta k / w.
-            each = 2.0 * ratio * np.sqrt(springs * standing.mass.diagonal())
-            if even:
-                return np.diag(each)
-        elif even:
-            return modal_damping_matrix(standing.mass, springs, ratio)
-        squared, shapes = _modes(standing.mass, np.diag(springs))
-        weighted = standing.mass @ shapes
-        if self.convention == "joint":  # how the modes differ, between them, too
-            within = np.sqrt(factors)[:, None] * (shapes.T * each @ shapes) * np.sqrt(factors)
-            return np.asarray(weighted @ within @ weighted.T)
-        energy = springs[:, None] * shapes**2
-        own = (ratio @ energy / energy.sum(axis=0)) * factors
-        return np.asarray((weighted * (2.0 * own * np.sqrt(squared))) @ weighted.T)
+            # As if each joint swung alone: c = 2 zeta k / w. How modes differ, between them, too.
+            each = 2.0 * ratio * np.sqrt(springs * np.diagonal(mass, axis1=-2, axis2=-1))
+            root = np.sqrt(factors)
+            within = (shapes.swapaxes(-1, -2) * each[..., None, :]) @ shapes
+            between = weighted * root[..., None, :]
+            return np.asarray(between @ within @ between.swapaxes(-1, -2))
+        energy = springs[..., :, None] * shapes**2
+        own = (ratio[..., None, :] @ energy)[..., 0, :] / energy.sum(axis=-2) * factors
+        between = weighted * (2.0 * own * np.sqrt(squared))[..., None, :]
+        return np.asarray(between @ weighted.swapaxes(-1, -2))
 
     def predict(self, at: FloatArray, known: Sequence[Predicted] | None = None) -> list[Predicted]:
         """The real and imaginary parts over the lines' scale, measured less predicted.
@@ -250,30 +280,39 @@ class FrfProblem:
         for k, standing in enumerate(self.standings):
             springs = standing.spring * scale[:n]
             first = 2 * n + len(self.steps) + self.modal * k
-            modes = np.exp(self.by_mode * at[first : first + self.modal])
-            mass = standing.mass + np.tensordot(off, standing.masses, 1)
+            factors = standing.factors
+            if self.modal:
+                factors = factors * np.exp(self.by_mode * at[first : first + self.modal])
+            mass = standing.mass_at(off)
             stiff = np.diag(springs) + standing.gravity
             pull = self.steps.index("gravity_stiffness") if self.gravity_std > 0.0 else None
             if pull is not None:
                 stiff = stiff + off[pull] * self.gravity_std * standing.gravity
-            damp = self.damping(standing, springs, ratio, modes)
             p = len(at)
             d_stiff, d_damp = np.zeros((p, n, n)), np.zeros((p, n, n))
             d_stiff[np.arange(n), np.arange(n), np.arange(n)] = springs
-            step = 1e-5
-            for j in range(n):
-                factor = np.where(np.arange(n) == j, 1.0 + step, 1.0)
-                d_damp[j] = self.damping(standing, springs * factor, ratio, modes) - damp
-                d_damp[n + j] = self.damping(standing, springs, ratio * factor, modes) - damp
-            for j in range(self.modal):
-                factor = np.where(np.arange(n) == j, 1.0 + step, 1.0)
-                more = self.damping(standing, springs, ratio, modes * factor) - damp
-                d_damp[first + j] = self.by_mode * more
-            d_damp /= step
+            by_mass = standing.mass_slopes(off)
+            moved = np.flatnonzero(np.abs(by_mass).max(axis=(1, 2), initial=0.0))
+            # The damping's slopes by differences, all at once: springs, ratios, modes, masses.
+            step, once = 1e-5, np.eye(n)
+            ones, still = np.ones((n, n)), np.ones((len(moved), n))
+            modes = np.ones((self.modal, n)) + step * once[: self.modal]
+            same = np.ones_like(modes)
+            change = [(1.0 + step * once, ones, ones), (ones, 1.0 + step * once, ones),
+                      (same, same, modes), (still, still, still)]  # fmt: skip
+            k_of, z_of, f_of = (np.concatenate([np.ones((1, n)), *part])
+                                for part in zip(*change, strict=True))  # fmt: skip
+            masses = np.repeat(mass[None], len(k_of), axis=0)
+            masses[len(k_of) - len(moved) :] += step * by_mass[moved]
+            damps = self.damping(masses, springs * k_of, ratio * z_of, factors * f_of)
+            damp, more = damps[0], (damps[1:] - damps[0]) / step
+            d_damp[: 2 * n] = more[: 2 * n]
+            d_damp[first : first + self.modal] = self.by_mode * more[2 * n : 2 * n + self.modal]
+            d_damp[2 * n + moved] = more[2 * n + self.modal :]
             if pull is not None:
                 d_stiff[2 * n + pull] = self.gravity_std * standing.gravity
             d_mass = np.zeros((p, n, n))
-            d_mass[2 * n : 2 * n + len(self.steps)] = standing.masses
+            d_mass[2 * n : 2 * n + len(self.steps)] = by_mass
             parts = (d_stiff.reshape(p, -1), d_damp.reshape(p, -1), d_mass.reshape(p, -1))
             for response in standing.responses:
                 found.append(self._response(response, off, (stiff, damp, mass), parts))
@@ -318,13 +357,6 @@ class FrfProblem:
         )
 
 
-def _modes(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(n,) squared rad/s and (n, n) shapes, of unit modal mass."""
-    inverse = np.linalg.inv(np.linalg.cholesky(mass))
-    squared, vectors = np.linalg.eigh(inverse @ stiffness @ inverse.T)
-    return squared, inverse.T @ vectors
-
-
 def make_problem(
     robot: FlexibleRobot, records: Sequence[Record], tolerance: Tolerance, prior: Prior
 ) -> FrfProblem:
@@ -341,7 +373,7 @@ def make_problem(
     """
     steps: dict[str, None] = {}
     bodies = _bodies(robot, tolerance)
-    names = [name for name, _ in bodies]
+    names = [name for name, _ in bodies.single]
     names += [f"pose.{name}" for name in robot.joint_names if tolerance.pose > 0.0]
     names += [f"tool_point.{axis}" for axis in "xyz" if tolerance.tool_point > 0.0]
     names += [f"sensor_position.{axis}" for axis in "xyz" if tolerance.sensor_position > 0.0]
@@ -362,10 +394,11 @@ def make_problem(
         flex = robot.flexible_index
         square = np.ix_(flex, flex)
         mass = robot.rigid.mass_matrix(pose)[square]
-        masses = np.zeros((len(index), *mass.shape))
-        for name, added in bodies:
-            heavier = robot.rigid.with_masses(added)
-            masses[index[name]] = heavier.mass_matrix(pose)[square] - mass
+        masses, products = np.zeros((len(index), *mass.shape)), []
+        for name, added in bodies.single:
+            masses[index[name]] = robot.rigid.with_masses(added).mass_matrix(pose)[square] - mass
+        for *_, added in bodies.double:
+            products.append(robot.rigid.with_masses(added).mass_matrix(pose)[square] - mass)
         for k, joint in enumerate(robot.joint_names):
             if tolerance.pose > 0.0:
                 other = pose + _TURN * np.eye(len(pose))[k]
@@ -373,8 +406,10 @@ def make_problem(
                 masses[index[f"pose.{joint}"]] = tolerance.pose / _TURN * change
         responses = tuple(_response_of(robot, one, pose, tolerance, index) for one in own)
         standings.append(Standing(
-            mass, robot.gravity_stiffness(pose), masses, robot.state(pose).stiffness, responses,
-            np.ones(len(flex)),
+            mass, robot.gravity_stiffness(pose), masses,
+            np.array(products).reshape(-1, *mass.shape),
+            np.array([(index[a], index[b]) for a, b, _ in bodies.double], np.intp).reshape(-1, 2),
+            robot.state(pose).stiffness, responses, np.ones(len(flex)),
         ))  # fmt: skip
     return FrfProblem(
         tuple(standings), prior, np.maximum(robot.damping_ratio, 1e-3), damping_std(robot),
@@ -383,30 +418,61 @@ def make_problem(
     )  # fmt: skip
 
 
-def _bodies(robot: FlexibleRobot, tolerance: Tolerance) -> list[tuple[str, list]]:
-    """What a standard deviation of mass, centre and inertia of each moving link is, as masses."""
-    found: list[tuple[str, list]] = []
+Added = list[tuple[float, str, tuple[float, float, float] | None]]
+
+
+class _Bodies(NamedTuple):
+    """What a standard deviation of what is never exact of a link is, as masses added to it.
+
+    Attributes:
+        single: by name, with the number itself.
+        double: by two names, with the product of both numbers.
+    """
+
+    single: list[tuple[str, Added]]
+    double: list[tuple[str, str, Added]]
+
+
+def _bodies(robot: FlexibleRobot, tolerance: Tolerance) -> _Bodies:
+    """Mass, centre and inertia of each moving link."""
+    found = _Bodies([], [])
     moving = {link for joint in robot.flexible_names for link in robot.tree.beyond(joint)}
     for link in sorted(moving):
         body = robot.tree.links.get(link)
         if body is None or not body.mass > 0.0:
             continue
-        if tolerance.link_mass > 0.0:
-            found.append((f"link_mass.{link}", [(tolerance.link_mass, link, None)]))
         centre = np.array(body.xyz)
+
+        def at(size: float, *arms: float, link: str = link, centre: FloatArray = centre) -> Added:
+            place = centre + _ARM * np.array(arms)
+            return [(size, link, (float(place[0]), float(place[1]), float(place[2])))]
+
+        def about_others(inertia: float, k: int, at: Callable[..., Added] = at) -> Added:
+            """Masses that turn about the two other axes only, kg m^2."""
+            size, way = inertia / (2.0 * _ARM**2), np.eye(3)[k]
+            return at(size, *way) + at(size, *-way) + at(-2.0 * size, 0.0, 0.0, 0.0)
+
+        if tolerance.link_mass > 0.0:
+            found.single.append((f"link_mass.{link}", [(tolerance.link_mass, link, None)]))
         for k, axis in enumerate("xyz"):
-            arm = _ARM * np.eye(3)[k]
-            ends = [tuple((centre + arm).tolist()), tuple((centre - arm).tolist())]
             if tolerance.link_com > 0.0:
-                size = body.mass * tolerance.link_com / (2.0 * _ARM)
-                both = [(size, link, ends[0]), (-size, link, ends[1])]
-                found.append((f"link_com.{link}.{axis}", both))
+                size, way = body.mass * tolerance.link_com / (2.0 * _ARM), np.eye(3)[k]
+                name = f"link_com.{link}.{axis}"
+                found.single.append((name, at(size, *way) + at(-size, *-way)))
+                square = about_others(body.mass * tolerance.link_com**2, k)
+                found.double.append((name, name, square))
             if tolerance.link_inertia > 0.0:
-                # About the two other axes it grows alike: three such make any diagonal change.
-                size = tolerance.link_inertia * body.inertia[(0, 3, 5)[k]] / (2.0 * _ARM**2)
-                put = [(size, link, ends[0]), (size, link, ends[1]),
-                       (-2.0 * size, link, tuple(centre.tolist()))]  # fmt: skip
-                found.append((f"link_inertia.{link}.{axis}", put))
+                # Three such make any change of the diagonal.
+                own = tolerance.link_inertia * body.inertia[(0, 3, 5)[k]]
+                found.single.append((f"link_inertia.{link}.{axis}", about_others(own, k)))
+        if tolerance.link_com > 0.0:
+            size = body.mass * tolerance.link_com**2 / (4.0 * _ARM**2)
+            for a, b in ((0, 1), (0, 2), (1, 2)):
+                one, other = np.eye(3)[a], np.eye(3)[b]
+                crossed = at(size, *(one + other)) + at(size, *(-one - other))
+                crossed += at(-size, *(one - other)) + at(-size, *(other - one))
+                names = [f"link_com.{link}.{'xyz'[i]}" for i in (a, b)]
+                found.double.append((names[0], names[1], crossed))
     return found
 
 

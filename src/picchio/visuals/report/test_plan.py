@@ -16,6 +16,10 @@ from picchio.visuals.plots.style import BLUE, VERMILION
 from picchio.visuals.report.page import Picture, Pictures, number, render
 from picchio.visuals.scene.portrait import Arrow, ArrowKind, plot_pose
 
+_HEADS = {
+    "static": ("no.", "load", "read along", "force| N", "reading| mm"),
+    "frf": ("no.", "hammer", "accelerometer along", "file"),
+}
 _DONE = {"static": ("pull", "gauge"), "frf": ("hit", "sensor")}
 
 
@@ -26,6 +30,7 @@ class _Stop:
     title: str
     picture: Picture
     pose: list[tuple[str, str]]
+    heads: tuple[str, ...]
     rows: list[list[str]]
 
 
@@ -43,7 +48,7 @@ def plan_page(
         the HTML.
     """
     pictures, stops, first = Pictures(), [], 1
-    places = groupby(found.records, key=lambda one: one.candidate.place)
+    places = groupby(found.records, key=lambda one: (one.candidate.place, one.candidate.kind))
     for turn, (_, group) in enumerate(places, start=1):
         records = list(group)
         stops.append(_stop(found, pictures, turn, first, records))
@@ -92,8 +97,13 @@ def _stop(
             label = f"{word} {k}" if before is None else f"{before.label}, {k}"
             arrows[key] = Arrow(way, label, kind, colour)
         reading = "x, y, z" if one.reads is None else along(one.reads)
-        rows.append([str(k), f"{number(one.force, 3)} N along {along(one.direction)}", reading,
-                     "", ""])  # fmt: skip
+        reading += f" on {one.frame}" if one.frame else ""
+        if static:
+            rows.append([str(k), f"{number(one.force, 3)} N along {along(one.direction)}", reading,
+                         "", ""])  # fmt: skip
+        else:
+            file = found.files[k - 1]
+            rows.append([str(k), f"hit along {along(one.direction)}", reading, file])
     pose = records[0].candidate.pose
     setting = [(name, f"{number(x, 5)} {'°' if unit == 'deg' else unit}")
             for name, (x, unit) in angles(found.robot, pose).items()]  # fmt: skip
@@ -102,4 +112,4 @@ def _stop(
     axes = plot_pose(found.robot, pose, list(arrows.values()))
     picture = pictures.picture(axes, f"The robot at pose {turn}: {said}", "")
     axes.figure.clear()
-    return _Stop(f"Pose {turn}", picture, setting, rows)
+    return _Stop(f"Pose {turn}", picture, setting, _HEADS[records[0].candidate.kind], rows)
