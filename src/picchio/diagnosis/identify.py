@@ -155,9 +155,9 @@ def method_for(campaign: Campaign) -> Method:
     """
     kinds = {record.kind for record in campaign}
     ways = list(methods().values())
-    for way in ways:
-        if kinds <= way.kinds:
-            return way
+    able = [way for way in ways if kinds <= way.kinds]
+    if able:  # the one that is made for just these
+        return min(able, key=lambda way: len(way.kinds))
     sets = [" and ".join(sorted(way.kinds)) for way in ways]
     file = campaign.folder / CAMPAIGN_FILE if campaign.folder is not None else None
     raise InputError(
