@@ -153,7 +153,7 @@ def method_for(campaign: Campaign) -> Method:
     Raises:
         InputError: there is none for all of them together.
     """
-    kinds = {record.kind for record in campaign}
+    kinds = {record.test for record in campaign}
     ways = list(methods().values())
     able = [way for way in ways if kinds <= way.kinds]
     if able:  # the one that is made for just these
@@ -208,7 +208,7 @@ def needs_springs(campaign: Campaign) -> bool:
     Raises:
         InputError: as `method_for`.
     """
-    kinds = {record.kind for record in campaign}
+    kinds = {record.test for record in campaign}
     return kinds <= method_for(campaign).needs_springs
 
 

@@ -39,8 +39,8 @@ class ByResponses(Method):
     """Springs and damping fitted to frequency response functions, from nothing."""
 
     name = "frf"
-    kinds = frozenset({"frf"})
-    needs_springs = frozenset({"frf"})
+    kinds = frozenset({"frf", "tap"})
+    needs_springs = frozenset({"frf", "tap"})
 
     def identify(
         self,
@@ -137,7 +137,7 @@ def identify_frf(
 
     Args:
         robot: flexible, its stiffness stated or estimated.
-        campaign: records of the kind "frf".
+        campaign: records of the kind "frf", and taps in time.
         progress: told what is being done.
 
     Returns:

@@ -33,8 +33,8 @@ class ByBoth(Method):
     """Springs and damping from static loadings and frequency response functions together."""
 
     name = "static and frf"
-    kinds = frozenset({"static", "frf"})
-    needs_springs = frozenset({"static", "frf"})
+    kinds = frozenset({"static", "frf", "tap"})
+    needs_springs = frozenset({"static", "frf", "tap"})
 
     def identify(
         self,
@@ -46,12 +46,13 @@ class ByBoth(Method):
     ) -> Identification:
         """The loadings first."""
 
-        def of(kind: str) -> Campaign:
-            return replace(campaign, records=tuple(r for r in campaign if r.kind == kind))
+        def of(static: bool) -> Campaign:
+            kept = tuple(r for r in campaign if (r.kind == "static") == static)
+            return replace(campaign, records=kept)
 
-        loads = identify_static(robot, of("static"), progress=progress)
+        loads = identify_static(robot, of(True), progress=progress)
         known = with_stiffness(robot, loads.answer.mean, loads.answer.covariance)
-        functions = identify_frf(known, of("frf"), progress=progress)
+        functions = identify_frf(known, of(False), progress=progress)
         joints = tuple(_joint(robot, k, loads, functions) for k in range(len(functions.joints)))
         return BothIdentification(robot, functions.source, joints, campaign, loads, functions)
 

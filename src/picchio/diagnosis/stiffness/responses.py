@@ -24,6 +24,7 @@ from picchio.core.errors import InputError
 from picchio.diagnosis.stiffness.fit import Predicted
 from picchio.diagnosis.stiffness.prior import Prior, damping_std
 from picchio.diagnosis.stiffness.statics import moved
+from picchio.diagnosis.stiffness.taps import UNKNOWN_BLOW, Seen, spectra
 from picchio.robot.flexible_robot import FlexibleRobot
 
 Damping = Literal["modal", "joint"]
@@ -51,7 +52,10 @@ class Response:
         pushes, sights: (k, n) by how much a standard deviation of each of its pose's k numbers
             changes these.
         tilts: (k, n) likewise.
-        gains: (k,) likewise, of the whole function, relative.
+        gains: (k,) likewise, of the whole function's logarithm.
+        delays: (k,) likewise, s, by which it comes later.
+        widths: (k,) likewise, s^2, the variance in time of a blow that is not known.
+        shift: 1/s, of the lines to the right of the imaginary axis; 0 of a frequency response.
     """
 
     file: str
@@ -66,6 +70,23 @@ class Response:
     sights: FloatArray
     tilts: FloatArray
     gains: FloatArray
+    delays: FloatArray
+    widths: FloatArray
+    shift: float = 0.0
+
+    @property
+    def s(self) -> ComplexArray:
+        """(m,) rad/s, where the lines lie in the Laplace plane."""
+        return self.shift + 1j * self.omega
+
+    def factor(self, off: FloatArray) -> ComplexArray:
+        """(m,) by which numbers that are never exact multiply the function.
+
+        Args:
+            off: (k,) of them, in standard deviations.
+        """
+        delay, width = off @ self.delays, off @ self.widths
+        return np.asarray(np.exp(off @ self.gains - self.s * delay + 0.5 * self.s**2 * width))
 
     @property
     def values(self) -> FloatArray:
@@ -210,12 +231,12 @@ class FrfProblem:
             pull = self.gravity_std * float(off[self.steps.index("gravity_stiffness")])
 
         def plain(one: Response) -> Response:
-            none, gain = np.zeros((0, n)), float(np.exp(off @ one.gains))
+            none, nothing, gain = np.zeros((0, n)), np.zeros(0), one.factor(off)
             return replace(
-                one, measured=one.measured / gain, scale=one.scale / gain,
+                one, measured=one.measured / gain, scale=one.scale / np.abs(gain),
                 push=one.push + off @ one.pushes, sight=one.sight + off @ one.sights,
                 tilt=one.tilt + off @ one.tilts, pushes=none, sights=none, tilts=none,
-                gains=np.zeros(0),
+                gains=nothing, delays=nothing, widths=nothing,
             )  # fmt: skip
 
         standings = []
@@ -326,33 +347,34 @@ class FrfProblem:
         parts: tuple[FloatArray, FloatArray, FloatArray],
     ) -> Predicted:
         stiff, damp, mass = system
-        w = response.omega[:, None, None]
+        line = response.s[:, None]
+        w = line[:, :, None]
         n, p = self.joints, parts[0].shape[0]
         push = response.push + off @ response.pushes
         sight, tilt = response.sight + off @ response.sights, response.tilt + off @ response.tilts
         sides = np.stack([push, sight, tilt], axis=1)
-        solved = np.linalg.solve(stiff - w**2 * mass + 1j * w * damp, sides[None])
-        lead = (1j * response.omega) ** response.power
+        solved = np.linalg.solve(stiff + w**2 * mass + w * damp, sides[None])
+        lead = response.s**response.power
         v = solved[:, :, 0]
         u = lead[:, None] * solved[:, :, 1] + solved[:, :, 2]
         seen = lead[:, None] * sight + tilt
-        gain = float(np.exp(off @ response.gains))
-        value = gain * np.einsum("mn,mn->m", seen, v)
-        outer = (u[:, :, None] * v[:, None, :]).reshape(len(w), -1)
-        omega = response.omega[:, None]
-        slope = -gain * (
-            outer @ parts[0].T + 1j * omega * (outer @ parts[1].T) - omega**2 * (outer @ parts[2].T)
-        )
+        gain = response.factor(off)[:, None]
+        value = gain[:, 0] * np.einsum("mn,mn->m", seen, v)
+        outer = (u[:, :, None] * v[:, None, :]).reshape(len(line), -1)
+        slope = -gain * (outer @ parts[0].T + line * (outer @ parts[1].T)
+                         + line**2 * (outer @ parts[2].T))  # fmt: skip
         own = slice(2 * n, 2 * n + len(self.steps))
         slope[:, own] += gain * (
             u @ response.pushes.T + lead[:, None] * (v @ response.sights.T) + v @ response.tilts.T
         )
-        slope[:, own] += value[:, None] * response.gains
+        slope[:, own] += value[:, None] * (
+            response.gains - line * response.delays + 0.5 * line**2 * response.widths
+        )
         left = (response.measured - value) / response.scale
         slope = slope / response.scale[:, None]
         return Predicted(
             np.stack([left.real, left.imag], axis=1),
-            np.stack([slope.real, slope.imag], axis=1).reshape(len(w), 2, p),
+            np.stack([slope.real, slope.imag], axis=1).reshape(len(line), 2, p),
             None,
         )
 
@@ -364,7 +386,7 @@ def make_problem(
 
     Args:
         robot: flexible.
-        records: of the kind "frf".
+        records: of the kind "frf", or taps.
         tolerance: how exact masses, poses and places are.
         prior: of the stiffness.
 
@@ -382,6 +404,9 @@ def make_problem(
     names += ["gravity_stiffness"] if tolerance.gravity_stiffness > 0.0 else []
     if tolerance.direction > 0.0:
         names += [f"direction.{record.file}.{axis}" for record in records for axis in "xyz"]
+    for record in records:
+        if record.test == "tap" and "force" not in record.channels:
+            names += [f"{name}.{record.file}" for name, _ in UNKNOWN_BLOW]
     steps = dict.fromkeys(names)
     index = {name: k for k, name in enumerate(steps)}
     poses: dict[tuple[float, ...], list[Record]] = {}
@@ -404,7 +429,10 @@ def make_problem(
                 other = pose + _TURN * np.eye(len(pose))[k]
                 change = robot.rigid.mass_matrix(other)[square] - mass
                 masses[index[f"pose.{joint}"]] = tolerance.pose / _TURN * change
-        responses = tuple(_response_of(robot, one, pose, tolerance, index) for one in own)
+        responses = tuple(
+            response for one in own
+            for response in _responses_of(robot, one, pose, tolerance, index)
+        )  # fmt: skip
         standings.append(Standing(
             mass, robot.gravity_stiffness(pose), masses,
             np.array(products).reshape(-1, *mass.shape),
@@ -476,6 +504,27 @@ def _bodies(robot: FlexibleRobot, tolerance: Tolerance) -> _Bodies:
     return found
 
 
+def _responses_of(
+    robot: FlexibleRobot, record: Record, pose: FloatArray, tolerance: Tolerance,
+    index: dict[str, int],
+) -> list[Response]:  # fmt: skip
+    """The functions of one record."""
+    if record.kind == "frf":
+        return [_response_of(robot, record, pose, tolerance, index)]
+    found = []
+    for one in spectra(robot, record, pose):
+        gains, delays, widths = np.zeros((3, len(index)))
+        if not one.known:
+            for numbers, (name, size) in zip((gains, delays, widths), UNKNOWN_BLOW, strict=True):
+                numbers[index[f"{name}.{record.file}"]] = size
+        made = _made(robot, record.file, one.seen, pose, tolerance, index)
+        found.append(replace(
+            made, omega=one.omega, measured=one.measured, scale=one.scale, shift=one.shift,
+            gains=made.gains + gains, delays=delays, widths=widths,
+        ))  # fmt: skip
+    return found
+
+
 def _response_of(
     robot: FlexibleRobot, record: Record, pose: FloatArray, tolerance: Tolerance,
     index: dict[str, int],
@@ -501,22 +550,37 @@ def _response_of(
     thin = np.flatnonzero(kept)[:: max(1, int(np.ceil(kept.sum() / _MOST_LINES)))]
     way = np.array(table.force_direction, dtype=float)
     along = np.array(table.response_direction, dtype=float)
-    way, along = way / np.linalg.norm(way), along / np.linalg.norm(along)
     quantity = table.quantity or "accelerance"
+    seen = Seen(
+        way / np.linalg.norm(way), along / np.linalg.norm(along), _POWER[quantity],
+        quantity == "accelerance", table.force_frame, table.force_point, table.response_frame,
+        table.response_point,
+    )  # fmt: skip
+    made = _made(robot, record.file, seen, pose, tolerance, index)
+    return replace(made, omega=2.0 * np.pi * frequency[thin], measured=measured[thin],
+                   scale=scale[thin])  # fmt: skip
+
+
+def _made(
+    robot: FlexibleRobot, file: str, seen: Seen, pose: FloatArray, tolerance: Tolerance,
+    index: dict[str, int],
+) -> Response:  # fmt: skip
+    """A function without its lines."""
+    way, along = seen.way, seen.along
     down = np.array(robot.mounting.gravity, dtype=float)
 
     def stand(at: FloatArray, push: FloatArray, see: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(6, n) of the force's point and of the sensor's, shifted by (3,) m in their frames."""
         return (
-            _point(robot, at, table.force_frame, table.force_point, push, True),
-            _point(robot, at, table.response_frame, table.response_point, see, False),
+            _point(robot, at, seen.force_frame, seen.force_point, push, True),
+            _point(robot, at, seen.response_frame, seen.response_point, see, False),
         )
 
     def sides(
         both: tuple[FloatArray, FloatArray], d: FloatArray, e: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """J_f^T d, J_s^T e and what turning in gravity reads: (w x g) . e."""
-        turned = both[1][3:].T @ np.cross(down, e) if quantity == "accelerance" else 0.0
+        turned = both[1][3:].T @ np.cross(down, e) if seen.tilts else 0.0
         return both[0][:3].T @ d, both[1][:3].T @ e, turned * np.ones(both[0].shape[1])
 
     nothing = np.zeros(3)
@@ -542,14 +606,15 @@ def _response_of(
             sides(stand(pose, nothing, tolerance.sensor_position * unit), way, along))  # fmt: skip
         put(f"sensor_angle.{axis}",
             sides(here, way, along + tolerance.sensor_angle * np.cross(unit, along)))  # fmt: skip
-        put(f"direction.{record.file}.{axis}",
+        put(f"direction.{file}.{axis}",
             sides(here, way + tolerance.direction * np.cross(unit, way), along))  # fmt: skip
     gains = np.zeros(len(index))
     if "sensor_gain" in index:
         gains[index["sensor_gain"]] = tolerance.sensor_gain
+    none, nothing = np.zeros(0), np.zeros(len(index))
     return Response(
-        record.file, 2.0 * np.pi * frequency[thin], measured[thin], scale[thin], _POWER[quantity],
-        own[0], own[1], own[2], changes[0], changes[1], changes[2], gains,
+        file, none, none.astype(complex), none, seen.power, own[0], own[1], own[2], changes[0],
+        changes[1], changes[2], gains, nothing, nothing,
     )  # fmt: skip
 
 
