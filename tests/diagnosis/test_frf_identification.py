@@ -157,9 +157,11 @@ def test_the_command(frfs, tmp_path, in_process):
     world = frfs.draw(3, 1, exact=True)
     exactly(world).save(tmp_path / "taps")
     done = in_process("identify", world.robot, "--data", "taps", "--out", "flex.toml",
-                      "--json", "found.json", cwd=tmp_path)  # fmt: skip
+                      "--json", "found.json", "--report", "page.html", cwd=tmp_path)  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "Damping: one ratio for each mode" in done.stdout
+    # Eighteen functions: those that fit worst are drawn.
+    assert (tmp_path / "page.html").read_text().count("<svg") == 12
     content = json.loads((tmp_path / "found.json").read_text())
     assert content["damping"]["convention"] == "modal"
     sidecar = read_sidecar(tmp_path / "flex.toml")

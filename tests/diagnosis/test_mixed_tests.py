@@ -75,6 +75,15 @@ def test_both_kinds_tell_more_than_one(worlds, tmp_path):
         robot.stiffness, [joint.stiffness.value for joint in found.joints], rtol=1e-9
     )
     assert len(robot.posterior.names) == 6
+    compared = found.compared()
+    assert len(compared) == 1 + 4
+    for one in compared:
+        left = np.linalg.norm(one.measured - one.fitted) / np.linalg.norm(one.measured)
+        assert left < 0.25 and one.left < 0.25
+    page = picchio.report(found, warnings=["a < b"]).html()
+    assert page.count("<svg") == 5 and "a &lt; b" in page
+    for joint in found.joints:
+        assert joint.name in page
 
 
 def test_a_contradiction_is_told(worlds):

@@ -12,7 +12,14 @@ import numpy as np
 from picchio.campaign.campaign import Campaign
 from picchio.core.arrays import FloatArray
 from picchio.core.provenance import provenance
-from picchio.diagnosis.identified import FORMAT, Identification, Identified, IdentifiedJoint, Method
+from picchio.diagnosis.identified import (
+    FORMAT,
+    Compared,
+    Identification,
+    Identified,
+    IdentifiedJoint,
+    Method,
+)
 from picchio.diagnosis.stiffness.fit import Fit, climb, score
 from picchio.diagnosis.stiffness.joints import MOST_HALF, Told, stiffness_of
 from picchio.diagnosis.stiffness.modes import starts
@@ -29,6 +36,7 @@ REMAINDER = 0.01
 _LOOKS, _BASINS, _STRIDE, _GAIN = 3, 4, 0.12, 2.0  # at other basins; ln of stiffness; ln evidence
 _STRAY, _INCREDIBLE = 1.5, 3.0  # standard deviations before the tests
 _DECISIVE = 5.0  # in log evidence, for a convention of the damping
+_READ = ("m/N", "m/s/N", "m/s²/N")
 _WORDS = {
     "modal": "one ratio for each mode, the joints' weighted by strain energy",
     "joint": "a dashpot in each joint",
@@ -98,6 +106,19 @@ class FrfIdentification(Identification):
             f"{100 * self.left:.3g} %; nothing was held out.",
             f"Damping: {_WORDS[self.convention]}{sure} (log evidence {self.decided:+.1f}).",
         )
+
+    def compared(self) -> list[Compared]:
+        """Every function, by its magnitude; the spread is what its coherence leaves."""
+        problem, found = self.fit.problem, []
+        for part, table in zip(problem.predict(self.fit.mean), problem.tables, strict=True):
+            fitted = (table.values - part.residual) @ np.array([1.0, 1j]) * table.scale
+            left = np.linalg.norm(table.measured - fitted) / np.linalg.norm(table.measured)
+            found.append(Compared(
+                table.file, "frequency [Hz]", f"magnitude [{_READ[table.power]}]",
+                table.omega / (2.0 * np.pi), np.abs(table.measured), np.abs(fitted),
+                table.scale * self.fit.noise["frf"], float(left), True,
+            ))  # fmt: skip
+        return found
 
     def sidecar_text(self) -> str:
         """See `Identification`; a joint that is not told has a wide spread."""

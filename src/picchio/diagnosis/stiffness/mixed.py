@@ -17,7 +17,13 @@ import numpy as np
 from picchio.campaign.campaign import Campaign
 from picchio.core.arrays import FloatArray
 from picchio.core.provenance import provenance
-from picchio.diagnosis.identified import FORMAT, Identification, IdentifiedJoint, Method
+from picchio.diagnosis.identified import (
+    FORMAT,
+    Compared,
+    Identification,
+    IdentifiedJoint,
+    Method,
+)
 from picchio.diagnosis.stiffness.frf import FrfIdentification, identify_frf
 from picchio.diagnosis.stiffness.joints import MOST_HALF
 from picchio.diagnosis.stiffness.prior import prior_of
@@ -96,6 +102,10 @@ class BothIdentification(Identification):
     def remarks(self) -> tuple[str, ...]:
         """Those of both."""
         return (*self.loads.remarks, *self.functions.remarks)
+
+    def compared(self) -> list[Compared]:
+        """Those of both."""
+        return [*self.loads.compared(), *self.functions.compared()]
 
     def sidecar_text(self) -> str:
         """See `Identification`: spreads and correlations after both."""
