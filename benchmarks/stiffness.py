@@ -2,11 +2,13 @@
 
     python benchmarks/stiffness.py --blind 200 [--first 1000] [--json FILE]
     python benchmarks/stiffness.py --frf 200 [--first 2000] [--json FILE]
+    python benchmarks/stiffness.py --taps 60 [--unknown] [--first 3000] [--json FILE]
     python benchmarks/stiffness.py --real DATA [--repeats 5] [--json FILE]
 
 Blind: campaigns of `tests/worlds/loads.py`, arms with 3, 6 and 7 joints in turn, stiffness off by
 up to a factor of four, everything slightly wrong; with --frf those of `tests/worlds/frfs.py`, 18
-frequency response functions each. Real: DATA is the folder of measured data; 43
+frequency response functions each; with --taps those of `tests/worlds/taps.py`, six blows in time,
+with --unknown without their force. Real: DATA is the folder of measured data; 43
 loadings of a FANUC R-2000iC (`r2000ic-static`), published stiffness against plain least squares
 and against `picchio identify`; then each cause that may leave a fifth of the signal unexplained,
 judged on loadings left out: ten folds, so many times as `--repeats` says.
@@ -19,6 +21,7 @@ import json
 import sys
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +45,7 @@ TESTS = Path(__file__).resolve().parent.parent / "tests"
 sys.path[:0] = [str(TESTS), str(TESTS / "diagnosis")]
 import blind_stiffness  # noqa: E402
 
-from worlds import frfs, loads  # noqa: E402
+from worlds import frfs, loads, taps  # noqa: E402
 
 ROBOT = "fanuc_r2000ic"
 
@@ -63,17 +66,18 @@ def blind(count: int, first: int) -> dict[str, Any]:
     return {"blind": found, "joints": [vars(one) for one in judged]}
 
 
-def responses(count: int, first: int) -> dict[str, Any]:
+def responses(trial: Any, count: int, first: int) -> dict[str, Any]:
     start = time.process_time()
-    stiffness, damping = blind_stiffness.frf_trial(frfs, count, first)
-    found = {}
+    stiffness, damping = trial(count=count, first=first)
+    found: dict[str, Any] = {}
     for what, judged in (("stiffness", stiffness), ("damping", damping)):
         found[what] = blind_stiffness.summary(judged)
         print(what)
         for name, value in found[what].items():
             print(f"  {name:24s} {value:.4g}")
     print(f"processor time a campaign  {(time.process_time() - start) / count:.2f} s")
-    return {"frf": found}
+    found["joints"] = [vars(one) for one in (*stiffness, *damping)]
+    return found
 
 
 def read(folder: Path) -> Campaign:
@@ -171,6 +175,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--blind", type=int, default=0)
     parser.add_argument("--frf", type=int, default=0)
+    parser.add_argument("--taps", type=int, default=0)
+    parser.add_argument("--unknown", action="store_true")
     parser.add_argument("--first", type=int, default=1000)
     parser.add_argument("--real", type=Path)
     parser.add_argument("--repeats", type=int, default=5)
@@ -182,7 +188,11 @@ def main() -> None:
     if given.blind:
         found |= blind(given.blind, given.first)
     if given.frf:
-        found |= responses(given.frf, given.first)
+        trial = partial(blind_stiffness.frf_trial, frfs)
+        found["frf"] = responses(trial, given.frf, given.first)
+    if given.taps:
+        trial = partial(blind_stiffness.tap_trial, taps, known=not given.unknown)
+        found["taps"] = responses(trial, given.taps, given.first)
     if given.json is not None:
         with atomic_write(given.json) as stream:
             json.dump(found, stream, indent=1)

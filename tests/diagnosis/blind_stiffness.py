@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -95,12 +96,31 @@ def frf_campaign(world) -> Campaign:
     return Campaign.from_records(records, robot=world.robot)
 
 
+def tap_campaign(world) -> Campaign:
+    """The world's taps as a campaign, a record each."""
+    records = [
+        Record.from_arrays(f"t{k:02d}.csv", held["time"],
+                           {name: x for name, x in held.items() if name != "time"}, **table)
+        for k, (held, table) in enumerate(world.records)
+    ]  # fmt: skip
+    return Campaign.from_records(records, robot=world.robot)
+
+
 def frf_trial(worlds, count: int, first: int = 0, sizes=SIZES) -> tuple[list, list]:
     """So many campaigns; stiffness, and damping ratios, judged alike."""
+    return _trial(worlds.draw, frf_campaign, count, first, sizes)
+
+
+def tap_trial(worlds, count: int, first: int = 0, sizes=SIZES, known=True) -> tuple[list, list]:
+    """The same of taps, their force measured or not."""
+    return _trial(partial(worlds.draw, known=known), tap_campaign, count, first, sizes)
+
+
+def _trial(draw, campaign_of, count, first, sizes) -> tuple[list, list]:
     stiffness, damping = [], []
     for seed in range(first, first + count):
-        world = worlds.draw(sizes[seed % len(sizes)], seed)
-        found = picchio.identify(world.robot, frf_campaign(world))
+        world = draw(sizes[seed % len(sizes)], seed)
+        found = picchio.identify(world.robot, campaign_of(world))
         for k, joint in enumerate(found.joints):
             for kind, one, truth in (
                 (stiffness, joint.stiffness, world.truth[k]),

@@ -66,7 +66,7 @@ def choose(
     outcome: Outcome, kinds: Sequence[Offered], budget: float, *, most: int | None = None,
     worth: float = WORTH,
 ) -> Choice:  # fmt: skip
-    """Take records one after the other.
+    """Take records one after the other, by their gain and by their gain for the time.
 
     Args:
         outcome: to be narrowed.
@@ -76,8 +76,17 @@ def choose(
         worth: the least gain of a record, a share of the outcome's deviation.
 
     Returns:
-        the records, and what is expected after them.
+        the records of the way that narrows it more, and what is expected after them.
     """
+    ways = [_taken(outcome, kinds, budget, most, worth, timed) for timed in (True, False)]
+    return min(ways, key=lambda way: way.after)
+
+
+def _taken(
+    outcome: Outcome, kinds: Sequence[Offered], budget: float, most: int | None, worth: float,
+    timed: bool,
+) -> Choice:  # fmt: skip
+    """Take the best record, again and again: for its time, or for itself."""
     space = Space.of(outcome, kinds)
     candidates = [one for kind in kinds for one in kind.each]
     seconds = [kind.test.seconds for kind in kinds for _ in kind.each]
@@ -109,7 +118,7 @@ def choose(
             if not within.any():
                 why = "the time is up"
                 break
-        best = int(np.where(within, gain / cost, -np.inf).argmax())
+        best = int(np.where(within, gain / cost if timed else gain, -np.inf).argmax())
         total = left + outcome.rest
         small = total <= 0.0 or math.sqrt(max(1.0 - gain[best] / total, 0.0)) > 1.0 - worth
         if small and not few:
