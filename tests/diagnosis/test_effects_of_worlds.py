@@ -87,6 +87,23 @@ def test_a_world_and_the_model_agree(robot, name):
     assert left(robot, cause, effect_class(name)(target, **values)) < share
 
 
+def test_a_link_that_bends_is_the_worlds(robot):
+    """The world's link yields about one axis only, and has another way to halve its mass."""
+    bent = {"stiffness": 2e5, "damping": 40.0, "angle": 0.7}
+    end = np.array(robot.rigid._model.jointPlacements[3].translation)
+    one, other = np.linalg.svd(end[None])[2][1:]
+    axis = np.cos(0.7) * one + np.sin(0.7) * other
+    first = np.cross(end, np.eye(3)[int(np.abs(end).argmin())])
+    first /= np.linalg.norm(first)
+    second = np.cross(end / np.linalg.norm(end), first)
+    angle = float(np.arctan2(axis @ second, axis @ first))
+    own = {"stiffness": 2e5, "damping": 40.0, "angle": angle, "modal_share": 0.0}
+    cause = ("mid_link_bending", "link_2", bent)
+    effect = effect_class("link_bending")
+    assert left(robot, cause, effect("joint_2", ratio=0.02, **own)) < 0.06
+    assert left(robot, cause, effect("joint_2", ratio=1.0, **own)) > 0.3
+
+
 FOUND = {
     "coupled_joints": ("belt_coupling", "stiffness", "stiffness"),
     "loose_bolt": ("loose_bolt", "change", "stiffness"),
@@ -198,6 +215,7 @@ NEW = {
     "belt_coupling": ("joint_3", {"stiffness": 2e4}),
     "counterbalance": ("joint_2", {"cosine": 400.0, "spring": -100.0}),
     "coupled_drive": ("joint_3", {"coefficient": 2.0, "ratio": -1.0}),
+    "link_bending": ("joint_2", {"stiffness": 3e5, "damping": 20.0, "angle": 0.5, "ratio": 0.3}),
     "link_inertia": ("link_2", {"mass": 0.1, "xz": 0.2}),
     "loose_bolt": ("joint_1", {"change": -1e4}),
     "payload_body": ("tool", {"mass": 2.0, "x": 0.1, "zz": 0.01}),

@@ -2,8 +2,8 @@
 
 A measurement sees more than the linear model: M, J and gravity change with the deflection,
 and the base or a bearing may yield where the URDF has it rigid. Here the robot stands on six
-further coordinates of its base and two hinges beside every flexible joint; which of them move
-is for the model to say.
+further coordinates of its base and two hinges beside every flexible joint, and on two in the
+middle of a link that bends; which of them move is for the model to say.
 """
 
 from __future__ import annotations
@@ -16,19 +16,29 @@ import pinocchio as pin
 
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
+from picchio.core.recent import Recent
+from picchio.model.inertia import pseudo_inertia, ten_numbers
 from picchio.robot.dynamics.rigid_model import unit_inertia
 from picchio.robot.flexible_robot import FlexibleRobot
 
 BASE_AXES = ("x", "y", "z", "rx", "ry", "rz")
 _STEP = 1e-4  # rad or m, of the central differences
+_KEPT_BENT = 32
+_SHORT = 1e-3  # m, a link that has no length to bend over
+
+# Joints whose links bend, and the angle, rad, of the first of the two axes about which each does.
+Bent = tuple[tuple[str, float], ...]
 
 
-def _widen(robot: FlexibleRobot, root: FloatArray) -> tuple[Any, dict[int, int], list[str]]:
+def _widen(
+    robot: FlexibleRobot, root: FloatArray, bent: Bent = ()
+) -> tuple[Any, dict[int, int], list[str]]:
     """The wide model, where each of the robot's joints is in it, and who has hinges.
 
     Args:
         robot: whose flexible revolute joints get hinges, perpendicular to the joint's axis.
         root: (3,) m, where the root link stands; the base turns about it.
+        bent: whose links bend: two hinges "bend.<joint>.1" and ".2" each.
 
     Returns:
         the model; its joint's number by the robot's; the names of the joints with hinges, whose
@@ -45,11 +55,17 @@ def _widen(robot: FlexibleRobot, root: FloatArray) -> tuple[Any, dict[int, int],
     from_root = pin.SE3(np.eye(3), -root)
     model.appendBodyToJoint(parent, from_root.act(source.inertias[0]), pin.SE3.Identity())
     where, hinges = {0: parent}, []
+    bends = {source.getJointId(name): angle for name, angle in bent}
+    beyond: dict[int, tuple[int, Any]] = {}  # the joint that bends a link, and its inverse place
+    outer = {i: next_joint(robot, source.names[i]) for i in bends}
     for i in range(1, source.njoints):
         name, place = source.names[i], source.jointPlacements[i]
         if source.parents[i] == 0:
             place = from_root * place
         at = where[source.parents[i]]
+        if outer.get(source.parents[i]) == i:
+            at, back = beyond[source.parents[i]]
+            place = back * place
         turns, own = _axis(source.joints[i])
         if turns and name in robot.flexible_names:
             hinges.append(name)
@@ -60,8 +76,64 @@ def _widen(robot: FlexibleRobot, root: FloatArray) -> tuple[Any, dict[int, int],
                 place = pin.SE3.Identity()
         kind = pin.JointModelRevoluteUnaligned if turns else pin.JointModelPrismaticUnaligned
         where[i] = model.addJoint(at, kind(own), place, name)
-        model.appendBodyToJoint(where[i], source.inertias[i], pin.SE3.Identity())
+        if i not in bends:
+            model.appendBodyToJoint(where[i], source.inertias[i], pin.SE3.Identity())
+            continue
+        end = np.array(source.jointPlacements[outer[i]].translation)
+        near, far = _halves(source.inertias[i], end)
+        model.appendBodyToJoint(where[i], near, pin.SE3.Identity())
+        first, second = _perpendicular(end / np.linalg.norm(end))
+        cos, sin = np.cos(bends[i]), np.sin(bends[i])
+        at, place = where[i], pin.SE3(np.eye(3), 0.5 * end)
+        for k, side in enumerate((cos * first + sin * second, cos * second - sin * first)):
+            joint = pin.JointModelRevoluteUnaligned(side)
+            at = model.addJoint(at, joint, place, f"bend.{name}.{k + 1}")
+            place = pin.SE3.Identity()
+        back = pin.SE3(np.eye(3), -0.5 * end)
+        model.appendBodyToJoint(at, far, back)
+        beyond[i] = at, back
     return model, where, hinges
+
+
+def next_joint(robot: FlexibleRobot, joint: str) -> int | None:
+    """The number of the joint after another on the way to the tool, if it stands apart from it.
+
+    Args:
+        robot: the robot.
+        joint: name of a joint.
+    """
+    model = robot.rigid._model
+    start, at = model.getJointId(joint), model.frames[robot.rigid.frame(robot.tool_frame)]
+    after = at.parentJoint
+    while after != 0 and model.parents[after] != start:
+        after = model.parents[after]
+    if after == 0 or np.linalg.norm(model.jointPlacements[after].translation) < _SHORT:
+        return None
+    return int(after)
+
+
+def _halves(whole: Any, end: FloatArray) -> tuple[Any, Any]:
+    """The two halves of a link's inertia, as of a beam along `end` (3,) m, in the link's frame.
+
+    Their centres of mass stand as far apart as those of the halves of a uniform rod with as large
+    a second moment along the link; together they are the whole, whatever it is.
+    """
+    ten = np.asarray(whole.toDynamicParameters())
+    if not ten[0] > 0.0:
+        return whole, pin.Inertia.Zero()
+    pseudo, along = pseudo_inertia(ten / ten[0]), end / np.linalg.norm(end)
+    centre = pseudo[:3, 3]
+    spread = pseudo[:3, :3] - np.outer(centre, centre)
+    size = along @ spread @ along
+    apart = np.sqrt(0.75 / size) * spread @ along if size > 0.0 else np.zeros(3)
+    halves = []
+    for sign in (-1.0, 1.0):
+        at = centre + sign * apart
+        half = np.ones((4, 4))
+        half[:3, :3] = spread - np.outer(apart, apart) + np.outer(at, at)
+        half[:3, 3] = half[3, :3] = at
+        halves.append(pin.Inertia.FromDynamicParameters(ten_numbers(0.5 * ten[0] * half)))
+    return halves[0], halves[1]
 
 
 def _axis(joint: Any) -> tuple[bool, FloatArray]:
@@ -153,17 +225,20 @@ class WideChain:
 
     Args:
         robot: the robot.
+        bent: joints whose links bend in the middle.
 
     Attributes:
-        coordinates: their names: the flexible joints first, then "base.x" to "base.rz" and
-            "hinge.<joint>.1" and ".2" for every flexible revolute joint.
+        coordinates: their names: the flexible joints first, then "base.x" to "base.rz",
+            "hinge.<joint>.1" and ".2" for every flexible revolute joint, and "bend.<joint>.1"
+            and ".2" for every link that bends.
     """
 
-    def __init__(self, robot: FlexibleRobot) -> None:
+    def __init__(self, robot: FlexibleRobot, bent: Bent = ()) -> None:
         self.robot = robot
+        self._bending: Recent[WideChain] = Recent(_KEPT_BENT)
         source = robot.rigid._model
         root = np.array(source.frames[robot.rigid.frame(robot.tree.root)].placement.translation)
-        self._model, joints, hinges = _widen(robot, root)
+        self._model, joints, hinges = _widen(robot, root, bent)
         # The base's last joint stands where the root link does.
         from_root = pin.SE3(np.eye(3), -root)
         self._frames = {
@@ -178,6 +253,7 @@ class WideChain:
             *robot.flexible_names,
             *(f"base.{axis}" for axis in BASE_AXES),
             *(f"hinge.{name}.{i}" for name in hinges for i in (1, 2)),
+            *(f"bend.{name}.{i}" for name, _ in bent for i in (1, 2)),
         )
         # Where the robot's own joints are in the wide model, whose joints have one number each.
         self._own = [self._model.joints[joints[i]].idx_v for i in range(1, source.njoints)]
@@ -188,6 +264,14 @@ class WideChain:
         for column, name in enumerate(self.coordinates[n:], start=n):
             joint = self._model.joints[self._model.getJointId(name)]
             self._columns[joint.idx_v, column] = 1.0
+
+    def bending(self, bent: Bent) -> WideChain:
+        """The same chain with links that bend.
+
+        Args:
+            bent: their joints, and the angles of their axes.
+        """
+        return self._bending.get(bent, lambda: WideChain(self.robot, bent))
 
     def _q(self, pose: FloatArray) -> FloatArray:
         rigid, q = self.robot.rigid, np.zeros(self._model.nq)

@@ -1,0 +1,71 @@
+"""A link bends in its middle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from picchio.model.effects.effect import Effect, Parameter
+from picchio.model.effects.evidence import Evidence
+from picchio.model.effects.scales import Scales
+from picchio.model.effects.structure import yielding
+from picchio.model.expansion import next_joint
+from picchio.model.plant import Changes
+
+
+class LinkBending(Effect):
+    """The link that a joint carries yields half-way to the next joint, about two axes across it.
+
+    As a beam bends first about its weaker axis. Half of the link's mass is beyond the middle.
+    """
+
+    name = "link_bending"
+    where = "structure"
+    target_kind = "joint"
+    parameters = (
+        yielding.stiffness("about the axis about which the link bends more", upper=1e12),
+        yielding.damping("about that axis", upper=1e8),
+        Parameter("angle", "rad", lower=-6.3, upper=6.3, size=0.3, shape=True,
+                  meaning="of that axis, across the link"),
+        Parameter("ratio", neutral=1.0, lower=0.02, upper=1.0, logarithmic=True, shape=True,
+                  meaning="this stiffness over that about the other axis"),
+        yielding.MODAL_SHARE,
+    )  # fmt: skip
+    meaning = "the link that the joint carries bends between it and the next joint"
+    mark = "bending"
+    source = (
+        "pseudo-rigid-body model with one hinge: Howell, Compliant Mechanisms, 2001, ch. 5; "
+        "Dwivedy, Eberhard, Mechanism and Machine Theory 41 (2006) 749"
+    )
+
+    @classmethod
+    def targets(cls, evidence: Evidence) -> list[str]:
+        """The flexible joints that turn and carry a link with a length."""
+        return [
+            j.name
+            for j in evidence.robot.flexible_joints
+            if j.kind == "revolute" and next_joint(evidence.robot, j.name) is not None
+        ]
+
+    def structure(self, plant: Changes) -> None:
+        """Let the two hinges within the link move."""
+        values = self.values
+        plant.modal_share = values["modal_share"]
+        pair = (values["stiffness"], values["stiffness"] / values["ratio"])
+        plant.add_bending(self.target, values["angle"], pair, values["damping"])
+
+    def trials(self, scales: Scales) -> list[dict[str, float]]:
+        """Five times as stiff as the joint, about three axes."""
+        return self._stiffer(scales, (5.0,))
+
+    def early_trials(self, scales: Scales) -> list[dict[str, float]]:
+        """From three to forty times as stiff as the joint, about three axes."""
+        return self._stiffer(scales, [3.0 * 1.9**i for i in range(5)])
+
+    def _stiffer(self, scales: Scales, times: Sequence[float]) -> list[dict[str, float]]:
+        k, m = scales.stiffness[self.target], scales.inertia[self.target]
+        return [
+            {"stiffness": n * k, "damping": 0.04 * (n * k * m) ** 0.5, "ratio": 0.2, "angle": angle}
+            for n in times
+            for angle in (0.0, math.pi / 3.0, 2.0 * math.pi / 3.0)
+        ]
