@@ -253,6 +253,11 @@ class Effect(ABC):
         return (self.name, self.target, *self.values.items(), *self.hidden.items())
 
     @property
+    def fitted(self) -> tuple[Parameter, ...]:
+        """The parameters that a fit moves: not those that are whole numbers, which are tried."""
+        return tuple(p for p in self.parameters if not p.whole)
+
+    @property
     def label(self) -> str:
         """Name and target, for people."""
         return f"{self.name}:{self.target}"

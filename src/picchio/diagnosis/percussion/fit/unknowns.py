@@ -233,7 +233,7 @@ class Hypothesis:
         told = {(label, name): (value, std) for label, name, value, std in self.priors}
         for i, effect in enumerate(self.effects):
             nuisance = i < self.n_nuisances
-            for p in effect.parameters:
+            for p in effect.fitted:
                 if effect.discrete or effect.latent is not None:
                     continue  # found in another way than by the fit
                 prior = None
