@@ -104,6 +104,31 @@ def test_a_link_that_bends_is_the_worlds(robot):
     assert left(robot, cause, effect("joint_2", ratio=1.0, **own)) > 0.3
 
 
+@pytest.mark.parametrize("order", [1.0, 2.0])
+@pytest.mark.parametrize("digital", [0.0, 1.0])
+def test_a_loggers_filter_is_the_worlds(robot, order, digital):
+    values = {"frequency": 2.0, "order": order, "digital": digital}
+    group = "accelerometer.tool"
+    effect = effect_class("sensor_highpass")
+    assert left(robot, ("sensor_highpass", group, values), effect(group, **values)) < 0.002
+    other = values | {"order": 3.0 - order}
+    assert left(robot, ("sensor_highpass", group, values), effect(group, **other)) > 0.05
+
+
+@pytest.mark.slow
+def test_the_order_of_a_filter_is_found(robot):
+    values = {"frequency": 2.5, "order": 2.0, "digital": 1.0}
+    campaign, _ = worlds.make(
+        robot=ARM, seed=104, causes=[("sensor_highpass", "accelerometer.tool", values)],
+        snr_db=40.0, sensors=SENSORS, records=9,
+    )  # fmt: skip
+    found = diagnose_percussion(robot, campaign, workers=1).diagnosis
+    (cause,) = found.causes
+    assert (found.verdict, cause.effect) == ("named", "sensor_highpass")
+    assert cause.parameters["frequency"].value == pytest.approx(2.5, rel=0.005)
+    assert cause.parameters["order"].value == 2.0
+
+
 FOUND = {
     "coupled_joints": ("belt_coupling", "stiffness", "stiffness"),
     "loose_bolt": ("loose_bolt", "change", "stiffness"),
