@@ -99,8 +99,25 @@ def test_its_modes_are_those_of_two_halves_with_hinges(tmp_path, angle):
     assert np.allclose(found[1], true[1], rtol=1e-7, atol=1e-9)
 
 
+def test_the_last_link_bends_half_way_to_the_tool(tmp_path):
+    """Statics: what is beyond its middle turns about it, so the tool moves by half its length."""
+    robot = _arm(tmp_path)
+    effect = LinkBending("joint_2", stiffness=STIFF, damping=DAMPING, ratio=1.0)
+    stiff, soft = _system(robot), _system(robot, [effect])
+
+    def compliance(system):
+        return system.force_jacobian @ np.linalg.solve(system.stiffness, system.force_jacobian.T)
+
+    more = np.trace(compliance(soft) - compliance(stiff))
+    half = 0.5 * np.linalg.norm([0.3, 0.05])
+    assert more == pytest.approx(2.0 * half**2 / STIFF, rel=1e-9)
+
+
 def test_a_link_without_length_cannot_bend(tmp_path):
-    whole = _arm(tmp_path)
+    _arm(tmp_path)
+    file = tmp_path / "armFalse.urdf"
+    file.write_text(file.read_text().replace("0.3 0.05 0", "0 0 0"))
+    robot = picchio.load_robot(file, flex=tmp_path / "armFalse.toml", tool="tool")
     effect = LinkBending("joint_2", stiffness=STIFF, damping=DAMPING)
     with pytest.raises(InputError, match="no link that could bend"):
-        Model(whole).with_effects([effect]).plant(Geometry.of(whole, np.zeros(2)))
+        _system(robot, [effect])

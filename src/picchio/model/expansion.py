@@ -32,8 +32,8 @@ Bent = tuple[tuple[str, float], ...]
 
 def _widen(
     robot: FlexibleRobot, root: FloatArray, bent: Bent = ()
-) -> tuple[Any, dict[int, int], list[str]]:
-    """The wide model, where each of the robot's joints is in it, and who has hinges.
+) -> tuple[Any, dict[int, int], list[str], dict[int, _Far]]:
+    """The wide model, where each of the robot's joints is in it, who has hinges, and far halves.
 
     Args:
         robot: whose flexible revolute joints get hinges, perpendicular to the joint's axis.
@@ -42,7 +42,8 @@ def _widen(
 
     Returns:
         the model; its joint's number by the robot's; the names of the joints with hinges, whose
-        joints are "hinge.<joint>.1" and ".2". The base's are "base.x" to "base.rz".
+        joints are "hinge.<joint>.1" and ".2"; what is beyond the middle of a link that bends, by
+        the number of its joint. The base's are "base.x" to "base.rz".
     """
     source, model = robot.rigid._model, pin.Model()
     model.gravity = source.gravity
@@ -56,16 +57,14 @@ def _widen(
     model.appendBodyToJoint(parent, from_root.act(source.inertias[0]), pin.SE3.Identity())
     where, hinges = {0: parent}, []
     bends = {source.getJointId(name): angle for name, angle in bent}
-    beyond: dict[int, tuple[int, Any]] = {}  # the joint that bends a link, and its inverse place
-    outer = {i: next_joint(robot, source.names[i]) for i in bends}
+    far: dict[int, _Far] = {}
     for i in range(1, source.njoints):
         name, place = source.names[i], source.jointPlacements[i]
         if source.parents[i] == 0:
             place = from_root * place
         at = where[source.parents[i]]
-        if outer.get(source.parents[i]) == i:
-            at, back = beyond[source.parents[i]]
-            place = back * place
+        if source.parents[i] in far:
+            at, place = far[source.parents[i]].carried(at, place)
         turns, own = _axis(source.joints[i])
         if turns and name in robot.flexible_names:
             hinges.append(name)
@@ -79,8 +78,9 @@ def _widen(
         if i not in bends:
             model.appendBodyToJoint(where[i], source.inertias[i], pin.SE3.Identity())
             continue
-        end = np.array(source.jointPlacements[outer[i]].translation)
-        near, far = _halves(source.inertias[i], end)
+        end = link_end(robot, name)
+        assert end is not None
+        near, beyond = _halves(source.inertias[i], end)
         model.appendBodyToJoint(where[i], near, pin.SE3.Identity())
         first, second = _perpendicular(end / np.linalg.norm(end))
         cos, sin = np.cos(bends[i]), np.sin(bends[i])
@@ -89,27 +89,56 @@ def _widen(
             joint = pin.JointModelRevoluteUnaligned(side)
             at = model.addJoint(at, joint, place, f"bend.{name}.{k + 1}")
             place = pin.SE3.Identity()
-        back = pin.SE3(np.eye(3), -0.5 * end)
-        model.appendBodyToJoint(at, far, back)
-        beyond[i] = at, back
-    return model, where, hinges
+        far[i] = _Far(at, end)
+        model.appendBodyToJoint(at, beyond, far[i].back)
+    return model, where, hinges, far
 
 
-def next_joint(robot: FlexibleRobot, joint: str) -> int | None:
-    """The number of the joint after another on the way to the tool, if it stands apart from it.
+@dataclass(frozen=True, eq=False)
+class _Far:
+    """What is beyond the middle of a link that bends.
+
+    Attributes:
+        joint: number of its joint in the wide model.
+        end: (3,) m, of the link, in the frame of the joint that carries it.
+    """
+
+    joint: int
+    end: FloatArray
+
+    @property
+    def back(self) -> Any:
+        """From the frame of the joint that carries the link to that in its middle."""
+        return pin.SE3(np.eye(3), -0.5 * self.end)
+
+    def carried(self, joint: int, place: Any) -> tuple[int, Any]:
+        """What carries a place on the link, and where: unchanged on the near half.
+
+        Args:
+            joint: that carries the near half.
+            place: on it.
+        """
+        if place.translation @ self.end > 0.5 * self.end @ self.end:
+            return self.joint, self.back * place
+        return joint, place
+
+
+def link_end(robot: FlexibleRobot, joint: str) -> FloatArray | None:
+    """Where the link that a joint carries ends, (3,) m in the joint's frame.
+
+    That is the next joint on the way to the tool, or the tool; None where that is no way off.
 
     Args:
         robot: the robot.
-        joint: name of a joint.
+        joint: its name.
     """
     model = robot.rigid._model
-    start, at = model.getJointId(joint), model.frames[robot.rigid.frame(robot.tool_frame)]
-    after = at.parentJoint
-    while after != 0 and model.parents[after] != start:
-        after = model.parents[after]
-    if after == 0 or np.linalg.norm(model.jointPlacements[after].translation) < _SHORT:
-        return None
-    return int(after)
+    start, tool = model.getJointId(joint), model.frames[robot.rigid.frame(robot.tool_frame)]
+    place, after = tool.placement, tool.parentJoint
+    while after not in (0, start):
+        place, after = model.jointPlacements[after], model.parents[after]
+    end = np.array(place.translation)
+    return end if after == start and np.linalg.norm(end) > _SHORT else None
 
 
 def _halves(whole: Any, end: FloatArray) -> tuple[Any, Any]:
@@ -238,17 +267,15 @@ class WideChain:
         self._bending: Recent[WideChain] = Recent(_KEPT_BENT)
         source = robot.rigid._model
         root = np.array(source.frames[robot.rigid.frame(robot.tree.root)].placement.translation)
-        self._model, joints, hinges = _widen(robot, root, bent)
+        self._model, joints, hinges, far = _widen(robot, root, bent)
         # The base's last joint stands where the root link does.
         from_root = pin.SE3(np.eye(3), -root)
-        self._frames = {
-            frame.name: (
-                joints[frame.parentJoint],
-                frame.placement if frame.parentJoint else from_root * frame.placement,
-            )
-            for frame in source.frames
-            if frame.type == pin.FrameType.BODY
-        }
+        self._frames = {}
+        for frame in source.frames:
+            if frame.type == pin.FrameType.BODY:
+                on = frame.parentJoint
+                at = joints[on], frame.placement if on else from_root * frame.placement
+                self._frames[frame.name] = far[on].carried(*at) if on in far else at
         self.coordinates = (
             *robot.flexible_names,
             *(f"base.{axis}" for axis in BASE_AXES),

@@ -10,7 +10,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.model.conditions import Conditions
-from picchio.model.expansion import Motion, next_joint
+from picchio.model.expansion import Motion, link_end
 from picchio.model.geometry import Geometry
 from picchio.model.inertia import point_masses
 from picchio.model.linear_system import shared_damping
@@ -144,9 +144,9 @@ class Changes:
             damping: N m s/rad, about the first; about the other it is in the same ratio.
 
         Raises:
-            InputError: a link without length, or none that leads on to the tool.
+            InputError: a link without length, or none on the way to the tool.
         """
-        if next_joint(self.robot, self.check_joint(joint)) is None:
+        if link_end(self.robot, self.check_joint(joint)) is None:
             raise InputError("carries no link that could bend", key="target", value=joint)
         self._bent[joint] = angle
         for i, own in enumerate(stiffness, start=1):

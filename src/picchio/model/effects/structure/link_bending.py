@@ -9,14 +9,15 @@ from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
 from picchio.model.effects.structure import yielding
-from picchio.model.expansion import next_joint
+from picchio.model.expansion import link_end
 from picchio.model.plant import Changes
 
 
 class LinkBending(Effect):
-    """The link that a joint carries yields half-way to the next joint, about two axes across it.
+    """The link that a joint carries yields half-way to the next joint or the tool.
 
-    As a beam bends first about its weaker axis. Half of the link's mass is beyond the middle.
+    It does so about two axes across it, as a beam does, first about its weaker one. Half of the
+    link's mass is beyond the middle.
     """
 
     name = "link_bending"
@@ -31,7 +32,7 @@ class LinkBending(Effect):
                   meaning="this stiffness over that about the other axis"),
         yielding.MODAL_SHARE,
     )  # fmt: skip
-    meaning = "the link that the joint carries bends between it and the next joint"
+    meaning = "the link that the joint carries bends half-way along"
     mark = "bending"
     source = (
         "pseudo-rigid-body model with one hinge: Howell, Compliant Mechanisms, 2001, ch. 5; "
@@ -44,7 +45,7 @@ class LinkBending(Effect):
         return [
             j.name
             for j in evidence.robot.flexible_joints
-            if j.kind == "revolute" and next_joint(evidence.robot, j.name) is not None
+            if j.kind == "revolute" and link_end(evidence.robot, j.name) is not None
         ]
 
     def structure(self, plant: Changes) -> None:
