@@ -28,7 +28,7 @@ class LinkBending(Effect):
         yielding.damping("about that axis", upper=1e8),
         Parameter("angle", "rad", lower=-6.3, upper=6.3, size=0.3, shape=True,
                   meaning="of that axis, across the link"),
-        Parameter("ratio", neutral=1.0, lower=0.02, upper=1.0, logarithmic=True, shape=True,
+        Parameter("ratio", neutral=1.0, lower=0.002, upper=1.0, logarithmic=True, shape=True,
                   meaning="this stiffness over that about the other axis"),
         yielding.MODAL_SHARE,
     )  # fmt: skip
@@ -66,7 +66,7 @@ class LinkBending(Effect):
     def _stiffer(self, scales: Scales, times: Sequence[float]) -> list[dict[str, float]]:
         k, m = scales.stiffness[self.target], scales.inertia[self.target]
         return [
-            {"stiffness": n * k, "damping": 0.04 * (n * k * m) ** 0.5, "ratio": 0.2, "angle": angle}
+            {"stiffness": n * k, "damping": 0.04 * (n * k * m) ** 0.5, "ratio": 0.1, "angle": angle}
             for n in times
             for angle in (0.0, math.pi / 3.0, 2.0 * math.pi / 3.0)
         ]
