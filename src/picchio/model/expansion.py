@@ -26,8 +26,9 @@ _STEP = 1e-4  # rad or m, of the central differences
 _KEPT_BENT = 32
 _SHORT = 1e-3  # m, a link that has no length to bend over
 
-# Joints whose links bend, and the angle, rad, of the first of the two axes about which each does.
-Bent = tuple[tuple[str, float], ...]
+# Joints whose links bend; the angle, rad, of the first of the two axes about which each does; how
+# far its halves' centres of mass are apart, over those of a uniform rod.
+Bent = tuple[tuple[str, float, float], ...]
 
 
 def _widen(
@@ -56,7 +57,7 @@ def _widen(
     from_root = pin.SE3(np.eye(3), -root)
     model.appendBodyToJoint(parent, from_root.act(source.inertias[0]), pin.SE3.Identity())
     where, hinges = {0: parent}, []
-    bends = {source.getJointId(name): angle for name, angle in bent}
+    bends = {source.getJointId(name): rest for name, *rest in bent}
     far: dict[int, _Far] = {}
     for i in range(1, source.njoints):
         name, place = source.names[i], source.jointPlacements[i]
@@ -80,10 +81,11 @@ def _widen(
             continue
         end = link_end(robot, name)
         assert end is not None
-        near, beyond = _halves(source.inertias[i], end)
+        angle, apart = bends[i]
+        near, beyond = _halves(source.inertias[i], end, apart)
         model.appendBodyToJoint(where[i], near, pin.SE3.Identity())
         first, second = _perpendicular(end / np.linalg.norm(end))
-        cos, sin = np.cos(bends[i]), np.sin(bends[i])
+        cos, sin = np.cos(angle), np.sin(angle)
         at, place = where[i], pin.SE3(np.eye(3), 0.5 * end)
         for k, side in enumerate((cos * first + sin * second, cos * second - sin * first)):
             joint = pin.JointModelRevoluteUnaligned(side)
@@ -141,11 +143,11 @@ def link_end(robot: FlexibleRobot, joint: str) -> FloatArray | None:
     return end if after == start and np.linalg.norm(end) > _SHORT else None
 
 
-def _halves(whole: Any, end: FloatArray) -> tuple[Any, Any]:
+def _halves(whole: Any, end: FloatArray, share: float) -> tuple[Any, Any]:
     """The two halves of a link's inertia, as of a beam along `end` (3,) m, in the link's frame.
 
-    Their centres of mass stand as far apart as those of the halves of a uniform rod with as large
-    a second moment along the link; together they are the whole, whatever it is.
+    Their centres of mass stand `share` times as far apart as those of the halves of a uniform rod
+    with as large a second moment along the link; together they are the whole, whatever it is.
     """
     ten = np.asarray(whole.toDynamicParameters())
     if not ten[0] > 0.0:
@@ -154,7 +156,7 @@ def _halves(whole: Any, end: FloatArray) -> tuple[Any, Any]:
     centre = pseudo[:3, 3]
     spread = pseudo[:3, :3] - np.outer(centre, centre)
     size = along @ spread @ along
-    apart = np.sqrt(0.75 / size) * spread @ along if size > 0.0 else np.zeros(3)
+    apart = share * np.sqrt(0.75 / size) * spread @ along if size > 0.0 else np.zeros(3)
     halves = []
     for sign in (-1.0, 1.0):
         at = centre + sign * apart
@@ -280,7 +282,7 @@ class WideChain:
             *robot.flexible_names,
             *(f"base.{axis}" for axis in BASE_AXES),
             *(f"hinge.{name}.{i}" for name in hinges for i in (1, 2)),
-            *(f"bend.{name}.{i}" for name, _ in bent for i in (1, 2)),
+            *(f"bend.{name}.{i}" for name, *_ in bent for i in (1, 2)),
         )
         # Where the robot's own joints are in the wide model, whose joints have one number each.
         self._own = [self._model.joints[joints[i]].idx_v for i in range(1, source.njoints)]
@@ -296,7 +298,7 @@ class WideChain:
         """The same chain with links that bend.
 
         Args:
-            bent: their joints, and the angles of their axes.
+            bent: see `Bent`.
         """
         return self._bending.get(bent, lambda: WideChain(self.robot, bent))
 

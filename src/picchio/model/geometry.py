@@ -83,7 +83,7 @@ class Geometry:
         """The geometry of the same robot at the same pose with links that bend.
 
         Args:
-            bent: their joints, and the angles of their axes.
+            bent: see `expansion.Bent`.
         """
         if not bent:
             return self

@@ -25,21 +25,27 @@ class Filter:
     digital: bool = False
 
     def analogue(self, kind: Literal["low", "high"]) -> tuple[FloatArray, FloatArray]:
-        """Numerator and denominator in s, highest power first.
+        """Its transfer function in s.
 
         Args:
             kind: what passes.
+
+        Returns:
+            (order + 1,) of numerator and denominator, highest power first.
         """
         from scipy.signal import butter
 
         return butter(self.order, 2.0 * np.pi * self.frequency, kind, analog=True)
 
     def sampled(self, kind: Literal["low", "high"], step: float) -> tuple[FloatArray, FloatArray]:
-        """Numerator and denominator in the delay by one sample, the undelayed first.
+        """Its transfer function in the delay by one sample.
 
         Args:
             kind: what passes.
             step: s, between samples; a corner above what they can carry is brought just below.
+
+        Returns:
+            (order + 1,) of numerator and denominator, the undelayed first.
         """
         from scipy.signal import butter
 

@@ -246,6 +246,8 @@ class Hypothesis:
                         lower, upper = self._tolerance(effect)
                         prior = (0.0, sigma)
                 scale = scales.get(f"{effect.label}.{p.name}", 1.0)
+                if p.spread:
+                    prior = (p.neutral / scale, p.spread / scale)
                 if (effect.label, p.name) in told:
                     value, std = told[effect.label, p.name]
                     prior = (math.log(value), std / value) if p.logarithmic else (

@@ -30,6 +30,8 @@ class LinkBending(Effect):
                   meaning="of that axis, across the link"),
         Parameter("ratio", neutral=1.0, lower=0.002, upper=1.0, logarithmic=True, shape=True,
                   meaning="this stiffness over that about the other axis"),
+        Parameter("apart", neutral=1.0, lower=0.0, upper=1.15, size=0.2, shape=True, spread=0.2,
+                  meaning="its halves' centres of mass, over those of a uniform rod"),
         yielding.MODAL_SHARE,
     )  # fmt: skip
     meaning = "the link that the joint carries bends half-way along"
@@ -53,7 +55,7 @@ class LinkBending(Effect):
         values = self.values
         plant.modal_share = values["modal_share"]
         pair = (values["stiffness"], values["stiffness"] / values["ratio"])
-        plant.add_bending(self.target, values["angle"], pair, values["damping"])
+        plant.add_bending(self.target, values["angle"], values["apart"], pair, values["damping"])
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
         """Five times as stiff as the joint, about three axes."""
