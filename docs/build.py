@@ -26,6 +26,7 @@ GUIDES = {
     "placement": "Placement",
     "priors": "Drive priors",
     "stiffness": "Stiffness from nothing",
+    "test_plans": "Planned tests",
     "paper": "The paper, reproduced",
     "performance": "Performance",
     "blind_trial": "The blind trial",

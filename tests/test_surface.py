@@ -22,8 +22,8 @@ from picchio.studies.maps.places import joint_grid
 
 FUNCTIONS = {
     "allowable", "annotate", "assess", "check", "compare", "diagnose", "effects", "envelope",
-    "fit_sn", "formats", "identify", "import_record", "place", "report", "reproduce", "robots",
-    "simulate", "start", "uncertain_life", "view", "workspace_map",
+    "fit_sn", "formats", "identify", "import_record", "place", "plan", "report", "reproduce",
+    "robots", "simulate", "start", "uncertain_life", "view", "workspace_map",
 }  # fmt: skip
 SLOW = {"diagnose", "identify", "reproduce"}
 # What they return stands within the JSON of `picchio assess`.
@@ -131,6 +131,7 @@ def calls(folder: Path) -> dict[str, Any]:
             folder / "hit.csv", mapping=folder / "mapping.toml"
         ),
         "place": lambda: picchio.place(robot, task, placements=8, self_collision=False),
+        "plan": lambda: picchio.plan(robot, task),
         "report": lambda: picchio.report(picchio.envelope(robot, POSE, BLOWS)),
         "reproduce": lambda: picchio.reproduce(worlds=8),
         "robots": lambda: picchio.robots(examples=False),

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from picchio.core.errors import PicchioWarning as PicchioWarning
     from picchio.diagnosis.diagnose import diagnose as diagnose
     from picchio.diagnosis.identify import identify as identify
+    from picchio.diagnosis.planning.plan import plan as plan
     from picchio.excitation.measured import MeasuredForce as MeasuredForce
     from picchio.excitation.pulse_train import HalfSineTrain as HalfSineTrain
     from picchio.excitation.pulse_train import PulseTrain as PulseTrain
@@ -70,6 +71,7 @@ _HOME = {
     "formats": "reference.formats",
     "import_record": "campaign.importing.importer",
     "place": "studies.placement.run",
+    "plan": "diagnosis.planning.plan",
     "report": "visuals.report.page",
     "reproduce": "paper.run",
     "robots": "robot.loading.catalogue",

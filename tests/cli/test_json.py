@@ -132,6 +132,10 @@ COMMANDS: dict[str, tuple[str, Any]] = {
         "place fanuc_like_3dof --placements 8 --no-self-collision",
         lambda: picchio.place(*arm(), placements=8, self_collision=False),
     ),
+    "plan": (
+        "plan fanuc_like_3dof --budget 5min --with weight,dial",
+        lambda: picchio.plan(*arm(), budget="5min", instruments=["weight", "dial"]),
+    ),
     "reproduce": (
         "reproduce --worlds 8 --assume period=0.05",
         lambda: picchio.reproduce({"period": 0.05}, worlds=8),

@@ -123,6 +123,7 @@ FAST = {
     "check": "check made --robot fanuc_like_3dof",
     "simulation": "simulate fanuc_like_3dof --plan plan.toml --to again",
     "sn": "fit-sn tests.csv",
+    "test-plan": "plan fanuc_like_3dof --budget 5min",
     "import": "import log.csv --mapping mapping.toml --to imported",
     "annotation": "annotate fanuc_like_3dof --flex {robots}/fanuc_like_3dof/flex.toml --out r.urdf",
     "start": "start ur10 --force",

@@ -154,6 +154,8 @@ _TABLES: tuple[tuple[str, type[BaseModel], str, str], ...] = (
      "campaign.toml: measured records and what was programmed"),
     (plan.FORMAT, plan.Plan, "simulate; diagnose --plan",
      "a test to be done: poses, directions, sensors with their noise"),
+    (plan.FORMAT, plan.TestPlan, "plan",
+     "tests for stiffness, done by hand: what is set, pulled and read"),
     (mapping.FORMAT, mapping.Mapping, "import",
      "how the series of a measured file become channels"),
     (saved_model.FORMAT, saved_model.SavedModel, "ROBOT; diagnose --model",
@@ -170,6 +172,7 @@ def _known() -> tuple[FileFormat, ...]:
     tables = []
     for format, table, command, meaning in _TABLES:
         name = format.removeprefix("picchio-").partition("/")[0]
+        name = "tests" if table is plan.TestPlan else name
         keys = (_format_key(format), *_keys(table))
         tables.append(FileFormat(name, format, "TOML", "input", meaning, command, keys))
     return (*tables, _record(), *_tests(), *_contracts(), _map())
