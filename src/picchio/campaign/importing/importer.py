@@ -30,7 +30,7 @@ _ISOLATED = {
     "parquet": "read_parquet", "npz": "read_npz", "json-lines": "read_json_lines",
     "lvm": "read_lvm",
 }  # fmt: skip
-_ENDINGS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".dat": "csv", ".uff": "uff",
+ENDINGS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".dat": "csv", ".uff": "uff",
             ".unv": "uff", ".mcap": "mcap", ".mat": "matlab", ".parquet": "parquet",
             ".bag": "bag", ".db3": "bag", ".lvm": "lvm", ".npz": "npz", ".jsonl": "json-lines",
             ".ndjson": "json-lines"}  # fmt: skip
@@ -50,10 +50,10 @@ def kind_of(path: Path, mapping: Mapping | None = None) -> str:
     Raises:
         InputError: neither says.
     """
-    kind = (mapping.source.kind if mapping else None) or _ENDINGS.get(path.suffix.lower())
+    kind = (mapping.source.kind if mapping else None) or ENDINGS.get(path.suffix.lower())
     if kind is None:
         raise InputError("the kind of file is not known by its ending", file=path,
-                         value=path.suffix, choices=_ENDINGS,
+                         value=path.suffix, choices=ENDINGS,
                          hint="or say [source] kind in the mapping")  # fmt: skip
     return kind
 
