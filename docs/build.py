@@ -22,6 +22,7 @@ HTML = HERE / "_build" / "html"
 
 GUIDES = {
     "diagnosis": "Diagnosis",
+    "counting": "Counting from logs",
     "motion": "Motion records",
     "placement": "Placement",
     "priors": "Drive priors",
@@ -41,6 +42,7 @@ STAGES = (
     "measurement",
     "prediction",
     "diagnosis",
+    "ledger",
     "visuals",
     "paper",
     "datasets",

@@ -207,15 +207,15 @@ def test_what_a_log_must_say(tmp_path, robot, task):
     rules = Mapping.model_validate(json.loads(text))
     with Ledger(tmp_path / "l", NAME) as book:
         with pytest.raises(InputError, match=r"log\.csv.*time\.start.*when this log was recorded"):
-            add_log(book, path, rules, robot, task)
+            add_log(book, path, rules, Model.of(robot), task)
         later = rules.model_copy(
             update={"time": rules.time.model_validate({"start": "2026-03-01T08:00:00Z"})}
         )
         with pytest.raises(InputError, match=r"log\.csv.*blows\.operation.*forward"):
-            add_log(book, path, later, robot, task)
+            add_log(book, path, later, Model.of(robot), task)
         wrong = text.replace("joint_1", "elbow")
         with pytest.raises(InputError, match=r"no such joint.*elbow.*joint_1"):
-            add_log(book, path, Mapping.model_validate(json.loads(wrong)), robot, task)
+            add_log(book, path, Mapping.model_validate(json.loads(wrong)), Model.of(robot), task)
         assert book.logs() == []
 
 

@@ -24,6 +24,7 @@ from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.ledger.blows import Blow, Burst, Run, assumed, bursts, covered, measured, runs, within
+from picchio.ledger.changes import exchanged, find, readings_of
 from picchio.ledger.damage import (
     BurstDamage,
     Totals,
@@ -35,6 +36,7 @@ from picchio.ledger.damage import (
 )
 from picchio.ledger.forecast import Worlds, quantiles, worlds
 from picchio.ledger.out import opc_ua
+from picchio.ledger.ringing import ring_downs, temperatures
 from picchio.ledger.samples import Samples, read_samples
 from picchio.ledger.store import Kept, Ledger, Stream
 from picchio.model.model import Model
@@ -338,7 +340,7 @@ def count(
         for number, file in enumerate(files):
             assert rules is not None
             try:
-                lines = add_log(book, file, rules, bare, work)
+                lines = add_log(book, file, rules, model, work)
             except InputError as error:
                 if len(files) == 1:
                     raise
@@ -354,15 +356,18 @@ def count(
             raise InputError("no log could be read", file=files[0].parent)
         counted = recount(book, model, curves, work)
         logs = len(book.logs())
+        changes = find(readings_of(model, counted.blows, book.features()))
     drawn = None
     if counted.bursts and any(curve is not None for curve in curves):
         day = np.array([b.onset for b in counted.bursts]) // (_SECONDS_A_DAY * 10**9)
         drawn = worlds(model, curves, sn_curve, counted.bursts, counted.totals, day, seed)
     inputs = [*bare.files, *work.files, *([rules_file] if rules_file else [])]
+    notes = (*_notes(counted, rules, bare), *exchanged(changes))
     return Count(
         model=model, ledger=Path(ledger), logs=logs, added=tuple(added), known=tuple(known),
-        refused=tuple(refused), detected=detected, counted=counted, worlds=drawn, changes=(),
-        curves=curves, notes=_notes(counted, rules, bare),
+        refused=tuple(refused), detected=detected, counted=counted, worlds=drawn,
+        changes=tuple(change.to_dict() for change in changes),
+        curves=curves, notes=notes,
         origin=provenance(inputs, seed=seed),
     )  # fmt: skip
 
@@ -497,7 +502,7 @@ def standing(samples: Samples, task: Task) -> Samples:
 
 
 def add_log(
-    book: Ledger, file: Path, rules: Mapping, robot: FlexibleRobot, task: Task
+    book: Ledger, file: Path, rules: Mapping, model: Model, task: Task
 ) -> tuple[str, ...] | None:
     """Keep what matters of a log.
 
@@ -505,7 +510,7 @@ def add_log(
         book: the ledger.
         file: the log.
         rules: its mapping.
-        robot: whose it is.
+        model: the robot whose it is.
         task: for what the log does not say.
 
     Returns:
@@ -514,6 +519,7 @@ def add_log(
     Raises:
         InputError: see `read_samples` and `stream_of`.
     """
+    robot = model.robot
     parts = [file, *(file.parent / t.file.replace("{stem}", file.stem) for t in rules.join)]
     log = hashlib.sha256("".join(sha256(p) for p in parts if p.is_file()).encode()).hexdigest()
     plan = rules.model_dump(mode="json", exclude={"record", "campaign"}, by_alias=True)
@@ -528,7 +534,15 @@ def add_log(
         first = standing(next(stretches), task)
         stream = book.stream(stream_of(first, rules, task))
         rest: Iterator[Samples] = (standing(part, task) for part in stretches)
-        book.add(log, how, file.name, stream, chain([first], rest))
+        features: list[tuple[str, int, float]] = []
+
+        def looked_at() -> Iterator[Samples]:
+            for part in chain([first], rest):
+                features.extend(ring_downs(part, stream, model))
+                features.extend(temperatures(part))
+                yield part
+
+        book.add(log, how, file.name, stream, looked_at(), features)
     except StopIteration:
         raise InputError("is empty", file=file) from None
     except InputError as error:

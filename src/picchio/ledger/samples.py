@@ -21,7 +21,7 @@ from picchio.robot.flexible_robot import FlexibleRobot
 
 KINDS = ("force", "acceleration", "trigger", "poses")
 """What blows are told by, the surest first."""
-BLOCK = 1 << 17
+BLOCK = 1 << 16
 """Samples that are held at a time of a log that can be read in blocks."""
 _STEPS = 5.0  # of the usual step: a longer one is a gap
 

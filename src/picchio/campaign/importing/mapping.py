@@ -71,7 +71,7 @@ class TimeTable(StrictModel):
         stamp: MCAP and bags: the message header's stamp, or the time it was logged.
         gaps: "split" makes a record of each stretch between dropouts, "refuse" takes none.
         start: when a clock that does not count from 1970 was at zero.
-        begin, end: what lies before or after is left out.
+        begin, end: s, or a date and time: what lies before or after is left out.
     """
 
     series: str | None = None
@@ -91,8 +91,8 @@ class FilterTable(StrictModel):
 
     Attributes:
         series: of the file.
-        least: smallest value, as stored.
-        most: largest value, as stored.
+        least: 1, smallest value, as stored.
+        most: 1, largest value, as stored.
     """
 
     series: str
@@ -107,8 +107,8 @@ class CouplingTable(StrictModel):
         kind: of the channels: position, motor_position, velocity, torque, ...
         joints: of the URDF, one a row of the matrix.
         series: of the file, one a column.
-        matrix: a row a joint: [0, -1, -1] is minus the second axis minus the third.
-        offset: added to each joint, in `unit`.
+        matrix: 1, a row a joint: [0, -1, -1] is minus the second axis minus the third.
+        offset: 1, added to each joint, in `unit`.
         unit: of the series; the file's, or else the channel's SI unit, where left out.
     """
 
@@ -176,8 +176,8 @@ class BlowsTable(StrictModel):
     Attributes:
         threshold: N (m/s^2 of an accelerometer, the channel's unit of a trigger), a blow exceeds
             it; a fifth of the task's force where left out.
-        foot: as the threshold: below it a blow is over; a tenth of the threshold where left out.
-        direction: of the tool's force on the robot, where one channel holds it.
+        foot: N, as the threshold: below it a blow is over; a tenth of the threshold where left out.
+        direction: 1, of the tool's force on the robot, where one channel holds it.
         frame: the direction's axes, and those of `force.x`, `.y`, `.z`: "tool" turns with the tool
             frame.
         trigger: the channel `trigger` is above the threshold while the tool works ("on"), or

@@ -144,7 +144,7 @@ def _show(found: Count) -> None:
     out.print(
         styled(
             found.model.robot.name,
-            f": {found.blows} blows in {count_of(found.logs, 'log')} of {found.hours:.4g} h together; "
+            f": {found.blows} blows in {count_of(found.logs, 'log')} of {found.hours:.4g} h; "
             + (
                 "all of them seen"
                 if found.seen_share == 1.0

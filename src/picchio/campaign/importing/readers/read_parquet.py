@@ -13,6 +13,7 @@ from picchio.campaign.importing.raw import RawChannel, RawFile, reason
 from picchio.core.errors import InputError
 
 LIMITS = Limits(memory_a_byte=64.0)
+_BUFFER = 1 << 20  # bytes
 
 
 def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
@@ -57,7 +58,8 @@ def blocks(path: Path, names: set[str] | None, size: int) -> Iterator[RawFile]:
         )
     types = pyarrow.types
     try:
-        with pyarrow.parquet.ParquetFile(path) as file:
+        # Nothing is read ahead: a column of a large row group would be held whole.
+        with pyarrow.parquet.ParquetFile(path, pre_buffer=False, buffer_size=_BUFFER) as file:
             schema = file.schema_arrow
             dates = {f.name for f in schema if types.is_timestamp(f.type)}
             numbers = {
