@@ -332,3 +332,83 @@ def test_residues_counted_together_are_the_whole_history():
     assert totals.alone[0] == pytest.approx(sum(map(shift.cost, histories)), rel=1e-12)
     scaled = totals.at(np.array([1.0, 1.3, 2.0, 4.0]))[0]
     assert scaled / scaled[0] == pytest.approx(np.array([1.0, 1.3, 2.0, 4.0]) ** 8.0, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_fleet_has_a_row_a_robot(tmp_path, robot, in_process):
+    rng = np.random.default_rng(12)
+    (tmp_path / "books").mkdir()
+    (tmp_path / "cells").mkdir()
+    for name, force in (("north", 1500.0), ("south", 2500.0)):
+        folder(tmp_path / "cells" / name, shift.rivets(1, rng, force=force), rng)
+    (tmp_path / "cells" / "broken").mkdir()
+    (tmp_path / "cells" / "broken" / "log.csv").write_text("nothing\n")
+    (tmp_path / "cells" / "mapping.toml").write_text(shift.MAPPING)
+    (tmp_path / "curve.toml").write_text(shift.CURVE)
+    done = in_process(
+        "count", NAME, "--log", "cells", "--ledger", "books", "--fleet", "--json", "f.json",
+        "--sn-curve", "curve.toml", "--report", "f.html", cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "f.json").read_text())
+    assert found["format"] == "picchio-fleet/1"
+    assert [row["name"] for row in found["robots"]] == ["south", "north", "broken"]
+    assert found["robots"][0]["damage"] > 20.0 * found["robots"][1]["damage"] > 0.0
+    assert "log.csv" in found["robots"][2]["error"]
+    assert "not counted: broken" in done.stdout
+    assert sorted(p.name for p in (tmp_path / "books").glob("*.ledger"))[-1] == "south.ledger"
+    curve = str(tmp_path / "curve.toml")
+    alone = count(robot, tmp_path / "cells/south", tmp_path / "l", sn_curve=curve)
+    assert max(alone.counted.totals.damage) == found["robots"][0]["damage"]
+    assert "south" in (tmp_path / "f.html").read_text()
+
+
+def test_what_other_programs_read(tmp_path, robot, stretch):
+    """Prometheus' text by its grammar, the MCAP by mcap's own reader."""
+    import re
+
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    from picchio.ledger.out import opc_ua, prometheus, write_diagnostics
+
+    found = count(robot, stretch[2].parent / "logs", tmp_path / "l", sn_curve=str(stretch[2]))
+    lines = prometheus(found).splitlines()
+    sample = re.compile(r'[a-z_]+\{[a-z_]+="[^"]*"(,[a-z_]+="[^"]*")*\} (\+Inf|[-+0-9.e]+)')
+    told = dict(line.rsplit(" ", 1) for line in lines if not line.startswith("#"))
+    assert all(sample.fullmatch(line) for line in lines if not line.startswith("#"))
+    assert float(told['picchio_blows_total{robot="fanuc_like_3dof"}']) == 36.0
+    own = 'picchio_damage_ratio{robot="fanuc_like_3dof",joint="joint_2"}'
+    assert float(told[own]) == found.counted.totals.damage[1]
+    names = {line.partition("{")[0] for line in told}
+    assert {line.split()[2] for line in lines if line.startswith("# TYPE")} == names
+    write_diagnostics(found, tmp_path / "d.mcap")
+    with open(tmp_path / "d.mcap", "rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        ((schema, channel, _, message),) = reader.iter_decoded_messages()
+    assert (schema.name, channel.topic) == ("diagnostic_msgs/msg/DiagnosticArray", "/diagnostics")
+    assert [s.name for s in message.status] == [f"picchio: joint_{k}" for k in (1, 2, 3)]
+    values = {v.key: float(v.value) for v in message.status[1].values}
+    assert values["damage"] == found.counted.totals.damage[1]
+    node = "MotionDeviceSystem/MotionDevices/fanuc_like_3dof/Axes/joint_2/ParameterSet/LifeUsed"
+    assert opc_ua(found)[node] == found.counted.totals.damage[1]
+
+
+def test_the_command_counts_and_its_page_shows_it(tmp_path, stretch, in_process, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    logs = stretch[2].parent / "logs"
+    done = in_process(
+        "count", NAME, "--log", logs, "--ledger", "l", "--sn-curve", stretch[2], "--report",
+        "p.html", "--json", "c.json", cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "36 blows in 1 log" in done.stdout and "ends the life" in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    content = json.loads((tmp_path / "c.json").read_text())
+    assert content["format"] == "picchio-count/1" and content["blows"] == 36
+    left = {j["name"]: j["blows_left"]["p50"] for j in content["joints"]}
+    assert content["ends"] == min(left, key=left.__getitem__)
+    page = (tmp_path / "p.html").read_text()
+    assert "life used and left" in page and "joint_2" in page
+    done = in_process("count", NAME, "--log", tmp_path, "--ledger", "m", cwd=tmp_path)
+    assert done.returncode == 2 and "--mapping" in done.stderr and not (tmp_path / "m").exists()

@@ -22,7 +22,7 @@ from picchio.studies.uncertainty.inputs import DEFAULT_INPUTS
 from picchio.studies.uncertainty.sampler import Sampler
 
 # Bursts that stand for all; their damage is followed through every drawn world.
-_TYPICAL = 5
+_TYPICAL = 4
 _LONGEST = 4000  # pieces of the force: a longer burst is not typical
 FORCE_SPREAD = {"force": 0.05, "acceleration": 0.25, "trigger": 0.15, "poses": 0.15}
 """Of a blow's size, one factor for all blows: a calibrated force, one told from an acceleration,
@@ -149,9 +149,10 @@ def worlds(
     share = totals.shares / np.maximum(np.nansum(totals.shares, axis=0), 1e-300)
     which = typical(bursts, share.max(axis=1) if share.size else np.ones(len(bursts)))
     operations = tuple(
-        Operation(str(k), bursts[k].direction, force_of(bursts[k]), 1, bursts[k].pose[None])
-        for k in which
-    )
+        Operation(str(k), bursts[k].direction, force_of(bursts[k]), 1, bursts[k].pose[None],
+                  float(which.count(k)))
+        for k in dict.fromkeys(which)
+    )  # fmt: skip
     seen = [blow.kind for burst in bursts for blow in burst.blows]
     force = math.sqrt(sum(FORCE_SPREAD[kind] ** 2 for kind in seen) / len(seen))
     inputs = {k: v for k, v in DEFAULT_INPUTS.items() if k != "width"}

@@ -38,6 +38,7 @@ from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
     from picchio.ledger.count import Count
+    from picchio.ledger.fleet import Fleet
 
 
 @app.command(
@@ -75,6 +76,18 @@ def count(
     every: Annotated[
         float, typer.Option(metavar="S", min=0.1, help="How often --watch looks, s.")
     ] = 10.0,
+    fleet: Annotated[
+        bool,
+        typer.Option(
+            "--fleet", help="--log holds a folder for each robot, LEDGER is a folder for theirs."
+        ),
+    ] = False,
+    workers: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Processes for a fleet (dask).")
+    ] = 1,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A dask scheduler for a fleet.")
+    ] = None,
     prometheus: Annotated[
         Path | None,
         typer.Option(metavar="FILE.prom", help="Write the figures as Prometheus reads them."),
@@ -99,6 +112,20 @@ def count(
         raise InputError("needs a folder to watch", key="--log")
     with notice_first(json):
         loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+    if fleet:
+        if not log or len(log) > 1 or watch or prometheus or mcap:
+            raise InputError("needs one --log, and is told as a table, --json or --report",
+                             key="--fleet")  # fmt: skip
+        from picchio.ledger.fleet import count_fleet
+
+        check_targets((json, report), [*loaded.files, mapping, task, sn_curve])
+        with progress("robots") as tick:
+            rows = count_fleet(loaded, log[0], ledger, mapping=mapping, task=task,
+                               sn_curve=sn_curve, seed=seed, workers=workers, scheduler=scheduler,
+                               progress=tick)  # fmt: skip
+        write_report(rows, report)
+        deliver(rows.to_dict(), json, lambda: _show_fleet(rows))
+        return
     targets = (json, report, prometheus, mcap, ledger)
     check_targets(targets, [*loaded.files, mapping, task, sn_curve])
     before: list[tuple[str, int, int]] | None = None
@@ -124,6 +151,26 @@ def count(
         if not watch:
             return
         time.sleep(every)
+
+
+def _show_fleet(found: Fleet) -> None:
+    out = console()
+    rows = []
+    for row in found.robots:
+        left = row["blows_left"] or {}
+        rows.append((
+            row["name"], str(row["logs"] or 0), str(row["blows"] or 0), row["joint"] or "-",
+            _share(math.nan if row["damage"] is None else row["damage"]),
+            format_count(math.inf if left.get("p50") is None else left["p50"]) if left else "-",
+            str(len(row["changes"])),
+        ))  # fmt: skip
+    heads = ("robot", ">logs", ">blows", "joint", ">life\nused, %", ">blows left,\nP50", ">changed")
+    out.print(table(heads, rows, title=f"{found.robot}: {found._headline()}"))
+    for row in found.robots:
+        if row["error"]:
+            out.print(styled(f"not counted: {row['name']}", f": {row['error']}"))
+        for change in row["changes"]:
+            out.print(styled(f"changed: {row['name']}", f": {change['words']}"))
 
 
 def _listing(logs: list[Path]) -> list[tuple[str, int, int]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,7 @@ def _ros1(path: Path) -> Iterator[tuple[str, str, int, Any]]:
 
 
 def _ros2(path: Path) -> Iterator[tuple[str, str, int, Any]]:
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.LATEST)
     database = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
@@ -74,7 +75,9 @@ def _ros2(path: Path) -> Iterator[tuple[str, str, int, Any]]:
             )
             for kind, text in rows:
                 if kind not in store.types and text:
-                    store.register(get_types_from_msg(text, kind))
+                    # One that can't be parsed is told below, with those that are not there.
+                    with suppress(TypesysError):
+                        store.register(get_types_from_msg(text, kind))
         topics = {
             key: (name, kind)
             for key, name, kind in database.execute("SELECT id, name, type FROM topics")

@@ -15,7 +15,7 @@ from picchio.campaign.importing.detect import moment
 from picchio.campaign.importing.isolated import Limits
 from picchio.campaign.importing.raw import Names, RawChannel, RawFile
 from picchio.core.errors import InputError
-from picchio.core.files import read_text
+from picchio.core.files import read_bytes
 
 LIMITS = Limits(memory_a_byte=128.0)
 _END = "***End_of_Header***"
@@ -34,7 +34,11 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
     Raises:
         InputError: no .lvm file, a row that is no row of numbers, segments that differ.
     """
-    lines = read_text(path, limit=_LARGEST).splitlines()
+    content = read_bytes(path, limit=_LARGEST)
+    try:
+        lines = content.decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError:  # what LabVIEW writes where a comment has umlauts
+        lines = content.decode("cp1252", errors="replace").splitlines()
     if not lines or not lines[0].startswith("LabVIEW Measurement"):
         raise InputError("is no LabVIEW measurement file", file=path,
                          value=lines[0][:60] if lines else "")  # fmt: skip
@@ -76,23 +80,21 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
         step = [_number(x, decimal) for x in head.get("Delta_X", []) if x.strip()]
         at, row = at + 2, 0
         while at < len(lines) and lines[at].strip():
-            cells = lines[at].split(separator)
+            cells = lines[at].split(separator)[: _width(columns, len(names))]
             try:
-                numbers = [
-                    _number(x, decimal) for x in cells[: _width(columns, len(names))] if x.strip()
-                ]
+                numbers = [_number(x, decimal) for x in cells]
             except ValueError:
                 raise InputError("is no row of numbers", file=path, key=f"line {at + 1}",
                                  value=lines[at][:60]) from None  # fmt: skip
-            if columns == "Multi":
-                pairs = list(zip(numbers[::2], numbers[1::2], strict=False))
-            elif columns == "No":
-                pairs = [(offset[i] + row * step[i], v) for i, v in enumerate(numbers)]
-            else:
-                pairs = [(numbers[0], v) for v in numbers[1:]]
-            if len(pairs) < len(names):
+            if len(numbers) < _width(columns, len(names)):
                 raise InputError(f"must have {len(names)} channels", file=path,
                                  key=f"line {at + 1}", value=lines[at][:60])  # fmt: skip
+            if columns == "Multi":
+                pairs = list(zip(numbers[::2], numbers[1::2], strict=True))
+            elif columns == "No":
+                pairs = [(offset[i] + row * step[i], v) for i, v in enumerate(numbers[1:])]
+            else:
+                pairs = [(numbers[0], v) for v in numbers[1:]]
             for name, (time, value) in zip(names, pairs, strict=False):
                 times.setdefault(name, []).append(time)
                 values.setdefault(name, []).append(value)
@@ -114,7 +116,8 @@ def _width(columns: str, channels: int) -> int:
 
 
 def _number(cell: str, decimal: str) -> float:
-    return float(cell.strip().replace(decimal, "."))
+    """Of a cell; an empty one is missing."""
+    return float(cell.strip().replace(decimal, ".") or "nan")
 
 
 def _date(date: str, time: str) -> int | None:

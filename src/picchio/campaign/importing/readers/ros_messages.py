@@ -139,7 +139,8 @@ def _numbers(name: str, value: Any, depth: int) -> Iterator[tuple[str, float]]:
     elif depth and not isinstance(value, (str, bytes)):
         fields = getattr(value, "__dataclass_fields__", None) or getattr(value, "__slots__", None)
         for field in fields or getattr(value, "__dict__", {}):
-            if field.startswith("_") or field == "header":
+            # What is in capitals is a constant of that kind of message, no reading.
+            if field.startswith("_") or field == "header" or field.isupper():
                 continue
             inner = getattr(value, field)
             yield from _numbers(f"{name}.{field}" if name else field, inner, depth - 1)
