@@ -412,3 +412,71 @@ def test_the_command_counts_and_its_page_shows_it(tmp_path, stretch, in_process,
     assert "life used and left" in page and "joint_2" in page
     done = in_process("count", NAME, "--log", tmp_path, "--ledger", "m", cwd=tmp_path)
     assert done.returncode == 2 and "--mapping" in done.stderr and not (tmp_path / "m").exists()
+
+
+def test_a_model_that_must_be_computed_one_by_one_counts_the_same(robot, stretch, tmp_path, task):
+    from picchio.ledger.damage import _exactly, burst_damages_of
+
+    samples, stream, curve = stretch
+    model = Model.of(robot)
+    curves = curves_of(robot, load_sn_curve(str(curve)))
+    with Ledger(tmp_path / "l", NAME) as book:
+        book.add("log", "m", "log", stream, [samples])
+        found = recount(book, model, curves, task)
+    burst = found.bursts[0]
+    (fast,) = burst_damages_of(model, curves, [burst])
+    slow = _exactly(model, curves, burst)
+    np.testing.assert_allclose(fast.peak, slow.peak, rtol=1e-6)
+    np.testing.assert_allclose(fast.alone, slow.alone, rtol=1e-4)
+    together_fast, together_slow = together([fast] * 3, curves), together([slow] * 3, curves)
+    np.testing.assert_allclose(together_fast.damage, together_slow.damage, rtol=1e-4)
+
+
+def test_a_bag_whose_topics_have_clocks_of_their_own(robot, tmp_path, task):
+    """Angles at 100 Hz, the force at 5 kHz, as ROS 2 writes them; rosbags writes the file."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    rng = np.random.default_rng(21)
+    made = shift.rivets(1, rng)
+    table = shift.log(made, rng, length=1.6)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    t, wrench, joints = store.types, "geometry_msgs/msg/WrenchStamped", "sensor_msgs/msg/JointState"
+    vector = t["geometry_msgs/msg/Vector3"]
+
+    def header(ns):
+        stamp = t["builtin_interfaces/msg/Time"](sec=ns // 10**9, nanosec=ns % 10**9)
+        return t["std_msgs/msg/Header"](stamp=stamp, frame_id="base")
+
+    with Writer(tmp_path / "run", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        links = [
+            writer.add_connection(f"/t{i}", k, typestore=store)
+            for i, k in enumerate((wrench, joints))
+        ]
+        for i, row in enumerate(table.itertuples()):
+            push = vector(row.fx, row.fy, row.fz)
+            force = t["geometry_msgs/msg/Wrench"](push, vector(0.0, 0.0, 0.0))
+            message = t[wrench](header(row.stamp), force)
+            writer.write(links[0], row.stamp, store.serialize_cdr(message, wrench))
+            if i % 50 == 0:
+                angles = np.array([row.q1, row.q2, row.q3])
+                names = ["joint_1", "joint_2", "joint_3"]
+                message = t[joints](header(row.stamp), names, angles, np.array([]), np.array([]))
+                writer.write(links[1], row.stamp, store.serialize_cdr(message, joints))
+    path = next((tmp_path / "run").glob("*.db3"))
+    topics = [c.topic for c in links]
+    text = 'format = "picchio-mapping/1"\n[blows]\nthreshold = 150.0\nfoot = 12.0\n'
+    for axis in "xyz":
+        text += f'[[channel]]\nfrom = "{topics[0]}:wrench.force.{axis}"\nto = "force.{axis}"\n'
+    for k in (1, 2, 3):
+        text += f'[[channel]]\nfrom = "{topics[1]}:position.joint_{k}"\nto = "position.joint_{k}"\n'
+    text = text.replace("foot = 12.0", 'foot = 12.0\nframe = "world"')
+    (tmp_path / "m.toml").write_text(text)
+    rules = picchio.campaign.importing.mapping.read_mapping(tmp_path / "m.toml")
+    with Ledger(tmp_path / "l", NAME) as book:
+        add_log(book, path, rules, Model.of(robot), task)
+        found = recount(book, Model.of(robot), curves_of(robot), task)
+    assert len(found.blows) == 12
+    np.testing.assert_allclose([b.peak for b in found.blows], made[0].peaks, rtol=0.01)
+    np.testing.assert_allclose(found.blows[0].pose, shift.POSES[made[0].place], atol=2e-4)
+    np.testing.assert_allclose(found.blows[3].direction, shift.DIRECTIONS[made[0].place], atol=0.01)

@@ -100,7 +100,7 @@ def count(
     report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Count the blows that logs show and the damage that they did, and tell what is left.
+    """What the blows in a robot's logs did to it, and the life left.
 
     A log that is counted twice counts once; order and cuts of the logs do not matter. Where no log
     shows blows they are those of the task, at the tool's trigger or the task's poses.
