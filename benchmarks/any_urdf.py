@@ -29,7 +29,6 @@ from typing import Any
 import picchio
 from picchio.core.errors import InputError
 from picchio.robot.loading.catalogue import shipped_robots
-from picchio.studies.default_task import task_of
 
 LIMIT = 10.0
 """s of one core that an answer may take, importing what is needed not counted."""
@@ -69,11 +68,13 @@ def loaded_with_a_tool(robot: str, found: dict[str, Any]) -> Any:
 
 
 def warm_up() -> None:
-    """Import what is needed once, before the processes part."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        arm = picchio.load_robot("fanuc_like_3dof")
-        picchio.uncertain_life(arm, task_of(arm), samples=64)
+    """Import what is needed once, before the processes part; no compiled code runs yet.
+
+    What runs on threads must not have run before a fork.
+    """
+    import picchio.cli.life.assess
+    import picchio.studies.rivet.damage_kernel
+    import picchio.studies.uncertainty.sampler  # noqa: F401
 
 
 def ask(robot: str) -> dict[str, Any]:

@@ -22,6 +22,7 @@ HTML = HERE / "_build" / "html"
 
 GUIDES = {
     "diagnosis": "Diagnosis",
+    "counting": "Counting from logs",
     "motion": "Motion records",
     "placement": "Placement",
     "priors": "Drive priors",
@@ -42,6 +43,7 @@ STAGES = (
     "measurement",
     "prediction",
     "diagnosis",
+    "ledger",
     "visuals",
     "paper",
     "datasets",

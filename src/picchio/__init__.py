@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from picchio.excitation.pulse_train import PulseTrain as PulseTrain
     from picchio.fatigue.sn.fit import fit_sn as fit_sn
     from picchio.fatigue.sn.library import load_sn_curve as load_sn_curve
+    from picchio.ledger.count import count as count
     from picchio.measurement.quality.report import check as check
     from picchio.model.model import Model as Model
     from picchio.paper.run import reproduce as reproduce
@@ -63,6 +64,7 @@ _HOME = {
     "assess": "studies.assessment.run",
     "check": "measurement.quality.report",
     "compare": "studies.comparison",
+    "count": "ledger.count",
     "diagnose": "diagnosis.diagnose",
     "effects": "reference.effects",
     "envelope": "studies.envelopes",

@@ -145,6 +145,11 @@ LOADING_KINDS: tuple[ChannelKind, ...] = (
                 "knows; else each row has a zero of its own, read just before"),
 )  # fmt: skip
 """The columns of a static record: a row a loading, in any order, without a time."""
+LOG_KINDS: tuple[ChannelKind, ...] = (
+    ChannelKind("force", None, ("N",), True, "on the tool, in the axes that [blows] names"),
+    ChannelKind("trigger", None, ("1",), meaning="of the tool: see [blows] trigger"),
+)
+"""What a log may hold beside a record's channels, for `picchio count`."""
 FREQUENCY = "frequency"
 FRF_KINDS: tuple[ChannelKind, ...] = (
     ChannelKind(FREQUENCY, None, ("Hz",), meaning="ascending; the first column"),

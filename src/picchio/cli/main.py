@@ -19,7 +19,15 @@ from picchio.cli.app import app
 
 # Importing its file adds a command, in the order of `picchio --help`.
 from picchio.cli.life import assess, compare, envelope, fit_sn, map, place, start, view  # noqa: F401
-from picchio.cli.measured import check, diagnose, identify, import_, plan, simulate  # noqa: F401
+from picchio.cli.measured import (  # noqa: F401
+    check,
+    count,
+    diagnose,
+    identify,
+    import_,
+    plan,
+    simulate,
+)
 from picchio.cli.output import begin, printable, say_warning, say_written
 from picchio.cli.reference import described, reproduce, robots  # noqa: F401
 from picchio.cli.waiting import waiting

@@ -8,7 +8,7 @@ from numba import njit, prange
 from picchio.core.arrays import FloatArray
 from picchio.fatigue.counting.kernel import finish, push
 from picchio.vibration.batch.modal_kernel import modes_of
-from picchio.vibration.batch.turning_kernel import turns_from_rest
+from picchio.vibration.batch.turning_kernel import FINE, turns_from_rest
 
 _BLOCK = 16
 
@@ -62,7 +62,7 @@ def history_damage(turns, factor, knots, lines, stack, ranges, means):  # type: 
 @njit(cache=True, error_model="numpy")
 def swing(  # type: ignore[no-untyped-def]
     mass, jacobian, stiffness, joint_ratio, along, limit, duration, constant, slope, amplitude,
-    wave, frequency,
+    wave, frequency, per_cycle=FINE,
 ):  # fmt: skip
     """Every joint's turning points from rest, ring-down included.
 
@@ -79,6 +79,7 @@ def swing(  # type: ignore[no-untyped-def]
         amplitude: (m,) complex N.
         wave: (m,) rad/s.
         frequency: (n,) Hz, out; left alone where the mass matrix is not positive definite.
+        per_cycle: see `turns_from_rest`.
 
     Returns:
         (n, k) rad, and how many of the k each joint has; none of either where a mode is not
@@ -99,13 +100,16 @@ def swing(  # type: ignore[no-untyped-def]
                 moved += jacobian[d, j] * shapes[j, i] * along[d]
         for j in range(n):
             weights[j, i] = shapes[j, i] * moved
-    return turns_from_rest(poles, weights, limit, duration, constant, slope, amplitude, wave)
+    return turns_from_rest(
+        poles, weights, limit, duration, constant, slope, amplitude, wave, per_cycle
+    )
 
 
 @njit(cache=True, parallel=True, error_model="numpy")
 def damages(  # type: ignore[no-untyped-def]
     duration, constant, slope, amplitude, wave, mass, jacobian, blows, place, stiffness,
     joint_ratio, along, factor, enough, knots, lines, known, frequency, lowest, highest, damage,
+    per_cycle=FINE,
 ):  # fmt: skip
     """Extremes and damage of p rivets: at many poses, or one varied many times.
 
@@ -132,6 +136,7 @@ def damages(  # type: ignore[no-untyped-def]
             take the exact path there.
         highest: (p, n) rad, out.
         damage: (p, n) out; zero for a joint without a curve.
+        per_cycle: see `turns_from_rest`.
     """
     poses, n = stiffness.shape
     for block in prange((poses + _BLOCK - 1) // _BLOCK):
@@ -146,6 +151,7 @@ def damages(  # type: ignore[no-untyped-def]
             turns, count = swing(
                 mass[q], jacobian[q], stiffness[s], joint_ratio[s], along[q], limit,
                 duration[b], constant[b], slope[b], amplitude[b], wave[b], frequency[s],
+                per_cycle,
             )  # fmt: skip
             size = turns.shape[1]
             if size == 0:
