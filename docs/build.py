@@ -23,6 +23,7 @@ HTML = HERE / "_build" / "html"
 GUIDES = {
     "diagnosis": "Diagnosis",
     "motion": "Motion records",
+    "explore": "Explore",
     "placement": "Placement",
     "priors": "Drive priors",
     "stiffness": "Stiffness from nothing",
