@@ -26,6 +26,7 @@ from picchio.vibration.closed_form.response import described, unit_vector
 from picchio.visuals.kinematics import frames, world
 from picchio.visuals.plots.style import direction_label
 from picchio.visuals.plots.workspace import best_branch, dataset_of, spacing
+from picchio.visuals.scene.cards import joint_card, rivet_card
 from picchio.visuals.scene.causes.causes import add_causes
 from picchio.visuals.scene.causes.site import Site
 from picchio.visuals.scene.motion import vibration
@@ -92,6 +93,8 @@ def build_scene(
     units = [joint.units.small for joint in robot.flexible_joints]
     _add_rings(scene, body, assessment, units)
     _add_envelopes(scene, body, units, subdivisions)
+    for k, joint_shown in enumerate(scene.joints):
+        joint_shown["card"] = joint_card(robot, k, envelope, assessment)
     blow = unit_vector(direction) if direction is not None else None
     _add_tool(scene, body, blow)
     if assessment is not None:
@@ -253,17 +256,20 @@ def _add_tool(scene: Scene, body: Body, direction: FloatArray | None) -> None:
 
 def _add_rivets(scene: Scene, body: Body, assessment: Assessment) -> None:
     values, scale = rivet_values(assessment)
-    scene.scales["rivets"] = scale
+    joints = scene.scales["joints"]
+    if scale.unit == joints.unit and scale.top <= joints.top:
+        scale = joints  # one bar for the joints and for what wears them
+    else:
+        scene.scales["rivets"] = scale
     length = 0.055 * body.reach
     mesh = scene.add(arrow(length, 0.0065 * body.reach, head=0.03 * body.reach))
     for k, (operation, row) in enumerate(zip(assessment.operations, values, strict=True)):
         layer = f"rivets-{k}"
         scene.layers.append((layer, f"rivets: {operation.name}", True))
-        for position, value in zip(operation.tool_position, row, strict=True):
-            start = position - operation.direction * length
-            scene.items.append(
-                Item(mesh, layer, "", turned_to(operation.direction, start), scale.colour(value))
-            )
+        for i, (position, value) in enumerate(zip(operation.tool_position, row, strict=True)):
+            place = turned_to(operation.direction, position - operation.direction * length)
+            told = rivet_card(assessment, operation, i)
+            scene.items.append(Item(mesh, layer, "", place, scale.colour(value), told=told))
 
 
 def _add_workspace(scene: Scene, workspace: xarray.Dataset, units: list[str]) -> None:
