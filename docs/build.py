@@ -24,6 +24,7 @@ GUIDES = {
     "diagnosis": "Diagnosis",
     "motion": "Motion records",
     "explore": "Explore",
+    "path_cost": "A cost for planners",
     "placement": "Placement",
     "priors": "Drive priors",
     "stiffness": "Stiffness from nothing",

@@ -6,9 +6,9 @@ and without its report: tens of microseconds to some milliseconds instead of hal
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from picchio.model.model import Model
 from picchio.robot.spread import root_of
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.rivet.pose import need_springs
-from picchio.studies.rivet.poses import damage_at, peaks_at, raised
+from picchio.studies.rivet.poses import BatchDamage, damage_at, peaks_at, raised
 from picchio.studies.rivet.variation import WornParts
 from picchio.studies.tasks import Operation, Task
 from picchio.studies.uncertainty.drawn import interval
@@ -90,6 +90,65 @@ class Instant:
         return np.fmax(self.utilisation, self.drive_utilisation)
 
 
+class Use(NamedTuple):
+    """What one rivet uses of the n flexible joints at p poses.
+
+    Attributes:
+        damage: extremes, stiffness and damage.
+        peak: (p, n) rad, largest deflection.
+        torque: (p, n) N m, largest magnitude, gravity and feed force included.
+        fatigue: (p, n) utilisation of shaft or drive in fatigue; NaN without either.
+        drives: (p, n) torque over the limit of reducer or drive that binds; NaN without.
+    """
+
+    damage: BatchDamage
+    peak: FloatArray
+    torque: FloatArray
+    fatigue: FloatArray
+    drives: FloatArray
+
+
+def use_at(
+    model: Model,
+    poses: FloatArray,
+    direction: FloatArray,
+    excitation: Excitation,
+    hits: int,
+    curves: Sequence[SNCurve | None],
+) -> Use:
+    """What one rivet from rest uses of every joint at many poses.
+
+    Args:
+        model: the robot and its effects.
+        poses: (p, nv) rad or m, taken unchecked.
+        direction: (3,) or (p, 3) unit vectors of the force, world.
+        excitation: the blows.
+        hits: of a rivet.
+        curves: of the n joints; None without a shaft or drive.
+
+    Returns:
+        its arrays.
+
+    Raises:
+        InputError: as `damage_at`.
+    """
+    joints = model.robot.flexible_joints
+    found = damage_at(model, poses, direction, excitation, hits, curves)
+    springs, low, high = found.stiffness, found.lowest, found.highest
+    static = found.many.static_torque(excitation.preload, direction)
+    torque = np.fmax(np.abs(static + springs * low), np.abs(static + springs * high))
+    per = stress_per_torque(joints)
+    allowable = np.array([np.nan if curve is None else curve.allowable for curve in curves])
+    lifted = raised(curves, np.nan_to_num(per * static))
+    drives = np.full_like(torque, np.nan)
+    for j, joint in enumerate(joints):
+        if joint.ratings is not None:
+            shares = joint.ratings.shares(torque[:, j], np.abs(static[:, j]))
+            drives[:, j] = np.max(list(shares.values()), axis=0)
+    fatigue = 0.5 * springs * (high - low) * per * lifted / allowable
+    return Use(found, np.fmax(np.abs(low), np.abs(high)), torque, fatigue, drives)
+
+
 @dataclass(eq=False)
 class InstantStudy:
     """A model, ready to be asked again and again.
@@ -140,36 +199,25 @@ class InstantStudy:
         Raises:
             InputError: a mode without damping; blows that an effect cannot take.
         """
-        robot, model = self.model.robot, self.model
-        poses = np.ascontiguousarray(place.pose[None])
-        found = damage_at(model, poses, place.direction, place.excitation, place.hits, self.curves)
-        springs, low, high = found.stiffness[0], found.lowest[0], found.highest[0]
-        static = found.many.static_torque(place.excitation.preload, place.direction)[0]
-        n = len(springs)
-        worst, along = np.full(n, np.nan), np.full((n, 3), np.nan)
+        model, poses = self.model, np.ascontiguousarray(place.pose[None])
+        used = use_at(
+            model, poses, place.direction, place.excitation, place.hits, self.curves
+        )  # fmt: skip
+        springs, peak = used.damage.stiffness[0], used.peak[0]
+        worst, along = np.full(len(peak), np.nan), np.full((len(peak), 3), np.nan)
         if not model.nonlinear:
             peaks, _ = peaks_at(model, poses, place.excitation, hits=place.hits)
             worst, along = peaks.peak_deflection[0], peaks.direction[0]
-        per = stress_per_torque(robot.flexible_joints)
-        allowable = np.array([np.nan if c is None else c.allowable for c in self.curves])
-        peak = np.fmax(np.abs(low), np.abs(high))
-        torque = np.fmax(np.abs(static + springs * low), np.abs(static + springs * high))
-        lifted = raised(self.curves, np.nan_to_num(per * static))
-        drives = np.full(n, np.nan)
-        for j, joint in enumerate(robot.flexible_joints):
-            if joint.ratings is not None:
-                shares = joint.ratings.shares(float(torque[j]), float(abs(static[j])))
-                drives[j] = max(shares.values())
         return Instant(
-            natural_frequencies=found.natural_frequencies[0],
+            natural_frequencies=used.damage.natural_frequencies[0],
             peak_deflection=peak,
             worst_deflection=worst,
             worst_direction=along,
-            peak_torque=torque,
-            stress=springs * peak * shaft_stress_per_torque(robot.flexible_joints),
-            utilisation=0.5 * springs * (high - low) * per * lifted / allowable,
-            drive_utilisation=drives,
-            damage=found.damage[0],
+            peak_torque=used.torque[0],
+            stress=springs * peak * shaft_stress_per_torque(model.robot.flexible_joints),
+            utilisation=used.fatigue[0],
+            drive_utilisation=used.drives[0],
+            damage=used.damage.damage[0],
         )
 
     def life_intervals(self, place: Place, samples: int) -> FloatArray:

@@ -109,7 +109,8 @@ class Session:
             axis = self._axis(self.place.pose) if keeps else None
             pose, missed = self.follower.follow(pose, point, axis)
             if missed > _OUT:
-                notes.append(f"the tool is {1e3 * missed:.3g} mm short of that place")
+                far = f"{missed:.3g} m" if missed >= 1.0 else f"{1e3 * missed:.3g} mm"
+                notes.append(f"the tool is {far} short of that place")
         if "blows" in gesture:
             excitation, hits = self._blows(dict(gesture["blows"]), excitation, hits)
         if "direction" in gesture:

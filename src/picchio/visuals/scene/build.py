@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
     from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 
+_MOST_PLACES = 8000  # of a map in a page
 _SHELL = 2  # subdivisions of the net about what is estimated
 
 
@@ -274,23 +275,30 @@ def _add_rivets(scene: Scene, body: Body, assessment: Assessment) -> None:
 
 def _add_workspace(scene: Scene, workspace: xarray.Dataset, units: list[str]) -> None:
     mapped = [str(name) for name in values_of(workspace, "joint", 1)]
+    step, every, count = 0.0, 1, 0
     for k, name in enumerate(scene.envelope.joint_names):
         if name not in mapped and k != scene.chosen:
             continue
         places, peak = best_branch(workspace, name)
+        count = len(places)
+        every = -(-count // _MOST_PLACES)
+        places, peak = places[::every], peak[::every]
+        step = step or spacing(places)
         scale = Scale(f"workspace: peak of {name}", units[k], 1e3 * float(peak.max()))
-        grain = sphere(0.4 * spacing(places), subdivisions=0)
-        count = len(grain.vertices)
+        grain = sphere(0.4 * step, subdivisions=0)
+        corners = len(grain.vertices)
         cloud = Mesh(
             (places[:, None] + grain.vertices[None]).reshape(-1, 3),
-            (np.arange(len(places))[:, None, None] * count + grain.faces[None]).reshape(-1, 3),
-            np.repeat(scale.colours(1e3 * peak), count, axis=0),
+            (np.arange(len(places))[:, None, None] * corners + grain.faces[None]).reshape(-1, 3),
+            np.repeat(scale.colours(1e3 * peak), corners, axis=0),
         )
         scene.joints[k]["map"] = scale.to_dict()
         scene.items.append(Item(scene.add(cloud), "map", "", np.eye(4), joint=k))
         if k == scene.chosen:
             scene.scales["map"] = scale
     text = f"workspace map, {response_of(workspace)}: peak of the joint, best branch"
+    if every > 1:
+        text += f"; one of {every} of the {count} places"
     scene.layers.append(("map", text, True))
 
 

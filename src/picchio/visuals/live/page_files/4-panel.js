@@ -16,7 +16,8 @@ function say(text, bad) {
   byId("state").className = bad ? "bad" : "";
 }
 
-const number3 = (x) => (x === null ? "–" : Math.abs(x) >= 1e5 ? x.toExponential(1) : Number(x.toPrecision(3)).toString());
+const number3 = (x) => (x === null ? "–" : Math.abs(x) >= 1e5 ? x.toExponential(1) : x !== 0 && Math.abs(x) < 1e-3 ? "≈ 0"
+  : Number(x.toPrecision(3)).toString());
 const count = (x) => (x === "no end" ? x : x >= 1e5 ? x.toExponential(1) : String(Math.round(x)));
 function lifeText(joint) {
   if (joint.life_interval === null) return joint.life === null ? "–" : count(joint.life);

@@ -106,7 +106,41 @@ function lookAlong(view) {
   viewer.set_dirty();
 }
 
+// A map can be cut open: of each axis, what is kept between two ends.
+function cuts() {
+  const maps = made.filter(({ item }) => item.layer === "map");
+  byId("cut").hidden = !maps.length;
+  if (!maps.length) return;
+  viewer.renderer.localClippingEnabled = true;
+  const box = new THREE.Box3();
+  for (const { object } of maps) {
+    object.geometry.computeBoundingBox();
+    box.union(object.geometry.boundingBox);
+  }
+  // The world's axes as three.js has them: its y is up.
+  const axes = { x: [1, 0, 0], y: [0, 0, -1], z: [0, 1, 0] }, planes = [];
+  for (const [name, way] of Object.entries(axes)) for (const side of ["min", "max"]) {
+    const sign = side === "min" ? 1 : -1, [low, high] = [box.min[name], box.max[name]];
+    const plane = new THREE.Plane(new THREE.Vector3(...way).multiplyScalar(sign), 1e9);
+    planes.push(plane);
+    const label = document.createElement("label"), input = document.createElement("input"), out = document.createElement("output");
+    label.append(`${name} ${side === "min" ? "from" : "to"} `, out);
+    Object.assign(input, { type: "range", min: 0, max: 1, step: 0.005, value: side === "min" ? 0 : 1, id: `cut-${name}-${side}` });
+    label.htmlFor = input.id;
+    input.oninput = () => {
+      const at = low + (high - low) * input.value;
+      out.textContent = `${at.toFixed(2)} m`;
+      plane.constant = Number(input.value) === (sign > 0 ? 0 : 1) ? 1e9 : -sign * at;
+      viewer.set_dirty();
+    };
+    input.oninput();
+    byId("cut").append(label, input);
+  }
+  for (const { object } of maps) object.material.clippingPlanes = planes;
+}
+
 function answers() {
+  cuts();
   const pane = byId("pane");
   let from = null;
   pane.addEventListener("pointerdown", (event) => { from = [event.clientX, event.clientY]; }, true);
