@@ -22,12 +22,14 @@ HTML = HERE / "_build" / "html"
 
 GUIDES = {
     "diagnosis": "Diagnosis",
+    "counting": "Counting from logs",
     "motion": "Motion records",
     "explore": "Explore",
     "path_cost": "A cost for planners",
     "placement": "Placement",
     "priors": "Drive priors",
     "stiffness": "Stiffness from nothing",
+    "test_plans": "Planned tests",
     "paper": "The paper, reproduced",
     "performance": "Performance",
     "blind_trial": "The blind trial",
@@ -43,6 +45,7 @@ STAGES = (
     "measurement",
     "prediction",
     "diagnosis",
+    "ledger",
     "visuals",
     "paper",
     "datasets",

@@ -21,8 +21,9 @@ from picchio.fatigue.sn.test_table import SNTests
 from picchio.studies.maps.places import joint_grid
 
 FUNCTIONS = {
-    "allowable", "annotate", "assess", "check", "compare", "diagnose", "effects", "envelope",
-    "explore", "fit_sn", "formats", "identify", "import_record", "place", "report", "reproduce",
+    "allowable", "annotate", "assess", "check", "compare", "count", "diagnose", "effects",
+    "envelope", "explore", "fit_sn", "formats", "identify", "import_record", "place", "plan",
+    "report", "reproduce",
     "robots", "simulate", "start", "uncertain_life", "view", "workspace_map",
 }  # fmt: skip
 SLOW = {"diagnose", "identify", "reproduce"}
@@ -54,6 +55,12 @@ to = "force"
 kind = "percussion"
 pose = { joint_1 = 0.3 }
 direction = [0.0, 0.0, 1.0]
+"""
+
+
+COUNTED = """format = "picchio-mapping/1"
+channel = [{ from = "on", to = "trigger" }, { from = "q", to = "position.joint_1" }]
+blows = { operation = "up" }
 """
 
 
@@ -112,6 +119,9 @@ def calls(folder: Path) -> dict[str, Any]:
     (folder / "plan.toml").write_text(PLAN)
     (folder / "mapping.toml").write_text(MAPPING)
     (folder / "hit.csv").write_text("t,F\n" + "".join(f"{i / 1e3},{i}\n" for i in range(50)))
+    rows = [f"{1772352000 + i / 250:.3f},{int(i % 125 < 99)},0.3" for i in range(500)]
+    (folder / "stamped.csv").write_text("\n".join(["time,on,q", *rows]) + "\n")
+    (folder / "stamped.toml").write_text(COUNTED)
     rng = np.random.default_rng(0)
     stress = np.repeat([300e6, 340e6, 380e6, 420e6], 4)
     cycles = 1e6 * (stress / 300e6) ** -9.0 * np.exp(0.4 * rng.standard_normal(16))
@@ -121,6 +131,13 @@ def calls(folder: Path) -> dict[str, Any]:
         "assess": lambda: picchio.assess(robot, task),
         "check": lambda: picchio.check(picchio.simulate(robot, folder / "plan.toml").campaign),
         "compare": lambda: picchio.compare(*[picchio.assess(robot, task)] * 2),
+        "count": lambda: picchio.count(
+            robot,
+            folder / "stamped.csv",
+            folder / "ledger",
+            mapping=folder / "stamped.toml",
+            task=task,
+        ),
         "diagnose": lambda: picchio.diagnose(robot, rubbing(robot)),
         "effects": lambda: picchio.effects("payload"),
         "envelope": lambda: picchio.envelope(robot, POSE, BLOWS),
@@ -132,6 +149,7 @@ def calls(folder: Path) -> dict[str, Any]:
             folder / "hit.csv", mapping=folder / "mapping.toml"
         ),
         "place": lambda: picchio.place(robot, task, placements=8, self_collision=False),
+        "plan": lambda: picchio.plan(robot, task),
         "report": lambda: picchio.report(picchio.envelope(robot, POSE, BLOWS)),
         "reproduce": lambda: picchio.reproduce(worlds=8),
         "robots": lambda: picchio.robots(examples=False),

@@ -24,11 +24,13 @@ if TYPE_CHECKING:
     from picchio.core.errors import PicchioWarning as PicchioWarning
     from picchio.diagnosis.diagnose import diagnose as diagnose
     from picchio.diagnosis.identify import identify as identify
+    from picchio.diagnosis.planning.plan import plan as plan
     from picchio.excitation.measured import MeasuredForce as MeasuredForce
     from picchio.excitation.pulse_train import HalfSineTrain as HalfSineTrain
     from picchio.excitation.pulse_train import PulseTrain as PulseTrain
     from picchio.fatigue.sn.fit import fit_sn as fit_sn
     from picchio.fatigue.sn.library import load_sn_curve as load_sn_curve
+    from picchio.ledger.count import count as count
     from picchio.measurement.quality.report import check as check
     from picchio.model.model import Model as Model
     from picchio.paper.run import reproduce as reproduce
@@ -63,6 +65,7 @@ _HOME = {
     "assess": "studies.assessment.run",
     "check": "measurement.quality.report",
     "compare": "studies.comparison",
+    "count": "ledger.count",
     "diagnose": "diagnosis.diagnose",
     "effects": "reference.effects",
     "envelope": "studies.envelopes",
@@ -72,6 +75,7 @@ _HOME = {
     "formats": "reference.formats",
     "import_record": "campaign.importing.importer",
     "place": "studies.placement.run",
+    "plan": "diagnosis.planning.plan",
     "report": "visuals.report.page",
     "reproduce": "paper.run",
     "robots": "robot.loading.catalogue",

@@ -86,6 +86,7 @@ OUTPUTS = [
            again="import raw2.csv --mapping made.toml --to OUT --append"),
     Output("simulated", f"simulate {ARM} --plan plan.toml --overwrite --to OUT"),
     Output("parquet", f"simulate {ARM} --plan plan.toml --parquet --overwrite --to OUT"),
+    Output("sheet.html", f"plan {ARM} --budget 3min --report OUT", slow=True),
     Output("steel.toml", "fit-sn tests.csv --out OUT"),
     Output("steel.png", "fit-sn tests.csv --plot OUT"),
     Output("c.json", "check campaign --json OUT"),

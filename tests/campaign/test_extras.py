@@ -34,6 +34,6 @@ def test_an_extra_that_is_not_installed_is_named(tmp_path, monkeypatch, module, 
         return
     path = tmp_path / f"a{ending}"
     path.write_bytes(b"x")
-    reader = importlib.import_module(f"picchio.campaign.importing.read_{ending[1:]}")
+    reader = importlib.import_module(f"picchio.campaign.importing.readers.read_{ending[1:]}")
     with pytest.raises(InputError, match=words):  # in a process of its own the module is there
         reader.read(path, {})

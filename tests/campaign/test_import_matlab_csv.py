@@ -107,7 +107,6 @@ BAD = {
     "a wrong unit": (CSV_LAYOUT.replace('"kN"', '"kg"'), ["Kraft -> force", "kg"]),
     "a wrong time unit": (CSV_LAYOUT.replace('"ms"', '"mm"'), ["time.unit", "mm"]),
     "no such time": (CSV_LAYOUT.replace('"Zeit"', '"Zeiten"'), ["time.series", "Zeit"]),
-    "no clock": (CSV_LAYOUT.replace('series = "Zeit"', ""), ["no clock", "rate"]),
     "one channel twice": (CSV_LAYOUT.replace("displacement.tool.x", "force"), ["force"]),
     "text for numbers": (CSV_LAYOUT.replace('"Weg"', '"Text"'), ["Text", "line 3", "ok"]),
     "a key misspelt": (CSV_LAYOUT.replace("scale", "x").replace("remove", "remov"), ["remov"]),
@@ -133,6 +132,13 @@ def test_a_bad_mapping_is_refused_in_one_line(tmp_path, name):
     assert "\n" not in str(caught.value)
     for word in words:
         assert word in str(caught.value), str(caught.value)
+
+
+def test_a_file_of_which_no_series_is_named_as_a_time(tmp_path):
+    path = tmp_path / "messung.csv"
+    path.write_text(CSV.replace("Zeit", "Nr"))
+    with pytest.raises(InputError, match=r"messung\.csv.*no clock.*series.*rate"):
+        read_mapped(path, mapped(tmp_path, CSV_LAYOUT.replace('series = "Zeit"', "") + RECORD))
 
 
 @pytest.mark.parametrize("ending", [".uff", ".unv", ".mat", ".mcap", ".csv"])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from picchio.campaign.importing import read_mcap
 from picchio.campaign.importing.importer import read_mapped, read_raw
 from picchio.campaign.importing.mapping import read_mapping
+from picchio.campaign.importing.readers import read_mcap
 from picchio.campaign.importing.template import mapping_template
 from picchio.core.errors import InputError
 
@@ -133,7 +133,7 @@ def test_even_stamps_come_in_bit_for_bit(tmp_path, signals):
     raw = read_raw(path)
     assert "/joint_states:effort.b" not in raw.channels  # NaN: no such reading
     assert "/joint_states:velocity.a" not in raw.channels
-    assert not any(name.startswith("/chat") for name in raw.channels)
+    assert not any(name.startswith("/chat") for name in raw.channels)  # it holds no number
     record = read_mapped(path, mapped(tmp_path)).records[0]
     read = record.read()
     np.testing.assert_allclose(read["time"], np.arange(200) / 500.0, rtol=1e-15)
@@ -171,7 +171,12 @@ def test_a_dropout_is_not_drawn_over(tmp_path, signals):
     with pytest.raises(
         InputError, match=r"/joint_states:position\.b.*missing for 0\.042 s.*0\.098"
     ):
-        read_mapped(path, mapped(tmp_path, 'resample = "linear"\nrate = 500.0'))
+        read_mapped(path, mapped(tmp_path, 'resample = "linear"\nrate = 500.0\ngaps = "refuse"'))
+    found = read_mapped(path, mapped(tmp_path, 'resample = "linear"\nrate = 500.0'))
+    assert [record.file for record in found] == ["run.csv", "run-2.csv"]
+    assert [record.clock.samples for record in found] == [50, 130]
+    np.testing.assert_allclose(found["run-2.csv"].time[[0, -1]], [0.140, 0.398], rtol=1e-12)
+    np.testing.assert_allclose(found["run-2.csv"]["position.b"], signals[1][70:], rtol=1e-9)
 
 
 def test_the_logs_own_time_may_be_taken(tmp_path, signals):

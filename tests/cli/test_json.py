@@ -49,6 +49,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         content = {"format": "picchio-assessment/1", "inputs": {"task": {"force": force}}}
         Path(f"{name}.json").write_text(json.dumps(content))
     Path("hit.csv").write_text("t,F\n" + "".join(f"{i / 1e3},{i}\n" for i in range(50)))
+    on = [f"{1772352000 + i / 250:.3f},{int(i % 125 < 99)},0.3" for i in range(250)]
+    Path("stamped.csv").write_text("\n".join(["time,on,q", *on]) + "\n")
+    Path("stamped.toml").write_text(
+        'format = "picchio-mapping/1"\nchannel = [{ from = "on", to = "trigger" }, '
+        '{ from = "q", to = "position.joint_1" }]\nblows = { operation = "upward" }\n'
+    )
     rng = np.random.default_rng(1)
     rows = ["Stress [MPa],Cycles,Comment"]
     for stress in np.repeat([280, 320, 360, 420, 480], 8):
@@ -77,6 +83,11 @@ def imported() -> Any:
     return picchio.import_record("hit.csv", "imported", "mapping.toml")
 
 
+def recounted() -> Any:
+    Path("l").unlink()
+    return picchio.count(arm()[0], "stamped.csv", "l", mapping="stamped.toml")
+
+
 def scene() -> Any:
     made = picchio.view("fanuc_like_3dof", pose=[0.3, 1.1, -1.0])
     made.save("a.html")
@@ -97,6 +108,10 @@ COMMANDS: dict[str, tuple[str, Any]] = {
     "compare": (
         "compare old.json new.json",
         lambda: picchio.compare("old.json", "new.json"),
+    ),
+    "count": (
+        "count fanuc_like_3dof --log stamped.csv --mapping stamped.toml --ledger l",
+        recounted,
     ),
     "diagnose": (
         "diagnose fanuc_like_3dof --data measured",
@@ -131,6 +146,10 @@ COMMANDS: dict[str, tuple[str, Any]] = {
     "place": (
         "place fanuc_like_3dof --placements 8 --no-self-collision",
         lambda: picchio.place(*arm(), placements=8, self_collision=False),
+    ),
+    "plan": (
+        "plan fanuc_like_3dof --budget 5min --with weight,dial",
+        lambda: picchio.plan(*arm(), budget="5min", instruments=["weight", "dial"]),
     ),
     "reproduce": (
         "reproduce --worlds 8 --assume period=0.05",

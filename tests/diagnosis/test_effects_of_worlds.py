@@ -87,6 +87,49 @@ def test_a_world_and_the_model_agree(robot, name):
     assert left(robot, cause, effect_class(name)(target, **values)) < share
 
 
+def test_a_link_that_bends_is_the_worlds(robot):
+    """The world's link yields about one axis only."""
+    bent = {"stiffness": 2e5, "damping": 40.0, "angle": 0.7}
+    end = np.array(robot.rigid._model.jointPlacements[3].translation)
+    one, other = np.linalg.svd(end[None])[2][1:]
+    axis = np.cos(0.7) * one + np.sin(0.7) * other
+    first = np.cross(end, np.eye(3)[int(np.abs(end).argmin())])
+    first /= np.linalg.norm(first)
+    second = np.cross(end / np.linalg.norm(end), first)
+    angle = float(np.arctan2(axis @ second, axis @ first))
+    own = {"stiffness": 2e5, "damping": 40.0, "angle": angle, "modal_share": 0.0}
+    own["apart"] = 0.8 / np.sqrt(0.75)
+    cause = ("mid_link_bending", "link_2", bent)
+    effect = effect_class("link_bending")
+    assert left(robot, cause, effect("joint_2", ratio=0.002, **own)) < 0.005
+    assert left(robot, cause, effect("joint_2", ratio=1.0, **own)) > 0.3
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0])
+@pytest.mark.parametrize("digital", [0.0, 1.0])
+def test_a_loggers_filter_is_the_worlds(robot, order, digital):
+    values = {"frequency": 2.0, "order": order, "digital": digital}
+    group = "accelerometer.tool"
+    effect = effect_class("sensor_highpass")
+    assert left(robot, ("sensor_highpass", group, values), effect(group, **values)) < 0.002
+    other = values | {"order": 3.0 - order}
+    assert left(robot, ("sensor_highpass", group, values), effect(group, **other)) > 0.05
+
+
+@pytest.mark.slow
+def test_the_order_of_a_filter_is_found(robot):
+    values = {"frequency": 2.5, "order": 2.0, "digital": 1.0}
+    campaign, _ = worlds.make(
+        robot=ARM, seed=104, causes=[("sensor_highpass", "accelerometer.tool", values)],
+        snr_db=40.0, sensors=SENSORS, records=9,
+    )  # fmt: skip
+    found = diagnose_percussion(robot, campaign, workers=1).diagnosis
+    (cause,) = found.causes
+    assert (found.verdict, cause.effect) == ("named", "sensor_highpass")
+    assert cause.parameters["frequency"].value == pytest.approx(2.5, rel=0.005)
+    assert cause.parameters["order"].value == 2.0
+
+
 FOUND = {
     "coupled_joints": ("belt_coupling", "stiffness", "stiffness"),
     "loose_bolt": ("loose_bolt", "change", "stiffness"),
@@ -134,20 +177,40 @@ def body_at(chain, body, mass, centre, inertia):
     return chain.with_body(body, *merge(own, (mass, centre, inertia)))
 
 
+EXTENT = np.array([0.004, 0.001, 0.002])
+
+
+def off_centre(bench, _, p):
+    """A body at the tool whose centre of mass is beside it: kg."""
+    chain = bench.chain
+    at, turn = chain.tool_offset, chain.tool_rotation
+    inertia = p["mass"] * (EXTENT.sum() * np.eye(3) - np.diag(EXTENT))
+    centre = at + turn @ [0.1, -0.05, 0.2]
+    bench.chain = body_at(chain, chain.tool, p["mass"], centre, turn @ inertia @ turn.T)
+
+
 def test_a_load_away_from_the_tool_frame_is_the_worlds(robot, monkeypatch):
-    extent = np.array([0.004, 0.001, 0.002])
-
-    def load(bench, _, p):
-        chain = bench.chain
-        turn, at = chain.tool_rotation, chain.tool_offset
-        inertia = 4.0 * (extent.sum() * np.eye(3) - np.diag(extent))
-        centre = at + turn @ [0.1, -0.05, 0.2]
-        bench.chain = body_at(chain, chain.tool, 4.0, centre, turn @ inertia @ turn.T)
-
-    monkeypatch.setitem(outside.EFFECTS, "load", load)
+    monkeypatch.setitem(outside.EFFECTS, "load", off_centre)
     values = {"mass": 4.0, "x": 0.1, "y": -0.05, "z": 0.2, "xx": 0.004, "yy": 0.001, "zz": 0.002}
     effect = effect_class("payload_body")("tool", **values)
     assert left(robot, ("load", "tool", {"mass": 4.0}), effect) < 0.0005
+
+
+@pytest.mark.slow
+def test_a_load_away_from_the_tool_frame_is_found_from_blows(robot, monkeypatch):
+    monkeypatch.setitem(outside.EFFECTS, "load", off_centre)
+    campaign, _ = worlds.make(
+        robot=ARM, seed=12, causes=[("load", "tool", {"mass": 3.0})], snr_db=40.0,
+        sensors=SENSORS, records=18,
+    )  # fmt: skip
+    found = diagnose_percussion(robot, campaign, workers=1).diagnosis
+    (cause,) = found.causes
+    assert (found.verdict, cause.effect) == ("named", "payload_body")
+    true = {"mass": 3.0, "x": 0.1, "y": -0.05, "z": 0.2}
+    for name, value in true.items():
+        given = cause.parameters[name]
+        assert abs(given.value - value) < 3.0 * given.std
+    assert cause.parameters["mass"].std < 0.1 * true["mass"]
 
 
 def test_a_link_changed_whole_is_the_worlds(robot, monkeypatch):
@@ -198,6 +261,7 @@ NEW = {
     "belt_coupling": ("joint_3", {"stiffness": 2e4}),
     "counterbalance": ("joint_2", {"cosine": 400.0, "spring": -100.0}),
     "coupled_drive": ("joint_3", {"coefficient": 2.0, "ratio": -1.0}),
+    "link_bending": ("joint_2", {"stiffness": 3e5, "damping": 20.0, "angle": 0.5, "ratio": 0.3}),
     "link_inertia": ("link_2", {"mass": 0.1, "xz": 0.2}),
     "loose_bolt": ("joint_1", {"change": -1e4}),
     "payload_body": ("tool", {"mass": 2.0, "x": 0.1, "zz": 0.01}),

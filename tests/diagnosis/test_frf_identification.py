@@ -6,10 +6,13 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
+from scipy.linalg import eigh
 
 import picchio
 from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
 from picchio.campaign.tables import Tolerance
 from picchio.diagnosis.stiffness.modes import peaks
 from picchio.diagnosis.stiffness.prior import prior_of
@@ -54,6 +57,49 @@ def test_the_prediction_is_the_worlds(frfs, joints):
     for part, table in zip(made.predict(at), made.tables, strict=True):
         left = np.linalg.norm(part.residual * table.scale[:, None])
         assert left < 1e-6 * np.linalg.norm(table.measured)
+
+
+def test_bodies_that_are_off_change_mass_and_damping_as_they_do():
+    """Masses, centres and inertias far off, on a light wrist: against Pinocchio's own bodies."""
+    robot = picchio.load_robot("kinova_gen3")
+    rng = np.random.default_rng(3)
+    pose = dict(zip(robot.joint_names, rng.uniform(-1.0, 1.0, 7).tolist(), strict=True))
+    columns = {"frequency": np.linspace(3.0, 160.0, 40), "real": np.ones(40), "imag": np.zeros(40)}
+    record = Record.from_columns(
+        "f.csv", columns, kind="frf", pose=pose, force_direction=[0.0, 0.6, 0.8],
+        response_direction=[1.0, 0.0, 0.0], quantity="receptance",
+    )  # fmt: skip
+    made = make_problem(robot, [record], Tolerance(), prior_of(robot))
+    at = np.zeros(len(made.precision))
+    model = pin.buildModelFromUrdf(str(robot.source))
+    for k, joint in enumerate(robot.flexible_names):
+        link, mass = robot.tree.joints[joint].child, 2.0 * rng.standard_normal()
+        centre = 2.0 * rng.standard_normal(3)
+        own = model.inertias[model.getJointId(joint)]
+        heavier = (1.0 + 0.01 * mass) * own.inertia
+        # Both at once differ from their sum by a hundredth of a shift: one link has one of them.
+        names = [f"link_com.{link}.{axis}" for axis in "xyz"] if k % 2 else [f"link_mass.{link}"]
+        for name, value in zip(names, centre if k % 2 else [mass], strict=True):
+            at[14 + made.steps.index(name)] = value
+        model.inertias[model.getJointId(joint)] = (
+            pin.Inertia(own.mass, own.lever + 0.002 * centre, own.inertia) if k % 2
+            else pin.Inertia((1.0 + 0.01 * mass) * own.mass, own.lever, heavier)
+        )  # fmt: skip
+    data, q = model.createData(), pin.neutral(model)
+    step = np.array([pose[name] for name in model.names[1:]])
+    q = pin.integrate(model, q, step)
+    m = np.array(pin.crba(model, data, q))
+    springs = robot.stiffness
+    squared, shapes = eigh(np.diag(springs), m)
+    ratio = robot.damping_ratio @ (springs[:, None] * shapes**2) / squared
+    c = m @ shapes @ np.diag(2.0 * ratio * np.sqrt(squared)) @ shapes.T @ m
+    (table,), (part,) = made.tables, made.predict(at)
+    k = np.diag(springs) + robot.gravity_stiffness(robot.pose(pose))
+    value = np.array([
+        table.sight @ np.linalg.solve(k - w**2 * m + 1j * w * c, table.push) for w in table.omega
+    ])  # fmt: skip
+    told = np.stack([value.real, value.imag], axis=1) / table.scale[:, None]
+    np.testing.assert_allclose(table.values - part.residual, told, atol=1e-6 * np.abs(told).max())
 
 
 def test_slopes_are_those_of_differences(frfs):
@@ -111,9 +157,11 @@ def test_the_command(frfs, tmp_path, in_process):
     world = frfs.draw(3, 1, exact=True)
     exactly(world).save(tmp_path / "taps")
     done = in_process("identify", world.robot, "--data", "taps", "--out", "flex.toml",
-                      "--json", "found.json", cwd=tmp_path)  # fmt: skip
+                      "--json", "found.json", "--report", "page.html", cwd=tmp_path)  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "Damping: one ratio for each mode" in done.stdout
+    # Eighteen functions: those that fit worst are drawn.
+    assert (tmp_path / "page.html").read_text().count("<svg") == 12
     content = json.loads((tmp_path / "found.json").read_text())
     assert content["damping"]["convention"] == "modal"
     sidecar = read_sidecar(tmp_path / "flex.toml")

@@ -102,6 +102,17 @@ def folder(tmp_path_factory):
             zip(range(300, 480, 9), [6 - 0.05 * i for i in range(20)], strict=True)]  # fmt: skip
     (folder / "tests.csv").write_text("\n".join(["Stress [MPa],Cycles,Outcome", *rows]))
     (folder / "log.csv").write_text("t,F\n" + "".join(f"{i},{i % 7}\n" for i in range(50)))
+    rows = [f"{1772352000 + 0.004 * i:.3f},{i % 125 < 99},0.3" for i in range(500)]
+    text = "\n".join(["time,on,q", *rows]).replace("True", "1").replace("False", "0")
+    (folder / "stamped.csv").write_text(text + "\n")
+    for name in ("robots/a", "robots/b", "books"):
+        (folder / name).mkdir(parents=True)
+    (folder / "robots/a/log.csv").write_text(text + "\n")
+    (folder / "robots/b/log.csv").write_text("nothing\n")
+    (folder / "stamped.toml").write_text(
+        'format = "picchio-mapping/1"\n[[channel]]\nfrom = "on"\nto = "trigger"\n[[channel]]\n'
+        'from = "q"\nto = "position.joint_1"\n[blows]\noperation = "upward"\n'
+    )
     (folder / "mapping.toml").write_text(
         'format = "picchio-mapping/1"\n[time]\nseries = "t"\nunit = "ms"\n[[channel]]\nfrom = "F"\n'
         'to = "force"\n[record]\nkind = "percussion"\npose = { joint_1 = 0.3 }\n'
@@ -123,7 +134,11 @@ FAST = {
     "check": "check made --robot fanuc_like_3dof",
     "simulation": "simulate fanuc_like_3dof --plan plan.toml --to again",
     "sn": "fit-sn tests.csv",
+    "test-plan": "plan fanuc_like_3dof --budget 5min",
     "import": "import log.csv --mapping mapping.toml --to imported",
+    "detection": "import log.csv",
+    "count": "count fanuc_like_3dof --log stamped.csv --mapping stamped.toml --ledger l",
+    "fleet": "count fanuc_like_3dof --log robots --mapping stamped.toml --ledger books --fleet",
     "annotation": "annotate fanuc_like_3dof --flex {robots}/fanuc_like_3dof/flex.toml --out r.urdf",
     "start": "start ur10 --force",
     "effects": "effects",

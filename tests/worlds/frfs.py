@@ -43,7 +43,8 @@ class Frfs:
 
 
 def draw(joints: int, seed: int, *, exact: bool = False, noise: float = 0.01,
-         spread: float = 2.0, factors=None, dashpots: bool = False) -> Frfs:  # fmt: skip
+         spread: float = 2.0, factors=None, dashpots: bool = False,
+         asked=None) -> Frfs:  # fmt: skip
     """A campaign of an arm with 3, 6 or 7 joints.
 
     Args:
@@ -53,6 +54,8 @@ def draw(joints: int, seed: int, *, exact: bool = False, noise: float = 0.01,
         noise: relative, of each line; and as much of a hundredth of the largest line.
         spread: of the damping ratio, a factor.
         factors: (n,) of the stiffness; drawn if None.
+        asked: (pose, hit, reads, frame of the sensor or None) of each function, in place of drawn
+            ones.
         dashpots: damping by viscous dashpots in the joints in place of the modes' ratios.
     """
     rng = np.random.default_rng((seed, joints, 7))
@@ -83,8 +86,13 @@ def draw(joints: int, seed: int, *, exact: bool = False, noise: float = 0.01,
     frequency = np.linspace(*BAND[joints], 240)
     w = 2.0 * np.pi * frequency
     records = []
-    for _ in range(POSES):
+    stops = [None] * POSES
+    if asked:
+        stops = list({tuple(one[0]): [o for o in asked if tuple(o[0]) == tuple(one[0])]
+                      for one in asked}.values())  # fmt: skip
+    for stop in stops:
         pose = rng.uniform(0.85 * low + 0.15 * high, 0.15 * low + 0.85 * high)
+        pose = pose if stop is None else np.asarray(stop[0][0], dtype=float)
         step = np.zeros(model.nv)
         step[columns] = pose + zero + 1e-4 * off * rng.standard_normal(n)
         q = pin.integrate(model, pin.neutral(model), step)
@@ -96,7 +104,15 @@ def draw(joints: int, seed: int, *, exact: bool = False, noise: float = 0.01,
         pin.framesForwardKinematics(model, data, q)
         turn = np.array(data.oMf[frame].rotation)
         push = full[:3] + np.cross(full[3:], turn @ hook, axis=0)
-        see = full[:3] + np.cross(full[3:], turn @ seat, axis=0)
+
+        def seen(name, at=q):
+            """Jacobians (3, n) of the sensor, linear and angular, in its frame."""
+            where = frame if name is None else model.getFrameId(name)
+            own = pin.computeFrameJacobian(model, data, at, where, pin.LOCAL_WORLD_ALIGNED)
+            own = own[:, columns]
+            lever = np.array(data.oMf[where].rotation) @ seat
+            return own[:3] + np.cross(own[3:], lever, axis=0), own[3:]
+
         if dashpots:
             damp = np.diag(2.0 * ratio * np.sqrt(truth * mass.diagonal()))
         else:
@@ -110,16 +126,20 @@ def draw(joints: int, seed: int, *, exact: bool = False, noise: float = 0.01,
                           [-inverse @ (np.diag(truth) + pull), -inverse @ damp]])  # fmt: skip
         poles, vectors = eig(state)
         back = np.linalg.inv(vectors)
-        for _ in range(TAPS):
-            told = rng.standard_normal(3)
+        for tap in range(TAPS) if stop is None else stop:
+            told = rng.standard_normal(3) if stop is None else np.array(tap[1])
             told /= np.linalg.norm(told)
             way = pin.exp3(0.005 * off * rng.standard_normal(3)) @ told
-            along_told = np.eye(3)[rng.integers(3)]
-            for reads in (told, along_told):
+            if stop is None:
+                sensors = [(told, None), (np.eye(3)[rng.integers(3)], None)]
+            else:
+                sensors = [(tap[2], tap[3])]
+            for reads, carrier in sensors:
+                see, turning = seen(carrier)
                 along = pin.exp3(askew) @ reads
                 entry = back[:, n:] @ (inverse @ (push.T @ way))
                 turned = vectors[:n].T @ (see.T @ along)
-                falls = vectors[:n].T @ (full[3:].T @ np.cross(model.gravity.linear, along))
+                falls = vectors[:n].T @ (turning.T @ np.cross(model.gravity.linear, along))
                 each = entry / (1j * w[:, None] - poles)
                 value = gain * (-(w**2) * (each @ turned) + each @ falls)
                 size = noise * np.abs(value) + 0.01 * noise * np.abs(value).max()
@@ -130,6 +150,7 @@ def draw(joints: int, seed: int, *, exact: bool = False, noise: float = 0.01,
                     {"frequency": frequency, "real": value.real, "imag": value.imag,
                      "coherence": known},
                     {"pose": dict(zip(own.joints, pose.tolist(), strict=True)),
-                     "force_direction": told.tolist(), "response_direction": reads.tolist()},
+                     "force_direction": told.tolist(), "response_direction": reads.tolist(),
+                     **({"response_frame": carrier} if carrier else {})},
                 ))  # fmt: skip
     return Frfs(own.name, own.joints, nominal, truth, ratio, records)

@@ -46,8 +46,26 @@ class Loads:
     slipped: np.ndarray
 
 
+@dataclass(frozen=True)
+class Asked:
+    """A loading that somebody planned: what is set, pulled and read, as told.
+
+    Attributes:
+        pose: (n,) rad.
+        way: (3,) of the pull, unit, world.
+        force: N.
+        reads: (3,) along which a gauge reads, unit; the three axes if None.
+    """
+
+    pose: np.ndarray
+    way: np.ndarray
+    force: float
+    reads: np.ndarray | None
+
+
 def draw(joints: int, seed: int, *, exact: bool = False, loadings: int | None = None,
-         base: float = 0.0) -> Loads:  # fmt: skip
+         base: float = 0.0, asked: list[Asked] | None = None, robot: str | None = None,
+         gauge: bool = False) -> Loads:  # fmt: skip
     """A campaign of an arm with 3, 6 or 7 joints.
 
     Args:
@@ -56,9 +74,12 @@ def draw(joints: int, seed: int, *, exact: bool = False, loadings: int | None = 
         exact: whether nothing but the stiffness differs from the files.
         loadings: how many; `LOADINGS` if None.
         base: N m/rad about the world's x axis through the root; rigid if 0.
+        asked: these loadings in place of drawn ones; all else is drawn alike.
+        robot: another one with as many joints.
+        gauge: one gauge along each pull, in any case.
     """
     rng = np.random.default_rng((seed, joints))
-    own = shipped(ROBOTS[joints])
+    own = shipped(robot or ROBOTS[joints])
     off = 0.0 if exact else 1.0
     model = own.model.copy()
     for k in range(1, model.njoints):
@@ -72,9 +93,9 @@ def draw(joints: int, seed: int, *, exact: bool = False, loadings: int | None = 
     scale = 1.0 + 0.01 * off * rng.standard_normal()
     hook = 1e-3 * off * rng.standard_normal(3)
     noise = 0.0 if exact else DIAL * math.exp(rng.uniform(-0.7, 1.1))
-    count = loadings or LOADINGS[joints]
+    count = len(asked) if asked else loadings or LOADINGS[joints]
     slips = (rng.random() < 0.35) * 0.06 * off
-    three = bool(rng.random() < 0.5)
+    three = bool(rng.random() < 0.5) and not gauge
     arm = _Arm(model, own.tool, own.joints, truth)
     low, high = np.maximum(own.lower, -2.5), np.minimum(own.upper, 2.5)
     rows: dict[str, list] = {}
@@ -88,6 +109,11 @@ def draw(joints: int, seed: int, *, exact: bool = False, loadings: int | None = 
         way = rng.standard_normal(3)
         way /= np.linalg.norm(way)
         size = own.force * rng.uniform(0.6, 1.4)
+        reads = None if three else way
+        if asked:
+            pose, way, size, reads = (
+                asked[row].pose, asked[row].way, asked[row].force, asked[row].reads
+            )  # fmt: skip
         pulled = _turned(way, 0.005 * off * rng.standard_normal(3)) * size * scale
         stands = pose + zero + 1e-4 * off * rng.standard_normal(len(pose))
         moved = arm.moved(stands, pulled, hook)
@@ -101,12 +127,12 @@ def draw(joints: int, seed: int, *, exact: bool = False, loadings: int | None = 
             put(f"force.{axis}", value)
         slip = SLIPPED * rng.standard_normal(3) * slipped[row]
         read = moved + slip + noise * rng.standard_normal(3)
-        if three:
+        if reads is None:
             for axis, value in zip("xyz", read, strict=True):
                 put(f"displacement.{own.tool}.{axis}", value)
         else:
-            put("dial", float(way @ read))
-            for axis, value in zip("xyz", way, strict=True):
+            put("dial", float(reads @ read))
+            for axis, value in zip("xyz", reads, strict=True):
                 put(f"dial_direction.{axis}", value)
     columns = {name: np.array(values) for name, values in rows.items()}
     return Loads(own.name, own.joints, nominal, truth, columns, noise, slipped)

@@ -151,6 +151,7 @@ IN_CATALOGUE = {
     "coupled_joints": {"belt_coupling"},
     "loose_bolt": {"loose_bolt"},
     "counterbalance": {"counterbalance"},
+    "mid_link_bending": {"link_bending"},
 }
 
 

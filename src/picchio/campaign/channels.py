@@ -129,6 +129,9 @@ LOADING_KINDS: tuple[ChannelKind, ...] = (
     ChannelKind("pose", "joint", ("rad", "m"), meaning="where the joint stands, link side"),
     ChannelKind("force", None, ("N",), True, "on the tool, world axes"),
     ChannelKind("weight", None, ("N",), meaning="in place of the force: hung on the tool"),
+    ChannelKind("pull", None, ("N",), meaning="in place of both: what a scale reads of a cord"),
+    ChannelKind("pull_direction", None, ("1",), True, "along which the cord pulls, world axes; of "
+                "any length"),
     ChannelKind("point", None, ("m",), True, "where the force acts, tool frame; else its origin, "
                 "or where the sidecar's [tool] has the tool's point"),
     ChannelKind("displacement", "frame", ("m",), True, "of the frame's origin against the "
@@ -142,6 +145,11 @@ LOADING_KINDS: tuple[ChannelKind, ...] = (
                 "knows; else each row has a zero of its own, read just before"),
 )  # fmt: skip
 """The columns of a static record: a row a loading, in any order, without a time."""
+LOG_KINDS: tuple[ChannelKind, ...] = (
+    ChannelKind("force", None, ("N",), True, "on the tool, in the axes that [blows] names"),
+    ChannelKind("trigger", None, ("1",), meaning="of the tool: see [blows] trigger"),
+)
+"""What a log may hold beside a record's channels, for `picchio count`."""
 FREQUENCY = "frequency"
 FRF_KINDS: tuple[ChannelKind, ...] = (
     ChannelKind(FREQUENCY, None, ("Hz",), meaning="ascending; the first column"),

@@ -68,9 +68,8 @@ def read_loadings(record: Record) -> Loadings:
         record: of the kind "static".
 
     Raises:
-        InputError: a number that is missing or none; neither force nor weight, or both; no pose;
-            nothing that moved; a joint of `joint_map` whose columns are not there; a dial without
-            its direction.
+        InputError: a number that is missing or none; no load, or two; no pose; nothing that moved;
+            a joint of `joint_map` whose columns are not there; a dial or pull without direction.
     """
     columns = record.read()
     if len(next(iter(columns.values()))) == 0:
@@ -84,12 +83,16 @@ def read_loadings(record: Record) -> Loadings:
             return None
         return np.stack([np.zeros(size) if one is None else one for one in given], axis=1)
 
-    force, weight = vectors("force"), columns.get("weight")
-    if (force is None) == (weight is None):
-        said = "is stated twice" if weight is not None else "is missing"
+    force, weight, pull = vectors("force"), columns.get("weight"), columns.get("pull")
+    count = sum(one is not None for one in (force, weight, pull))
+    if count != 1:
         raise record.source.error(
-            f"the load {said}", hint="give columns force.x [N], force.y, force.z, or weight [N]"
+            f"the load {'is stated twice' if count else 'is missing'}",
+            hint="give columns force.x [N], force.y, force.z, or weight [N], or pull [N] with "
+            "pull_direction.x, .y, .z",
         )
+    if pull is not None:
+        force = pull[:, None] * _ways(record, columns, "pull_direction", "which way does it pull?")
     return Loadings(
         record.file, _poses(record, columns), force, weight, vectors("point"),
         _readings(record, columns), columns.get("set"),
@@ -156,17 +159,25 @@ def _readings(record: Record, columns: Mapping[str, FloatArray]) -> tuple[Readin
 
 def _dial(record: Record, columns: Mapping[str, FloatArray]) -> Reading:
     size = len(columns["dial"])
+    way = _ways(record, columns, "dial_direction", "which way does the dial read?")
 
     def column(name: str, axis: str) -> FloatArray:
         return columns.get(f"{name}.{axis}", np.zeros(size))
 
-    way = np.stack([column("dial_direction", axis) for axis in AXES], axis=1)
-    length = np.linalg.norm(way, axis=1)
-    if not (length > 0.0).all():
-        bad = int(np.argmin(length > 0.0))
-        raise record.source.error("is zero or missing: which way does the dial read?",
-                                  channel="dial_direction", sample=bad)  # fmt: skip
     point = None
     if any(f"dial_point.{axis}" in columns for axis in AXES):
         point = np.stack([column("dial_point", axis) for axis in AXES], axis=1)
-    return Reading("dial", columns["dial"][:, None], (way / length[:, None])[:, None], point=point)
+    return Reading("dial", columns["dial"][:, None], way[:, None], point=point)
+
+
+def _ways(
+    record: Record, columns: Mapping[str, FloatArray], name: str, question: str
+) -> FloatArray:
+    """(m, 3) of unit length; axes that are left out are zero."""
+    size = len(next(iter(columns.values())))
+    way = np.stack([columns.get(f"{name}.{axis}", np.zeros(size)) for axis in AXES], axis=1)
+    length = np.linalg.norm(way, axis=1)
+    if not (length > 0.0).all():
+        bad = int(np.argmin(length > 0.0))
+        raise record.source.error(f"is zero or missing: {question}", channel=name, sample=bad)
+    return np.asarray(way / length[:, None])

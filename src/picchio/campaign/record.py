@@ -156,6 +156,12 @@ class Record:
         return self.table.kind
 
     @property
+    def test(self) -> str:
+        """What kind of test it is: its kind, or "tap" of a percussion record that is one blow."""
+        tapped = self.kind == "percussion" and self.excitation.kind == "tap"
+        return "tap" if tapped else self.kind
+
+    @property
     def in_time(self) -> bool:
         """Whether its rows are samples in time."""
         return self.source.layout.first == TIME
@@ -190,8 +196,8 @@ class Record:
 
     @property
     def hits(self) -> int | None:
-        """Blows of the burst; None in a steady record."""
-        return self.excitation.hits
+        """Blows of the burst, one of a tap; None in a steady record."""
+        return self.excitation.hits or (1 if self.test == "tap" else None)
 
     def blows(self) -> Excitation | None:
         """The programmed blow train; None where none is stated.

@@ -29,7 +29,15 @@ from picchio.cli.life import (  # noqa: F401
     start,
     view,
 )
-from picchio.cli.measured import check, diagnose, identify, import_, simulate  # noqa: F401
+from picchio.cli.measured import (  # noqa: F401
+    check,
+    count,
+    diagnose,
+    identify,
+    import_,
+    plan,
+    simulate,
+)
 from picchio.cli.output import begin, printable, say_warning, say_written
 from picchio.cli.reference import described, reproduce, robots  # noqa: F401
 from picchio.cli.waiting import waiting

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
 
 from picchio.campaign.campaign import Campaign
+from picchio.core.arrays import FloatArray
 from picchio.core.results import TableResult
 from picchio.robot.flexible_robot import FlexibleRobot
 
@@ -54,6 +55,31 @@ class IdentifiedJoint:
     damping_ratio: Identified
 
 
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """What one record or instrument read, over what the fit has.
+
+    Attributes:
+        title: of it.
+        across, up: words and unit of the two axes.
+        x: (m,) lines or numbers of readings.
+        measured, fitted: (m,).
+        spread: (m,) standard deviation of what was measured.
+        left: residual over signal.
+        lines: whether the readings follow each other, on a logarithmic scale.
+    """
+
+    title: str
+    across: str
+    up: str
+    x: FloatArray
+    measured: FloatArray
+    fitted: FloatArray
+    spread: FloatArray
+    left: float
+    lines: bool
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(TableResult):
     """What `identify` found; its table is the joints.
@@ -64,6 +90,7 @@ class Identification(TableResult):
         joints: every flexible joint.
     """
 
+    PAGE = "visuals.report.identification:identification_page"
     INDEX = "joint"
     UNITS: ClassVar = {f"stiffness_{part}": "N*m/rad" for part in ("value", "low", "high")}
 
@@ -88,6 +115,10 @@ class Identification(TableResult):
     def doubt(self) -> str:
         """Why to look twice at it; empty where there is no reason."""
         return ""
+
+    def compared(self) -> list[Compared]:
+        """What was measured over what was fitted, where the method fits readings."""
+        return []
 
     def _told(self) -> str:
         told = sum(joint.stiffness.told for joint in self.joints)

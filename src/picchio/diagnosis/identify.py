@@ -153,11 +153,11 @@ def method_for(campaign: Campaign) -> Method:
     Raises:
         InputError: there is none for all of them together.
     """
-    kinds = {record.kind for record in campaign}
+    kinds = {record.test for record in campaign}
     ways = list(methods().values())
-    for way in ways:
-        if kinds <= way.kinds:
-            return way
+    able = [way for way in ways if kinds <= way.kinds]
+    if able:  # the one that is made for just these
+        return min(able, key=lambda way: len(way.kinds))
     sets = [" and ".join(sorted(way.kinds)) for way in ways]
     file = campaign.folder / CAMPAIGN_FILE if campaign.folder is not None else None
     raise InputError(
@@ -208,7 +208,7 @@ def needs_springs(campaign: Campaign) -> bool:
     Raises:
         InputError: as `method_for`.
     """
-    kinds = {record.kind for record in campaign}
+    kinds = {record.test for record in campaign}
     return kinds <= method_for(campaign).needs_springs
 
 

@@ -101,6 +101,27 @@ class HalfSineTrain(Train):
         return _rectangle(self)
 
 
+@dataclass(frozen=True)
+class Tap(HalfSineTrain):
+    """One blow of a hammer; what is not stated of it is a guess.
+
+    Attributes:
+        force: N, peak, about.
+        period: s, so long is nothing hit again.
+        width: s, about.
+    """
+
+    kind = "tap"
+    meaning = "one blow of a hammer: its force is measured, or unknown"
+    words = "a hammer's blow of about {force} peak"
+    needed = ()
+    optional = ("force", "period", "width", "preload")
+
+    force: float = 200.0
+    period: float = 60.0
+    width: float = 0.004
+
+
 def _rectangle(train: Train) -> PiecewiseForce:
     zero = np.zeros(1)
     return PiecewiseForce(zero, train.width, np.array([train.force]), zero, zero, zero)

@@ -9,7 +9,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.recent import Recent
-from picchio.model.expansion import Inertia, Motion, WideChain
+from picchio.model.expansion import Bent, Inertia, Motion, WideChain
 from picchio.robot.dynamics.rigid_model import Mass
 from picchio.robot.flexible_robot import FlexibleRobot
 
@@ -39,6 +39,7 @@ class Geometry:
         # Records of one pose share theirs.
         self.plants: Recent[Plant] = Recent(_KEPT_PLANTS)
         self._beside: Recent[Geometry] = Recent(_KEPT_BESIDE)
+        self._bent: Recent[Geometry] = Recent(_KEPT_BESIDE)
         state = chain.robot.state(pose)
         self.stiffness = state.stiffness
         self.gravity_torque = state.gravity_torque
@@ -77,6 +78,16 @@ class Geometry:
             pose: (nv,) rad or m.
         """
         return self._beside.get(pose.tobytes(), lambda: Geometry(self.chain, pose))
+
+    def bending(self, bent: Bent) -> Geometry:
+        """The geometry of the same robot at the same pose with links that bend.
+
+        Args:
+            bent: see `expansion.Bent`.
+        """
+        if not bent:
+            return self
+        return self._bent.get(bent, lambda: Geometry(self.chain.bending(bent), self.pose))
 
     def total(self, masses: tuple[Mass, ...], taken: tuple[int, ...]) -> Inertia:
         """The weighted sum of inertias, of some of the coordinates.

@@ -10,7 +10,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.model.conditions import Conditions
-from picchio.model.expansion import Motion
+from picchio.model.expansion import Motion, link_end
 from picchio.model.geometry import Geometry
 from picchio.model.inertia import point_masses
 from picchio.model.linear_system import shared_damping
@@ -79,6 +79,7 @@ class Changes:
         self.force_offset = np.zeros(3)
         self.coordinates: list[str] = list(robot.flexible_names)
         self._motors: dict[str, str] = {}
+        self._bent: dict[str, tuple[float, float]] = {}
         self._masses: list[Mass] = [(1.0, "robot", None)]
         self.added_inertias: list[tuple[str, float]] = []
         self._springs: list[_Spring] = []
@@ -130,6 +131,32 @@ class Changes:
         self._springs.append(_Spring(name, stiffness, damping))
         if inertia:
             self.added_inertias.append((name, inertia))
+
+    def add_bending(
+        self,
+        joint: str,
+        angle: float,
+        apart: float,
+        stiffness: tuple[float, float],
+        damping: float,
+    ) -> None:
+        """Let the link that a joint carries bend in its middle.
+
+        Args:
+            joint: the joint's name.
+            angle: rad, of the first axis about which it bends, across the link.
+            apart: how far its halves' centres of mass are, over those of a uniform rod.
+            stiffness: N m/rad, about that axis and about the one at right angles to it.
+            damping: N m s/rad, about the first; about the other it is in the same ratio.
+
+        Raises:
+            InputError: a link without length, or none on the way to the tool.
+        """
+        if link_end(self.robot, self.check_joint(joint)) is None:
+            raise InputError("carries no link that could bend", key="target", value=joint)
+        self._bent[joint] = angle, apart
+        for i, own in enumerate(stiffness, start=1):
+            self.add_coordinate(f"bend.{joint}.{i}", own, damping * own / stiffness[0])
 
     def add_motor(self, joint: str, inertia: float, stiffness: float, damping: float) -> None:
         """Let the motor side of a joint yield against its servo."""
@@ -279,7 +306,8 @@ class Plant(Changes):
     @cached_property
     def _unloaded(self) -> tuple[VibratingSystem, Motion]:
         """All that does not depend on the force's direction, and how the force's point moves."""
-        geometry, names = self.geometry, self.coordinates
+        geometry = self.geometry.bending(tuple((j, *how) for j, how in self._bent.items()))
+        names = self.coordinates
         size = len(names)
         chain = geometry.chain.coordinates
         wide = [i for i, name in enumerate(names) if name in chain]

@@ -3,10 +3,57 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class Filter:
+    """A Butterworth filter of a sensor's electronics or of its logger.
+
+    Attributes:
+        frequency: Hz, the corner.
+        order: 1 or 2.
+        digital: of the samples, by the bilinear transform; else of the signal itself.
+    """
+
+    frequency: float
+    order: int = 1
+    digital: bool = False
+
+    def analogue(self, kind: Literal["low", "high"]) -> tuple[FloatArray, FloatArray]:
+        """Its transfer function in s.
+
+        Args:
+            kind: what passes.
+
+        Returns:
+            (order + 1,) of numerator and denominator, highest power first.
+        """
+        from scipy.signal import butter
+
+        return butter(self.order, 2.0 * np.pi * self.frequency, kind, analog=True)
+
+    def sampled(self, kind: Literal["low", "high"], step: float) -> tuple[FloatArray, FloatArray]:
+        """Its transfer function in the delay by one sample.
+
+        Args:
+            kind: what passes.
+            step: s, between samples; a corner above what they can carry is brought just below.
+
+        Returns:
+            (order + 1,) of numerator and denominator, the undelayed first.
+        """
+        from scipy.signal import butter
+
+        return butter(self.order, min(2.0 * self.frequency * step, _NYQUIST), kind)
+
+
+# Of half the rate: the highest corner of a digital filter.
+_NYQUIST = 0.99
 
 
 @dataclass
@@ -21,8 +68,8 @@ class SensorChain:
         place: (3,) m, from the frame's origin to the sensor, in the frame's axes.
         turn: (3, 3) from what the frame's axes carry to what the sensor's axes read.
         gain: factor.
-        highpass: Hz, first order.
-        lowpass: Hz, first order.
+        highpass: takes out slow motion.
+        lowpass: takes out fast motion.
         delay: s, the reading is late by this.
         clock_rate: a sample stamped t is of the time t (1 + clock_rate).
         limit: the reading is clipped to +-limit; infinite where it is not.
@@ -33,22 +80,40 @@ class SensorChain:
     place: FloatArray = field(default_factory=lambda: np.zeros(3))
     turn: FloatArray = field(default_factory=lambda: np.eye(3))
     gain: float = 1.0
-    highpass: float | None = None
-    lowpass: float | None = None
+    highpass: Filter | None = None
+    lowpass: Filter | None = None
     delay: float = 0.0
     clock_rate: float = 0.0
     limit: float = np.inf
     hum: list[tuple[float, float, float]] = field(default_factory=list)
 
+    def passes(self, digital: bool) -> list[tuple[Literal["low", "high"], Filter]]:
+        """Its filters of one kind that have something to take out.
+
+        Args:
+            digital: those of the samples, or else of the signal.
+        """
+        pairs = (("high", self.highpass), ("low", self.lowpass))
+        return [
+            (kind, each)  # type: ignore[misc]
+            for kind, each in pairs
+            if each is not None and each.digital == digital and 0.0 < each.frequency < np.inf
+        ]
+
+    @property
+    def analogue(self) -> bool:
+        """Whether the reading depends on what the signal was between the samples before."""
+        return self.mount is not None or bool(self.passes(digital=False))
+
     @property
     def filters(self) -> bool:
         """Whether the reading depends on what came before."""
-        return self.mount is not None or self.highpass is not None or self.lowpass is not None
+        return self.analogue or bool(self.passes(digital=True))
 
     @property
     def smooth(self) -> bool:
         """Whether its filters let no jump through at once."""
-        return self.mount is not None or self.lowpass is not None
+        return self.mount is not None or "low" in dict(self.passes(digital=False))
 
     @property
     def timing(self) -> tuple[float, float]:

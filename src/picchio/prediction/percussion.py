@@ -23,7 +23,7 @@ from picchio.model.effects.effect import Effect
 from picchio.model.expansion import WideChain
 from picchio.model.geometry import Geometry
 from picchio.model.model import Model
-from picchio.model.sensing import SensorChain
+from picchio.model.sensing import Filter, SensorChain
 from picchio.model.system import VibratingSystem
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.vibration.integration.integrate import (
@@ -206,18 +206,21 @@ class PercussionSetup:
 
     def _taken(self, channel: Channel, chain: SensorChain) -> _Taken:
         if channel.kind.ac_corner and chain.highpass is None:
-            chain = replace(chain, highpass=channel.kind.ac_corner)
+            chain = replace(chain, highpass=Filter(channel.kind.ac_corner))
         samples = self._shifted(chain)
         if not chain.filters:
             return _Taken(chain, samples, "after", 0, 1)
-        factor = max(1, int(np.ceil(samples.step / _FILTER_STEP - 1e-9)))
+        factor = 1
+        if chain.analogue:
+            factor = max(1, int(np.ceil(samples.step / _FILTER_STEP - 1e-9)))
         # Samples before a steady record, for filters to settle.
         lead = int(min(2.0 / samples.step, 20000)) if self.steady else 0
         fine = samples.step / factor
         samples = Samples(
             samples.start - lead * samples.step, fine, factor * (samples.count + lead - 1) + 1
         )
-        return _Taken(chain, samples, "moments" if chain.smooth else "mean", lead, factor)
+        at_jumps: AtJumps = "moments" if chain.smooth else "mean" if chain.analogue else "after"
+        return _Taken(chain, samples, at_jumps, lead, factor)
 
     def _behind(
         self, taken: _Taken, members: Sequence[Channel], values: FloatArray
@@ -225,8 +228,8 @@ class PercussionSetup:
         """The channels of a group behind its filters: (..., count) of a reader's (..., rows, k)."""
         kind, chain = members[0].kind, taken.chain
         if chain.filters:
-            filtered = apply_filters(chain, values, taken.samples.step)
-            values = np.ascontiguousarray(filtered[..., taken.factor * taken.lead :: taken.factor])
+            values = apply_filters(chain, values, taken.samples.step, taken.factor)
+            values = np.ascontiguousarray(values[..., taken.lead :])
         if kind.axes:
             values = chain.gain * (chain.turn @ values)
             return {c.name: values[..., AXES.index(c.axis or "x"), :] for c in members}
@@ -511,34 +514,43 @@ def predict(
     return {s.name: s.predict(model) for s in percussion_setups(robot, campaign)}
 
 
-# First- and second-order sensor filters, exact for straight lines between samples.
+# First- and second-order sensor filters; analogue ones exact for straight lines between samples.
 
 
-def apply_filters(chain: SensorChain, values: FloatArray, step: float) -> FloatArray:
+def apply_filters(
+    chain: SensorChain, values: FloatArray, step: float, factor: int = 1
+) -> FloatArray:
     """What is left of (c, k) values `step` s apart behind the chain's mount and filters.
 
     Before the first sample there is rest.
+
+    Args:
+        chain: the sensor.
+        values: (..., k) of the signal.
+        step: s.
+        factor: every so-manyth of them is a sample that is written down.
+
+    Returns:
+        (..., samples).
     """
     from scipy.signal import lfilter
 
     for b, a in _transfer_functions(chain):
         numerator, denominator = _first_order_hold(tuple(b), tuple(a), step)
         values = lfilter(numerator, denominator, values, axis=-1)
+    values = values[..., ::factor]
+    for kind, each in chain.passes(digital=True):
+        values = lfilter(*each.sampled(kind, factor * step), values, axis=-1)
     return values
 
 
-def _transfer_functions(chain: SensorChain) -> list[tuple[list[float], list[float]]]:
+def _transfer_functions(chain: SensorChain) -> list[tuple[FloatArray, FloatArray]]:
     """Numerators and denominators in s, highest power first."""
     found = []
     if chain.mount is not None and np.isfinite(chain.mount[0]):
         w, zeta = 2.0 * np.pi * chain.mount[0], chain.mount[1]
-        found.append(([w * w], [1.0, 2.0 * zeta * w, w * w]))
-    if chain.highpass is not None and chain.highpass > 0.0:
-        found.append(([1.0, 0.0], [1.0, 2.0 * np.pi * chain.highpass]))
-    if chain.lowpass is not None and np.isfinite(chain.lowpass):
-        w = 2.0 * np.pi * chain.lowpass
-        found.append(([w], [1.0, w]))
-    return found
+        found.append((np.array([w * w]), np.array([1.0, 2.0 * zeta * w, w * w])))
+    return found + [each.analogue(kind) for kind, each in chain.passes(digital=False)]
 
 
 @cache

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from datetime import datetime
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
@@ -12,7 +13,15 @@ from pydantic import Field
 from picchio.campaign.channels import AXES, Channel, ChannelKind, kinds, parse_channel
 from picchio.campaign.tables import CampaignExcitation, Direction, Pose, SampleRate, Tolerance
 from picchio.core.errors import InputError
-from picchio.core.toml import Finite, Name, NotNegative, Positive, StrictModel
+from picchio.core.toml import (
+    Finite,
+    Name,
+    NotNegative,
+    Positive,
+    StrictModel,
+    parse_toml,
+    read_toml,
+)
 from picchio.excitation.piecewise import Hits
 from picchio.excitation.table import catalogue, excitation_class
 from picchio.model.effects.effect import Effect
@@ -232,13 +241,68 @@ class Plan(StrictModel):
         self.excitation.overridden_by(CampaignExcitation(force=first.get("force"))).blows.build()
 
 
-def plan_toml(plan: Plan) -> str:
+class PlannedTest(StrictModel):
+    """One `[[test]]`: a record to be taken by hand.
+
+    Attributes:
+        kind: what it becomes in a campaign.
+        pose: rad or m, by joint name.
+        direction: of the pull or the blow, world, unit length.
+        force: N, how hard.
+        read_direction: the way in which the instrument reads, world; all axes where left out.
+        file: of the campaign, where the record goes.
+        minutes: 1, that it takes, with what must be set up for it.
+    """
+
+    kind: Literal["static", "frf"]
+    pose: Pose
+    direction: Direction
+    force: Positive
+    read_direction: Direction | None = None
+    file: Name
+    minutes: Positive
+
+
+class TestPlan(StrictModel):
+    """A plan of tests for stiffness, as `picchio plan` writes it.
+
+    Attributes:
+        robot: its name or file.
+        instruments: at hand.
+        test: the records, in the order in which to take them.
+        notes: free text.
+    """
+
+    robot: Name
+    instruments: list[Name]
+    test: list[PlannedTest]
+    notes: str | None = None
+
+
+def read_plan(path: str | Path) -> Plan:
+    """The plan of blows in a file.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        InputError: no such plan; one of tests that are done by hand.
+    """
+    if "test" in read_toml(path):
+        raise InputError(
+            "is a plan of tests for stiffness, which are done by hand", file=Path(path), key="test",
+            hint="fill in the form beside it; picchio identify reads it",
+        )  # fmt: skip
+    return parse_toml(path, Plan, format=FORMAT)
+
+
+def plan_toml(plan: Plan | TestPlan) -> str:
     """The plan as a file."""
     import tomlkit
 
     content = plan.model_dump(exclude_none=True, exclude_defaults=True)
-    tables = ("excitation", "tolerance", "sensor", "effect")
-    keys = sorted(content, key=lambda name: (name in tables, name in ("sensor", "effect")))
+    tables = ("excitation", "tolerance", "sensor", "effect", "test")
+    keys = sorted(content, key=lambda name: (name in tables, name in ("sensor", "effect", "test")))
     document = tomlkit.document()
     document |= {"format": FORMAT, **{key: content[key] for key in keys}}
     return tomlkit.dumps(document)

@@ -17,11 +17,10 @@ from picchio.core.errors import InputError
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.core.results import Result
-from picchio.core.toml import parse_toml
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 from picchio.prediction.percussion import PercussionSetup, percussion_setups
-from picchio.prediction.plan import FORMAT, Plan
+from picchio.prediction.plan import Plan, read_plan
 from picchio.robot.dynamics.pose import warn_beyond_limits
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.load import load_robot
@@ -110,7 +109,7 @@ def simulate(
     """
     loaded = load_robot(robot, flex=flex, tool=tool)
     file = None if isinstance(plan, Plan) else Path(plan)
-    asked = plan if isinstance(plan, Plan) else parse_toml(plan, Plan, format=FORMAT)
+    asked = plan if isinstance(plan, Plan) else read_plan(plan)
     if seed is not None:
         asked = asked.model_copy(update={"seed": seed})
     files = [*([] if file is None else [file]), *loaded.files]

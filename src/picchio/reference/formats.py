@@ -154,7 +154,9 @@ _TABLES: tuple[tuple[str, type[BaseModel], str, str], ...] = (
      "campaign.toml: measured records and what was programmed"),
     (plan.FORMAT, plan.Plan, "simulate; diagnose --plan",
      "a test to be done: poses, directions, sensors with their noise"),
-    (mapping.FORMAT, mapping.Mapping, "import",
+    (plan.FORMAT, plan.TestPlan, "plan",
+     "tests for stiffness, done by hand: what is set, pulled and read"),
+    (mapping.FORMAT, mapping.Mapping, "import, count",
      "how the series of a measured file become channels"),
     (saved_model.FORMAT, saved_model.SavedModel, "ROBOT; diagnose --model",
      "a robot, its sidecar and the effects that a diagnosis found"),
@@ -170,6 +172,7 @@ def _known() -> tuple[FileFormat, ...]:
     tables = []
     for format, table, command, meaning in _TABLES:
         name = format.removeprefix("picchio-").partition("/")[0]
+        name = "tests" if table is plan.TestPlan else name
         keys = (_format_key(format), *_keys(table))
         tables.append(FileFormat(name, format, "TOML", "input", meaning, command, keys))
     return (*tables, _record(), *_tests(), *_contracts(), _map())
@@ -232,7 +235,7 @@ def _contracts() -> Iterator[FileFormat]:
     shared = content.pop("shared")
     for name, entry in content.items():
         kind, role = entry.get("kind", "JSON"), entry.get("role", "output")
-        format = entry.get("format", f"picchio-{name}/1") if kind == "JSON" else ""
+        format = entry.get("format", f"picchio-{name}/1" if kind == "JSON" else "")
         keys = [_format_key(format)] if format else []
         for path, line in entry["keys"].items():
             keys += [_contract_key(*found) for found in _expanded(path, line, shared)]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ _NEAR = 0.15  # of the reach; places nearer along the arm than this are one part
 _HEIGHT = 0.05  # of the reach, the tool's above the plane that the robot stands on
 _AHEAD, _ASIDE = 0.25, 1.5  # in front: so much of the reach ahead, at most so many times it aside
 _SINGULAR = 0.3  # the share of the poses drawn that are nearest to a singular one
+_STANDING = 2  # so many of the first wishes are of how an arm can stand at all
 _FEW = 25  # poses that a wish must leave, or it is given up
 _SPREAD, _CLOSER = 0.5, 0.8  # of the reach, between two poses' tool points; then less and less
 
@@ -139,20 +141,42 @@ def default_poses(robot: FlexibleRobot, *, seed: int = 0) -> FloatArray:
     Raises:
         InputError: no joint moves the tool.
     """
+    drawn, order = _kept(robot, seed, None)
+    return drawn.whole(robot, order[_spread_out(drawn.tool[order] / drawn.reach)])
+
+
+def possible_poses(robot: FlexibleRobot, count: int, *, seed: int = 0) -> FloatArray:
+    """Poses in which an arm can stand, as far as its joints alone tell.
+
+    Drawn within the limits; no part of the arm near another, and none below the plane that it
+    stands on, unless that leaves few. Unlike `default_poses` stretched and folded ones, too.
+
+    Args:
+        robot: see `default_task`.
+        count: how many, at most 4000.
+        seed: of the draw.
+
+    Returns:
+        (m, nv) rad or m, to three decimals; fewer than `count` where there are no more.
+
+    Raises:
+        InputError: no joint moves the tool.
+    """
+    drawn, order = _kept(robot, seed, _STANDING)
+    return drawn.whole(robot, order[:count])
+
+
+def _kept(robot: FlexibleRobot, seed: int, wishes: int | None) -> tuple[_Drawn, NDArray[np.intp]]:
+    """Poses drawn, and which of them are as the first so many wishes (all: None) would have it."""
     chain = tool_chain(robot)
     if not len(chain.index):
         raise InputError("no joint moves the tool", key="tool", value=robot.tool_frame)
     drawn = _Drawn(chain, _draws(chain, seed), pin.rpy.rpyToMatrix(*robot.mounting.rpy))
     kept = np.ones(_DRAWN, dtype=bool)
-    for wish in drawn.wishes():
+    for wish in islice(drawn.wishes(), wishes):
         if (kept & wish).sum() >= _FEW:
             kept &= wish
-    order = np.flatnonzero(kept)
-    chosen = order[_spread_out(drawn.tool[order] / drawn.reach)]
-    rest = np.clip(np.zeros(len(robot.joint_names)), robot.lower, robot.upper)
-    poses = np.tile(rest, (len(chosen), 1))
-    poses[:, chain.index] = drawn.q[chosen]
-    return poses
+    return drawn, np.flatnonzero(kept)
 
 
 def _draws(chain: Chain, seed: int) -> FloatArray:
@@ -235,6 +259,13 @@ class _Drawn:
         yield (own[:, 0] > _AHEAD * self.reach) & (np.abs(own[:, 1]) < _ASIDE * own[:, 0])
         yield self.regular > np.quantile(self.regular, _SINGULAR)
         yield (self.tool_axis * self.away).sum(axis=1) > 0.0
+
+    def whole(self, robot: FlexibleRobot, chosen: NDArray[np.intp]) -> FloatArray:
+        """Some of the poses, (m, nv): joints that do not move the tool stand at rest."""
+        rest = np.clip(np.zeros(len(robot.joint_names)), robot.lower, robot.upper)
+        poses = np.tile(rest, (len(chosen), 1))
+        poses[:, self.chain.index] = self.q[chosen]
+        return poses
 
     @property
     def _foot(self) -> FloatArray:

@@ -7,50 +7,199 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.channels import TIME, parse_channel
-from picchio.campaign.importing import read_csv
+from picchio.campaign.importing.detect import implausible, told
 from picchio.campaign.importing.isolated import read_isolated
-from picchio.campaign.importing.mapping import ChannelTable, Mapping, read_mapping
+from picchio.campaign.importing.mapping import ChannelTable, Mapping, TimeTable, read_mapping
 from picchio.campaign.importing.raw import RawChannel, RawFile
-from picchio.campaign.importing.resample import common_clock
+from picchio.campaign.importing.readers import read_csv
+from picchio.campaign.importing.resample import clocked, common_clock
 from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, warn_user
 from picchio.core.files import locked, regular_file
 from picchio.core.provenance import provenance
 from picchio.core.results import Result
 
-_ISOLATED = {kind: f"picchio.campaign.importing.read_{kind}" for kind in ("uff", "mcap", "matlab")}
-_ENDINGS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".uff": "uff", ".unv": "uff",
-            ".mcap": "mcap", ".mat": "matlab"}  # fmt: skip
+_ROOM = "picchio.campaign.importing.readers"
+_ISOLATED = {
+    "uff": "read_uff", "mcap": "read_mcap", "matlab": "read_matlab", "bag": "read_bag",
+    "parquet": "read_parquet", "npz": "read_npz", "json-lines": "read_json_lines",
+    "lvm": "read_lvm",
+}  # fmt: skip
+ENDINGS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".dat": "csv", ".uff": "uff",
+            ".unv": "uff", ".mcap": "mcap", ".mat": "matlab", ".parquet": "parquet",
+            ".bag": "bag", ".db3": "bag", ".lvm": "lvm", ".npz": "npz", ".jsonl": "json-lines",
+            ".ndjson": "json-lines"}  # fmt: skip
 
 # s that an import waits for another one into the same campaign.
 _PATIENCE = 60.0
+_BLOCK = 1 << 17  # samples
+
+
+def kind_of(path: Path, mapping: Mapping | None = None) -> str:
+    """The kind of a foreign file, as the mapping or its ending says.
+
+    Args:
+        path: the file.
+        mapping: its `[source] kind` counts.
+
+    Raises:
+        InputError: neither says.
+    """
+    kind = (mapping.source.kind if mapping else None) or ENDINGS.get(path.suffix.lower())
+    if kind is None:
+        raise InputError("the kind of file is not known by its ending", file=path,
+                         value=path.suffix, choices=ENDINGS,
+                         hint="or say [source] kind in the mapping")  # fmt: skip
+    return kind
 
 
 def read_raw(path: str | Path, mapping: Mapping | None = None) -> RawFile:
     """The series of a foreign file.
 
+    Args:
+        path: the file.
+        mapping: how it is written, and which time to take.
+
+    Returns:
+        all of its series.
+
     Raises:
         InputError: missing, of an unknown kind, or not readable.
     """
     source = regular_file(path)
-    kind = (mapping.source.kind if mapping else None) or _ENDINGS.get(source.suffix.lower())
-    if kind is None:
-        raise InputError("the kind of file is not known by its ending", file=source,
-                         value=source.suffix, choices=_ENDINGS,
-                         hint="or say [source] kind in the mapping")  # fmt: skip
-    if kind not in _ISOLATED:
+    kind = kind_of(source, mapping)
+    if kind == "csv":
         return read_csv.read(source, mapping)
-    clock = mapping.time.model_dump() if mapping else {}
-    return read_isolated(_ISOLATED[kind], source, clock)
+    clock = mapping.time.model_dump(mode="json") if mapping else {}
+    return read_isolated(f"{_ROOM}.{_ISOLATED[kind]}", source, clock)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Detection(Result):
+    """What a file seems to be.
+
+    Attributes:
+        raw: the file.
+        lines: a sentence each: layout, clock, rate, gaps.
+    """
+
+    raw: RawFile
+    lines: tuple[str, ...]
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """The lines to print, the file's name and series first."""
+        names = ", ".join(self.raw.channels)
+        head = f"{self._headline()}: {names}"
+        return (head, *(f"  {line}" for line in self.lines))
+
+    def _headline(self) -> str:
+        return f"{self.raw.path.name}: {self.raw.kind}, {len(self.raw.channels)} series"
+
+    def _content(self) -> dict[str, Any]:
+        return {
+            "format": "picchio-detection/1",
+            "file": self.raw.path,
+            "kind": self.raw.kind,
+            "detected": list(self.lines),
+            "series": [
+                {"name": c.name, "samples": c.values.size, "unit": c.unit, "channel": c.suggestion,
+                 "rate": None if c.time is None or c.time.size < 2 else
+                 1.0 / float(np.median(np.diff(c.time)))}
+                for c in self.raw.channels.values()
+            ],
+            "provenance": provenance([self.raw.path]),
+        }  # fmt: skip
+
+
+def detection(path: str | Path, mapping: Mapping | None = None) -> Detection:
+    """What a file seems to be: its layout, series, clock, rate and gaps.
+
+    Args:
+        path: the file.
+        mapping: what is known already.
+
+    Raises:
+        InputError: the file can't be read.
+    """
+    raw = read_raw(path, mapping)
+    try:
+        raw = clocked(raw, mapping.time if mapping else TimeTable())
+        lines = list(raw.detected)
+    except InputError as error:
+        lines = [*raw.detected, f"no clock: {error.problem}"]
+    clocks: dict[bytes, str] = {}
+    for channel in raw.channels.values():
+        if channel.time is not None and channel.time.size > 1:
+            ns = np.rint(channel.time * 1e9).astype(np.int64)
+            clocks.setdefault(ns.tobytes(), f"{channel.name}: {', '.join(told(raw, ns, False))}")
+    if not any(line.startswith("rate ") for line in lines):
+        lines += clocks.values()
+    return Detection(raw, tuple(lines))
+
+
+def joined(raw: RawFile, mapping: Mapping, mapping_file: Path | None = None) -> RawFile:
+    """The file with its clock, and the files that the mapping joins to it, on one clock.
+
+    Args:
+        raw: the first file.
+        mapping: its clock, and what is joined.
+        mapping_file: for messages.
+
+    Returns:
+        the series of all of them, those of a joined file named "<name>:<series>".
+
+    Raises:
+        InputError: a file that can't be read, or whose clock does not tell when it was at zero
+            while the other's does.
+    """
+    own = {s for _, _, parts, _ in mapping.entries for s in parts if s in raw.channels}
+    own |= {entry.series for entry in mapping.filter if entry.series in raw.channels}
+    first = clocked(raw, mapping.time, mapping_file, own)
+    for table in mapping.join:
+        name = table.file.replace("{stem}", raw.path.stem)
+        path = regular_file(raw.path.parent / name)
+        rules = Mapping(source=table.source, time=table.time, channel=mapping.channel,
+                        coupling=mapping.coupling)  # fmt: skip
+        other = clocked(read_raw(path, _only(rules, table.name)), table.time, mapping_file)
+        if (first.epoch is None) != (other.epoch is None):
+            raise InputError("one of the two files says when its clock was at zero, the other "
+                             "does not", file=path, hint="give its [time] start")  # fmt: skip
+        shift = table.shift
+        if first.epoch is not None and other.epoch is not None:
+            shift += (other.epoch - first.epoch) * 1e-9
+        more = {
+            f"{table.name}:{key}": replace(
+                c, name=f"{table.name}:{key}", time=None if c.time is None else c.time + shift
+            )
+            for key, c in other.channels.items()
+        }
+        lines = tuple(f"{path.name}: {line}" for line in other.detected)
+        first = replace(first, channels={**first.channels, **more},
+                        detected=(*first.detected, *lines))  # fmt: skip
+    return first
+
+
+def _only(mapping: Mapping, name: str) -> Mapping:
+    """The mapping with the series of a joined file, as that file names them."""
+    entries = [
+        ChannelTable(series=s.partition(":")[2], to="force")
+        for _, _, parts, _ in mapping.entries
+        for s in parts
+        if s.startswith(f"{name}:")
+    ]
+    return mapping.model_copy(update={"channel": entries, "coupling": []})
 
 
 def read_mapped(
     path: str | Path, mapping: Mapping, *, file: str | None = None, mapping_file: Path | None = None
 ) -> Campaign:
-    """Read a foreign file as a campaign of one record, in memory.
+    """Read a foreign file as a campaign of one record, in memory; of several where it has gaps.
 
     Args:
         path: the file.
@@ -58,35 +207,90 @@ def read_mapped(
         file: the record's name; the file's own with .csv where None.
         mapping_file: for messages.
 
+    Returns:
+        the campaign.
+
     Raises:
         InputError: the file can't be read, or the mapping does not fit it.
     """
-    raw = read_raw(path, mapping)
-    series = [
-        raw.channel(entry.series, mapping=mapping_file, key=f"channel[{i}].from")
-        for i, entry in enumerate(mapping.channel)
-    ]
-    time, values = common_clock(raw, mapping.time, series, mapping_file)
-    channels, units = {}, {}
-    for entry, stored in zip(mapping.channel, values, strict=True):
-        if entry.to in channels:
-            raise InputError("two series become this channel", file=mapping_file, key=entry.to)
-        channels[entry.to], units[entry.to] = _converted(
-            entry, raw.channels[entry.series], stored, time, mapping_file
-        )
+    return _read_mapped(path, mapping, file, mapping_file)[0]
+
+
+def _read_mapped(
+    path: str | Path, mapping: Mapping, file: str | None, mapping_file: Path | None
+) -> tuple[Campaign, tuple[str, ...]]:
+    """The campaign, and what was detected."""
+    if not mapping.entries:
+        raise InputError("needs a [[channel]] or a [[coupling]]", file=mapping_file)
+    raw = joined(read_raw(path, mapping), mapping, mapping_file)
+    used: dict[str, RawChannel] = {}
+    for key, _, parts, _ in mapping.entries:
+        for series in parts:
+            used[series] = raw.channel(series, mapping=mapping_file, key=key)
+    pieces = common_clock(raw, mapping.time, list(used.values()), mapping_file, mapping.filter)
     table = dict(mapping.record)
     if raw.taken is not None:
         table.setdefault("time", raw.taken)
     name = file or f"{Path(path).stem}.csv"
+    stem, _, ending = name.rpartition(".")
+    records = []
+    for count, (time, values) in enumerate(pieces, start=1):
+        own = name if count == 1 else f"{stem}-{count}.{ending}"
+        channels, units = _channels(mapping, raw, dict(zip(used, values, strict=True)), time,
+                                    mapping_file)  # fmt: skip
+        try:
+            records.append(Record.from_arrays(own, time, channels, units=units, **table))
+        except InputError as error:
+            if error.file is not None:
+                raise
+            raise InputError(str(error), file=mapping_file or path) from None
     try:
-        record = Record.from_arrays(name, time, channels, units=units, **table)
-        campaign = Campaign.from_records([record], **mapping.campaign)
+        campaign = Campaign.from_records(records, **mapping.campaign)
     except InputError as error:
         if error.file is not None:
             raise
         raise InputError(str(error), file=mapping_file or path) from None
-    record.check_samples()
-    return campaign
+    for record in records:
+        record.check_samples()
+    lines = raw.detected
+    if len(records) > 1:
+        lines = (*lines, f"split at its gaps into {len(records)} records")
+    return campaign, lines
+
+
+def _channels(
+    mapping: Mapping,
+    raw: RawFile,
+    values: dict[str, FloatArray],
+    time: FloatArray,
+    file: Path | None,
+) -> tuple[dict[str, FloatArray], dict[str, str]]:
+    """The channels that series become, SI, and their units."""
+    channels: dict[str, FloatArray] = {}
+    units: dict[str, str] = {}
+    for _, to, parts, entry in mapping.entries:
+        if to in channels:
+            raise InputError("two series become this channel", file=file, key=to)
+        stored = combined(values, parts)
+        first = raw.channels[next(iter(parts))]
+        channels[to], units[to] = _converted(entry, first, stored, time, file)
+    return channels, units
+
+
+def combined(values: dict[str, FloatArray], parts: dict[str, float]) -> FloatArray:
+    """Series added up; one of factor 1 as it is.
+
+    Args:
+        values: by series.
+        parts: {series: factor}.
+
+    Returns:
+        (m,) their sum.
+    """
+    if len(parts) == 1 and next(iter(parts.values())) == 1.0:
+        return values[next(iter(parts))]
+    total: FloatArray = sum(factor * values[series] for series, factor in parts.items())  # type: ignore[assignment]
+    return total
 
 
 def _converted(
@@ -97,6 +301,8 @@ def _converted(
         channel, convert = parse_channel(entry.to, entry.unit or raw.unit)
     except InputError as error:
         raise error.placed(file=file, key=f"{entry.series} -> {entry.to}") from None
+    if problem := implausible(replace(raw, values=convert(values)), entry.to):
+        warn_user(f"{file or 'mapping'}: {problem}")
     if channel.name == TIME:
         raise InputError("the time is no channel; see [time]", file=file, key=entry.to)
     if entry.scale != 1.0:
@@ -120,15 +326,19 @@ class ImportedRecord(Result):
     Attributes:
         campaign: as it stands on disk; in memory where nothing was to be written.
         origin: provenance of this record.
+        detected: what was found out about the file, a sentence each.
+        records_added: how many records the file became: its gaps divide it.
     """
 
     campaign: Campaign
     origin: dict[str, Any]
+    detected: tuple[str, ...] = ()
+    records_added: int = 1
 
     @property
     def record(self) -> Record:
-        """The record that was imported."""
-        return self.campaign.records[-1]
+        """The record that was imported; of several, the first."""
+        return self.campaign.records[-self.records_added]
 
     def _headline(self) -> str:
         clock = self.record.clock
@@ -145,6 +355,8 @@ class ImportedRecord(Result):
             "channels": list(self.record.channels),
             "samples": self.record.clock.samples,
             "sample_rate": self.record.clock.rate,
+            "records": [r.file for r in self.campaign.records[-self.records_added :]],
+            "detected": list(self.detected),
             "provenance": self.origin,
         }
 
@@ -157,7 +369,9 @@ def import_record(
     name: str | None = None,
     append: bool = False,
 ) -> ImportedRecord:
-    """Import a file of another format (UFF 58, MCAP, MATLAB, CSV) as a record of a campaign.
+    """Import a file of another format as a record of a campaign; of several where it has gaps.
+
+    CSV of any habit, Parquet, MCAP, ROS 2 .db3, ROS 1 .bag, UFF 58, MATLAB, .lvm, .npz, JSON lines.
 
     Args:
         file: the file.
@@ -184,17 +398,18 @@ def import_record(
             hint=f"`picchio import {source} --write-mapping mapping.toml` writes one to edit",
         )
     rules = Path(mapping)
-    new = read_mapped(source, read_mapping(rules), file=name, mapping_file=rules)
+    new, found = _read_mapped(source, read_mapping(rules), name, rules)
+    added = len(new.records)
     origin = provenance([source, rules])
     if to is None:
-        return ImportedRecord(_noted(new, origin), origin)
+        return ImportedRecord(_noted(new, origin), origin, found, added)
     extra = {"mapping.toml": rules.read_bytes()}
     # Two that append at once would each add to the campaign as it was before.
     with locked(Path(to), patience=_PATIENCE) if Path(to).parent.is_dir() else nullcontext():
         if append:
             new, extra = _appended(new, Path(to), extra["mapping.toml"])
         made = _noted(new, origin).save(to, overwrite=append, extra_files=extra)
-    return ImportedRecord(made, origin)
+    return ImportedRecord(made, origin, found, added)
 
 
 def _appended(new: Campaign, to: Path, mapping: bytes) -> tuple[Campaign, dict[str, bytes]]:

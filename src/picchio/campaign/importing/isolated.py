@@ -115,6 +115,8 @@ def child(module: str, path: str, out: str, clock: str) -> None:
     told = {
         "kind": found.kind,
         "taken": found.taken and found.taken.isoformat(),
+        "epoch": found.epoch,
+        "detected": found.detected,
         "series": series,
         "warnings": said,
     }
@@ -137,7 +139,7 @@ def _unpacked(path: Path, stored: Path) -> RawFile:
         both = {name: arrays.get(entry[name]) for name in ("values", "time")}
         channels[entry["name"]] = RawChannel(**entry | both)
     taken = told["taken"] and datetime.fromisoformat(told["taken"])
-    return RawFile(path, told["kind"], channels, taken)
+    return RawFile(path, told["kind"], channels, taken, told["epoch"], tuple(told["detected"]))
 
 
 def _warn(messages: Sequence[str]) -> None:

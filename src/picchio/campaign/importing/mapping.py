@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from picchio.campaign.tables import FreeTable, SampleRate
-from picchio.core.toml import Finite, StrictModel, parse_toml
+from picchio.core.toml import Finite, FiniteVector, Positive, StrictModel, parse_toml
 
 FORMAT = "picchio-mapping/1"
-FileKind = Literal["csv", "uff", "mcap", "matlab"]
+FileKind = Literal["csv", "uff", "mcap", "matlab", "parquet", "bag", "lvm", "npz", "json-lines"]
+KINDS: tuple[FileKind, ...] = get_args(FileKind)
 
 
 def _one_letter(value: str) -> str:
@@ -23,12 +25,16 @@ def _one_letter(value: str) -> str:
 class SourceTable(StrictModel):
     """`[source]`: how the file is written; all but `kind` is for CSV.
 
+    Where no key but `kind` is given, the layout of a CSV file is detected.
+
     Attributes:
         kind: of file; told by its ending where left out.
-        delimiter: one letter between columns.
+        delimiter: one letter between columns; a blank for any run of blanks.
         decimal: sign of decimal numbers.
         skip_lines: lines before the header (or the first sample).
         header: whether a line names the columns; without one they are "1", "2", ...
+        units: whether a line below the header states the units.
+        comment: lines that begin with this are left out.
     """
 
     kind: FileKind | None = None
@@ -36,27 +42,109 @@ class SourceTable(StrictModel):
     decimal: Literal[".", ","] = "."
     skip_lines: Annotated[int, Field(ge=0, strict=True)] = 0
     header: bool = True
+    units: bool = False
+    comment: str | None = None
+
+    @property
+    def stated(self) -> bool:
+        """Whether the mapping says how a table is written."""
+        return bool(self.model_fields_set - {"kind"})
+
+
+Moment = datetime | Finite
+"""A date and time (UTC where it has no zone), or s in the file's own time."""
 
 
 class TimeTable(StrictModel):
     """`[time]`: where the clock comes from.
 
     Attributes:
-        series: the series that holds the time, in `unit`; not for UFF and MCAP, which have one.
-        unit: of the series.
+        series: the series that holds the time; found by its name where neither it nor `rate` is
+            given and the file has no clock of its own.
+        unit: of the series: s, ms, us, ns; told by the name, or by the size of the stamps, where
+            left out. Dates as text need none.
         rate: Hz, sample rate where there is no time series, or the rate to resample to.
         zero: s, the time in the file that becomes t = 0 (the first edge of the first blow). With
-            `rate` alone the first sample is at 0; UFF and MCAP files state the time of theirs.
+            `rate` alone the first sample is at 0; UFF and MCAP files state the time of theirs;
+            stamps that count from 1970 begin at 0 where no zero is given.
         resample: "linear" interpolates uneven time stamps onto an even clock of `rate`.
-        stamp: MCAP only: the message header's stamp, or the time it was logged.
+        stamp: MCAP and bags: the message header's stamp, or the time it was logged.
+        gaps: "split" makes a record of each stretch between dropouts, "refuse" takes none.
+        start: when a clock that does not count from 1970 was at zero.
+        begin, end: s, or a date and time: what lies before or after is left out.
     """
 
     series: str | None = None
-    unit: str = "s"
+    unit: str | None = None
     rate: SampleRate | None = None
     zero: Finite = 0.0
     resample: Literal["linear"] | None = None
     stamp: Literal["header", "log"] = "header"
+    gaps: Literal["split", "refuse"] = "split"
+    start: datetime | None = None
+    begin: Moment | None = None
+    end: Moment | None = None
+
+
+class FilterTable(StrictModel):
+    """One `[[filter]]`: only samples at which a series lies within bounds are taken.
+
+    Attributes:
+        series: of the file.
+        least: 1, smallest value, as stored.
+        most: 1, largest value, as stored.
+    """
+
+    series: str
+    least: Finite | None = None
+    most: Finite | None = None
+
+
+class CouplingTable(StrictModel):
+    """One `[[coupling]]`: joints of the URDF, value = matrix (a controller's axes) + offset.
+
+    Attributes:
+        kind: of the channels: position, motor_position, velocity, torque, ...
+        joints: of the URDF, one a row of the matrix.
+        series: of the file, one a column.
+        matrix: 1, a row a joint: [0, -1, -1] is minus the second axis minus the third.
+        offset: 1, added to each joint, in `unit`.
+        unit: of the series; the file's, or else the channel's SI unit, where left out.
+    """
+
+    kind: str = "position"
+    joints: list[str] = Field(min_length=1)
+    series: list[str] = Field(alias="from", min_length=1)
+    matrix: list[list[Finite]]
+    offset: list[Finite] | None = None
+    unit: str | None = None
+
+    @model_validator(mode="after")
+    def _shaped(self) -> CouplingTable:
+        rows, columns = len(self.joints), len(self.series)
+        if len(self.matrix) != rows or any(len(row) != columns for row in self.matrix):
+            raise ValueError(f"the matrix must have {rows} rows of {columns} numbers")
+        if self.offset is not None and len(self.offset) != rows:
+            raise ValueError(f"the offset must have {rows} numbers")
+        return self
+
+
+class JoinTable(StrictModel):
+    """One `[[join]]`: another file of the same time; its series are named "<name>:<series>".
+
+    Attributes:
+        name: before the colon.
+        file: relative to the first one; {stem} stands for the first one's name without ending.
+        source: how it is written.
+        time: its clock; `series`, `unit`, `rate`, `stamp` and `start` count.
+        shift: s, added to its clock.
+    """
+
+    name: Annotated[str, Field(min_length=1)]
+    file: Annotated[str, Field(min_length=1)]
+    source: SourceTable = SourceTable()
+    time: TimeTable = TimeTable()
+    shift: Finite = 0.0
 
 
 class ChannelTable(StrictModel):
@@ -82,6 +170,29 @@ class ChannelTable(StrictModel):
     remove: Literal["mean", "quiet"] | None = None
 
 
+class BlowsTable(StrictModel):
+    """`[blows]`: how `picchio count` finds blows in the channels.
+
+    Attributes:
+        threshold: N (m/s^2 of an accelerometer, the channel's unit of a trigger), a blow exceeds
+            it; a fifth of the task's force where left out.
+        foot: N, as the threshold: below it a blow is over; a tenth of the threshold where left out.
+        direction: 1, of the tool's force on the robot, where one channel holds it.
+        frame: the direction's axes, and those of `force.x`, `.y`, `.z`: "tool" turns with the tool
+            frame.
+        trigger: the channel `trigger` is above the threshold while the tool works ("on"), or
+            passes it at each blow ("blow").
+        operation: of the task: whose blows are assumed where none are seen.
+    """
+
+    threshold: Positive | None = None
+    foot: Positive | None = None
+    direction: FiniteVector | None = None
+    frame: Literal["tool", "world"] = "tool"
+    trigger: Literal["on", "blow"] = "on"
+    operation: str | None = None
+
+
 class Mapping(StrictModel):
     """A mapping file.
 
@@ -89,15 +200,47 @@ class Mapping(StrictModel):
         source: how the file is written.
         time: its clock.
         channel: which series becomes which channel, one table for each.
+        coupling: joints whose angles follow from several of the controller's axes.
+        filter: which samples are taken; all of them must hold.
+        join: other files of the same time.
         record: keys of the campaign's `[[record]]`: kind, pose, direction, ...
         campaign: the campaign's other keys: robot, tool, excitation, ...
+        blows: how `picchio count` finds blows; no import uses it.
     """
 
     source: SourceTable = SourceTable()
     time: TimeTable = TimeTable()
-    channel: list[ChannelTable] = Field(min_length=1)
+    channel: list[ChannelTable] = Field(default_factory=list)
+    coupling: list[CouplingTable] = Field(default_factory=list)
+    filter: list[FilterTable] = Field(default_factory=list)
+    join: list[JoinTable] = Field(default_factory=list)
     record: FreeTable = Field(default_factory=dict)
     campaign: FreeTable = Field(default_factory=dict)
+    blows: BlowsTable | None = None
+
+    @model_validator(mode="after")
+    def _something(self) -> Mapping:
+        if not self.channel and not self.coupling:
+            raise ValueError("needs a [[channel]] or a [[coupling]]")
+        return self
+
+    @property
+    def entries(self) -> list[tuple[str, str, dict[str, float], ChannelTable]]:
+        """What becomes of which series: its key in the file, {series: factor}, how it is taken."""
+        found = [
+            (f"channel[{i}].from", {entry.series: 1.0}, entry)
+            for i, entry in enumerate(self.channel)
+        ]
+        for i, table in enumerate(self.coupling):
+            offsets = table.offset or [0.0] * len(table.joints)
+            for joint, row, offset in zip(table.joints, table.matrix, offsets, strict=True):
+                parts = {s: f for s, f in zip(table.series, row, strict=True) if f}
+                entry = ChannelTable(
+                    series=table.series[0], to=f"{table.kind}.{joint}", unit=table.unit,
+                    offset=offset,
+                )  # fmt: skip
+                found.append((f"coupling[{i}].from", parts or {table.series[0]: 0.0}, entry))
+        return [(key, entry.to, parts, entry) for key, parts, entry in found]
 
 
 def read_mapping(path: str | Path) -> Mapping:

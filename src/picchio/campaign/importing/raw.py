@@ -16,7 +16,8 @@ class RawChannel:
 
     Attributes:
         name: unique in its file.
-        values: (m,) float64, as stored.
+        values: (m,) float64, as stored (int64 where a float would lose digits); NaN where a
+            table's cell is empty.
         time: (m,) s from the file's beginning, where the format itself says; else None.
         unit: as the file says, or None.
         suggestion: the contract's channel it seems to be, or None.
@@ -37,15 +38,19 @@ class RawFile:
 
     Attributes:
         path: the file.
-        kind: "csv", "uff", "mcap" or "matlab".
+        kind: one of `picchio.campaign.importing.mapping.KINDS`.
         channels: by name.
         taken: when it was recorded, where the format says.
+        epoch: ns from 1970 to zero of the channels' times, where the file says.
+        detected: what was found out about the file, a sentence each.
     """
 
     path: Path
     kind: str
     channels: dict[str, RawChannel]
     taken: datetime | None = None
+    epoch: int | None = None
+    detected: tuple[str, ...] = ()
 
     def channel(self, name: str, *, mapping: Path | None = None, key: str = "from") -> RawChannel:
         """A series by name.

@@ -1,28 +1,186 @@
-"""Series with stamps of their own onto one even clock."""
+"""Series with stamps of their own onto even clocks, a stretch between dropouts at a time."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
 from picchio.campaign.clock import TOLERANCE, not_seconds
-from picchio.campaign.importing.mapping import TimeTable
+from picchio.campaign.importing import detect
+from picchio.campaign.importing.mapping import FilterTable, TimeTable
 from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.campaign.units import conversion
-from picchio.core.arrays import FloatArray
-from picchio.core.errors import InputError
+from picchio.core.arrays import BoolArray, FloatArray
+from picchio.core.errors import InputError, warn_user
 
 # A hole of more usual steps than this is a dropout, over which nothing may be drawn.
 _LARGEST_GAP = 5.0
 # Straight lines between stamps hold nothing that is this many times as fast.
 _FASTER = 20.0
+# A stated rate that is off by more than this from the stamps' is told.
+_OFF = 0.01
+_A_DATE = 1e8  # s from 1970: a zero beyond is a date
+Piece = tuple[FloatArray, list[FloatArray]]
+
+
+def clocked(
+    raw: RawFile, asked: TimeTable, mapping: Path | None = None, names: set[str] | None = None
+) -> RawFile:
+    """The file with a time for every series, s, and what its clock is.
+
+    Args:
+        raw: the file.
+        asked: the mapping's `[time]`.
+        mapping: its file, for messages.
+        names: of the series that need one; all where None.
+
+    Raises:
+        InputError: no clock, an unknown series or unit, stamps that do not ascend.
+    """
+    wanted = set(raw.channels) if names is None else names & set(raw.channels)
+    own = all(raw.channels[name].time is not None for name in wanted)
+    lines, epoch = list(raw.detected), raw.epoch
+    time: FloatArray | None = None
+    found = None if own and asked.series is None else detect.clock(raw, asked.series)
+    needed = asked.rate is None and not own
+    if asked.series is not None:
+        raw.channel(asked.series, mapping=mapping, key="time.series")
+    elif found is not None and asked.rate is not None and asked.resample is None:
+        # A column without a name that ascends may be anything.
+        rate = 1.0 / (_step(raw, found) or np.inf)
+        if abs(rate / asked.rate - 1.0) > _OFF and not found.series.isdigit():
+            warn_user(f"{raw.path}: [time] rate is {asked.rate:g} Hz, the stamps in "
+                      f"{found.series!r} tell {rate:.6g} Hz")  # fmt: skip
+        found = None
+    if asked.series is not None or needed or found is not None:
+        if asked.unit is None or asked.series is None:
+            found = detect.require(found, raw)
+        name = asked.series or (found.series if found else "")
+        if asked.unit is None:
+            assert found is not None
+            unit, dates = found.unit, found.dates
+            lines.append(f"time in {name!r}, unit {unit}, {found.why}")
+        else:
+            try:
+                scale = conversion(asked.unit, ("s",))[1].scale
+            except InputError as error:
+                raise error.placed(file=mapping, key="time.unit") from None
+            unit = min(detect.SCALES, key=lambda u: abs(np.log(detect.SCALES[u] / scale)))
+            if not np.isclose(detect.SCALES[unit], scale, rtol=1e-6):
+                raise InputError("is no unit of stamps", file=mapping, key="time.unit",
+                                 value=asked.unit, choices=detect.SCALES)  # fmt: skip
+            dates = _counts(raw.channels[name], unit)
+        stamps = raw.channels[name].values
+        if stamps.size < 2:
+            raise InputError("holds fewer than two samples", file=raw.path, key=name)
+        known = np.isfinite(stamps) if stamps.dtype.kind == "f" else np.ones(stamps.size, bool)
+        rises = np.diff(stamps) > 0
+        if not known.all() or not rises.all():
+            bad = int(np.flatnonzero(~(rises & known[1:] & known[:-1]))[0]) + 1
+            raise InputError(f"the stamps do not ascend (sample {bad + 1})", file=raw.path,
+                             key=name, value=float(stamps[bad]))  # fmt: skip
+        if dates:
+            ns = detect.ns_of(stamps, unit)
+            epoch = int(ns[0])
+            time = (ns - ns[0]) * 1e-9
+            lines += detect.told(raw, ns, True)
+        else:
+            scale = detect.SCALES[unit]
+            time = stamps * 1.0 if scale == 1.0 else stamps * scale
+            step = float(np.median(np.diff(time)))
+            if problem := not_seconds(time[0], step, scale):
+                raise InputError(problem, file=raw.path, key=name)
+            lines += detect.told(raw, np.rint((time - time[0]) * 1e9).astype(np.int64), False)
+    if asked.start is not None and epoch is None:
+        epoch = detect.nanoseconds(asked.start)
+    channels = dict(raw.channels)
+    for name in wanted:
+        entry = channels[name]
+        stamp = time if time is not None else entry.time
+        if stamp is None:
+            assert asked.rate is not None
+            stamp = np.arange(entry.values.size) / asked.rate
+        if stamp.size != entry.values.size:
+            raise InputError(f"has {entry.values.size} samples and its clock {stamp.size}",
+                             file=raw.path, key=name)  # fmt: skip
+        channels[name] = replace(entry, time=stamp)
+    taken = raw.taken
+    if taken is None and epoch is not None and asked.start is None:
+        taken = datetime.fromtimestamp(epoch / 1e9, UTC)
+    return replace(raw, channels=channels, taken=taken, epoch=epoch, detected=tuple(lines))
+
+
+def _step(raw: RawFile, found: detect.FoundClock) -> float:
+    """s, the usual step of a clock."""
+    return float(np.median(np.diff(raw.channels[found.series].values))) * detect.SCALES[found.unit]
+
+
+def _counts(channel: RawChannel, unit: str) -> bool:
+    """Whether stamps in this unit count from 1970."""
+    found = detect.ns_of(channel.values[:1], unit) if channel.values.size else np.zeros(0)
+    low, high = detect._DATES
+    return bool(found.size) and low <= int(found[0]) <= high
+
+
+def taken_samples(
+    raw: RawFile, series: RawChannel, asked: TimeTable, filters: list[FilterTable],
+    mapping: Path | None,
+) -> BoolArray:  # fmt: skip
+    """(m,) whether each sample lies in the window and passes the filters.
+
+    A filter's series on another clock holds its last sample until the next.
+
+    Args:
+        raw: the file, clocked.
+        series: one of it.
+        asked: `[time]`.
+        filters: all must hold.
+        mapping: for messages.
+
+    Raises:
+        InputError: an unknown series; a date for a file without one.
+    """
+    assert series.time is not None
+    kept = np.isfinite(series.values) if series.values.dtype.kind == "f" else np.ones(
+        series.values.size, bool
+    )  # fmt: skip
+    for key, after in (("begin", True), ("end", False)):
+        moment = getattr(asked, key)
+        if moment is None:
+            continue
+        if isinstance(moment, datetime):
+            if raw.epoch is None:
+                raise InputError("the file states no date; give s in its own time", file=mapping,
+                                 key=f"time.{key}", value=str(moment))  # fmt: skip
+            moment = (detect.nanoseconds(moment) - raw.epoch) * 1e-9
+        kept = kept & ((series.time >= moment) if after else (series.time <= moment))
+    for i, entry in enumerate(filters):
+        other = raw.channel(entry.series, mapping=mapping, key=f"filter[{i}].series")
+        held = np.ones(other.values.size, bool)
+        if entry.least is not None:
+            held &= other.values >= entry.least
+        if entry.most is not None:
+            held &= other.values <= entry.most
+        if other.time is series.time or np.array_equal(other.time, series.time):  # type: ignore[arg-type]
+            kept = kept & held
+        else:
+            assert other.time is not None
+            at = np.searchsorted(other.time, series.time, side="right") - 1
+            kept = kept & np.where(at >= 0, held[np.maximum(at, 0)], False)
+    return kept
 
 
 def common_clock(
-    raw: RawFile, asked: TimeTable, series: list[RawChannel], mapping: Path | None
-) -> tuple[FloatArray, list[FloatArray]]:
-    """One even clock for all series, and their values on it.
+    raw: RawFile,
+    asked: TimeTable,
+    series: list[RawChannel],
+    mapping: Path | None,
+    filters: list[FilterTable] | None = None,
+) -> list[Piece]:
+    """One even clock for all series, and their values on it, for each stretch without a dropout.
 
     Series that share an even clock pass unchanged, bit for bit. Others are drawn by straight
     lines between their stamps onto a clock of the rate asked for, over the time they have in
@@ -30,85 +188,98 @@ def common_clock(
     thinned.
 
     Args:
-        raw: the file.
+        raw: the file, clocked.
         asked: the mapping's `[time]`.
         series: those of the file that are imported.
         mapping: its file, for messages.
+        filters: which samples are taken.
 
     Raises:
         InputError: stamps that differ, are uneven or out of order and no resampling is asked
-            for; no stamps, or a rate that is missing; a dropout; no time in common.
+            for; no stamps, or a rate that is missing; a dropout that is to be refused; no time in
+            common.
     """
     file, rate = raw.path, asked.rate
-    stamps, scale = _stamps(raw, asked, series, mapping)
-    for stamp, entry in zip(stamps, series, strict=True):
+    zero = asked.zero
+    if raw.epoch is not None and zero > _A_DATE:
+        zero -= raw.epoch * 1e-9
+    whole, kept = [], []
+    for entry in series:
+        assert entry.time is not None
+        take = taken_samples(raw, entry, asked, filters or [], mapping)
+        stamp, values = entry.time, entry.values
+        if not take.all():
+            stamp, values = stamp[take], values[take]
         if stamp.size < 2:
             raise InputError("holds fewer than two samples", file=file, key=entry.name)
         if not np.isfinite(stamp).all() or not (np.diff(stamp) > 0.0).all():
             bad = int(np.flatnonzero(~(np.diff(stamp) > 0.0))[0]) + 1
             raise InputError(f"the stamps do not ascend (sample {bad + 1})", file=file,
                              key=entry.name)  # fmt: skip
-        if problem := not_seconds(stamp[0] - asked.zero, float(np.median(np.diff(stamp))), scale):
+        if problem := not_seconds(stamp[0] - zero, float(np.median(np.diff(stamp)))):
             raise InputError(problem, file=file, key=asked.series or entry.name)
-    first = stamps[0]
-    same = all(stamp is first or np.array_equal(stamp, first) for stamp in stamps)
-    if asked.resample is None:
-        if not same:
-            raise InputError("the series have stamps of their own", file=file,
-                             hint=_advice(stamps))  # fmt: skip
-        if (jitter := _jitter(first)) > TOLERANCE:
-            raise InputError(f"the clock is not even (by {jitter:.2g} steps)", file=file,
-                             hint=_advice(stamps))  # fmt: skip
-        return first - asked.zero, [entry.values for entry in series]
-    if rate is None:
+        whole.append(stamp)
+        kept.append(values)
+    same = all(stamp is whole[0] or np.array_equal(stamp, whole[0]) for stamp in whole)
+    if asked.resample is None and not same:
+        raise InputError("the series have stamps of their own", file=file, hint=_advice(whole))
+    if asked.resample is not None and rate is None:
         raise InputError("resampling needs a rate", file=file, key="time.rate",
-                         hint=_advice(stamps))  # fmt: skip
-    for stamp, entry in zip(stamps, series, strict=True):
-        steps = np.diff(stamp)
-        if steps.max() > _LARGEST_GAP * np.median(steps):
-            raise InputError(
-                f"is missing for {steps.max():.3g} s from {stamp[int(steps.argmax())]:.6g} s on",
-                file=file, key=entry.name,
-            )  # fmt: skip
-    usual = _usual(stamps)
-    if rate > _FASTER * usual:
+                         hint=_advice(whole))  # fmt: skip
+    usual = _usual(whole)
+    if asked.resample is not None and rate is not None and rate > _FASTER * usual:
         raise InputError(f"is more than {_FASTER:g} times the stamps' own {usual:.6g} Hz",
                          file=mapping, key="time.rate", value=rate)  # fmt: skip
-    begin, end = max(s[0] for s in stamps), min(s[-1] for s in stamps)
-    samples = int(np.floor((end - begin) * rate * (1.0 + 1e-12))) + 1
-    if end <= begin or samples < 2:
+    stretches = _stretches(whole, series, asked, file)
+    pieces: list[Piece] = []
+    for begin, end in stretches:
+        rows = [(s >= begin) & (s <= end) for s in whole]
+        cut = whole if len(stretches) == 1 else [s[r] for s, r in zip(whole, rows, strict=True)]
+        parts = kept if len(stretches) == 1 else [v[r] for v, r in zip(kept, rows, strict=True)]
+        if min(s.size for s in cut) < 2:
+            warn_user(f"{file}: the samples between {begin:.6g} s and {end:.6g} s are left out: "
+                      "fewer than two lie between dropouts")  # fmt: skip
+            continue
+        if asked.resample is None:
+            if (jitter := _jitter(cut[0])) > TOLERANCE:
+                raise InputError(f"the clock is not even (by {jitter:.2g} steps)", file=file,
+                                 hint=_advice(whole))  # fmt: skip
+            pieces.append((cut[0] - zero, [v.astype(np.float64) for v in parts]))
+            continue
+        assert rate is not None
+        first, last = max(s[0] for s in cut), min(s[-1] for s in cut)
+        samples = int(np.floor((last - first) * rate * (1.0 + 1e-12))) + 1
+        if last <= first or samples < 2:
+            continue
+        clock = first + np.arange(samples) / rate
+        drawn = [np.interp(clock, s, v) for s, v in zip(cut, parts, strict=True)]
+        pieces.append((clock - zero, drawn))
+    if not pieces:
         raise InputError("the series have no time in common", file=file)
-    clock = begin + np.arange(samples) / rate
-    values = [np.interp(clock, s, e.values) for s, e in zip(stamps, series, strict=True)]
-    return clock - asked.zero, values
+    return pieces
 
 
-def _stamps(
-    raw: RawFile, asked: TimeTable, series: list[RawChannel], mapping: Path | None
-) -> tuple[list[FloatArray], float]:
-    """The time of every sample of each series, s; and the unit it is stored in, s."""
-    scale = 1.0
-    own: list[FloatArray | None] = [s.time for s in series]
-    if asked.series is not None:
-        clock = raw.channel(asked.series, mapping=mapping, key="time.series").values
-        try:
-            _, convert = conversion(asked.unit, ("s",))
-        except InputError as error:
-            raise error.placed(file=mapping, key="time.unit") from None
-        scale = convert.scale
-        own = [convert(clock)] * len(series)
-    elif asked.rate is not None and any(s.time is None for s in series):
-        own = [np.arange(s.values.size) / asked.rate for s in series]
-    stamps: list[FloatArray] = []
-    for entry, stamp in zip(series, own, strict=True):
-        if stamp is None:
-            raise InputError("this file has no clock of its own", file=mapping, key="time",
-                             hint="give [time] series (which holds the time) or rate")  # fmt: skip
-        if stamp.size != entry.values.size:
-            raise InputError(f"has {entry.values.size} samples and its clock {stamp.size}",
-                             file=raw.path, key=entry.name)  # fmt: skip
-        stamps.append(stamp)
-    return stamps, scale
+def _stretches(
+    stamps: list[FloatArray], series: list[RawChannel], asked: TimeTable, file: Path
+) -> list[tuple[float, float]]:
+    """The times, s, over which no series has a dropout."""
+    found = [(-np.inf, np.inf)]
+    for stamp, entry in zip(stamps, series, strict=True):
+        if stamp is stamps[0] and entry is not series[0]:
+            continue
+        steps = np.diff(stamp)
+        gaps = np.flatnonzero(steps > _LARGEST_GAP * np.median(steps))
+        # What a clock is uneven by is no dropout where no resampling is asked for.
+        if stamp.size < 10:
+            gaps = gaps[:0]
+        if gaps.size and asked.gaps == "refuse":
+            worst = int(steps.argmax())
+            raise InputError(f"is missing for {steps[worst]:.3g} s from {stamp[worst]:.6g} s on",
+                             file=file, key=entry.name)  # fmt: skip
+        edges = [stamp[0], *np.ravel([(stamp[k], stamp[k + 1]) for k in gaps]), stamp[-1]]
+        own = list(zip(edges[::2], edges[1::2], strict=True))
+        found = [(max(a, c), min(b, d)) for a, b in found for c, d in own if max(a, c) <= min(b, d)]
+    return found
 
 
 def _jitter(time: FloatArray) -> float:

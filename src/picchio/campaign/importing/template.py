@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
+import numpy as np
+
 from picchio.campaign.channels import patterns
+from picchio.campaign.importing.detect import clock, layout
 from picchio.campaign.importing.importer import read_raw
-from picchio.campaign.importing.mapping import FORMAT
+from picchio.campaign.importing.mapping import FORMAT, TimeTable
 from picchio.campaign.importing.raw import RawChannel, RawFile
+from picchio.campaign.importing.resample import clocked
 from picchio.core.errors import InputError
 from picchio.core.files import write_text
-
-_TIMES = ("t", "time", "time [s]", "time_s", "timestamp", "zeit")
 
 
 def write_mapping(file: str | Path, out: str | Path) -> None:
@@ -36,8 +39,10 @@ def mapping_template(raw: RawFile) -> str:
     Args:
         raw: as `read_raw` gives it.
     """
+    times, told = _time(raw)
     lines = [
         f"# What the series of {raw.path.name} become; see picchio import --help.",
+        *(f"# detected: {line}" for line in told),
         f'format = "{FORMAT}"',
         "",
         "[source]",
@@ -45,7 +50,7 @@ def mapping_template(raw: RawFile) -> str:
         *(_csv_layout(raw) if raw.kind == "csv" else ()),
         "",
         "[time]",
-        *_time(raw),
+        *times,
         "# zero = 0.0               # s: this time becomes t = 0, the first edge of the first blow",
         "",
         "[record]                   # the keys of a campaign's [[record]]",
@@ -67,28 +72,40 @@ def mapping_template(raw: RawFile) -> str:
 
 
 def _csv_layout(raw: RawFile) -> list[str]:
-    from picchio.campaign.importing.read_csv import _guess
+    found = layout(raw.path)
+    lines = [f"delimiter = {_quoted(found.delimiter)}", f'decimal = "{found.decimal}"']
+    if found.skip_lines:
+        lines.append(f"skip_lines = {found.skip_lines}")
+    if not found.header:
+        lines.append("header = false")
+    if found.units:
+        lines.append("units = true")
+    return lines + ([f"comment = {_quoted(found.comment)}"] if found.comment else [])
 
-    layout = _guess(raw.path)
-    return [f"delimiter = {_quoted(layout.delimiter)}", f'decimal = "{layout.decimal}"']
 
-
-def _time(raw: RawFile) -> list[str]:
+def _time(raw: RawFile) -> tuple[list[str], tuple[str, ...]]:
+    """The lines of `[time]`, and what was detected."""
     if any(channel.time is not None for channel in raw.channels.values()):
         return ["# the file's own stamps are used",
                 '# resample = "linear"      # where they are uneven; then a rate, in Hz',
-                "# rate = 500.0"]  # fmt: skip
-    named = [n for n in raw.channels if n.rpartition(".")[2].lower() in _TIMES]
-    if named:
-        return [f"series = {_quoted(named[0])}", 'unit = "s"']
-    return [
-        '# series = "..."           # which holds the time; or',
-        "rate = 1000.0              # Hz",
-    ]
+                "# rate = ..."], raw.detected  # fmt: skip
+    found = clock(raw)
+    if found is None:
+        return [
+            '# series = "..."           # which holds the time; or',
+            "# rate = ...               # Hz: no series is named as a time, so it must be said",
+        ], raw.detected
+    try:
+        told = clocked(raw, TimeTable(series=found.series, unit=found.unit), names=set()).detected
+    except InputError as error:
+        told = (*raw.detected, f"the clock is not taken: {error.problem}")
+    lines = [f"series = {_quoted(found.series)}", f'unit = "{found.unit}"   # {found.why}']
+    return lines, told
 
 
 def _channel(channel: RawChannel) -> list[str]:
-    low, high = channel.values.min(), channel.values.max()
+    known = channel.values[np.isfinite(channel.values)] if channel.values.size else channel.values
+    low, high = (known.min(), known.max()) if known.size else (math.nan, math.nan)
     about = f"# {channel.values.size} samples, {low:.6g} to {high:.6g}"
     note = f" ({channel.note})" if channel.note else ""
     unit = channel.unit or "..."

@@ -13,6 +13,7 @@ from picchio.cli.options import (
     FlexOption,
     JsonOption,
     ReducersOption,
+    ReportOption,
     RobotArgument,
     ToolOption,
 )
@@ -24,6 +25,7 @@ from picchio.cli.output import (
     styled,
     table,
     telling,
+    write_report,
 )
 from picchio.core.errors import InputError
 from picchio.core.files import write_text
@@ -43,6 +45,7 @@ def identify(
     flex: FlexOption = None,
     tool: ToolOption = None,
     reducers: ReducersOption = None,
+    report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
     """Stiffness and damping from measured data, as a sidecar.
@@ -56,7 +59,7 @@ def identify(
 
     if str(out) == "-":
         raise InputError("must be a file", key="--out", value=str(out))
-    check_targets((out, json), [flex])
+    check_targets((out, report, json), [flex])
     campaign = picchio.load_campaign(data)
     loaded = picchio.load_robot(
         robot, flex=flex, tool=tool, reducers=reducers or (),
@@ -64,12 +67,13 @@ def identify(
     )  # fmt: skip
     files = [*loaded.files, *campaign.files]
     check_targets([out], files)
-    check_targets([json], [*files, out])
+    check_targets([report, json], [*files, out])
     with telling("reading the data") as say:
         found = picchio.identify(loaded, campaign, progress=say)
     write_text(out, found.sidecar_text())
     if found.doubt:
         say_warning(found.doubt)
+    write_report(found, report)
     deliver(found.to_dict(), json, lambda: show_identified(found))
 
 

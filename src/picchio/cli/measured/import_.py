@@ -20,7 +20,12 @@ from picchio.core.errors import InputError
 )
 def import_(
     file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="UFF 58, MCAP (ROS 2), MATLAB .mat or CSV.")
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="CSV of any habit, Parquet, MCAP and .db3 (ROS 2), .bag (ROS 1), UFF 58, MATLAB "
+            ".mat, .lvm, .npz or JSON lines (.jsonl).",
+        ),
     ],
     to: Annotated[
         Path | None, typer.Option(metavar="CAMPAIGN", help="The folder of the campaign.")
@@ -46,7 +51,9 @@ def import_(
 ) -> None:
     """Import a measured file as a record of a campaign.
 
-    The mapping is kept in the campaign's folder as mapping.toml.
+    With FILE alone it tells what the file seems to be: its layout, series, clock, rate and gaps. A
+    file with gaps becomes several records. The mapping is kept in the campaign's folder as
+    mapping.toml.
     """
     import picchio
 
@@ -58,9 +65,22 @@ def import_(
         check_targets([write_mapping], [file])
         template.write_mapping(file, write_mapping)
         return
+    if to is None and mapping is None:
+        from picchio.campaign.importing.importer import detection
+
+        check_targets([json], [file])
+        seen = detection(file)
+        deliver(seen.to_dict(), json, lambda: console().print("\n".join(seen.told)))
+        return
     if to is None:
         raise InputError("say where the campaign goes", key="--to")
     check_targets([json], [file, mapping], folder=to)
     made = picchio.import_record(file, to, mapping, name=name, append=append)
     channels = ", ".join(made.record.channels)
-    deliver(made.to_dict(), json, lambda: console().print(f"{made._headline()}, {channels}"))
+
+    def show() -> None:
+        console().print(f"{made._headline()}, {channels}")
+        for line in made.detected:
+            console().print(f"  detected: {line}")
+
+    deliver(made.to_dict(), json, show)

@@ -44,7 +44,11 @@ from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.diagnosis.percussion.fit.parallel import parallel_records
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.follow_up.next_measurement import next_measurement
-from picchio.diagnosis.percussion.search.candidates import all_candidates, warm_up
+from picchio.diagnosis.percussion.search.candidates import (
+    all_candidates,
+    finer_candidates,
+    warm_up,
+)
 from picchio.diagnosis.percussion.search.select import (
     alternatives,
     begin_search,
@@ -137,14 +141,16 @@ def diagnose_percussion(
     say("reading the records and their noise")
     problem = Problem(robot, campaign, gravity_stiffness=gravity_stiffness, workers=workers)
     candidates = all_candidates(problem, without)
+    finer = finer_candidates(problem, without)
     warm_up(problem, candidates)
     with parallel_records(problem):
-        return _concluded(*_searched(problem, candidates, known, say))
+        return _concluded(*_searched(problem, candidates, finer, known, say))
 
 
 def _searched(
     problem: Problem,
     candidates: Sequence[tuple[type[Effect], str]],
+    finer: Sequence[tuple[type[Effect], str]],
     known: Sequence[Estimate],
     say: Callable[[str], None],
 ) -> tuple[Search, Fit, Evidence]:
@@ -154,7 +160,7 @@ def _searched(
     """
 
     def searched(split: Split) -> Search:
-        search = begin_search(problem, candidates, split, say)
+        search = begin_search(problem, candidates, split, say, finer)
         start_from(search, known)
         run_search(search)
         return search

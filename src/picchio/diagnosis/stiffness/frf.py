@@ -12,7 +12,14 @@ import numpy as np
 from picchio.campaign.campaign import Campaign
 from picchio.core.arrays import FloatArray
 from picchio.core.provenance import provenance
-from picchio.diagnosis.identified import FORMAT, Identification, Identified, IdentifiedJoint, Method
+from picchio.diagnosis.identified import (
+    FORMAT,
+    Compared,
+    Identification,
+    Identified,
+    IdentifiedJoint,
+    Method,
+)
 from picchio.diagnosis.stiffness.fit import Fit, climb, score
 from picchio.diagnosis.stiffness.joints import MOST_HALF, Told, stiffness_of
 from picchio.diagnosis.stiffness.modes import starts
@@ -29,6 +36,7 @@ REMAINDER = 0.01
 _LOOKS, _BASINS, _STRIDE, _GAIN = 3, 4, 0.12, 2.0  # at other basins; ln of stiffness; ln evidence
 _STRAY, _INCREDIBLE = 1.5, 3.0  # standard deviations before the tests
 _DECISIVE = 5.0  # in log evidence, for a convention of the damping
+_READ = ("m/N", "m/s/N", "m/s²/N")
 _WORDS = {
     "modal": "one ratio for each mode, the joints' weighted by strain energy",
     "joint": "a dashpot in each joint",
@@ -39,8 +47,8 @@ class ByResponses(Method):
     """Springs and damping fitted to frequency response functions, from nothing."""
 
     name = "frf"
-    kinds = frozenset({"frf"})
-    needs_springs = frozenset({"frf"})
+    kinds = frozenset({"frf", "tap"})
+    needs_springs = frozenset({"frf", "tap"})
 
     def identify(
         self,
@@ -99,6 +107,19 @@ class FrfIdentification(Identification):
             f"Damping: {_WORDS[self.convention]}{sure} (log evidence {self.decided:+.1f}).",
         )
 
+    def compared(self) -> list[Compared]:
+        """Every function, by its magnitude; the spread is what its coherence leaves."""
+        problem, found = self.fit.problem, []
+        for part, table in zip(problem.predict(self.fit.mean), problem.tables, strict=True):
+            fitted = (table.values - part.residual) @ np.array([1.0, 1j]) * table.scale
+            left = np.linalg.norm(table.measured - fitted) / np.linalg.norm(table.measured)
+            found.append(Compared(
+                table.file, "frequency [Hz]", f"magnitude [{_READ[table.power]}]",
+                table.omega / (2.0 * np.pi), np.abs(table.measured), np.abs(fitted),
+                table.scale * self.fit.noise["frf"], float(left), True,
+            ))  # fmt: skip
+        return found
+
     def sidecar_text(self) -> str:
         """See `Identification`; a joint that is not told has a wide spread."""
         return sidecar(
@@ -137,7 +158,7 @@ def identify_frf(
 
     Args:
         robot: flexible, its stiffness stated or estimated.
-        campaign: records of the kind "frf".
+        campaign: records of the kind "frf", and taps in time.
         progress: told what is being done.
 
     Returns:
@@ -158,30 +179,55 @@ def identify_frf(
     )  # fmt: skip
     bare = _settled(plain, bare)
     other = climb(problem.bare(convention="joint"), bare.mean, _TAILS)
-    gain = bare.evidence - other.evidence
-    convention: Damping = "modal" if gain >= -_DECISIVE else "joint"
     say("frequency responses: with all that is never exact")
-    whole = replace(problem, convention=convention)
-    at = np.zeros(len(whole.precision))
-    at[: problem.springs] = (bare if convention == "modal" else other).mean
-    fit = climb(whole, at, _TAILS)
-    # Without nuisances a joint hardly seen makes up for what masses and places are off by.
-    known = np.concatenate([problem.prior.std, problem.damping_std])
-    strays = np.abs(at[: problem.springs]) > _STRAY * known
-    if strays.any():
-        at[: problem.springs][strays] = 0.0
-        fit = max(fit, climb(whole, at, _TAILS), key=lambda found: found.evidence)
-    fit = _settled(whole, fit)
-    stated = np.zeros(len(problem.precision))
+    # Which convention holds shows only where modes may differ from it, as they always do a little.
+    modal = _whole(problem, bare.mean)
+    joint = _whole(replace(problem, convention="joint"), other.mean)
+    gain = modal.evidence - joint.evidence
+    convention: Damping = "modal" if gain >= -_DECISIVE else "joint"
+    fit = _settled(*((modal.problem, modal) if convention == "modal" else (joint.problem, joint)))
+    if convention == "modal":
+        modal = fit
     covariance = _with_remainder(fit)
-    modal = (fit, covariance) if convention == "modal" else (bare, _with_remainder(bare))
-    joints = _joints(robot, fit, covariance, *modal)
+    joints = _joints(robot, fit, covariance, modal, _by_modes(modal))
+    stated = np.zeros(len(problem.precision))
     source = "memory" if campaign.folder is None else campaign.folder.resolve().name
     return FrfIdentification(
-        robot, source, joints, campaign, fit, fit.half(), covariance, _left(fit.problem, fit.mean),
+        robot, source, joints, campaign, fit, fit.half(), covariance,
+        _left(fit.problem, fit.mean),
         _left(problem, stated), convention,
         gain if convention == "modal" else -gain,
     )  # fmt: skip
+
+
+def _whole(problem: FrfProblem, begin: FloatArray) -> Fit:
+    """The fit of everything, begun at springs and damping (2 n,) fitted alone."""
+    at = np.zeros(len(problem.precision))
+    at[: problem.springs] = begin
+    fit = climb(problem, at, _TAILS)
+    # Without nuisances a joint hardly seen makes up for what masses and places are off by.
+    known = np.concatenate([problem.prior.std, problem.damping_std])
+    strays = np.abs(begin) > _STRAY * known
+    if strays.any():
+        at[: problem.springs][strays] = 0.0
+        fit = max(fit, climb(problem, at, _TAILS), key=lambda found: found.evidence)
+    return fit
+
+
+def _by_modes(fit: Fit) -> FloatArray:
+    """The covariance (2 n, 2 n) of springs and damping, wider where modes differ more than told.
+
+    Under dashpots in the joints no ratio of the modes holds at all poses: what the modes are then
+    off by is more than their tolerance.
+    """
+    problem: FrfProblem = fit.problem
+    found = _with_remainder(fit)
+    count = problem.modal * len(problem.standings)
+    if not count:
+        return found
+    own = fit.mean[-count:] ** 2 + np.diag(fit.covariance)[-count:]
+    found[problem.joints :, problem.joints :] *= max(1.0, float(own.mean()))
+    return found
 
 
 def _settled(problem: FrfProblem, fit: Fit) -> Fit:
@@ -257,7 +303,11 @@ def _left(problem: FrfProblem, at: FloatArray) -> float:
 
 
 def _joints(
-    robot: FlexibleRobot, fit: Fit, covariance: FloatArray, modal: Fit, of_modal: FloatArray
+    robot: FlexibleRobot,
+    fit: Fit,
+    covariance: FloatArray,
+    modal: Fit,
+    of_modes: FloatArray,
 ) -> tuple[IdentifiedJoint, ...]:
     problem: FrfProblem = fit.problem
     n = problem.joints
@@ -281,7 +331,7 @@ def _joints(
     for k, joint in enumerate(robot.flexible_joints):
         if not is_drive(joint.name):
             continue
-        size = float(math.sqrt(of_modal[n + k, n + k]))
+        size = float(math.sqrt(of_modes[n + k, n + k]))
         value = float(problem.damping_ratio[k] * math.exp(modal.mean[n + k]))
         reach = math.exp(half * size)
         sure = 0.5 * (reach - 1.0 / reach) <= MOST_HALF and size < 0.5 * problem.damping_std[k]

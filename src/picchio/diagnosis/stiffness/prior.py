@@ -67,6 +67,17 @@ def prior_of(robot: FlexibleRobot) -> Prior:
     return Prior(covariance + lift * np.eye(len(names)), tuple(stated))
 
 
+def damping_std(robot: FlexibleRobot) -> FloatArray:
+    """(n,) of the logarithms of the joints' damping ratios, as the stiffness's.
+
+    Args:
+        robot: flexible.
+    """
+    spread = [robot.spreads.get(f"damping_ratio.{joint.name}") for joint in robot.flexible_joints]
+    return np.array([one.size if one is not None and one.log and one.size > 0.0 else UNKNOWN
+                     for one in spread])  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Spring:
     """A compliance beside the joints'.

@@ -9,22 +9,22 @@ v = Z^-1 J_f^T d and u likewise of the sensor.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from picchio.campaign.channels import FREQUENCY
 from picchio.campaign.record import Record
 from picchio.campaign.tables import Tolerance
-from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.core.arrays import ComplexArray, FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.stiffness.fit import Predicted
-from picchio.diagnosis.stiffness.prior import UNKNOWN, Prior
+from picchio.diagnosis.stiffness.prior import Prior, damping_std
 from picchio.diagnosis.stiffness.statics import moved
-from picchio.model.linear_system import modal_damping_matrix
+from picchio.diagnosis.stiffness.taps import UNKNOWN_BLOW, Seen, spectra
 from picchio.robot.flexible_robot import FlexibleRobot
 
 Damping = Literal["modal", "joint"]
@@ -52,7 +52,10 @@ class Response:
         pushes, sights: (k, n) by how much a standard deviation of each of its pose's k numbers
             changes these.
         tilts: (k, n) likewise.
-        gains: (k,) likewise, of the whole function, relative.
+        gains: (k,) likewise, of the whole function's logarithm.
+        delays: (k,) likewise, s, by which it comes later.
+        widths: (k,) likewise, s^2, the variance in time of a blow that is not known.
+        shift: 1/s, of the lines to the right of the imaginary axis; 0 of a frequency response.
     """
 
     file: str
@@ -67,6 +70,23 @@ class Response:
     sights: FloatArray
     tilts: FloatArray
     gains: FloatArray
+    delays: FloatArray
+    widths: FloatArray
+    shift: float = 0.0
+
+    @property
+    def s(self) -> ComplexArray:
+        """(m,) rad/s, where the lines lie in the Laplace plane."""
+        return self.shift + 1j * self.omega
+
+    def factor(self, off: FloatArray) -> ComplexArray:
+        """(m,) by which numbers that are never exact multiply the function.
+
+        Args:
+            off: (k,) of them, in standard deviations.
+        """
+        delay, width = off @ self.delays, off @ self.widths
+        return np.asarray(np.exp(off @ self.gains - self.s * delay + 0.5 * self.s**2 * width))
 
     @property
     def values(self) -> FloatArray:
@@ -87,6 +107,9 @@ class Standing:
         mass: (n, n) kg m^2.
         gravity: (n, n) N m/rad, dg/dq.
         masses: (k, n, n) what a standard deviation of each number that is never exact adds to it.
+        products: (q, n, n) likewise, with the product of two numbers: a centre of mass that is off
+            to either side makes a light wrist turn more slowly.
+        pairs: (q, 2) which two.
         spring: (n,) N m/rad, as stated.
         responses: measured here.
         factors: (n,) on the modes' damping ratios, by ascending frequency.
@@ -95,9 +118,33 @@ class Standing:
     mass: FloatArray
     gravity: FloatArray
     masses: FloatArray
+    products: FloatArray
+    pairs: IndexArray
     spring: FloatArray
     responses: tuple[Response, ...]
     factors: FloatArray
+
+    def mass_at(self, off: FloatArray) -> FloatArray:
+        """The mass matrix (n, n).
+
+        Args:
+            off: (k,) numbers that are never exact, in standard deviations.
+        """
+        both = off[self.pairs].prod(axis=1)
+        added = np.tensordot(off, self.masses, 1) + np.tensordot(both, self.products, 1)
+        return np.asarray(self.mass + added)
+
+    def mass_slopes(self, off: FloatArray) -> FloatArray:
+        """(k, n, n) its derivatives by the numbers.
+
+        Args:
+            off: as above.
+        """
+        found = self.masses.copy()
+        for own, other in ((0, 1), (1, 0)):
+            part = off[self.pairs[:, other], None, None] * self.products
+            np.add.at(found, self.pairs[:, own], part)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +202,7 @@ class FrfProblem:
     @cached_property
     def modal(self) -> int:
         """How many numbers the modes of one pose have."""
-        return self.joints if self.convention == "modal" and self.by_mode > 0.0 else 0
+        return self.joints if self.by_mode > 0.0 else 0
 
     @cached_property
     def precision(self) -> FloatArray:
@@ -184,12 +231,12 @@ class FrfProblem:
             pull = self.gravity_std * float(off[self.steps.index("gravity_stiffness")])
 
         def plain(one: Response) -> Response:
-            none, gain = np.zeros((0, n)), float(np.exp(off @ one.gains))
+            none, nothing, gain = np.zeros((0, n)), np.zeros(0), one.factor(off)
             return replace(
-                one, measured=one.measured / gain, scale=one.scale / gain,
+                one, measured=one.measured / gain, scale=one.scale / np.abs(gain),
                 push=one.push + off @ one.pushes, sight=one.sight + off @ one.sights,
                 tilt=one.tilt + off @ one.tilts, pushes=none, sights=none, tilts=none,
-                gains=np.zeros(0),
+                gains=nothing, delays=nothing, widths=nothing,
             )  # fmt: skip
 
         standings = []
@@ -199,8 +246,9 @@ class FrfProblem:
                 own = at[first + self.modal * k : first + self.modal * (k + 1)]
             factors = np.exp(self.by_mode * own) if self.modal else np.ones(n)
             standings.append(replace(
-                standing, mass=standing.mass + np.tensordot(off, standing.masses, 1),
+                standing, mass=standing.mass_at(off),
                 gravity=(1.0 + pull) * standing.gravity, masses=np.zeros((0, n, n)),
+                products=np.zeros((0, n, n)), pairs=np.zeros((0, 2), dtype=np.intp),
                 responses=tuple(map(plain, standing.responses)),
                 factors=standing.factors * factors,
             ))  # fmt: skip
@@ -208,27 +256,36 @@ class FrfProblem:
                        convention=convention)  # fmt: skip
 
     def damping(
-        self, standing: Standing, springs: FloatArray, ratio: FloatArray, modes: FloatArray
+        self,
+        mass: FloatArray,
+        springs: FloatArray,
+        ratio: FloatArray,
+        factors: FloatArray,
     ) -> FloatArray:
-        """The damping matrix (n, n), N m s/rad.
+        """The damping matrices (..., n, n), N m s/rad.
 
         Args:
-            standing: the pose.
-            springs: (n,) N m/rad.
-            ratio: (n,) damping ratios of the joints.
-            modes: (n,) factors on the modes' ratios; empty for none.
+            mass: (..., n, n) kg m^2.
+            springs: (..., n) N m/rad.
+            ratio: (..., n) damping ratios of the joints.
+            factors: (..., n) on the modes' ratios.
         """
+        inverse = np.linalg.inv(np.linalg.cholesky(mass))
+        back = inverse.swapaxes(-1, -2)
+        squared, vectors = np.linalg.eigh((inverse * springs[..., None, :]) @ back)
+        shapes = back @ vectors
+        weighted = mass @ shapes
         if self.convention == "joint":
-            # As if each joint swung alone: c = 2 zeta k / w.
-            return np.diag(2.0 * ratio * np.sqrt(springs * standing.mass.diagonal()))
-        factors = standing.factors * modes if len(modes) else standing.factors
-        if (factors == 1.0).all():
-            return modal_damping_matrix(standing.mass, springs, ratio)
-        squared, shapes = _modes(standing.mass, np.diag(springs))
-        energy = springs[:, None] * shapes**2
-        own = (ratio @ energy / energy.sum(axis=0)) * factors
-        weighted = standing.mass @ shapes
-        return np.asarray((weighted * (2.0 * own * np.sqrt(squared))) @ weighted.T)
+            # As if each joint swung alone: c = 2 zeta k / w. How modes differ, between them, too.
+            each = 2.0 * ratio * np.sqrt(springs * np.diagonal(mass, axis1=-2, axis2=-1))
+            root = np.sqrt(factors)
+            within = (shapes.swapaxes(-1, -2) * each[..., None, :]) @ shapes
+            between = weighted * root[..., None, :]
+            return np.asarray(between @ within @ between.swapaxes(-1, -2))
+        energy = springs[..., :, None] * shapes**2
+        own = (ratio[..., None, :] @ energy)[..., 0, :] / energy.sum(axis=-2) * factors
+        between = weighted * (2.0 * own * np.sqrt(squared))[..., None, :]
+        return np.asarray(between @ weighted.swapaxes(-1, -2))
 
     def predict(self, at: FloatArray, known: Sequence[Predicted] | None = None) -> list[Predicted]:
         """The real and imaginary parts over the lines' scale, measured less predicted.
@@ -244,30 +301,39 @@ class FrfProblem:
         for k, standing in enumerate(self.standings):
             springs = standing.spring * scale[:n]
             first = 2 * n + len(self.steps) + self.modal * k
-            modes = np.exp(self.by_mode * at[first : first + self.modal])
-            mass = standing.mass + np.tensordot(off, standing.masses, 1)
+            factors = standing.factors
+            if self.modal:
+                factors = factors * np.exp(self.by_mode * at[first : first + self.modal])
+            mass = standing.mass_at(off)
             stiff = np.diag(springs) + standing.gravity
             pull = self.steps.index("gravity_stiffness") if self.gravity_std > 0.0 else None
             if pull is not None:
                 stiff = stiff + off[pull] * self.gravity_std * standing.gravity
-            damp = self.damping(standing, springs, ratio, modes)
             p = len(at)
             d_stiff, d_damp = np.zeros((p, n, n)), np.zeros((p, n, n))
             d_stiff[np.arange(n), np.arange(n), np.arange(n)] = springs
-            step = 1e-5
-            for j in range(n):
-                factor = np.where(np.arange(n) == j, 1.0 + step, 1.0)
-                d_damp[j] = self.damping(standing, springs * factor, ratio, modes) - damp
-                d_damp[n + j] = self.damping(standing, springs, ratio * factor, modes) - damp
-            for j in range(self.modal):
-                factor = np.where(np.arange(n) == j, 1.0 + step, 1.0)
-                more = self.damping(standing, springs, ratio, modes * factor) - damp
-                d_damp[first + j] = self.by_mode * more
-            d_damp /= step
+            by_mass = standing.mass_slopes(off)
+            moved = np.flatnonzero(np.abs(by_mass).max(axis=(1, 2), initial=0.0))
+            # The damping's slopes by differences, all at once: springs, ratios, modes, masses.
+            step, once = 1e-5, np.eye(n)
+            ones, still = np.ones((n, n)), np.ones((len(moved), n))
+            modes = np.ones((self.modal, n)) + step * once[: self.modal]
+            same = np.ones_like(modes)
+            change = [(1.0 + step * once, ones, ones), (ones, 1.0 + step * once, ones),
+                      (same, same, modes), (still, still, still)]  # fmt: skip
+            k_of, z_of, f_of = (np.concatenate([np.ones((1, n)), *part])
+                                for part in zip(*change, strict=True))  # fmt: skip
+            masses = np.repeat(mass[None], len(k_of), axis=0)
+            masses[len(k_of) - len(moved) :] += step * by_mass[moved]
+            damps = self.damping(masses, springs * k_of, ratio * z_of, factors * f_of)
+            damp, more = damps[0], (damps[1:] - damps[0]) / step
+            d_damp[: 2 * n] = more[: 2 * n]
+            d_damp[first : first + self.modal] = self.by_mode * more[2 * n : 2 * n + self.modal]
+            d_damp[2 * n + moved] = more[2 * n + self.modal :]
             if pull is not None:
                 d_stiff[2 * n + pull] = self.gravity_std * standing.gravity
             d_mass = np.zeros((p, n, n))
-            d_mass[2 * n : 2 * n + len(self.steps)] = standing.masses
+            d_mass[2 * n : 2 * n + len(self.steps)] = by_mass
             parts = (d_stiff.reshape(p, -1), d_damp.reshape(p, -1), d_mass.reshape(p, -1))
             for response in standing.responses:
                 found.append(self._response(response, off, (stiff, damp, mass), parts))
@@ -281,42 +347,36 @@ class FrfProblem:
         parts: tuple[FloatArray, FloatArray, FloatArray],
     ) -> Predicted:
         stiff, damp, mass = system
-        w = response.omega[:, None, None]
+        line = response.s[:, None]
+        w = line[:, :, None]
         n, p = self.joints, parts[0].shape[0]
         push = response.push + off @ response.pushes
         sight, tilt = response.sight + off @ response.sights, response.tilt + off @ response.tilts
         sides = np.stack([push, sight, tilt], axis=1)
-        solved = np.linalg.solve(stiff - w**2 * mass + 1j * w * damp, sides[None])
-        lead = (1j * response.omega) ** response.power
+        solved = np.linalg.solve(stiff + w**2 * mass + w * damp, sides[None])
+        lead = response.s**response.power
         v = solved[:, :, 0]
         u = lead[:, None] * solved[:, :, 1] + solved[:, :, 2]
         seen = lead[:, None] * sight + tilt
-        gain = float(np.exp(off @ response.gains))
-        value = gain * np.einsum("mn,mn->m", seen, v)
-        outer = (u[:, :, None] * v[:, None, :]).reshape(len(w), -1)
-        omega = response.omega[:, None]
-        slope = -gain * (
-            outer @ parts[0].T + 1j * omega * (outer @ parts[1].T) - omega**2 * (outer @ parts[2].T)
-        )
+        gain = response.factor(off)[:, None]
+        value = gain[:, 0] * np.einsum("mn,mn->m", seen, v)
+        outer = (u[:, :, None] * v[:, None, :]).reshape(len(line), -1)
+        slope = -gain * (outer @ parts[0].T + line * (outer @ parts[1].T)
+                         + line**2 * (outer @ parts[2].T))  # fmt: skip
         own = slice(2 * n, 2 * n + len(self.steps))
         slope[:, own] += gain * (
             u @ response.pushes.T + lead[:, None] * (v @ response.sights.T) + v @ response.tilts.T
         )
-        slope[:, own] += value[:, None] * response.gains
+        slope[:, own] += value[:, None] * (
+            response.gains - line * response.delays + 0.5 * line**2 * response.widths
+        )
         left = (response.measured - value) / response.scale
         slope = slope / response.scale[:, None]
         return Predicted(
             np.stack([left.real, left.imag], axis=1),
-            np.stack([slope.real, slope.imag], axis=1).reshape(len(w), 2, p),
+            np.stack([slope.real, slope.imag], axis=1).reshape(len(line), 2, p),
             None,
         )
-
-
-def _modes(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(n,) squared rad/s and (n, n) shapes, of unit modal mass."""
-    inverse = np.linalg.inv(np.linalg.cholesky(mass))
-    squared, vectors = np.linalg.eigh(inverse @ stiffness @ inverse.T)
-    return squared, inverse.T @ vectors
 
 
 def make_problem(
@@ -326,7 +386,7 @@ def make_problem(
 
     Args:
         robot: flexible.
-        records: of the kind "frf".
+        records: of the kind "frf", or taps.
         tolerance: how exact masses, poses and places are.
         prior: of the stiffness.
 
@@ -335,7 +395,7 @@ def make_problem(
     """
     steps: dict[str, None] = {}
     bodies = _bodies(robot, tolerance)
-    names = [name for name, _ in bodies]
+    names = [name for name, _ in bodies.single]
     names += [f"pose.{name}" for name in robot.joint_names if tolerance.pose > 0.0]
     names += [f"tool_point.{axis}" for axis in "xyz" if tolerance.tool_point > 0.0]
     names += [f"sensor_position.{axis}" for axis in "xyz" if tolerance.sensor_position > 0.0]
@@ -344,6 +404,9 @@ def make_problem(
     names += ["gravity_stiffness"] if tolerance.gravity_stiffness > 0.0 else []
     if tolerance.direction > 0.0:
         names += [f"direction.{record.file}.{axis}" for record in records for axis in "xyz"]
+    for record in records:
+        if record.test == "tap" and "force" not in record.channels:
+            names += [f"{name}.{record.file}" for name, _ in UNKNOWN_BLOW]
     steps = dict.fromkeys(names)
     index = {name: k for k, name in enumerate(steps)}
     poses: dict[tuple[float, ...], list[Record]] = {}
@@ -356,53 +419,109 @@ def make_problem(
         flex = robot.flexible_index
         square = np.ix_(flex, flex)
         mass = robot.rigid.mass_matrix(pose)[square]
-        masses = np.zeros((len(index), *mass.shape))
-        for name, added in bodies:
-            heavier = robot.rigid.with_masses(added)
-            masses[index[name]] = heavier.mass_matrix(pose)[square] - mass
+        masses, products = np.zeros((len(index), *mass.shape)), []
+        for name, added in bodies.single:
+            masses[index[name]] = robot.rigid.with_masses(added).mass_matrix(pose)[square] - mass
+        for *_, added in bodies.double:
+            products.append(robot.rigid.with_masses(added).mass_matrix(pose)[square] - mass)
         for k, joint in enumerate(robot.joint_names):
             if tolerance.pose > 0.0:
                 other = pose + _TURN * np.eye(len(pose))[k]
                 change = robot.rigid.mass_matrix(other)[square] - mass
                 masses[index[f"pose.{joint}"]] = tolerance.pose / _TURN * change
-        responses = tuple(_response_of(robot, one, pose, tolerance, index) for one in own)
+        responses = tuple(
+            response for one in own
+            for response in _responses_of(robot, one, pose, tolerance, index)
+        )  # fmt: skip
         standings.append(Standing(
-            mass, robot.gravity_stiffness(pose), masses, robot.state(pose).stiffness, responses,
-            np.ones(len(flex)),
+            mass, robot.gravity_stiffness(pose), masses,
+            np.array(products).reshape(-1, *mass.shape),
+            np.array([(index[a], index[b]) for a, b, _ in bodies.double], np.intp).reshape(-1, 2),
+            robot.state(pose).stiffness, responses, np.ones(len(flex)),
         ))  # fmt: skip
-    spread = [robot.spreads.get(f"damping_ratio.{joint.name}") for joint in robot.flexible_joints]
-    width = np.array([one.size if one is not None and one.log and one.size > 0.0 else UNKNOWN
-                      for one in spread])  # fmt: skip
     return FrfProblem(
-        tuple(standings), prior, np.maximum(robot.damping_ratio, 1e-3), width, tuple(steps),
+        tuple(standings), prior, np.maximum(robot.damping_ratio, 1e-3), damping_std(robot),
+        tuple(steps),
         tolerance.damping_by_mode, tolerance.gravity_stiffness,
     )  # fmt: skip
 
 
-def _bodies(robot: FlexibleRobot, tolerance: Tolerance) -> list[tuple[str, list]]:
-    """What a standard deviation of mass, centre and inertia of each moving link is, as masses."""
-    found: list[tuple[str, list]] = []
+Added = list[tuple[float, str, tuple[float, float, float] | None]]
+
+
+class _Bodies(NamedTuple):
+    """What a standard deviation of what is never exact of a link is, as masses added to it.
+
+    Attributes:
+        single: by name, with the number itself.
+        double: by two names, with the product of both numbers.
+    """
+
+    single: list[tuple[str, Added]]
+    double: list[tuple[str, str, Added]]
+
+
+def _bodies(robot: FlexibleRobot, tolerance: Tolerance) -> _Bodies:
+    """Mass, centre and inertia of each moving link."""
+    found = _Bodies([], [])
     moving = {link for joint in robot.flexible_names for link in robot.tree.beyond(joint)}
     for link in sorted(moving):
         body = robot.tree.links.get(link)
         if body is None or not body.mass > 0.0:
             continue
-        if tolerance.link_mass > 0.0:
-            found.append((f"link_mass.{link}", [(tolerance.link_mass, link, None)]))
         centre = np.array(body.xyz)
+
+        def at(size: float, *arms: float, link: str = link, centre: FloatArray = centre) -> Added:
+            place = centre + _ARM * np.array(arms)
+            return [(size, link, (float(place[0]), float(place[1]), float(place[2])))]
+
+        def about_others(inertia: float, k: int, at: Callable[..., Added] = at) -> Added:
+            """Masses that turn about the two other axes only, kg m^2."""
+            size, way = inertia / (2.0 * _ARM**2), np.eye(3)[k]
+            return at(size, *way) + at(size, *-way) + at(-2.0 * size, 0.0, 0.0, 0.0)
+
+        if tolerance.link_mass > 0.0:
+            found.single.append((f"link_mass.{link}", [(tolerance.link_mass, link, None)]))
         for k, axis in enumerate("xyz"):
-            arm = _ARM * np.eye(3)[k]
-            ends = [tuple((centre + arm).tolist()), tuple((centre - arm).tolist())]
             if tolerance.link_com > 0.0:
-                size = body.mass * tolerance.link_com / (2.0 * _ARM)
-                both = [(size, link, ends[0]), (-size, link, ends[1])]
-                found.append((f"link_com.{link}.{axis}", both))
+                size, way = body.mass * tolerance.link_com / (2.0 * _ARM), np.eye(3)[k]
+                name = f"link_com.{link}.{axis}"
+                found.single.append((name, at(size, *way) + at(-size, *-way)))
+                square = about_others(body.mass * tolerance.link_com**2, k)
+                found.double.append((name, name, square))
             if tolerance.link_inertia > 0.0:
-                # About the two other axes it grows alike: three such make any diagonal change.
-                size = tolerance.link_inertia * body.inertia[(0, 3, 5)[k]] / (2.0 * _ARM**2)
-                put = [(size, link, ends[0]), (size, link, ends[1]),
-                       (-2.0 * size, link, tuple(centre.tolist()))]  # fmt: skip
-                found.append((f"link_inertia.{link}.{axis}", put))
+                # Three such make any change of the diagonal.
+                own = tolerance.link_inertia * body.inertia[(0, 3, 5)[k]]
+                found.single.append((f"link_inertia.{link}.{axis}", about_others(own, k)))
+        if tolerance.link_com > 0.0:
+            size = body.mass * tolerance.link_com**2 / (4.0 * _ARM**2)
+            for a, b in ((0, 1), (0, 2), (1, 2)):
+                one, other = np.eye(3)[a], np.eye(3)[b]
+                crossed = at(size, *(one + other)) + at(size, *(-one - other))
+                crossed += at(-size, *(one - other)) + at(-size, *(other - one))
+                names = [f"link_com.{link}.{'xyz'[i]}" for i in (a, b)]
+                found.double.append((names[0], names[1], crossed))
+    return found
+
+
+def _responses_of(
+    robot: FlexibleRobot, record: Record, pose: FloatArray, tolerance: Tolerance,
+    index: dict[str, int],
+) -> list[Response]:  # fmt: skip
+    """The functions of one record."""
+    if record.kind == "frf":
+        return [_response_of(robot, record, pose, tolerance, index)]
+    found = []
+    for one in spectra(robot, record, pose):
+        gains, delays, widths = np.zeros((3, len(index)))
+        if not one.known:
+            for numbers, (name, size) in zip((gains, delays, widths), UNKNOWN_BLOW, strict=True):
+                numbers[index[f"{name}.{record.file}"]] = size
+        made = _made(robot, record.file, one.seen, pose, tolerance, index)
+        found.append(replace(
+            made, omega=one.omega, measured=one.measured, scale=one.scale, shift=one.shift,
+            gains=made.gains + gains, delays=delays, widths=widths,
+        ))  # fmt: skip
     return found
 
 
@@ -431,22 +550,37 @@ def _response_of(
     thin = np.flatnonzero(kept)[:: max(1, int(np.ceil(kept.sum() / _MOST_LINES)))]
     way = np.array(table.force_direction, dtype=float)
     along = np.array(table.response_direction, dtype=float)
-    way, along = way / np.linalg.norm(way), along / np.linalg.norm(along)
     quantity = table.quantity or "accelerance"
+    seen = Seen(
+        way / np.linalg.norm(way), along / np.linalg.norm(along), _POWER[quantity],
+        quantity == "accelerance", table.force_frame, table.force_point, table.response_frame,
+        table.response_point,
+    )  # fmt: skip
+    made = _made(robot, record.file, seen, pose, tolerance, index)
+    return replace(made, omega=2.0 * np.pi * frequency[thin], measured=measured[thin],
+                   scale=scale[thin])  # fmt: skip
+
+
+def _made(
+    robot: FlexibleRobot, file: str, seen: Seen, pose: FloatArray, tolerance: Tolerance,
+    index: dict[str, int],
+) -> Response:  # fmt: skip
+    """A function without its lines."""
+    way, along = seen.way, seen.along
     down = np.array(robot.mounting.gravity, dtype=float)
 
     def stand(at: FloatArray, push: FloatArray, see: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(6, n) of the force's point and of the sensor's, shifted by (3,) m in their frames."""
         return (
-            _point(robot, at, table.force_frame, table.force_point, push, True),
-            _point(robot, at, table.response_frame, table.response_point, see, False),
+            _point(robot, at, seen.force_frame, seen.force_point, push, True),
+            _point(robot, at, seen.response_frame, seen.response_point, see, False),
         )
 
     def sides(
         both: tuple[FloatArray, FloatArray], d: FloatArray, e: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """J_f^T d, J_s^T e and what turning in gravity reads: (w x g) . e."""
-        turned = both[1][3:].T @ np.cross(down, e) if quantity == "accelerance" else 0.0
+        turned = both[1][3:].T @ np.cross(down, e) if seen.tilts else 0.0
         return both[0][:3].T @ d, both[1][:3].T @ e, turned * np.ones(both[0].shape[1])
 
     nothing = np.zeros(3)
@@ -472,14 +606,15 @@ def _response_of(
             sides(stand(pose, nothing, tolerance.sensor_position * unit), way, along))  # fmt: skip
         put(f"sensor_angle.{axis}",
             sides(here, way, along + tolerance.sensor_angle * np.cross(unit, along)))  # fmt: skip
-        put(f"direction.{record.file}.{axis}",
+        put(f"direction.{file}.{axis}",
             sides(here, way + tolerance.direction * np.cross(unit, way), along))  # fmt: skip
     gains = np.zeros(len(index))
     if "sensor_gain" in index:
         gains[index["sensor_gain"]] = tolerance.sensor_gain
+    none, nothing = np.zeros(0), np.zeros(len(index))
     return Response(
-        record.file, 2.0 * np.pi * frequency[thin], measured[thin], scale[thin], _POWER[quantity],
-        own[0], own[1], own[2], changes[0], changes[1], changes[2], gains,
+        file, none, none.astype(complex), none, seen.power, own[0], own[1], own[2], changes[0],
+        changes[1], changes[2], gains, nothing, nothing,
     )  # fmt: skip
 
 

@@ -14,7 +14,14 @@ from picchio.campaign.loadings import read_loadings
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.provenance import provenance
-from picchio.diagnosis.identified import FORMAT, Identification, Identified, IdentifiedJoint, Method
+from picchio.diagnosis.identified import (
+    FORMAT,
+    Compared,
+    Identification,
+    Identified,
+    IdentifiedJoint,
+    Method,
+)
 from picchio.diagnosis.result import Cause, Value
 from picchio.diagnosis.stiffness.fit import Problem
 from picchio.diagnosis.stiffness.joints import Told, stiffness_of
@@ -136,6 +143,27 @@ class StaticIdentification(Identification):
         if self.outliers:
             said.append(f"Outliers, which hardly count: {', '.join(self.outliers)}.")
         return tuple(said)
+
+    def compared(self) -> list[Compared]:
+        """Every instrument of every record, loading by loading."""
+        fit, found = self.answer.fit, []
+        problem = fit.problem
+        for record, table, part in zip(
+            self.campaign, problem.tables, problem.predict(fit.mean), strict=True
+        ):
+            for k, group in enumerate(table.groups):
+                scale, unit = (1e3, "mrad") if group == "deflection" else (1e3, "mm")
+                measured, left = table.values[:, k], part.residual[:, k]
+                shared = table.groups.count(group) > 1
+                size = max(float(np.linalg.norm(measured)), 1e-300)
+                title = f"{record.file}: {group}" + (f" {k + 1}" if shared else "")
+                found.append(Compared(
+                    title, record.source.row_word, f"reading [{unit}]",
+                    np.arange(len(table)) + float(record.source.first_row), scale * measured,
+                    scale * (measured - left), np.full(len(table), scale * fit.noise[group]),
+                    float(np.linalg.norm(left)) / size, False,
+                ))  # fmt: skip
+        return found
 
     def sidecar_text(self) -> str:
         """See `Identification`; a joint that is not told has a wide spread."""

@@ -163,7 +163,8 @@ class Effect(ABC):
         urdf: attribute of URDF's <dynamics> -> the parameter that it states.
         needs: the effect without which, at the same target, this one has no meaning.
         refines: the effect that this one tells with more numbers: where that one shows, too, it
-            takes the place of one that was found, with the values that they share.
+            takes the place of one that was found (`finer_than`); from blows it is not looked for
+            otherwise.
         over: effects on joints that do in each joint by themselves what this one does: in a motion
             it has to gain beside all of them, found or not. What couples joints is told by that.
         beside: parameters of which bodies may do as much: in a motion, the others have to gain.
@@ -253,6 +254,11 @@ class Effect(ABC):
         return (self.name, self.target, *self.values.items(), *self.hidden.items())
 
     @property
+    def fitted(self) -> tuple[Parameter, ...]:
+        """The parameters that a fit moves: not those that are whole numbers, which are tried."""
+        return tuple(p for p in self.parameters if not p.whole)
+
+    @property
     def label(self) -> str:
         """Name and target, for people."""
         return f"{self.name}:{self.target}"
@@ -274,6 +280,16 @@ class Effect(ABC):
         neutral = {p.name: p.neutral for p in self.parameters}
         kept = {k: v for k, v in self.values.items() if v != neutral[k]}
         return type(self)(self.target, **{**kept, **values}).with_hidden(self.hidden)
+
+    @classmethod
+    def finer_than(cls, coarse: Effect) -> Self:
+        """This effect where it does what the one does that it refines.
+
+        Args:
+            coarse: at work at the same target.
+        """
+        own = {p.name for p in cls.parameters}
+        return cls(coarse.target, **{k: v for k, v in coarse.values.items() if k in own})
 
     def bounded(self, **values: float) -> Self:
         """The same effect with other values, brought within their bounds.

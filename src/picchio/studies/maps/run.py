@@ -143,7 +143,7 @@ def workspace_map(
         )
     job = MapJob(model, excitation, places, direction, branch, hits, damage)
     if scheduler is not None:
-        _require_scheduler(scheduler)
+        require_scheduler(scheduler)
     with locked(target):
         if restart:
             shutil.rmtree(_folder_of(target), ignore_errors=True)
@@ -245,8 +245,11 @@ def _run(
             yield future.result()
 
 
-def _require_scheduler(address: str) -> None:
+def require_scheduler(address: str) -> None:
     """Raise where no dask scheduler answers, which a client would wait long for.
+
+    Args:
+        address: such as "tcp://host:8786".
 
     Raises:
         InputError: none does.

@@ -198,7 +198,7 @@ class Sampler:
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Damage and utilisation (k, m, p), peak torque and the torque at rest (n, m, p)."""
         from picchio.studies.rivet.damage_kernel import damages
-        from picchio.vibration.batch.turning_kernel import COARSE
+        from picchio.vibration.batch.turning_kernel import COARSE, FINE
 
         m, p = draw.count, len(op.poses)
         worlds = [nominal]
@@ -231,7 +231,8 @@ class Sampler:
         damages(
             *stacked(forces), mass, jacobian, d if len(forces) > 1 else np.zeros_like(d), place,
             stiffness, ratio[world] * draw.damping[d], np.tile(op.direction, (len(mass), 1)),
-            factor, *curve_tables(curves), frequency, low, high, damaged, COARSE,
+            factor, *curve_tables(curves), frequency, low, high, damaged,
+            COARSE if any(each.estimated for each in self.inputs) else FINE,
         )  # fmt: skip
         allowable = np.array([curve.allowable for curve in self.stress.curves])
         loaded = 0.5 * (stiffness * (high - low) * factor)[:, columns] / allowable

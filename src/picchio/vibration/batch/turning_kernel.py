@@ -11,7 +11,7 @@ from picchio.vibration.closed_form.response import RING_DOWN_LEVEL
 
 # Samples a cycle of the fastest mode that lives: a turn's value is then off by 1e-7 of it.
 FINE = 16.0
-# By half of them: off by 5e-6 of it, in half the time. For worlds drawn from spreads.
+# By half of them: off by 5e-6 of it, in half the time. For worlds drawn from estimates.
 COARSE = 8.0
 # A mode asks for its own step until its free decay has fallen as far: exp(-16) = 1e-7.
 _DECAYED = 16.0 / np.log(FINE)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -73,6 +74,82 @@ def plot_robot(
     Returns:
         the Axes, metres to the right and up in the picture.
     """
+    axes, view, tool, reach = _drawn_robot(robot, pose, axes_or_new(ax, width=5.0, height=3.6))
+    for k, operation in enumerate(assessment.operations):
+        at = view.seen(operation.tool_position)
+        colour = look(k)["color"]
+        axes.scatter(at[:, 0], at[:, 1], s=9, color=colour, zorder=3, label=plain(operation.name))
+        along = 0.16 * reach * view.seen(operation.direction)[:2]
+        tip = view.seen(tool)[:2] if len(at) == 0 else at[:, :2].mean(axis=0)
+        axes.annotate(
+            "", xy=(tip[0], tip[1]), xytext=(tip[0] - along[0], tip[1] - along[1]), zorder=4,
+            arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.6},
+        )  # fmt: skip
+    _finished(axes, view, tool, reach)
+    if len(assessment.operations) > 1:
+        axes.legend(loc="upper left", markerscale=1.6, labelcolor=INK)
+    return axes
+
+
+ArrowKind = Literal["leaves", "comes", "line"]
+
+
+class Arrow(NamedTuple):
+    """An arrow at the tool.
+
+    Attributes:
+        direction: (3,) unit, world.
+        label: at its end.
+        kind: whether it leaves the tool, comes to it, or is a line from it.
+        colour: of it.
+    """
+
+    direction: FloatArray
+    label: str
+    kind: ArrowKind
+    colour: str
+
+
+@styled
+def plot_pose(
+    robot: FlexibleRobot, pose: ArrayLike, arrows: Sequence[Arrow] = (), ax: Axes | None = None
+) -> Axes:
+    """The robot at a pose, what pulls or hits its tool, and along what an instrument reads.
+
+    Args:
+        robot: the robot; its meshes are read.
+        pose: (nv,) rad or m.
+        arrows: at the tool.
+        ax: where to draw.
+
+    Returns:
+        the Axes, metres to the right and up in the picture.
+    """
+    axes, view, tool, reach = _drawn_robot(robot, pose, axes_or_new(ax, width=4.0, height=3.2))
+    at = view.seen(tool)[:2]
+    for arrow in arrows:
+        side = -1.0 if arrow.kind == "comes" else 1.0
+        along = side * 0.22 * reach * view.seen(arrow.direction)[:2]
+        head = "-" if arrow.kind == "line" else "-|>" if arrow.kind == "leaves" else "<|-"
+        axes.annotate(
+            "", xy=tuple(at + along), xytext=tuple(at), zorder=6,
+            arrowprops={"arrowstyle": head, "color": arrow.colour, "linewidth": 1.8},
+        )  # fmt: skip
+        far = at + 1.18 * along
+        # What comes to the eye has no length: its name stands beside the tool.
+        far = far + (0.0 if np.linalg.norm(along) > 0.05 * reach else 0.05 * reach)
+        axes.text(
+            float(far[0]), float(far[1]), arrow.label, color=arrow.colour, fontsize=9,
+            ha="center", va="center", fontweight="bold", zorder=7,
+        )  # fmt: skip
+    _finished(axes, view, tool, reach)
+    return axes
+
+
+def _drawn_robot(
+    robot: FlexibleRobot, pose: ArrayLike, axes: Axes
+) -> tuple[Axes, View, FloatArray, float]:
+    """Its picture on axes; the camera, the tool's place (3,) m, and the robot's size, m."""
     checked = robot.pose(pose)
     tree = frames(robot, checked)
     places = world(tree)
@@ -81,28 +158,19 @@ def plot_robot(
     view = View.of_arm(base, tool)
     parts = [moved(body.shapes[k], places[link] @ matrix) for link, k, matrix in body.parts]
     image, extent = _picture(parts, view)
-    axes = axes_or_new(ax, width=5.0, height=3.6)
     axes.imshow(image, extent=extent, interpolation="antialiased", zorder=1)
-    for k, operation in enumerate(assessment.operations):
-        at = view.seen(operation.tool_position)
-        colour = look(k)["color"]
-        axes.scatter(at[:, 0], at[:, 1], s=9, color=colour, zorder=3, label=plain(operation.name))
-        along = 0.16 * body.reach * view.seen(operation.direction)[:2]
-        tip = view.seen(tool)[:2] if len(at) == 0 else at[:, :2].mean(axis=0)
-        axes.annotate(
-            "", xy=(tip[0], tip[1]), xytext=(tip[0] - along[0], tip[1] - along[1]), zorder=4,
-            arrowprops={"arrowstyle": "-|>", "color": colour, "linewidth": 1.6},
-        )  # fmt: skip
+    return axes, view, tool, body.reach
+
+
+def _finished(axes: Axes, view: View, tool: FloatArray, reach: float) -> None:
+    """Mark the tool, and show how long something is in place of axes."""
     spot = view.seen(tool)
     axes.plot(spot[0], spot[1], "o", markersize=7, fillstyle="none", color=INK, zorder=5)
     axes.margins(_MARGIN)
     axes.set_aspect("equal")
     axes.grid(False)
     axes.set_axis_off()
-    _scale_bar(axes, body.reach)
-    if len(assessment.operations) > 1:
-        axes.legend(loc="upper left", markerscale=1.6, labelcolor=INK)
-    return axes
+    _scale_bar(axes, reach)
 
 
 def _scale_bar(axes: Axes, reach: float) -> None:

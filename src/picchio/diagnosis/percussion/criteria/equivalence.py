@@ -40,7 +40,7 @@ def bic(found: Fit) -> float:
 
 
 def _numbers(effect: Effect) -> int:
-    return 1 if effect.latent is not None or effect.discrete else len(effect.parameters)
+    return 1 if effect.latent is not None or effect.discrete else len(effect.fitted)
 
 
 def confidence(better: Fit, other: Fit) -> float:

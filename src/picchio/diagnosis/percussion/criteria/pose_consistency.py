@@ -15,6 +15,8 @@ from picchio.diagnosis.percussion.fit.least_squares import Fit
 _POSES = 3
 # Directions of a pose's unknowns that its data tell this much less than its best are not told.
 _TOLD = 1e-9
+# Of what all poses tell of a direction: where the others tell less, one pose tells it alone.
+_ALONE = 1e-3
 
 
 def pose_inconsistency(found: Fit) -> float:
@@ -68,15 +70,18 @@ def jackknife_covariance(found: Fit) -> FloatArray:
     if len(parts) < 2:
         return np.zeros((size, size))
     whole = found.normal_matrix()
+    scale = np.sqrt(np.maximum(whole.diagonal(), 1e-300))
+    values, vectors = np.linalg.eigh(whole / np.outer(scale, scale))
+    told = values > _TOLD * max(float(values.max()), 1e-300)
+    # In these coordinates all poses together tell every direction as well as any other.
+    basis = vectors[:, told] / np.sqrt(values[told]) / scale[:, None]
     moved = []
     for own, right in parts:
-        left = whole - own
-        # What this pose alone tells stays: the others have nothing to say of it.
-        told = left.diagonal() > _TOLD * whole.diagonal()
-        scale = np.where(told, np.sqrt(np.maximum(left.diagonal(), 0.0)), np.inf)
-        solved = np.linalg.pinv(left / np.outer(scale, scale), rcond=_TOLD, hermitian=True)
+        # What this pose all but alone tells stays: the others have nothing to say of it.
+        shares, ways = np.linalg.eigh(basis.T @ (whole - own) @ basis)
+        kept = basis @ ways[:, shares > _ALONE]
         # The fit stands where all gradients cancel: without one pose that one's pulls it back.
-        moved.append(solved @ (right / scale) / scale)
+        moved.append(kept @ ((kept.T @ right) / shares[shares > _ALONE]))
     spread = np.array(moved) - np.mean(moved, axis=0)
     count = len(parts)
     return np.asarray((count - 1) / count * spread.T @ spread)

@@ -233,7 +233,7 @@ class Hypothesis:
         told = {(label, name): (value, std) for label, name, value, std in self.priors}
         for i, effect in enumerate(self.effects):
             nuisance = i < self.n_nuisances
-            for p in effect.parameters:
+            for p in effect.fitted:
                 if effect.discrete or effect.latent is not None:
                     continue  # found in another way than by the fit
                 prior = None
@@ -246,6 +246,8 @@ class Hypothesis:
                         lower, upper = self._tolerance(effect)
                         prior = (0.0, sigma)
                 scale = scales.get(f"{effect.label}.{p.name}", 1.0)
+                if p.spread:
+                    prior = (p.neutral / scale, p.spread / scale)
                 if (effect.label, p.name) in told:
                     value, std = told[effect.label, p.name]
                     prior = (math.log(value), std / value) if p.logarithmic else (

@@ -60,6 +60,26 @@ def all_candidates(problem: Problem, without: Iterable[str] = ()) -> list[tuple[
     ]
 
 
+def finer_candidates(
+    problem: Problem, without: Iterable[str] = ()
+) -> list[tuple[type[Effect], str]]:
+    """Every (effect, target) that tells another one with more numbers (`Effect.refines`).
+
+    Such an effect is not screened; it is tried in the place of the other one where that is found.
+
+    Args:
+        problem: robot and records.
+        without: names of effects to leave out.
+    """
+    left_out, evidence = set(without), evidence_of(problem)
+    return [
+        (effect, target)
+        for name, effect in catalogue().items()
+        if effect.refines and name not in left_out and effect.shows(motion=False)
+        for target in effect.targets(evidence)
+    ]
+
+
 def not_looked_for(problem: Problem) -> dict[str, str]:
     """Effects that these records cannot show, and why.
 
@@ -73,7 +93,7 @@ def not_looked_for(problem: Problem) -> dict[str, str]:
     return {
         name: why
         for name, effect in catalogue().items()
-        if effect.shows(motion=False) and (why := effect.why_not(evidence))
+        if effect.shows(motion=False) and not effect.refines and (why := effect.why_not(evidence))
     }
 
 

@@ -26,7 +26,8 @@ def restarted(search: Search, best: Fit) -> Fit:
     """The fit, or a better one from where what does nothing stands at one of its usual sizes again.
 
     What is far off is put back always; where more than noise is left, so is what does nothing where
-    it is, such as the preload of a contact that never opens: it may have to be much smaller.
+    it is, such as the preload of a contact that never opens: it may have to be much smaller. A
+    whole number, such as a filter's order, then takes each of its other values.
 
     Args:
         search: data, sizes and records.
@@ -36,9 +37,14 @@ def restarted(search: Search, best: Fit) -> Fit:
     problem, noisy = search.problem, not search.leaves_noise(best)
     for effect in best.hypothesis.causes:
         for name, sizes in _usual(effect, search.scales).items():
-            far = [not 1.0 / _FAR < effect.values[name] / size < _FAR for size in sizes]
-            off = all(far) and any(p.logarithmic for p in effect.parameters if p.name == name)
-            if not (off or (noisy and _does_nothing(problem, best, effect, name))):
+            (parameter,) = (p for p in effect.parameters if p.name == name)
+            if parameter.whole:
+                again = noisy
+            else:
+                far = [not 1.0 / _FAR < effect.values[name] / size < _FAR for size in sizes]
+                again = all(far) and parameter.logarithmic
+                again = again or (noisy and _does_nothing(problem, best, effect, name))
+            if not again:
                 continue
             for size in sizes:
                 effects = tuple(
@@ -48,20 +54,22 @@ def restarted(search: Search, best: Fit) -> Fit:
                 start = replace(found.hypothesis, effects=effects)
                 windows = _GROWING if is_nonsmooth(start) else (None,)
                 grow = partial(fit_growing, windows=windows, iterations=8)
-                again = attempt(effect.label, partial(grow, problem, start, search.records))
-                found = again if again is not None and again.cost < found.cost else found
+                tried = attempt(effect.label, partial(grow, problem, start, search.records))
+                found = tried if tried is not None and tried.cost < found.cost else found
     return found
 
 
 def _usual(effect: Effect, scales: Scales) -> dict[str, list[float]]:
-    """The sizes above 0 at which an effect's parameters are tried, each once."""
+    """The sizes at which an effect's parameters are tried: above 0, or another whole number."""
     sizes: dict[str, list[float]] = {}
     if effect.latent is not None or effect.discrete:
         return sizes
     for trial in effect.trials(scales):
         for name, wanted in trial.items():
             value = effect.bounded(**{name: wanted}).values[name]
-            if value > 0.0 and value not in sizes.get(name, []):
+            whole = any(p.whole for p in effect.parameters if p.name == name)
+            fits = value != effect.values[name] if whole else value > 0.0
+            if fits and value not in sizes.get(name, []):
                 sizes.setdefault(name, []).append(value)
     return sizes
 

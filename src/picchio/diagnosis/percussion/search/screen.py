@@ -62,7 +62,7 @@ def resized(trial: Effect, size: float) -> Effect:
     values = dict(trial.values)
     for p in trial.parameters:
         value = values[p.name]
-        if value == p.neutral or not math.isfinite(value):
+        if value == p.neutral or not math.isfinite(value) or p.whole:
             continue
         if p.neutral == 0.0 and not p.logarithmic:
             new = value * size
@@ -356,7 +356,7 @@ def _judged(
     alone = (moves.T @ -left) / size**2
     linear = acts_either_way(type(kept[0]), faint)
     gains = np.where(linear | (alone > 0.0), (alone * size) ** 2, 0.0)
-    numbers = len(kept[0].parameters)
+    numbers = len(kept[0].fitted)
     if kept[0].discrete:
         # nothing lies between its sizes: the residual as it would be
         totals = np.array([((left + m) ** 2).sum() for m in moves.T])

@@ -21,6 +21,7 @@ from picchio.diagnosis.percussion.search.exchange import (
     replace_causes,
     rivals_of,
 )
+from picchio.diagnosis.percussion.search.refine import refined
 from picchio.diagnosis.percussion.search.restart import restarted
 from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.diagnosis.percussion.search.trials import (
@@ -49,6 +50,7 @@ def begin_search(
     candidates: Sequence[tuple[type[Effect], str]],
     split: Split,
     say: Callable[[str], None] = lambda text: None,
+    finer: Sequence[tuple[type[Effect], str]] = (),
 ) -> Search:
     """A search that has the nominal model fitted within its tolerance.
 
@@ -57,13 +59,14 @@ def begin_search(
         candidates: effects and targets.
         split: records to fit, and records held out.
         say: told what is being done.
+        finer: effects and targets that tell another cause with more numbers.
     """
     say("fitting the nominal model within its tolerance")
     start = Hypothesis.baseline(problem.robot, problem.campaign.tolerance)
     baseline = settled(problem, fit_growing(problem, start, split[0]), split[0])
     effects = baseline.hypothesis.effects
     scales = measure_scales(problem, effects, problem.predictions(effects))
-    return Search(problem, candidates, scales, *split, baseline, baseline, say)
+    return Search(problem, candidates, scales, *split, baseline, baseline, say, finer)
 
 
 def start_from(search: Search, known: Sequence[Estimate]) -> None:
@@ -120,7 +123,7 @@ def _grow(search: Search, stack: ExitStack) -> None:
             break
         if not search.pinned:
             trials = over_the_same_samples(search, trials)
-        trials = settled_alike(search, trials)
+        trials = refined(search, settled_alike(search, trials))
         search.steps.append(trials)
         best = _chosen(search, trials, wider=not quiet)
         gain = search.pays(here, best.fit, best.about) if best is not None else 0.0

@@ -72,6 +72,7 @@ class Search:
         about: what the records were linearised about for it.
         best: the hypothesis that stands, fitted to the first; the baseline to begin with.
         say: told what is being done.
+        finer: effects and targets that tell another cause with more numbers.
         steps: per step the trials, the best first.
         pinned: whether noise was all that was left, and what is known is held fixed since.
         replacements: label of a cause -> the fit it was replaced in, and the trials.
@@ -85,6 +86,7 @@ class Search:
     baseline: Fit
     best: Fit
     say: Callable[[str], None] = lambda text: None
+    finer: Sequence[tuple[type[Effect], str]] = ()
     steps: list[list[Trial]] = field(default_factory=list)
     pinned: bool = False
     replacements: dict[str, tuple[Fit, list[Trial]]] = field(default_factory=dict)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, Parameter
+from picchio.model.effects.sensors import filtering
 from picchio.model.sensing import Sensors
 
 
 class SensorLowpass(Effect):
-    """A first-order low-pass."""
+    """A low-pass: the amplifier's, or the logger's own filter."""
 
     name = "sensor_lowpass"
     where = "sensor"
@@ -23,10 +24,13 @@ class SensorLowpass(Effect):
             logarithmic=True,
             meaning="corner",
         ),
+        filtering.ORDER,
+        filtering.DIGITAL,
     )
     meaning = "the sensor or its filter takes out fast motion"
-    tried = ({"frequency": 40.0}, {"frequency": 120.0})
+    tried = filtering.tried_at((40.0, 120.0))
+    source = "Oppenheim, Schafer, Discrete-Time Signal Processing, 3rd ed. 2010, sec. 7.2"
 
     def sense(self, sensors: Sensors, conditions: Conditions) -> None:
         """Change the group's chain."""
-        sensors.chain(self.target).lowpass = self.values["frequency"]
+        sensors.chain(self.target).lowpass = filtering.filter_of(self.values)

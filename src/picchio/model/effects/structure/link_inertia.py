@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from typing import Self
+
 import numpy as np
 
 from picchio.core.arrays import FloatArray
@@ -51,6 +54,15 @@ class LinkInertia(Effect):
         """The links that have a mass."""
         links = evidence.robot.tree.links
         return [link for link in super().targets(evidence) if links.get(link) is not None]
+
+    @classmethod
+    def finer_than(cls, coarse: Effect) -> Self:
+        """A link of as many times the mass.
+
+        Args:
+            coarse: `link_mass` at work at the same link.
+        """
+        return cls(coarse.target, mass=math.log(coarse.values["scale"]))
 
     def _added(self, own: FloatArray) -> FloatArray:
         return stretched(own, [self.values[name] for name in _NAMES]) - own

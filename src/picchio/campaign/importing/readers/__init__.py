@@ -1,0 +1,1 @@
+"""Readers of foreign files: one a kind of file."""

@@ -1,0 +1,240 @@
+"""`picchio count`: the damage that logs show, added to a ledger; what is left."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+
+from picchio.cli.app import app
+from picchio.cli.options import (
+    FlexOption,
+    JsonOption,
+    ReducersOption,
+    ReportOption,
+    RobotArgument,
+    SNCurveOption,
+    TaskOption,
+    ToolOption,
+)
+from picchio.cli.output import (
+    check_targets,
+    console,
+    count_of,
+    deliver,
+    notice_first,
+    progress,
+    styled,
+    table,
+    write_report,
+)
+from picchio.core.errors import InputError
+from picchio.robot.annotations.flexibility import estimate_notice
+from picchio.studies.assessment.result import format_count
+
+if TYPE_CHECKING:
+    from picchio.ledger.count import Count
+    from picchio.ledger.fleet import Fleet
+
+
+@app.command(
+    epilog="Example: picchio count fanuc_like_3dof --log logs --ledger cell4.ledger "
+    "--report life.html"
+)
+def count(
+    robot: RobotArgument,
+    ledger: Annotated[
+        Path, typer.Option(metavar="LEDGER", help="The robot's ledger; made where it is missing.")
+    ],
+    log: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Logs: a folder, or a file; may be repeated. Without it: what the ledger holds.",
+        ),
+    ] = None,
+    mapping: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="What the logs' series are (TOML, see `picchio formats mapping`); mapping.toml in "
+            "the folder if not given.",
+        ),
+    ] = None,
+    task: TaskOption = None,
+    flex: FlexOption = None,
+    tool: ToolOption = None,
+    reducers: ReducersOption = None,
+    sn_curve: SNCurveOption = None,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Go on counting what arrives, until Ctrl-C.")
+    ] = False,
+    every: Annotated[
+        float, typer.Option(metavar="S", min=0.1, help="How often --watch looks, s.")
+    ] = 10.0,
+    fleet: Annotated[
+        bool,
+        typer.Option(
+            "--fleet", help="--log holds a folder for each robot, LEDGER is a folder for theirs."
+        ),
+    ] = False,
+    workers: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Processes for a fleet (dask).")
+    ] = 1,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A dask scheduler for a fleet.")
+    ] = None,
+    prometheus: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.prom", help="Write the figures as Prometheus reads them."),
+    ] = None,
+    mcap: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.mcap", help="Write diagnostic_msgs/DiagnosticArray (ROS 2)."),
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Random seed of the draws.")] = 0,
+    report: ReportOption = None,
+    json: JsonOption = None,
+) -> None:
+    """What the blows in a robot's logs did to it, and the life left.
+
+    A log that is counted twice counts once; order and cuts of the logs do not matter. Where no log
+    shows blows they are those of the task, at the tool's trigger or the task's poses.
+    """
+    import picchio
+    from picchio.ledger.out import write_diagnostics, write_prometheus
+
+    if watch and not log:
+        raise InputError("needs a folder to watch", key="--log")
+    with notice_first(json):
+        loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+    if fleet:
+        if not log or len(log) > 1 or watch or prometheus or mcap:
+            raise InputError("needs one --log, and is told as a table, --json or --report",
+                             key="--fleet")  # fmt: skip
+        from picchio.ledger.fleet import count_fleet
+
+        check_targets((json, report), [*loaded.files, mapping, task, sn_curve])
+        with progress("robots") as tick:
+            rows = count_fleet(loaded, log[0], ledger, mapping=mapping, task=task,
+                               sn_curve=sn_curve, seed=seed, workers=workers, scheduler=scheduler,
+                               progress=tick)  # fmt: skip
+        write_report(rows, report)
+        deliver(rows.to_dict(), json, lambda: _show_fleet(rows))
+        return
+    targets = (json, report, prometheus, mcap, ledger)
+    check_targets(targets, [*loaded.files, mapping, task, sn_curve])
+    before: list[tuple[str, int, int]] | None = None
+    while True:
+        now = _listing(log or [])
+        if now != before:
+            with progress("logs") as tick:
+                found = picchio.count(loaded, log or None, ledger, mapping=mapping, task=task,
+                                      sn_curve=sn_curve, seed=seed, progress=tick)  # fmt: skip
+            if prometheus is not None:
+                write_prometheus(found, prometheus)
+            if mcap is not None:
+                write_diagnostics(found, mcap)
+            write_report(found, report)
+
+            def show(found: Count = found) -> None:
+                if notice := estimate_notice(loaded.name, loaded.origins):
+                    console().print(f"{notice}.\n", style="bold yellow")
+                _show(found)
+
+            deliver(found.to_dict(arrays=True), json, show)
+            before = now
+        if not watch:
+            return
+        time.sleep(every)
+
+
+def _show_fleet(found: Fleet) -> None:
+    out = console()
+    rows = []
+    for row in found.robots:
+        left = row["blows_left"] or {}
+        rows.append((
+            row["name"], str(row["logs"] or 0), str(row["blows"] or 0), row["joint"] or "-",
+            _share(math.nan if row["damage"] is None else row["damage"]),
+            format_count(math.inf if left.get("p50") is None else left["p50"]) if left else "-",
+            str(len(row["changes"])),
+        ))  # fmt: skip
+    heads = ("robot", ">logs", ">blows", "joint", ">life\nused, %", ">blows left,\nP50", ">changed")
+    out.print(table(heads, rows, title=f"{found.robot}: {found._headline()}"))
+    for row in found.robots:
+        if row["error"]:
+            out.print(styled(f"not counted: {row['name']}", f": {row['error']}"))
+        for change in row["changes"]:
+            out.print(styled(f"changed: {row['name']}", f": {change['words']}"))
+
+
+def _listing(logs: list[Path]) -> list[tuple[str, int, int]]:
+    """Names, sizes and times of the files that are there."""
+    files = [p for log in logs for p in (log.rglob("*") if log.is_dir() else [log]) if p.is_file()]
+    stats = [(str(p), p.stat()) for p in files]
+    return sorted((name, stat.st_size, stat.st_mtime_ns) for name, stat in stats)
+
+
+def _show(found: Count) -> None:
+    out = console()
+    for name in found.added:
+        out.print(f"counted {name}: {'; '.join(found.detected[name])}")
+    if found.known:
+        out.print(f"{count_of(len(found.known), 'log')} counted before")
+    for name, why in found.refused:
+        out.print(styled(f"not counted: {name}", f": {why}", style="bold yellow"))
+    out.print(
+        styled(
+            found.model.robot.name,
+            f": {found.blows} blows in {count_of(found.logs, 'log')} of {found.hours:.4g} h; "
+            + (
+                "all of them seen"
+                if found.seen_share == 1.0
+                else f"{100 * found.seen_share:.4g} % of them seen, the others assumed"
+            ),
+        )
+    )
+    rows = []
+    for joint in found.joints():
+        left = joint["blows_left"]
+        low, high = joint["damage_interval"] or (math.nan, math.nan)
+        rows.append((
+            joint["name"], _share(joint["damage"]),
+            "-" if math.isnan(low) else f"{_share(low)} to {_share(high)}",
+            *("-" if left is None else format_count(left[p]) for p in ("p10", "p50", "p90")),
+            (joint["date"] or {}).get("p50") or "-",
+        ))  # fmt: skip
+    heads = ("joint", ">life\nused, %", ">90 % interval,\n%", ">blows left,\nP10", ">P50", ">P90",
+             ">P50 is\nreached")  # fmt: skip
+    out.print(table(heads, rows, title="Life used and left"))
+    first = found.first_to_fail
+    if first is not None:
+        name = found.model.robot.flexible_names[first]
+        gain = float(found.if_force(0.9)[first])
+        longer = f" With blows 10 % weaker it would last {gain:.3g} times as long."
+        out.print(f"{name} ends the life, at {found.blows_a_day:.4g} blows a day.{longer}")
+    elif found.blows:
+        out.print("No life has an end: no blow damages a shaft or a drive.")
+    places = found.stations()[:3]
+    if places and found.first_to_fail is not None:
+        shares = ", ".join(
+            f"{100 * s['share'][first]:.3g} % at ({_angles(s['pose'])})" for s in places
+        )
+        out.print(f"Where it comes from: {shares}.")
+    for change in found.changes:
+        out.print(styled("changed: ", change["words"], style="bold yellow"))
+    for note in found.notes:
+        out.print(f"  - {note}")
+
+
+def _angles(pose: np.ndarray) -> str:
+    return ", ".join(f"{value:.3g}" for value in pose)
+
+
+def _share(value: float) -> str:
+    return "-" if math.isnan(value) else f"{100 * value:.3g}"

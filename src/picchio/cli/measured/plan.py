@@ -1,0 +1,128 @@
+"""`picchio plan`: which tests of stiffness narrow the life most."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from picchio.cli.app import app
+from picchio.cli.options import (
+    FlexOption,
+    JsonOption,
+    ReducersOption,
+    ReportOption,
+    RobotArgument,
+    TaskOption,
+    ToolOption,
+)
+from picchio.cli.output import (
+    check_targets,
+    console,
+    deliver,
+    notice_first,
+    styled,
+    table,
+    telling,
+    write_report,
+)
+
+if TYPE_CHECKING:
+    from picchio.diagnosis.planning.plan import PlannedTests
+
+
+@app.command(
+    epilog="Example: picchio plan fanuc_r2000ic --budget 20min --with dial,scale --to loads"
+)
+def plan(
+    robot: RobotArgument,
+    task: TaskOption = None,
+    budget: Annotated[
+        str, typer.Option(metavar="TIME", help="The time there is, such as 20min, 1h or 900s.")
+    ] = "20min",
+    instruments: Annotated[
+        str,
+        typer.Option(
+            "--with",
+            metavar="NAMES",
+            help="Instruments at hand: scale or weight with dial or tracker; hammer with "
+            "accelerometer.",
+        ),
+    ] = "scale,dial",
+    force: Annotated[
+        float | None,
+        typer.Option(metavar="N", help="How hard to pull; as the task's blows, at most 400."),
+    ] = None,
+    to: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Where the campaign goes: a form to fill in, plan.toml, sheet.html to print.",
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Write over a form that is there, filled in or not.")
+    ] = False,
+    flex: FlexOption = None,
+    tool: ToolOption = None,
+    reducers: ReducersOption = None,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Random seed of the poses.")] = 0,
+    report: ReportOption = None,
+    json: JsonOption = None,
+) -> None:
+    """The tests for stiffness that narrow the life on a task most.
+
+    Poses, directions and places of the instruments, until the time is up or one more would not
+    change the answer. With --flex the sidecar of an earlier `picchio identify` the plan goes on
+    from what is known.
+    """
+    import picchio
+    from picchio.studies.default_task import task_of
+
+    hands = [name.strip() for name in instruments.split(",") if name.strip()]
+    with notice_first(json):
+        loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+    work = task_of(loaded, task)
+    check_targets((report, json), [*loaded.files, *work.files], folder=to)
+    with telling("planning") as say:
+        found = picchio.plan(
+            loaded, work, budget=budget, instruments=hands, force=force, seed=seed, progress=say
+        )
+    if to is not None:
+        found.save(to, overwrite=overwrite)
+        write_report(found, to / "sheet.html")
+    write_report(found, report)
+    deliver(found.to_dict(), json, lambda: _show(found, to))
+
+
+def _show(found: PlannedTests, to: Path | None) -> None:
+    from picchio.diagnosis.planning.tests import along, angles
+
+    out = console()
+    out.print(styled(f"{found._headline()}."))
+    rows, before = [], None
+    for k, record in enumerate(found.records, start=1):
+        one = record.candidate
+        told = ""
+        if one.place != before:
+            told = ", ".join(f"{value:.4g}" for value, _ in angles(found.robot, one.pose).values())
+        before = one.place
+        reads = "x, y, z" if one.reads is None else along(one.reads)
+        reads += f" on {one.frame}" if one.frame else ""
+        load = f"{one.force:.3g} N" if one.kind == "static" else "hit"
+        rows.append([str(k), told, f"{load} {along(one.direction)}", reads,
+                     f"{record.seconds / 60.0:.1f}"])  # fmt: skip
+    if rows:
+        out.print(table(("", "pose, deg or mm", "load", "read along", ">min"), rows))
+    out.print(f"It ends there: {found.choice.why}.")
+    factors = [[joint.name, f"{joint.before:.3g}", f"{joint.after:.3g}"] for joint in found.joints]
+    out.print(table(
+        ("joint", ">now", ">then"), factors,
+        title="The stiffness lies within this factor either way (90 %)",
+    ))  # fmt: skip
+    for note in found.notes:
+        out.print(f"  - {note}")
+    if to is not None:
+        out.print("\nFill in the form, then:")
+        out.print(styled(f"  {found.next_command(str(to))}"), soft_wrap=True)

@@ -1,0 +1,1 @@
+"""Which tests of stiffness narrow the life on a task most: `picchio plan`."""

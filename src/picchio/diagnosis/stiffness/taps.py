@@ -1,0 +1,169 @@
+"""Taps in time: records of one blow as functions along a line in the Laplace plane.
+
+An exponential window w = exp(-a t) on force and reading makes them decay within the record; their
+Fourier transforms are then the Laplace transforms at s = a + i w, and their ratio is the transfer
+function there, with no damping to be corrected afterwards (Bucher, J. Vib. Acoust. 120 (1998) 588,
+has the window as a shift of the poles). Without a measured force the ratio to a unit impulse is
+taken, and how hard, when and how long the blow was are numbers of their own.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from picchio.campaign.channels import AXES
+from picchio.campaign.record import Record
+from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.robot.flexible_robot import FlexibleRobot
+
+UNKNOWN_BLOW = (("impulse", 2.3), ("blow_delay", 1e-3), ("blow_variance", 3e-7))
+"""Numbers of a blow that is not measured, and their standard deviations: ln of N s, s, s^2."""
+_IMPULSE, _DELAY, _VARIANCE = 1.0, 1.5e-3, 4e-7  # N s, s, s^2: a hammer's, about
+_DECAY = 6.0  # of the window, over the record's length
+_SAMPLED, _STRUCK = 0.4, 0.1  # highest line over the sample rate; least force over the largest
+_MOST_UNKNOWN = 120.0  # Hz, to which a blow of unknown shape is nearly an impulse
+_MOST_LINES = 240
+_MODEL = 0.005  # of a line: nothing is measured better than that
+_WIDTH = 3.0  # samples that a measured blow must last
+_QUIET = 20  # samples, at least, that tell a channel's noise
+_REACH = 250.0  # Hz, to which a hammer's blow of 4 ms shakes an arm
+_POWER = {"accelerometer": 2, "acceleration": 2, "velocity": 1, "displacement": 0}
+
+
+class Seen(NamedTuple):
+    """How a function was taken.
+
+    Attributes:
+        way: (3,) unit, world, of the force.
+        along: (3,) unit, world, in which the sensor reads.
+        power: of s, from a motion to the reading.
+        tilts: whether the sensor also reads that it turns in gravity.
+        force_frame, force_point: where the force acts; see `RecordTable`.
+        response_frame, response_point: where the sensor is.
+    """
+
+    way: FloatArray
+    along: FloatArray
+    power: int
+    tilts: bool
+    force_frame: str | None = None
+    force_point: tuple[float, float, float] | None = None
+    response_frame: str | None = None
+    response_point: tuple[float, float, float] | None = None
+
+
+class Spectrum(NamedTuple):
+    """One channel of a tap.
+
+    Attributes:
+        seen: what it is.
+        omega: (m,) rad/s, of the lines.
+        shift: 1/s, likewise.
+        measured: (m,) SI per newton.
+        scale: (m,) its standard deviation.
+        known: whether the force was measured.
+    """
+
+    seen: Seen
+    omega: FloatArray
+    shift: float
+    measured: ComplexArray
+    scale: FloatArray
+    known: bool
+
+
+def spectra(robot: FlexibleRobot, record: Record, pose: FloatArray) -> list[Spectrum]:
+    """What every channel of a tap says.
+
+    Args:
+        robot: flexible.
+        record: a percussion record of one blow.
+        pose: (nv,) rad or m.
+
+    Returns:
+        one for each channel of an accelerometer and the like.
+
+    Raises:
+        InputError: no such channel; a record that does not begin before the blow's end, is too
+            short, or is sampled too slowly for its blow or for the robot's modes.
+    """
+    columns = record.read()
+    time = columns.pop("time")
+    step = float(np.median(np.diff(time)))
+    after = time >= 0.0
+    length = float(time[-1])
+    if after.sum() < 64 or length <= 0.0:
+        raise record.source.error("a tap needs 64 samples or more from t = 0 on", channel="time")
+    shift = _DECAY / length
+    force = columns.pop("force", None)
+    used = [name for name in columns if record.channel(name).kind.name in _POWER]
+    if not used:
+        raise record.source.error("no channel of this tap tells the stiffness",
+                                  choices=[f"{name}.<frame>.x" for name in _POWER])  # fmt: skip
+    highest = _SAMPLED / step
+    _sampled_well(robot, record, pose, step)
+    if force is not None:
+        struck = np.abs(force) > _STRUCK * np.abs(force).max()
+        if not np.abs(force).max() > 0.0:
+            raise record.source.error("is zero throughout", channel="force")
+        if struck.sum() < _WIDTH:
+            raise record.source.error(
+                f"the blow lasts {struck.sum()} samples at {1.0 / step:.0f} Hz: its force is not "
+                "known so", channel="force",
+                hint="sample faster, or leave the force out: the ring-down is used then",
+            )  # fmt: skip
+    else:
+        highest = min(highest, _MOST_UNKNOWN)
+    spacing = max(2.0 / length, highest / _MOST_LINES)
+    omega = 2.0 * np.pi * np.arange(spacing, highest, spacing)
+    line = shift + 1j * omega
+    kernel = np.exp(-np.outer(line, time[after])) * step
+
+    def transformed(values: FloatArray) -> ComplexArray:
+        return np.asarray(kernel @ values[after])
+
+    if force is not None:
+        blow = transformed(force)
+        kept = np.abs(blow) > _STRUCK * np.abs(blow).max()
+        kept &= np.cumprod(kept).astype(bool)  # beyond the first gap nothing
+    else:
+        blow = _IMPULSE * np.exp(-line * _DELAY + 0.5 * line**2 * _VARIANCE)
+        kept = np.ones(len(line), bool)
+    found = []
+    for name in used:
+        channel = record.channel(name)
+        values = columns[name]
+        quiet = values[~after] if (~after).sum() >= _QUIET else values[-max(len(values) // 10, 2) :]
+        noise = float(np.std(quiet))
+        if (~after).sum() >= _QUIET:
+            values = values - float(np.mean(quiet))
+        value = transformed(values) / blow
+        size = noise * step * np.sqrt(np.sum(np.exp(-2.0 * shift * time[after]))) / np.abs(blow)
+        axis = np.eye(3)[AXES.index(channel.axis or "x")]
+        own = channel.kind.name == "accelerometer"
+        if own:
+            axis = robot.frame_placement(pose, channel.subject or "")[1] @ axis
+        assert record.direction is not None
+        seen = Seen(record.direction, axis, _POWER[channel.kind.name], own,
+                    response_frame=channel.subject)  # fmt: skip
+        floor = _MODEL * np.hypot(np.abs(value), 0.01 * np.abs(value[kept]).max())
+        found.append(Spectrum(seen, omega[kept], shift, value[kept],
+                              np.hypot(size, floor)[kept], force is not None))  # fmt: skip
+    return found
+
+
+def _sampled_well(robot: FlexibleRobot, record: Record, pose: FloatArray, step: float) -> None:
+    """Refuse what folds: no filter is known of, and modes may lie beyond half the sample rate."""
+    state = robot.state(pose)
+    inverse = np.linalg.inv(np.linalg.cholesky(state.mass_matrix))
+    squared = np.linalg.eigvalsh(inverse @ np.diag(state.stiffness) @ inverse.T)
+    modes = np.sqrt(squared) / (2.0 * np.pi)
+    folds = modes[(modes > 0.5 / step) & (modes < _REACH)]
+    if len(folds):
+        raise record.source.error(
+            f"is sampled at {1.0 / step:.0f} Hz: a mode near {folds[0]:.0f} Hz, if nothing filters "
+            "it, folds into what is read", channel="time",
+            hint=f"sample at {2.5 * folds[-1]:.0f} Hz or more, as no phone does",
+        )  # fmt: skip

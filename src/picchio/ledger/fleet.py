@@ -1,0 +1,212 @@
+"""Many robots of one type: a ledger each, counted side by side, in one table."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from picchio.core.errors import InputError, PicchioError
+from picchio.core.html import sheet
+from picchio.core.processes import safe_start
+from picchio.core.provenance import provenance
+from picchio.core.results import TableResult
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.ledger.count import MAPPING, Count, count
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.studies.default_task import task_of
+from picchio.studies.maps.run import require_scheduler
+from picchio.studies.tasks import Task
+
+ENDING = ".ledger"
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """What all robots of a fleet share."""
+
+    robot: FlexibleRobot
+    task: Task
+    mapping: Path | None
+    ledgers: Path
+    sn_curve: str | SNCurve | None
+    seed: int
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fleet(TableResult):
+    """The counts of many robots.
+
+    Attributes:
+        robot: their type.
+        robots: a summary each, the one with the most damage first.
+        origin: provenance.
+    """
+
+    UNITS: ClassVar[dict[str, str]] = {"damage": "1", "blows_left_p50": "1"}
+
+    robot: str
+    robots: tuple[dict[str, Any], ...]
+    origin: dict[str, Any]
+
+    def _headline(self) -> str:
+        bad = sum(row["error"] is not None for row in self.robots)
+        text = f"{len(self.robots)} robots, {sum(row['blows'] or 0 for row in self.robots)} blows"
+        return text + (f"; {bad} could not be counted" if bad else "")
+
+    def _rows(self) -> list[dict[str, Any]]:
+        return [
+            {"name": row["name"], "logs": row["logs"], "blows": row["blows"], "joint": row["joint"],
+             "damage": row["damage"], "blows_left_p50": (row["blows_left"] or {}).get("p50"),
+             "changes": len(row["changes"])}
+            for row in self.robots
+        ]  # fmt: skip
+
+    def _repr_html_(self) -> str:
+        heads = ("robot", "logs", "blows", "joint", "life used, %", "blows left, P10", "P50", "P90",
+                 "P50 is reached", "changed", "not counted")  # fmt: skip
+        rows = []
+        for row in self.robots:
+            left, date = row["blows_left"] or {}, row["date"] or {}
+            used = None if row["damage"] is None else 100.0 * row["damage"]
+            rows.append((
+                row["name"], row["logs"], row["blows"], row["joint"], used, left.get("p10"),
+                left.get("p50"), left.get("p90"), date.get("p50"),
+                "; ".join(c["words"] for c in row["changes"]), row["error"],
+            ))  # fmt: skip
+        return sheet(f"A fleet of {self.robot}", None, heads, rows, self._headline())
+
+    def _content(self) -> dict[str, Any]:
+        return {
+            "format": "picchio-fleet/1",
+            "robot": self.robot,
+            "robots": list(self.robots),
+            "provenance": self.origin,
+        }
+
+
+def count_fleet(
+    robot: FlexibleRobot,
+    logs: str | Path,
+    ledgers: str | Path,
+    *,
+    mapping: str | Path | None = None,
+    task: Task | str | Path | None = None,
+    sn_curve: str | SNCurve | None = None,
+    seed: int = 0,
+    workers: int | None = 1,
+    scheduler: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Fleet:
+    """Count the logs of many robots of one type.
+
+    A robot that cannot be counted is told in its row; the others are counted all the same.
+
+    Args:
+        robot: their type.
+        logs: a folder with a folder of logs for each robot, which names it.
+        ledgers: a folder for a ledger each.
+        mapping: of all logs; else `mapping.toml` in a robot's folder or in `logs`.
+        task: as of `count`, like the rest.
+        sn_curve: of all shafts.
+        seed: of the draws.
+        workers: processes of a dask cluster of our own; 1 for none.
+        scheduler: address of a dask scheduler, whose workers see the same files.
+        progress: called with (robots done, robots in all).
+
+    Returns:
+        a row a robot.
+
+    Raises:
+        InputError: no folder, no robot in it, a scheduler that does not answer.
+    """
+    folder, books = Path(logs), Path(ledgers)
+    if not folder.is_dir():
+        raise InputError("no such folder", file=folder)
+    if not books.is_dir():
+        raise InputError("must be a folder, for a ledger each", file=books, key="ledger")
+    names = sorted(p.name for p in folder.iterdir() if p.is_dir())
+    if not names:
+        raise InputError("holds no folder: each robot's logs are in one of its own", file=folder)
+    work = task_of(robot, task)
+    shared = Path(mapping) if mapping is not None else None
+    if shared is None and (folder / MAPPING).is_file():
+        shared = folder / MAPPING
+    job = _Job(robot, work, shared, books, sn_curve, seed)
+    found = []
+    for row in _spread(job, [folder / name for name in names], workers, scheduler):
+        found.append(row)
+        if progress is not None:
+            progress(len(found), len(names))
+    found.sort(key=lambda row: (-(row["damage"] or 0.0), row["name"]))
+    inputs = [*robot.files, *work.files, *([shared] if shared else [])]
+    return Fleet(robot.name, tuple(found), provenance(inputs, seed=seed))
+
+
+def _spread(
+    job: _Job, folders: Sequence[Path], workers: int | None, scheduler: str | None
+) -> Iterator[dict[str, Any]]:
+    """A row for each folder, in any order."""
+    if scheduler is None and workers == 1:
+        yield from (_row(job, folder) for folder in folders)
+        return
+    if scheduler is not None:
+        require_scheduler(scheduler)
+    from distributed import Client, LocalCluster, as_completed
+
+    with ExitStack() as opened:
+        opened.callback(logging.disable, logging.NOTSET)
+        cluster = None
+        if scheduler is None:
+            with safe_start():
+                cluster = LocalCluster(
+                    n_workers=workers, threads_per_worker=1, processes=True,
+                    dashboard_address=None, silence_logs=logging.CRITICAL,
+                )  # fmt: skip
+            opened.enter_context(cluster)
+        client = opened.enter_context(Client(cluster or scheduler))
+        opened.callback(logging.disable)
+        shared = client.scatter(job, broadcast=True)
+        futures = client.map(_row, [shared] * len(folders), list(folders), pure=False, retries=2)
+        for future in as_completed(futures):
+            yield future.result()
+
+
+def _row(job: _Job, folder: Path) -> dict[str, Any]:
+    """One robot's summary."""
+    own = folder / MAPPING
+    mapping = job.mapping if job.mapping is not None and not own.is_file() else None
+    row: dict[str, Any] = dict.fromkeys(
+        ("logs", "blows", "seen_share", "joint", "damage", "damage_interval", "blows_left", "date",
+         "error")
+    )  # fmt: skip
+    row |= {"name": folder.name, "changes": [], "refused": []}
+    try:
+        found = count(job.robot, folder, job.ledgers / f"{folder.name}{ENDING}", mapping=mapping,
+                      task=job.task, sn_curve=job.sn_curve, seed=job.seed)  # fmt: skip
+    except PicchioError as error:
+        return row | {"error": str(error)}
+    return row | _summary(found)
+
+
+def _summary(found: Count) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "logs": found.logs, "blows": found.blows, "seen_share": found.seen_share,
+        "changes": list(found.changes),
+        "refused": [{"log": name, "why": why} for name, why in found.refused],
+    }  # fmt: skip
+    damage = found.counted.totals.damage
+    if np.isfinite(damage).any():
+        joint = found.joints()[int(np.nanargmax(damage))]
+        left = joint["blows_left"] and {
+            k: None if math.isinf(v) else v for k, v in joint["blows_left"].items()
+        }
+        row |= {"joint": joint["name"], "damage": joint["damage"], "date": joint["date"],
+                "damage_interval": joint["damage_interval"], "blows_left": left}  # fmt: skip
+    return row

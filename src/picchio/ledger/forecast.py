@@ -1,0 +1,189 @@
+"""What is left: the worlds that may be, and blows as they have come so far."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray
+from picchio.excitation.measured import MeasuredForce
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.fatigue.uncertain_lives import Draws, Uncertain
+from picchio.ledger.blows import Burst
+from picchio.ledger.damage import Totals
+from picchio.model.model import Model
+from picchio.robot.spread import root_of
+from picchio.studies.rivet.variation import WornParts
+from picchio.studies.tasks import Operation, Task
+from picchio.studies.uncertainty.inputs import DEFAULT_INPUTS
+from picchio.studies.uncertainty.sampler import Sampler
+
+# Bursts that stand for all; their damage is followed through every drawn world.
+_TYPICAL = 4
+_LONGEST = 4000  # pieces of the force: a longer burst is not typical
+FORCE_SPREAD = {"force": 0.05, "acceleration": 0.25, "trigger": 0.15, "poses": 0.15}
+"""Of a blow's size, one factor for all blows: a calibrated force, one told from an acceleration,
+one that the task states."""
+
+
+@dataclass(frozen=True, eq=False)
+class Worlds:
+    """Drawn worlds: what the joints have suffered in each.
+
+    Attributes:
+        damage: (n, m) so far; NaN without a curve.
+        mix: (m,) factor on the damage a blow to come does: the days so far, drawn anew.
+    """
+
+    damage: FloatArray
+    mix: FloatArray
+
+    def interval(self, joint: int, share: float = 0.9) -> tuple[float, float]:
+        """Where the damage of a joint lies in so many of the worlds.
+
+        Args:
+            joint: which.
+            share: of the worlds.
+        """
+        values = self.damage[joint]
+        low, high = np.quantile(values, [0.5 - 0.5 * share, 0.5 + 0.5 * share])
+        return float(low), float(high)
+
+    def blows_left(self, joint: int, blows: int) -> FloatArray:
+        """How many blows are left until the sum is one.
+
+        The joint is whole: worlds in which it had to be broken by now are none of ours.
+
+        Args:
+            joint: which.
+            blows: so far.
+
+        Returns:
+            (w,) of the worlds in which the sum is below one; inf without end.
+        """
+        done = self.damage[joint]
+        alive = done < 1.0
+        done, mix = done[alive], self.mix[alive]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            left = (1.0 - done) * blows / (done * mix)
+        return np.where(done > 0.0, left, np.inf)
+
+
+def quantiles(values: FloatArray) -> dict[str, float]:
+    """P10, P50 and P90, each a value that is there; NaN of none.
+
+    Args:
+        values: (w,), inf allowed.
+
+    Returns:
+        them by name.
+    """
+    if not values.size:
+        return {"p10": 0.0, "p50": 0.0, "p90": 0.0}
+    found = np.quantile(values, [0.1, 0.5, 0.9], method="inverted_cdf")
+    return dict(zip(("p10", "p50", "p90"), map(float, found), strict=True))
+
+
+def typical(bursts: Sequence[Burst], weight: FloatArray) -> list[int]:
+    """Bursts that stand for all: as many in each stretch of equal weight.
+
+    Args:
+        bursts: by time.
+        weight: (b,) not negative.
+
+    Returns:
+        their indices.
+    """
+    whole = np.cumsum(weight + 1e-12 * max(float(weight.max()), 1e-300))
+    targets = (np.arange(_TYPICAL) + 0.5) / _TYPICAL * whole[-1]
+    chosen = [int(k) for k in np.searchsorted(whole, targets)]
+    short = [k for k in chosen if bursts[k].start.size <= _LONGEST]
+    return short or [int(np.argmin([b.start.size for b in bursts]))]
+
+
+def force_of(burst: Burst) -> MeasuredForce:
+    """A burst as a measured force, straight lines between its samples.
+
+    Args:
+        burst: any.
+    """
+    end = burst.start[1:]
+    last = burst.constant[:-1] + burst.slope[:-1] * np.diff(burst.start)
+    span = np.diff(burst.start)
+    before = end - np.minimum(1e-9, 0.01 * span)
+    time = np.column_stack([burst.start[:-1], before]).ravel()
+    force = np.column_stack([burst.constant[:-1], last]).ravel()
+    time, force = np.append(time, burst.start[-1]), np.append(force, 0.0)
+    return MeasuredForce(time, force, float(time[-1]))
+
+
+def worlds(
+    model: Model,
+    curves: Sequence[SNCurve | None],
+    sn_curve: str | SNCurve | None,
+    bursts: Sequence[Burst],
+    totals: Totals,
+    days: FloatArray,
+    seed: int,
+) -> Worlds:
+    """Draw the worlds: stiffness, damping, force, the model's error, the specimens' strength.
+
+    Each factor is one for all blows of a world. What bursts do there is followed through some of
+    them, and taken for all.
+
+    Args:
+        model: the robot and its effects.
+        curves: of the n joints.
+        sn_curve: as given for all shafts, or None.
+        bursts: by time.
+        totals: their damage.
+        days: (b,) the day of each burst.
+        seed: of the draws.
+
+    Returns:
+        what the joints have suffered in each.
+    """
+    share = totals.shares / np.maximum(np.nansum(totals.shares, axis=0), 1e-300)
+    which = typical(bursts, share.max(axis=1) if share.size else np.ones(len(bursts)))
+    operations = tuple(
+        Operation(str(k), bursts[k].direction, force_of(bursts[k]), 1, bursts[k].pose[None],
+                  float(which.count(k)))
+        for k in dict.fromkeys(which)
+    )  # fmt: skip
+    seen = [blow.kind for burst in bursts for blow in burst.blows]
+    force = math.sqrt(sum(FORCE_SPREAD[kind] ** 2 for kind in seen) / len(seen))
+    inputs = {k: v for k, v in DEFAULT_INPUTS.items() if k != "width"}
+    inputs["force"] = Uncertain(1.0, force)
+    stress = WornParts.of(model.robot, sn_curve)
+    sampler = Sampler.of(model, Task(operations), stress, inputs, [])
+    names = [each.name for each in sampler.inputs]
+    draws = Draws(len(names), seed)
+    scores = draws.more().reshape(-1, len(names)) @ root_of(names, model.robot.posterior)
+    per = 1.0 / sampler.run(scores).lives  # (k, m) of a typical burst
+    n, m = len(curves), per.shape[1]
+    damage = np.full((n, m), np.nan)
+    count = len(bursts)
+    for row, j in enumerate(stress.columns):
+        chosen = totals.shares[which, j].mean() * count
+        # What the typical ones leave out of the whole, and what residues close together.
+        scale = totals.damage[j] / chosen if chosen > 0.0 else 1.0
+        own = totals.alone[j] / totals.damage[j] if totals.damage[j] > 0.0 else 1.0
+        damage[j] = per[row] * count * scale / own if chosen > 0.0 else per[row] * count
+    return Worlds(damage, _mix(totals, days, m, seed))
+
+
+def _mix(totals: Totals, days: FloatArray, m: int, seed: int) -> FloatArray:
+    """(m,) damage of a blow over its mean so far, from as many days drawn anew."""
+    worst = int(np.nanargmax(totals.damage)) if np.isfinite(totals.damage).any() else 0
+    _, day = np.unique(days, return_inverse=True)
+    done = np.bincount(day, totals.shares[:, worst])
+    blows = np.bincount(day).astype(float)
+    if done.size < 2 or not done.sum() > 0.0:
+        return np.ones(m)
+    rng = np.random.default_rng(seed)
+    chosen = rng.integers(0, done.size, (m, done.size))
+    rate = done[chosen].sum(axis=1) / blows[chosen].sum(axis=1)
+    return np.maximum(np.asarray(rate / (done.sum() / blows.sum())), 1e-3)

@@ -1,0 +1,208 @@
+"""From a log and its mapping to stamped samples: what may be a blow, and where the robot stands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from picchio.campaign.channels import LOG_KINDS, Channel, kinds, parse_channel
+from picchio.campaign.importing.importer import combined, joined, kind_of, read_raw
+from picchio.campaign.importing.mapping import Mapping
+from picchio.campaign.importing.raw import RawFile
+from picchio.campaign.importing.readers import read_csv, read_parquet
+from picchio.campaign.importing.resample import clocked, taken_samples
+from picchio.campaign.units import Conversion
+from picchio.core.arrays import FloatArray, IndexArray
+from picchio.core.errors import InputError
+from picchio.robot.flexible_robot import FlexibleRobot
+
+KINDS = ("force", "acceleration", "trigger", "poses")
+"""What blows are told by, the surest first."""
+BLOCK = 1 << 16
+"""Samples that are held at a time of a log that can be read in blocks."""
+_STEPS = 5.0  # of the usual step: a longer one is a gap
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A stretch of a log.
+
+    Attributes:
+        kind: one of `KINDS`.
+        stamps: (m,) int64 ns from 1970, ascending.
+        values: (m, k): force N (k = 1 along a direction, 3 with axes), acceleration m/s^2 (1 to
+            3), trigger (1), or nothing to see (0).
+        pose_stamps: (p,) int64 ns, ascending.
+        poses: (p, nv) rad or m.
+        others: further channels by name: (stamps, values).
+        detected: what was found out about the file.
+    """
+
+    kind: str
+    stamps: IndexArray
+    values: FloatArray
+    pose_stamps: IndexArray
+    poses: FloatArray
+    others: dict[str, tuple[IndexArray, FloatArray]] = field(default_factory=dict)
+    detected: tuple[str, ...] = ()
+
+    def between(self, first: int, last: int) -> Samples:
+        """The part of it that lies in an interval, both ends included.
+
+        Args:
+            first: ns.
+            last: ns.
+        """
+        own = (self.stamps >= first) & (self.stamps <= last)
+        pose = (self.pose_stamps >= first) & (self.pose_stamps <= last)
+        return replace(self, stamps=self.stamps[own], values=self.values[own],
+                       pose_stamps=self.pose_stamps[pose], poses=self.poses[pose])  # fmt: skip
+
+    @property
+    def usual_step(self) -> int:
+        """ns, from one sample to the next, to two digits; 0 where it cannot be said."""
+        stamps = self.stamps if self.stamps.size > 1 else self.pose_stamps
+        if stamps.size < 2:
+            return 0
+        return int(float(f"{float(np.median(np.diff(stamps))):.1e}"))
+
+    @property
+    def gap(self) -> int:
+        """ns: longer steps than this are gaps."""
+        return int(_STEPS * self.usual_step)
+
+
+def read_samples(path: Path, mapping: Mapping, robot: FlexibleRobot) -> Iterator[Samples]:
+    """A log in stretches, in bounded memory where its kind of file allows (CSV, Parquet).
+
+    Args:
+        path: the file.
+        mapping: which series become which channels.
+        robot: whose joints the poses are of.
+
+    Raises:
+        InputError: the file can't be read, the mapping does not fit it or the robot, or nothing
+            says when it was recorded.
+    """
+    plan = _Plan(mapping, robot)
+    fixed = mapping
+    for raw in _blocks(path, mapping):
+        if mapping.join:
+            found = joined(raw, fixed)
+        else:
+            found = clocked(raw, fixed.time, None, plan.series & set(raw.channels))
+        if fixed is mapping and mapping.time.series is None and mapping.time.rate is None:
+            fixed = _fixed(raw, mapping)
+        yield plan.samples(found)
+
+
+def _blocks(path: Path, mapping: Mapping) -> Iterator[RawFile]:
+    kind = kind_of(path, mapping)
+    if mapping.join or mapping.filter or kind not in ("csv", "parquet"):
+        yield read_raw(path, mapping)
+    elif kind == "csv":
+        yield from read_csv.blocks(path, mapping, BLOCK)
+    else:
+        yield from read_parquet.blocks(path, None, BLOCK)
+
+
+def _fixed(raw: RawFile, mapping: Mapping) -> Mapping:
+    """The mapping with the clock that the first block showed: the others must not differ."""
+    from picchio.campaign.importing import detect
+
+    if all(channel.time is not None for channel in raw.channels.values()):
+        return mapping
+    found = detect.require(detect.clock(raw), raw)
+    time = mapping.time.model_copy(update={"series": found.series, "unit": found.unit})
+    return mapping.model_copy(update={"time": time})
+
+
+class _Plan:
+    """What the series of a mapping are for."""
+
+    def __init__(self, mapping: Mapping, robot: FlexibleRobot) -> None:
+        self.mapping, self.robot = mapping, robot
+        self.series = {s for _, _, parts, _ in mapping.entries for s in parts}
+        self.series |= {entry.series for entry in mapping.filter}
+        self.poses: dict[str, int] = {}
+        self.seen: dict[str, list[str]] = {}
+        names = robot.joint_names
+        for key, to, _, entry in mapping.entries:
+            if entry.remove is not None:
+                raise InputError("a log has no rest to take a mean of; give an offset",
+                                 key=f"{key}.remove", value=entry.remove)  # fmt: skip
+            word, _, rest = to.partition(".")
+            if word in ("position", "motor_position") and rest not in ("x", "y", "z"):
+                if rest not in names:
+                    raise InputError("the robot has no such joint", key=key, value=rest,
+                                     choices=names)  # fmt: skip
+                # The motor side where both are logged: the link side swings under the blows.
+                if word == "motor_position" or rest not in {
+                    p.partition(".")[2] for p in self.poses
+                }:
+                    self.poses = {
+                        p: j for p, j in self.poses.items() if p.partition(".")[2] != rest
+                    }
+                    self.poses[to] = list(names).index(rest)
+            elif word in ("force", "trigger"):
+                self.seen.setdefault(word, []).append(to)
+            elif word in ("accelerometer", "acceleration"):
+                self.seen.setdefault("acceleration", []).append(to)
+        self.kind = next((kind for kind in KINDS if self.seen.get(kind)), "poses")
+        if self.kind == "poses" and not self.poses:
+            raise InputError("maps no force, acceleration, trigger or position, so that nothing "
+                             "can be counted", key="channel")  # fmt: skip
+        self.missing = [n for n in names if n not in {p.partition(".")[2] for p in self.poses}]
+
+    def samples(self, raw: RawFile) -> Samples:
+        if raw.epoch is None:
+            raise InputError(
+                "nothing says when this log was recorded, so that its blows cannot be told from "
+                "another log's", file=raw.path, key="time.start",
+                hint="give [time] start in the mapping, or stamps with a date",
+            )  # fmt: skip
+        values: dict[str, tuple[IndexArray, FloatArray]] = {}
+        for key, to, parts, entry in self.mapping.entries:
+            series = {s: raw.channel(s, key=key) for s in parts}
+            first = next(iter(series.values()))
+            assert first.time is not None
+            channel, convert = _channel(to, entry.unit or first.unit)
+            stored = combined({s: c.values for s, c in series.items()}, parts)
+            stored = entry.sign * (entry.scale * stored.astype(np.float64) + entry.offset)
+            take = taken_samples(raw, first, self.mapping.time, self.mapping.filter, None)
+            stamps = raw.epoch + np.rint(first.time * 1e9).astype(np.int64)
+            values[channel.name] = (stamps[take], convert(stored)[take])
+        nothing = (np.empty(0, np.int64), np.empty((0, 1)))
+        stamps, table = _together([values[n] for n in self.seen.get(self.kind, ())], *nothing)
+        at, rows = _together([values[n] for n in self.poses], nothing[0], np.empty((0, 0)))
+        poses = np.zeros((at.size, len(self.robot.joint_names)))
+        poses[:, list(self.poses.values())] = rows.reshape(at.size, len(self.poses))
+        used = {*self.seen.get(self.kind, ()), *self.poses}
+        others = {n: v for n, v in values.items() if n not in used}
+        return Samples(self.kind, stamps, table, at, poses, others, raw.detected)
+
+
+def _channel(name: str, unit: str | None) -> tuple[Channel, Conversion]:
+    return parse_channel(name, unit, (*LOG_KINDS, *kinds()))
+
+
+def _together(
+    series: list[tuple[IndexArray, FloatArray]], stamps: IndexArray, table: FloatArray
+) -> tuple[IndexArray, FloatArray]:
+    """Series on the stamps of the first; others hold their last sample until the next."""
+    if not series:
+        return stamps, table
+    clock = series[0][0]
+    columns = []
+    for own, values in series:
+        if own.size == clock.size and (own == clock).all():
+            columns.append(values)
+        elif own.size:
+            at = np.maximum(np.searchsorted(own, clock, side="right") - 1, 0)
+            columns.append(values[at])
+        else:
+            return stamps, table
+    return clock, np.column_stack(columns)

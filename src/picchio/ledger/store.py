@@ -1,0 +1,405 @@
+"""The ledger on disk: an SQLite file of the samples that matter, each log in one transaction.
+
+SQLite rather than Parquet with DuckDB: a log is added whole or not at all, also when the process is
+killed; readers and a writer may work at once; a log that is counted anew replaces its rows; every
+language reads it, DuckDB included (`ATTACH 'cell4.ledger' (TYPE sqlite)`), and it comes with
+Python. What is kept is a set of samples with stamps, so that no order of logs and no cut between
+them can matter: a union has none. The damage is never stored as a sum; `burst` holds what
+was computed of single bursts, by model, and may be emptied at any time.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from picchio.core.arrays import BoolArray, FloatArray, IndexArray
+from picchio.core.errors import InputError, OutputError
+from picchio.core.files import is_stream
+from picchio.ledger.samples import Samples
+
+FORMAT = "picchio-ledger/1"
+_TABLES = """
+CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT) WITHOUT ROWID;
+CREATE TABLE stream (id TEXT PRIMARY KEY, kind TEXT, gap INTEGER, columns INTEGER, settings TEXT)
+  WITHOUT ROWID;
+CREATE TABLE log (id TEXT PRIMARY KEY, stream TEXT, mapping TEXT, name TEXT, first INTEGER,
+  last INTEGER, samples INTEGER, detected TEXT) WITHOUT ROWID;
+CREATE TABLE span (log TEXT, first INTEGER, last INTEGER);
+CREATE TABLE run (log TEXT, stamps BLOB, sizes BLOB);
+CREATE TABLE pose (log TEXT, stamps BLOB, sizes BLOB);
+CREATE TABLE feature (log TEXT, name TEXT, stamp INTEGER, value REAL);
+CREATE TABLE burst (model TEXT, key BLOB, damage BLOB, PRIMARY KEY (model, key)) WITHOUT ROWID;
+CREATE INDEX span_log ON span (log);
+CREATE INDEX run_log ON run (log);
+CREATE INDEX pose_log ON pose (log);
+CREATE INDEX feature_log ON feature (log);
+"""
+_PATIENCE = 60.0  # s that a writer waits for another
+
+
+@dataclass(frozen=True)
+class Stream:
+    """What logs under one mapping have in common.
+
+    Attributes:
+        kind: see `picchio.ledger.samples.KINDS`.
+        gap: ns: longer steps are gaps.
+        columns: of the values.
+        threshold: what a blow exceeds.
+        foot: below this a blow is over.
+        settings: the mapping's `[blows]`, and what else tells streams apart.
+    """
+
+    kind: str
+    gap: int
+    columns: int
+    threshold: float
+    foot: float
+    settings: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def id(self) -> str:
+        """What it is called: streams that see the same in the same way are one."""
+        told = [self.kind, self.columns, self.threshold.hex(), self.foot.hex(), self.settings]
+        return json.dumps(told, sort_keys=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """What a ledger holds of a stream.
+
+    Attributes:
+        stream: which.
+        spans: (s, 2) int64 ns, the time that was logged; in any order, overlaps included.
+        stamps: (m,) int64 ns, ascending, each once.
+        values: (m, k).
+        pose_stamps: (p,) int64 ns, ascending, each once.
+        poses: (p, nv).
+    """
+
+    stream: Stream
+    spans: IndexArray
+    stamps: IndexArray
+    values: FloatArray
+    pose_stamps: IndexArray
+    poses: FloatArray
+
+
+def magnitude(values: FloatArray) -> FloatArray:
+    """(m,) the size of samples (m, k), whatever their direction.
+
+    Args:
+        values: of a force, an acceleration or a trigger.
+    """
+    return np.abs(values[:, 0]) if values.shape[1] == 1 else np.linalg.norm(values, axis=1)
+
+
+def pieces(stamps: IndexArray, gap: int) -> Iterator[slice]:
+    """The stretches between gaps.
+
+    Args:
+        stamps: (m,) ns, ascending.
+        gap: ns.
+    """
+    cuts = np.flatnonzero(np.diff(stamps) > gap) + 1
+    edges = [0, *cuts.tolist(), stamps.size]
+    for first, last in zip(edges[:-1], edges[1:], strict=True):
+        if last > first:
+            yield slice(first, last)
+
+
+def worth_keeping(samples: Samples, stream: Stream) -> tuple[BoolArray, BoolArray]:
+    """Which samples and which poses a ledger must keep so that nothing depends on the log's ends.
+
+    Of each stretch the first and the last sample; every run of samples above the foot that exceeds
+    the threshold or touches an end of the stretch, with the sample before and after it. The pose
+    before each run, and the first and last pose.
+
+    Args:
+        samples: of a log.
+        stream: that it belongs to.
+
+    Returns:
+        (m,) of the samples, (p,) of the poses.
+    """
+    size = magnitude(samples.values) if samples.values.shape[1] else np.zeros(samples.stamps.size)
+    keep = np.zeros(samples.stamps.size, dtype=bool)
+    begins: list[IndexArray] = []
+    for piece in pieces(samples.stamps, stream.gap):
+        own = size[piece]
+        active = own > stream.foot
+        edge = np.diff(active.astype(np.int8), prepend=0, append=0)
+        start, end = np.flatnonzero(edge == 1), np.flatnonzero(edge == -1)
+        if start.size:
+            tops = np.maximum.reduceat(np.where(active, own, 0.0), start)
+            good = (tops > stream.threshold) | (start == 0) | (end == own.size)
+            here = keep[piece]
+            for a, b in zip(start[good], end[good], strict=True):
+                here[max(a - 1, 0) : b + 1] = True
+            begins.append(piece.start + start[good])
+        keep[piece.start] = keep[piece.stop - 1] = True
+    standing = np.zeros(samples.pose_stamps.size, dtype=bool)
+    if standing.size:
+        standing[[0, -1]] = True
+        if begins:
+            when = samples.stamps[np.concatenate(begins)]
+            at = np.searchsorted(samples.pose_stamps, when, side="right") - 1
+            standing[np.maximum(at, 0)] = True
+    return keep, standing
+
+
+class Ledger:
+    """An open ledger.
+
+    Args:
+        path: its file; made where it is missing.
+        robot: its name; a ledger is one robot's.
+
+    Raises:
+        InputError: the file is no ledger, of another version, or another robot's.
+        OutputError: it can't be read or written.
+    """
+
+    def __init__(self, path: str | Path, robot: str) -> None:
+        self.path = Path(path)
+        if is_stream(path) or self.path.is_dir():
+            raise InputError("a ledger is a file", file=path)
+        if not self.path.resolve().parent.is_dir():
+            raise InputError("cannot write here: the folder does not exist", file=path)
+        with self._told():
+            self._base = sqlite3.connect(self.path, timeout=_PATIENCE, isolation_level=None)
+            try:
+                self._begin(robot)
+            except BaseException:
+                self._base.close()
+                raise
+
+    def _begin(self, robot: str) -> None:
+        base = self._base
+        base.execute("PRAGMA journal_mode = WAL")
+        base.execute("PRAGMA synchronous = FULL")
+        with self.writing():
+            known = {name for (name,) in base.execute("SELECT name FROM sqlite_master")}
+            if "meta" not in known:
+                if known:
+                    raise InputError("is a database, but no ledger", file=self.path)
+                for statement in _TABLES.split(";"):
+                    base.execute(statement)
+                about = {"format": FORMAT, "robot": robot}
+                base.executemany("INSERT INTO meta VALUES (?, ?)", about.items())
+        found = dict(base.execute("SELECT key, value FROM meta"))
+        if found.get("format") != FORMAT:
+            raise InputError("unknown format", file=self.path, key="format",
+                             value=found.get("format"), choices=[FORMAT])  # fmt: skip
+        if found.get("robot") != robot:
+            raise InputError("is the ledger of another robot", file=self.path, key="robot",
+                             value=found.get("robot"), choices=[robot])  # fmt: skip
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """Within the block, what SQLite does not like is one line."""
+        try:
+            yield
+        except sqlite3.DatabaseError as error:
+            text = str(error)
+            if "not a database" in text or "malformed" in text:
+                raise InputError(f"is no ledger, or damaged: {text}", file=self.path) from None
+            raise OutputError(f"cannot be written: {text}", file=self.path) from None
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Within the block, one transaction: all of it is kept, or nothing.
+
+        Returns:
+            a context manager.
+        """
+        with self._told():
+            self._base.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self._base.execute("COMMIT")
+            except BaseException:
+                if self._base.in_transaction:
+                    self._base.execute("ROLLBACK")
+                raise
+
+    def close(self) -> None:
+        """Close the file."""
+        self._base.close()
+
+    def __enter__(self) -> Ledger:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def holds(self, log: str, mapping: str) -> bool:
+        """Whether a log has been counted by this mapping.
+
+        Args:
+            log: hash of its content.
+            mapping: hash of how it is read.
+        """
+        with self._told():
+            rows = self._base.execute("SELECT mapping FROM log WHERE id = ?", (log,)).fetchall()
+        return rows == [(mapping,)]
+
+    def stream(self, wanted: Stream) -> Stream:
+        """The stream as the ledger has it: the gap stays what it was when it was new.
+
+        Args:
+            wanted: as a log has it.
+        """
+        with self._told():
+            row = self._base.execute("SELECT gap FROM stream WHERE id = ?", (wanted.id,)).fetchone()
+        if row is None:
+            return wanted
+        return Stream(wanted.kind, row[0], wanted.columns, wanted.threshold, wanted.foot,
+                      wanted.settings)  # fmt: skip
+
+    def add(
+        self, log: str, mapping: str, name: str, stream: Stream, stretches: Iterable[Samples],
+        features: Iterable[tuple[str, int, float]] = (),
+    ) -> int:  # fmt: skip
+        """Keep what matters of a log; one that is held already is replaced.
+
+        Args:
+            log: hash of its content.
+            mapping: hash of how it is read.
+            name: of its file, for people.
+            stream: that it belongs to.
+            stretches: of the log, in any order.
+            features: (name, ns, value) of single numbers that it shows.
+
+        Returns:
+            how many samples it had.
+        """
+        with self.writing():
+            base = self._base
+            for table in ("span", "run", "pose", "feature"):
+                base.execute(f"DELETE FROM {table} WHERE log = ?", (log,))
+            settings = json.dumps([stream.threshold, stream.foot, stream.settings], sort_keys=True)
+            base.execute(
+                "INSERT OR IGNORE INTO stream VALUES (?, ?, ?, ?, ?)",
+                (stream.id, stream.kind, stream.gap, stream.columns, settings),
+            )
+            first, last, count = 2**63 - 1, 0, 0
+            detected: tuple[str, ...] = ()
+            for samples in stretches:
+                clock = samples.stamps if samples.stamps.size else samples.pose_stamps
+                if not clock.size:
+                    continue
+                keep, standing = worth_keeping(samples, stream)
+                detected = detected or samples.detected
+                count += clock.size
+                first, last = min(first, int(clock[0])), max(last, int(clock[-1]))
+                spans = [(log, int(clock[p][0]), int(clock[p][-1]))
+                         for p in pieces(clock, stream.gap)]  # fmt: skip
+                base.executemany("INSERT INTO span VALUES (?, ?, ?)", spans)
+                for table, stamps, values in (
+                    ("run", samples.stamps[keep], samples.values[keep]),
+                    ("pose", samples.pose_stamps[standing], samples.poses[standing]),
+                ):
+                    if stamps.size:
+                        row = (log, _packed(stamps, "<i8"), _packed(values, "<f8"))
+                        base.execute(f"INSERT INTO {table} VALUES (?, ?, ?)", row)
+            base.executemany(
+                "INSERT INTO feature VALUES (?, ?, ?, ?)", [(log, *each) for each in features]
+            )
+            told = json.dumps(detected)
+            base.execute("INSERT OR REPLACE INTO log VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+                         (log, stream.id, mapping, name, first, last, count, told))  # fmt: skip
+        return count
+
+    def logs(self) -> list[tuple[str, str, int, int, int]]:
+        """Every log by time: (id, name, first ns, last ns, samples)."""
+        with self._told():
+            return self._base.execute(
+                "SELECT id, name, first, last, samples FROM log ORDER BY first, id"
+            ).fetchall()
+
+    def kept(self) -> list[Kept]:
+        """Everything that is held, a stream at a time, the surest kinds first."""
+        found = []
+        with self._told():
+            rows = self._base.execute(
+                "SELECT id, kind, gap, columns, settings FROM stream"
+            ).fetchall()
+            for key, kind, gap, columns, settings in rows:
+                threshold, foot, more = json.loads(settings)
+                stream = Stream(kind, gap, columns, threshold, foot, more)
+                spans = self._base.execute(
+                    "SELECT span.first, span.last FROM span JOIN log ON log.id = span.log "
+                    "WHERE log.stream = ?", (key,),
+                ).fetchall()  # fmt: skip
+                if not spans:
+                    continue
+                stamps, values = self._union("run", key, columns)
+                at, poses = self._union("pose", key, 0)
+                found.append(Kept(stream, np.array(spans, np.int64), stamps, values, at, poses))
+        from picchio.ledger.samples import KINDS
+
+        return sorted(found, key=lambda k: (KINDS.index(k.stream.kind), k.stream.id))
+
+    def _union(self, table: str, stream: str, columns: int) -> tuple[IndexArray, FloatArray]:
+        """The samples of all logs of a stream, each stamp once, ascending."""
+        stamps, values = [], []
+        for at, sizes in self._base.execute(
+            f"SELECT {table}.stamps, {table}.sizes FROM {table} "
+            f"JOIN log ON log.id = {table}.log WHERE log.stream = ?", (stream,),
+        ):  # fmt: skip
+            stamps.append(np.frombuffer(at, "<i8"))
+            values.append(np.frombuffer(sizes, "<f8").reshape(stamps[-1].size, -1))
+        if not stamps:
+            return np.empty(0, np.int64), np.empty((0, columns))
+        when, what = np.concatenate(stamps), np.concatenate(values)
+        # Two logs that disagree at a stamp: the larger sample, whichever came first.
+        order = np.lexsort((*what.T, magnitude(what) if what.shape[1] else when * 0, when))
+        when, what = when[order], what[order]
+        last = np.append(np.diff(when) > 0, True)
+        return when[last], what[last]
+
+    def features(self) -> list[tuple[str, int, float]]:
+        """(name, ns, value), each once, by name and time."""
+        with self._told():
+            return self._base.execute(
+                "SELECT DISTINCT name, stamp, value FROM feature ORDER BY name, stamp, value"
+            ).fetchall()
+
+    def computed(self, model: str) -> dict[bytes, bytes]:
+        """What has been computed of bursts with a model.
+
+        Args:
+            model: its hash.
+
+        Returns:
+            {the burst's hash: its numbers}.
+        """
+        with self._told():
+            return dict(
+                self._base.execute("SELECT key, damage FROM burst WHERE model = ?", (model,))
+            )
+
+    def remember(self, model: str, found: dict[bytes, bytes]) -> None:
+        """Keep what was computed of bursts; that of other models goes.
+
+        Args:
+            model: its hash.
+            found: as `computed` gives it.
+        """
+        with self.writing():
+            self._base.execute("DELETE FROM burst WHERE model <> ?", (model,))
+            rows = [(model, key, value) for key, value in found.items()]
+            self._base.executemany("INSERT OR REPLACE INTO burst VALUES (?, ?, ?)", rows)
+
+
+def _packed(values: FloatArray, kind: str) -> bytes:
+    return np.ascontiguousarray(values, dtype=kind).tobytes()

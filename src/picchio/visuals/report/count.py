@@ -1,0 +1,137 @@
+"""From a count to one self-contained HTML page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from picchio.fatigue.miner import format_count
+from picchio.ledger.count import Count
+from picchio.visuals.plots.style import blank_figure, look, styled
+from picchio.visuals.report.page import Picture, Pictures, number, render
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+_POINTS = 1000
+
+
+def count_page(found: Count, *, command: str | None = None, warnings: Sequence[str] = ()) -> str:
+    """The page of a count: life used and left, by day, the worst poses, what changed.
+
+    Args:
+        found: the count.
+        command: the command line that gave this.
+        warnings: what was warned of on the way.
+
+    Returns:
+        the HTML.
+    """
+    names = found.model.robot.flexible_names
+    joints = found.joints()
+    rows = []
+    for joint in joints:
+        low, high = joint["damage_interval"] or (math.nan, math.nan)
+        left, date = joint["blows_left"], joint["date"] or {}
+        cells = (
+            ["–"] * 3 if left is None else [format_count(left[p]) for p in ("p10", "p50", "p90")]
+        )
+        rows.append([
+            joint["name"], _share(joint["damage"]),
+            "–" if math.isnan(low) else f"{_share(low)} to {_share(high)}", *cells,
+            date.get("p50") or "–",
+        ])  # fmt: skip
+    first = found.first_to_fail
+    places = [
+        [", ".join(f"{v:.3f}" for v in s["pose"]),
+         ", ".join(f"{v:.2f}" for v in np.round(s["direction"], 2) + 0.0),
+         s["blows"], *(_share(v) for v in s["share"])]
+        for s in found.stations()
+    ]  # fmt: skip
+    facts: list[list[Any]] = [
+        ["Logs", found.logs],
+        ["Blows", f"{found.blows:,}"],
+        ["Seen, the others assumed", f"{100 * found.seen_share:.4g} %"],
+        ["Blows a day, lately", number(found.blows_a_day)],
+    ]
+    facts.append(["Hours logged", number(found.hours)])
+    if first is not None:
+        gain = float(found.if_force(0.9)[first])
+        facts.append(["Ends the life", names[first]])
+        facts.append(["With blows 10 % weaker", f"{gain:.3g} times as long"])
+    return render(
+        "count.html.j2", robot=found.model.robot.name, headline=found._headline() + ".",
+        facts=facts, rows=rows, pictures=_pictures(found), places=places,
+        place_heads=["Pose|rad", "Force along", "Blows",
+                     *(f"{name}|% of its damage" for name in names)],
+        changes=[change["words"] for change in found.changes],
+        refused=[list(pair) for pair in found.refused], notes=found.notes, command=command,
+        warnings=list(warnings), provenance=found.origin,
+    )  # fmt: skip
+
+
+def _share(value: float) -> str:
+    return "–" if math.isnan(value) else f"{100 * value:.3g}"
+
+
+def _pictures(found: Count) -> list[Picture]:
+    days = found.days()
+    if not days:
+        return []
+    made = Pictures()
+    return [
+        made.picture(plot_life_used(found), "Life used over time",
+                     "Share of each joint's life that is used (Miner's sum)."),
+        made.picture(plot_blows(found), "Blows a day", "Blows on each day."),
+    ]  # fmt: skip
+
+
+@styled
+def plot_life_used(found: Count) -> Axes:
+    """The damage of each joint over time.
+
+    Args:
+        found: the count.
+    """
+    axes = blank_figure()
+    onset = np.array([burst.onset for burst in found.counted.bursts])
+    total = 100.0 * np.cumsum(found.counted.totals.shares, axis=0)
+    few = np.unique(np.linspace(0, len(onset) - 1, _POINTS).astype(int))
+    when = onset[few].astype("datetime64[ns]")
+    when, total = np.append(when[:1], when), np.vstack([0.0 * total[:1], total[few]])
+    for j, name in enumerate(found.model.robot.flexible_names):
+        if found.curves[j] is not None:
+            axes.plot(when, total[:, j], drawstyle="steps-post", label=name, **look(j))
+    axes.set_ylabel("life used, %")
+    axes.set_ylim(bottom=0.0)
+    axes.legend()
+    _dated(axes)
+    return axes
+
+
+@styled
+def plot_blows(found: Count) -> Axes:
+    """The blows on each day.
+
+    Args:
+        found: the count.
+    """
+    axes = blank_figure()
+    days = found.days()
+    dates = np.array([day["date"] for day in days], dtype="datetime64[D]")
+    axes.bar(dates, [day["blows"] for day in days], width=0.8)
+    axes.set_ylabel("blows a day")
+    _dated(axes)
+    return axes
+
+
+def _dated(axes: Axes) -> None:
+    from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+
+    locator = AutoDateLocator(minticks=2, maxticks=7)
+    axes.xaxis.set_major_locator(locator)
+    axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))

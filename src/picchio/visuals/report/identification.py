@@ -1,0 +1,93 @@
+"""From an identification to one page: what was measured over what was fitted, joint by joint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from picchio.diagnosis.identified import Compared, Identification, Identified
+from picchio.visuals.plots.style import BLUE, INK, MUTED, VERMILION, blank_figure, plain, styled
+from picchio.visuals.report.page import Pictures, capitalised, number, percent, render
+
+_MOST = 12  # pictures
+
+
+def identification_page(
+    found: Identification, *, command: str | None = None, warnings: Sequence[str] = ()
+) -> str:
+    """The page of an identification.
+
+    Args:
+        found: of any method.
+        command: the command line that gave this.
+        warnings: what was warned of on the way.
+
+    Returns:
+        the HTML.
+    """
+    content = found.to_dict()
+    compared = found.compared()
+    # Those that fit worst are shown, in the order of the records.
+    worst = sorted(range(len(compared)), key=lambda k: -compared[k].left)[:_MOST]
+    pictures = Pictures()
+    shown = [
+        pictures.picture(
+            plot_compared(compared[k]), f"{compared[k].title}: measured and fitted",
+            f"{compared[k].title}: {percent(compared[k].left)} % is left",
+        )
+        for k in sorted(worst)
+    ]  # fmt: skip
+    return render(
+        "identification.html.j2",
+        headline=capitalised(found._headline()) + ".",
+        robot=found.robot.name,
+        source=found.source,
+        joints=[
+            [joint.name, *_cells(joint.stiffness), *_cells(joint.damping_ratio)]
+            for joint in found.joints
+        ],
+        reasons=[
+            (joint.name, joint.stiffness.why, joint.damping_ratio.why) for joint in found.joints
+        ],
+        remarks=found.remarks,
+        pictures=shown,
+        hidden=len(compared) - len(shown),
+        left=[[one.title, number(len(one.x)), percent(one.left)] for one in compared],
+        command=command,
+        warnings=[*warnings, *([found.doubt] if found.doubt else [])],
+        provenance=content.get("provenance"),
+    )
+
+
+def _cells(one: Identified) -> list[str]:
+    between = f"{number(one.low, 3)} to {number(one.high, 3)}"
+    return [number(one.value), between, "yes" if one.told else "no"]
+
+
+@styled
+def plot_compared(compared: Compared, ax: Axes | None = None) -> Axes:
+    """What was measured over what was fitted.
+
+    Args:
+        compared: the two.
+        ax: where to draw.
+    """
+    axes = ax if ax is not None else blank_figure(width=4.6, height=2.7)
+    if compared.lines:
+        low = np.maximum(compared.measured - compared.spread, 0.3 * compared.measured)
+        axes.fill_between(compared.x, low, compared.measured + compared.spread,
+                          color=MUTED, alpha=0.3, linewidth=0.0)  # fmt: skip
+        axes.plot(compared.x, compared.measured, color=MUTED, linewidth=3.5, alpha=0.6,
+                  label="measured")  # fmt: skip
+        axes.plot(compared.x, compared.fitted, color=VERMILION, linewidth=1.2, label="fitted")
+        axes.set_yscale("log")
+    else:
+        axes.errorbar(compared.x, compared.measured, compared.spread, fmt="o", color=INK,
+                      markersize=3.5, linewidth=0.8, label="measured")  # fmt: skip
+        axes.plot(compared.x, compared.fitted, "x", color=BLUE, markersize=5.0, label="fitted")
+        axes.axhline(0.0, color=MUTED, linewidth=0.7)
+    axes.set(xlabel=compared.across, ylabel=compared.up, title=plain(compared.title))
+    axes.legend(loc="best")
+    return axes

@@ -1,0 +1,96 @@
+"""Taps in time: an instrumented hammer, ring-downs of unknown blows, and what is refused."""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import picchio
+from picchio.campaign.campaign import Campaign
+from picchio.campaign.record import Record
+from picchio.campaign.tables import Tolerance
+from picchio.diagnosis.stiffness.prior import prior_of
+from picchio.diagnosis.stiffness.responses import make_problem
+
+
+@pytest.fixture(scope="module")
+def taps():
+    """The independent world of taps."""
+    sys.path.insert(0, str(Path(__file__).parents[1]))
+    try:
+        from worlds import taps
+    finally:
+        sys.path.pop(0)
+    return taps
+
+
+def campaign(world, **table) -> Campaign:
+    records = []
+    for k, (held, told) in enumerate(world.records):
+        channels = {name: x for name, x in held.items() if name != "time"}
+        records.append(Record.from_arrays(f"t{k}.csv", held["time"], channels, **told))
+    return Campaign.from_records(records, robot=world.robot, **table)
+
+
+def test_the_prediction_is_the_worlds(taps):
+    """A record cut off while the arm still rings, too: the window's line needs no correction."""
+    for length in (2.0, 0.8):
+        world = taps.draw(3, 2, exact=True, noise=1e-6, poses=1, taps=1, length=length)
+        robot = picchio.load_robot(world.robot)
+        made = make_problem(robot, campaign(world).records, Tolerance.zero(), prior_of(robot))
+        at = np.zeros(len(made.precision))
+        at[:3] = np.log(world.truth / world.nominal)
+        at[3:] = np.log(world.damping / made.damping_ratio)
+        for part, table in zip(made.predict(at), made.tables, strict=True):
+            left = np.linalg.norm(part.residual * table.scale[:, None])
+            assert left < 0.01 * np.linalg.norm(table.measured)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_stiffness_and_damping_by_taps(taps, known):
+    world = taps.draw(3, 4, known=known)
+    found = picchio.identify(world.robot, campaign(world))
+    for joint, stiffness, ratio in zip(found.joints, world.truth, world.damping, strict=True):
+        k = joint.stiffness
+        assert k.told and abs(math.log(k.value / stiffness)) < 0.04
+        assert k.low / 1.02 < stiffness < k.high * 1.02
+        assert abs(math.log(joint.damping_ratio.value / ratio)) < 0.4
+    assert not found.doubt and found.convention == "modal"
+
+
+def test_slopes_of_an_unknown_blow_are_those_of_differences(taps):
+    world = taps.draw(3, 5, known=False, poses=1, taps=1)
+    robot = picchio.load_robot(world.robot)
+    made = make_problem(robot, campaign(world).records, Tolerance(), prior_of(robot))
+    at = 0.2 * np.random.default_rng(0).standard_normal(len(made.precision))
+    parts = made.predict(at)
+    names = [name for name in made.steps if name.startswith(("impulse", "blow"))]
+    assert len(names) == 3
+    for name in names:
+        k = 6 + made.steps.index(name)
+        step = 1e-5 * (np.arange(len(at)) == k)
+        plus, minus = made.predict(at + step), made.predict(at - step)
+        for part, more, less in zip(parts, plus, minus, strict=True):
+            found = -(more.residual - less.residual) / 2e-5
+            np.testing.assert_allclose(part.slope[..., k], found,
+                                       atol=1e-4 * max(1e-3, np.abs(found).max()))  # fmt: skip
+
+
+def test_what_a_phone_folds_is_refused(taps):
+    world = taps.draw(7, 1, rate=200.0, poses=1, taps=1)
+    with pytest.raises(picchio.InputError, match=r"sampled at 200 Hz: a mode near .* folds"):
+        picchio.identify(world.robot, campaign(world))
+    slow = taps.draw(3, 1, rate=400.0, poses=1, taps=1)
+    with pytest.raises(picchio.InputError, match=r"the blow lasts . samples .* ring-down"):
+        picchio.identify(slow.robot, campaign(slow))
+
+
+def test_a_tap_needs_a_sensor(taps):
+    world = taps.draw(3, 1, poses=1, taps=1)
+    held, told = world.records[0]
+    only = {"force": held["force"]}
+    record = Record.from_arrays("t.csv", held["time"], only, **told)
+    with pytest.raises(picchio.InputError, match="no channel of this tap"):
+        picchio.identify(world.robot, Campaign.from_records([record]))

@@ -1,0 +1,482 @@
+"""`picchio count` on shifts whose damage is known, however their logs are cut, mixed and broken."""
+
+import json
+import sqlite3
+
+import numpy as np
+import pytest
+import shift
+
+import picchio
+from picchio.campaign.importing.mapping import Mapping
+from picchio.core.errors import InputError, OutputError
+from picchio.fatigue.sn.library import load_sn_curve
+from picchio.ledger import count as counting
+from picchio.ledger.blows import covered, within
+from picchio.ledger.count import add_log, count, recount
+from picchio.ledger.damage import together
+from picchio.ledger.samples import Samples, read_samples
+from picchio.ledger.store import Ledger, Stream
+from picchio.model.model import Model
+from picchio.studies.rivet.life_rules import curves_of
+from picchio.studies.tasks import load_task
+
+NAME = "fanuc_like_3dof"
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return picchio.load_robot(NAME)
+
+
+@pytest.fixture(scope="module")
+def task(robot):
+    return load_task(robot.task_path, robot)
+
+
+def folder(path, made, rng, parts=1, **how):
+    """A folder of logs of a shift, with mapping and curve."""
+    path.mkdir(exist_ok=True)
+    table = shift.log(made, rng, **how)
+    for k, rows in enumerate(np.array_split(np.arange(len(table)), parts)):
+        table.iloc[rows].to_parquet(path / f"part{k}.parquet")
+    (path / "mapping.toml").write_text(shift.MAPPING)
+    (path.parent / "curve.toml").write_text(shift.CURVE)
+    return path
+
+
+@pytest.mark.parametrize(("rivets", "seed"), [(3, 1), pytest.param(12, 2, marks=pytest.mark.slow)])
+def test_the_damage_of_a_shift_is_known_within_two_per_cent(tmp_path, robot, rivets, seed):
+    rng = np.random.default_rng(seed)
+    made = shift.rivets(rivets, rng)
+    whole, alone = shift.truth(NAME, made)
+    logs = folder(tmp_path / "logs", made, rng, parts=2)
+    found = count(robot, logs, tmp_path / "l", sn_curve=str(tmp_path / "curve.toml"))
+    assert found.blows == 12 * rivets and found.seen_share == 1.0
+    wears = whole > 1e-3 * whole.max()
+    np.testing.assert_allclose(found.counted.totals.damage[wears], whole[wears], rtol=0.02)
+    np.testing.assert_allclose(found.counted.totals.alone[wears], alone[wears], rtol=0.02)
+    for joint in found.joints():
+        low, high = joint["damage_interval"]
+        assert low < joint["damage"] < high
+        left = joint["blows_left"]
+        assert left["p10"] < left["p50"] < left["p90"]
+    again = count(robot, logs, tmp_path / "l", sn_curve=str(tmp_path / "curve.toml"))
+    assert again.added == () and len(again.known) == 2
+    assert (again.counted.totals.damage == found.counted.totals.damage).all()
+
+
+@pytest.fixture(scope="module")
+def stretch(robot, tmp_path_factory):
+    """A short shift as samples, its stream, and what it adds up to as one log."""
+    rng = np.random.default_rng(5)
+    made = shift.rivets(3, rng, apart=1.6, places=2)
+    path = folder(tmp_path_factory.mktemp("shift") / "logs", made, rng, length=6.0)
+    rules = picchio.campaign.importing.mapping.read_mapping(path / "mapping.toml")
+    (samples,) = read_samples(path / "part0.parquet", rules, robot)
+    stream = counting.stream_of(samples, rules, load_task(robot.task_path, robot))
+    return samples, stream, path.parent / "curve.toml"
+
+
+class Faulty:
+    """A connection that fails at its n-th statement."""
+
+    def __init__(self, base, after):
+        self._base, self._left = base, after
+
+    def __getattr__(self, name):
+        return getattr(self._base, name)
+
+    def _count(self):
+        self._left -= 1
+        if self._left == 0:
+            raise sqlite3.OperationalError("disk I/O error")
+
+    def execute(self, *arguments):
+        if arguments[0] != "ROLLBACK":
+            self._count()
+        return self._base.execute(*arguments)
+
+    def executemany(self, *arguments):
+        self._count()
+        return self._base.executemany(*arguments)
+
+
+def cuts(samples, rng, most=6):
+    """The samples in pieces, some of them twice or of very few samples, in any order."""
+    ends = np.sort(rng.choice(samples.stamps, int(rng.integers(1, most)), replace=False))
+    edges = [samples.stamps[0], *ends, samples.stamps[-1] + 1]
+    pieces = [(a, b - 1) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a]
+    for _ in range(int(rng.integers(0, 3))):  # a second copy of some time, or of all
+        a, b = np.sort(rng.choice(samples.stamps, 2, replace=False))
+        pieces.append((a, b))
+    return [pieces[k] for k in rng.permutation(len(pieces))]
+
+
+def counted(book, robot, curves, task, cache):
+    """The totals, with what has been computed of bursts kept between ledgers."""
+    book.remember(cache[0], cache[1])
+    found = recount(book, Model.of(robot), curves, task)
+    cache[1].update(book.computed(cache[0]))
+    return found
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_cuts_order_repeats_and_faults_change_nothing(tmp_path, robot, task, stretch, seed):
+    samples, stream, curve = stretch
+    curves = curves_of(robot, load_sn_curve(str(curve)))
+    cache = (counting.fingerprint(Model.of(robot), curves), {})
+    with Ledger(tmp_path / "whole", NAME) as book:
+        book.add("log", "m", "log", stream, [samples])
+        expected = counted(book, robot, curves, task, cache)
+    assert len(expected.blows) == 36
+    rng = np.random.default_rng(seed)
+    for trial in range(10):
+        with Ledger(tmp_path / f"cut{trial}", NAME) as book:
+            for number, (a, b) in enumerate(cuts(samples, rng)):
+                part = samples.between(a, b)
+                sound = book._base
+                book._base = Faulty(sound, int(rng.integers(1, 14)))
+                try:
+                    book.add(str(number), "m", "part", stream, [part])
+                except OutputError as error:
+                    assert "disk I/O error" in str(error)  # noqa: PT017
+                book._base = sound
+                book.add(str(number), "m", "part", stream, [part])
+            found = counted(book, robot, curves, task, cache)
+        np.testing.assert_allclose(found.totals.damage, expected.totals.damage, rtol=1e-9, atol=0.0)
+        assert len(found.blows) == len(expected.blows)
+        assert (found.spans == expected.spans).all()
+        assert not any(blow.cut for blow in found.blows)
+
+
+def test_a_blow_on_the_edge_waits_for_its_other_half(tmp_path, robot, task, stretch):
+    samples, stream, curve = stretch
+    curves = curves_of(robot, load_sn_curve(str(curve)))
+    cache = (counting.fingerprint(Model.of(robot), curves), {})
+    with Ledger(tmp_path / "l", NAME) as book:
+        book.add("all", "m", "all", stream, [samples])
+        whole = counted(book, robot, curves, task, cache)
+        middle = whole.blows[20]
+        cut = middle.onset + int(0.4e9 * middle.time[-1])
+    with Ledger(tmp_path / "m", NAME) as book:
+        book.add("late", "m", "late", stream, [samples.between(cut + 1, 2**62)])
+        half = counted(book, robot, curves, task, cache)
+        assert half.blows[0].cut and len(half.blows) == 16
+        book.add("early", "m", "early", stream, [samples.between(0, cut)])
+        found = counted(book, robot, curves, task, cache)
+    assert found.blows[20].onset == middle.onset
+    assert (found.blows[20].force == middle.force).all()
+    assert (found.totals.damage == whole.totals.damage).all()
+
+
+def test_a_changed_model_recounts_and_a_changed_mapping_replaces(tmp_path, robot, stretch):
+    logs = stretch[2].parent / "logs"
+    curve = str(stretch[2])
+    first = count(robot, logs, tmp_path / "l", sn_curve=curve)
+    steeper = tmp_path / "weak.toml"
+    steeper.write_text(shift.CURVE.replace(f"{shift.STRENGTH}", f"{0.5 * shift.STRENGTH}"))
+    weak = count(robot, None, tmp_path / "l", sn_curve=str(steeper))
+    np.testing.assert_allclose(
+        weak.counted.totals.damage, 2.0**shift.SLOPE * first.counted.totals.damage, rtol=1e-9
+    )
+    scaled = tmp_path / "m.toml"
+    scaled.write_text(shift.MAPPING.replace('to = "force.', 'scale = 0.5\nto = "force.'))
+    half = count(robot, logs, tmp_path / "l", mapping=scaled, sn_curve=curve)
+    assert half.logs == 1 and half.added == ("part0.parquet",) and half.blows == 36
+    ratio = half.counted.totals.damage / first.counted.totals.damage
+    np.testing.assert_allclose(ratio, 0.5**shift.SLOPE, rtol=0.02)
+
+
+def test_who_the_ledger_belongs_to(tmp_path, robot, stretch):
+    logs = stretch[2].parent / "logs"
+    count(robot, logs, tmp_path / "l")
+    with pytest.raises(InputError, match=r"ledger of another robot.*fanuc_like_3dof"):
+        Ledger(tmp_path / "l", "ur10")
+    (tmp_path / "text").write_text("hello " * 400)
+    with pytest.raises(InputError, match="no ledger"):
+        Ledger(tmp_path / "text", NAME)
+    with pytest.raises(InputError, match="does not exist"):
+        Ledger(tmp_path / "no" / "l", NAME)
+
+
+def test_what_a_log_must_say(tmp_path, robot, task):
+    path = tmp_path / "log.csv"
+    path.write_text("t,F,q1\n" + "".join(f"{i / 1000},{i},0.1\n" for i in range(50)))
+    text = '{"channel": [{"from": "F", "to": "force"}, {"from": "q1", "to": "position.joint_1"}]}'
+    rules = Mapping.model_validate(json.loads(text))
+    with Ledger(tmp_path / "l", NAME) as book:
+        with pytest.raises(InputError, match=r"log\.csv.*time\.start.*when this log was recorded"):
+            add_log(book, path, rules, Model.of(robot), task)
+        later = rules.model_copy(
+            update={"time": rules.time.model_validate({"start": "2026-03-01T08:00:00Z"})}
+        )
+        with pytest.raises(InputError, match=r"log\.csv.*blows\.operation.*forward"):
+            add_log(book, path, later, Model.of(robot), task)
+        wrong = text.replace("joint_1", "elbow")
+        with pytest.raises(InputError, match=r"no such joint.*elbow.*joint_1"):
+            add_log(book, path, Mapping.model_validate(json.loads(wrong)), Model.of(robot), task)
+        assert book.logs() == []
+
+
+def test_one_bad_log_of_many_is_told_and_no_other_lost(tmp_path, robot, stretch):
+    rng = np.random.default_rng(8)
+    logs = folder(tmp_path / "logs", shift.rivets(1, rng), rng)
+    (logs / "bad.csv").write_text("stamp,fx\n1,2\n")
+    with pytest.warns(picchio.PicchioWarning, match=r"not counted.*bad\.csv"):
+        found = count(robot, logs, tmp_path / "l")
+    assert found.blows == 12
+    assert [name for name, _ in found.refused] == ["bad.csv"]
+    assert found.to_dict()["refused"][0]["log"] == "bad.csv"
+
+
+def test_a_moment_counts_once_whoever_saw_it(tmp_path, robot, task, stretch):
+    """A trigger of the controller's beside the force: where both are there, the force counts."""
+    samples, stream, curve = stretch
+    curves = curves_of(robot, load_sn_curve(str(curve)))
+    step = 10_000_000
+    stamps = np.arange(samples.stamps[0], samples.stamps[-1] + 4_000_000_000, step)
+    on = ((stamps - samples.stamps[0]) // 1_000_000_000 % 2 == 1).astype(float)[:, None]
+    pose = np.tile(shift.POSES[0], (stamps.size, 1))
+    trigger = Samples("trigger", stamps, on, stamps, pose)
+    slow = Stream("trigger", trigger.gap, 1, 0.5, 0.5, {"operation": "upward"})
+    with Ledger(tmp_path / "l", NAME) as book:
+        book.add("slow", "m", "slow", slow, [trigger])
+        assumed = recount(book, Model.of(robot), curves, task)
+        assert len(assumed.blows) == 5 * 25 and not any(b.seen for b in assumed.blows)
+        book.add("fast", "m", "fast", stream, [samples])
+        both = recount(book, Model.of(robot), curves, task)
+    seen = sum(blow.seen for blow in both.blows)
+    assert seen == 36
+    later = [b for b in both.blows if b.onset > samples.stamps[-1]]
+    assert len(both.blows) == 36 + len(later) and later and not any(b.seen for b in later)
+
+
+def test_accelerations_tell_the_size_of_a_blow(tmp_path, robot, task):
+    """The tool's acceleration in a blow is the force over what it feels of the masses."""
+    omega, shapes, _, levers, _ = shift.oscillators(NAME, shift.POSES[0])
+    del omega
+    along = np.array([0.0, 0.0, 1.0])
+    mobility = float(((shapes.T @ levers.T @ along) ** 2).sum())
+    time = np.arange(0.0, 2.0, 1e-4)
+    blow = np.zeros_like(time)
+    for k in range(12):
+        u = (time - 0.5 - 0.04 * k) / 0.004
+        blow += np.where((u > 0.0) & (u < 1.0), 800.0, 0.0)
+    stamps = shift.BEGIN + np.rint(time * 1e9).astype(np.int64)
+    reading = (mobility * blow)[:, None] * along + 0.05 * np.random.default_rng(1).normal(
+        size=(time.size, 3)
+    )
+    samples = Samples("acceleration", stamps, reading, stamps[::50],
+                      np.tile(shift.POSES[0], (time[::50].size, 1)))  # fmt: skip
+    stream = Stream("acceleration", samples.gap, 3, 0.3 * mobility * 800.0,
+                    0.1 * mobility * 800.0, {"operation": "upward"})  # fmt: skip
+    with Ledger(tmp_path / "l", NAME) as book:
+        book.add("a", "m", "a", stream, [samples])
+        found = recount(book, Model.of(robot), curves_of(robot), task)
+    assert len(found.blows) == 12
+    assert [blow.peak for blow in found.blows] == pytest.approx([800.0] * 12, rel=0.03)
+
+
+def test_poses_alone_stand_for_rivets(tmp_path, robot, task):
+    pose = task.operations[2].poses[4]
+    stamps = shift.BEGIN + 4_000_000 * np.arange(1500)
+    poses = np.tile(pose, (1500, 1))
+    poses[500:1000] += 0.3  # away for two seconds
+    poses[1200:1230] += 0.3  # 0.8 and 1.08 s at the pose before and after
+    samples = counting.standing(
+        Samples("poses", np.empty(0, np.int64), np.empty((0, 1)), stamps, poses), task
+    )
+    stream = Stream("poses", samples.gap, 1, 0.5, 0.5, {"operation": "upward"})
+    with Ledger(tmp_path / "l", NAME) as book:
+        book.add("a", "m", "a", stream, [samples])
+        found = recount(book, Model.of(robot), curves_of(robot), task)
+    assert len(found.blows) == 3 * task.operations[2].hits_per_rivet
+    assert {blow.kind for blow in found.blows} == {"poses"}
+
+
+def test_intervals_of_time():
+    rng = np.random.default_rng(2)
+    spans = rng.integers(0, 10_000, (200, 1)) + np.sort(rng.integers(0, 60, (200, 2)), axis=1)
+    marked = np.zeros(10_100, bool)
+    for a, b in spans:
+        marked[a : b + 1] = True
+    found = covered(spans, 1)
+    assert sum(b - a + 1 for a, b in found) == marked.sum()
+    when = np.arange(10_100)
+    assert (within(when, found) == marked).all()
+
+
+def test_residues_counted_together_are_the_whole_history():
+    """Against the whole history by the `rainflow` package."""
+    from picchio.fatigue.sn.curve import SNCurve
+    from picchio.ledger.damage import SCALES, BurstDamage
+
+    curve = SNCurve(name="c", strength=shift.STRENGTH, cycles=shift.CYCLES, slopes=(shift.SLOPE,))
+    rng = np.random.default_rng(3)
+    from picchio.fatigue.counting.counter import RainflowCounter
+    from picchio.fatigue.miner import damage
+
+    made, histories = [], []
+    for _ in range(20):
+        history = 1e8 * rng.normal(size=300) * np.exp(-np.linspace(0, 3, 300))
+        history[[0, -1]] = 0.0
+        histories.append(history)
+        counter = RainflowCounter()
+        counter.add(history)
+        closed = [[damage(counter.cycles("discarded").scaled(s), curve) for s in SCALES]]
+        half = [[damage(counter.cycles("half-cycles").scaled(s), curve) for s in SCALES]]
+        made.append(BurstDamage(np.array(closed), np.array(half), np.zeros(1), (counter.residue,)))
+    totals = together(made, [curve])
+    assert totals.damage[0] == pytest.approx(shift.cost(np.concatenate(histories)), rel=1e-12)
+    assert totals.alone[0] == pytest.approx(sum(map(shift.cost, histories)), rel=1e-12)
+    scaled = totals.at(np.array([1.0, 1.3, 2.0, 4.0]))[0]
+    assert scaled / scaled[0] == pytest.approx(np.array([1.0, 1.3, 2.0, 4.0]) ** 8.0, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_fleet_has_a_row_a_robot(tmp_path, robot, in_process):
+    rng = np.random.default_rng(12)
+    (tmp_path / "books").mkdir()
+    (tmp_path / "cells").mkdir()
+    for name, force in (("north", 1500.0), ("south", 2500.0)):
+        folder(tmp_path / "cells" / name, shift.rivets(1, rng, force=force), rng)
+    (tmp_path / "cells" / "broken").mkdir()
+    (tmp_path / "cells" / "broken" / "log.csv").write_text("nothing\n")
+    (tmp_path / "cells" / "mapping.toml").write_text(shift.MAPPING)
+    (tmp_path / "curve.toml").write_text(shift.CURVE)
+    done = in_process(
+        "count", NAME, "--log", "cells", "--ledger", "books", "--fleet", "--json", "f.json",
+        "--sn-curve", "curve.toml", "--report", "f.html", cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "f.json").read_text())
+    assert found["format"] == "picchio-fleet/1"
+    assert [row["name"] for row in found["robots"]] == ["south", "north", "broken"]
+    assert found["robots"][0]["damage"] > 20.0 * found["robots"][1]["damage"] > 0.0
+    assert "log.csv" in found["robots"][2]["error"]
+    assert "not counted: broken" in done.stdout
+    assert sorted(p.name for p in (tmp_path / "books").glob("*.ledger"))[-1] == "south.ledger"
+    curve = str(tmp_path / "curve.toml")
+    alone = count(robot, tmp_path / "cells/south", tmp_path / "l", sn_curve=curve)
+    assert max(alone.counted.totals.damage) == found["robots"][0]["damage"]
+    assert "south" in (tmp_path / "f.html").read_text()
+
+
+def test_what_other_programs_read(tmp_path, robot, stretch):
+    """Prometheus' text by its grammar, the MCAP by mcap's own reader."""
+    import re
+
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    from picchio.ledger.out import opc_ua, prometheus, write_diagnostics
+
+    found = count(robot, stretch[2].parent / "logs", tmp_path / "l", sn_curve=str(stretch[2]))
+    lines = prometheus(found).splitlines()
+    sample = re.compile(r'[a-z_]+\{[a-z_]+="[^"]*"(,[a-z_]+="[^"]*")*\} (\+Inf|[-+0-9.e]+)')
+    told = dict(line.rsplit(" ", 1) for line in lines if not line.startswith("#"))
+    assert all(sample.fullmatch(line) for line in lines if not line.startswith("#"))
+    assert float(told['picchio_blows_total{robot="fanuc_like_3dof"}']) == 36.0
+    own = 'picchio_damage_ratio{robot="fanuc_like_3dof",joint="joint_2"}'
+    assert float(told[own]) == found.counted.totals.damage[1]
+    names = {line.partition("{")[0] for line in told}
+    assert {line.split()[2] for line in lines if line.startswith("# TYPE")} == names
+    write_diagnostics(found, tmp_path / "d.mcap")
+    with open(tmp_path / "d.mcap", "rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        ((schema, channel, _, message),) = reader.iter_decoded_messages()
+    assert (schema.name, channel.topic) == ("diagnostic_msgs/msg/DiagnosticArray", "/diagnostics")
+    assert [s.name for s in message.status] == [f"picchio: joint_{k}" for k in (1, 2, 3)]
+    values = {v.key: float(v.value) for v in message.status[1].values}
+    assert values["damage"] == found.counted.totals.damage[1]
+    node = "MotionDeviceSystem/MotionDevices/fanuc_like_3dof/Axes/joint_2/ParameterSet/LifeUsed"
+    assert opc_ua(found)[node] == found.counted.totals.damage[1]
+
+
+def test_the_command_counts_and_its_page_shows_it(tmp_path, stretch, in_process, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    logs = stretch[2].parent / "logs"
+    done = in_process(
+        "count", NAME, "--log", logs, "--ledger", "l", "--sn-curve", stretch[2], "--report",
+        "p.html", "--json", "c.json", cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "36 blows in 1 log" in done.stdout and "ends the life" in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    content = json.loads((tmp_path / "c.json").read_text())
+    assert content["format"] == "picchio-count/1" and content["blows"] == 36
+    left = {j["name"]: j["blows_left"]["p50"] for j in content["joints"]}
+    assert content["ends"] == min(left, key=left.__getitem__)
+    page = (tmp_path / "p.html").read_text()
+    assert "life used and left" in page and "joint_2" in page
+    done = in_process("count", NAME, "--log", tmp_path, "--ledger", "m", cwd=tmp_path)
+    assert done.returncode == 2 and "--mapping" in done.stderr and not (tmp_path / "m").exists()
+
+
+def test_a_model_that_must_be_computed_one_by_one_counts_the_same(robot, stretch, tmp_path, task):
+    from picchio.ledger.damage import _exactly, burst_damages_of
+
+    samples, stream, curve = stretch
+    model = Model.of(robot)
+    curves = curves_of(robot, load_sn_curve(str(curve)))
+    with Ledger(tmp_path / "l", NAME) as book:
+        book.add("log", "m", "log", stream, [samples])
+        found = recount(book, model, curves, task)
+    burst = found.bursts[0]
+    (fast,) = burst_damages_of(model, curves, [burst])
+    slow = _exactly(model, curves, burst)
+    np.testing.assert_allclose(fast.peak, slow.peak, rtol=1e-6)
+    np.testing.assert_allclose(fast.alone, slow.alone, rtol=1e-4)
+    together_fast, together_slow = together([fast] * 3, curves), together([slow] * 3, curves)
+    np.testing.assert_allclose(together_fast.damage, together_slow.damage, rtol=1e-4)
+
+
+def test_a_bag_whose_topics_have_clocks_of_their_own(robot, tmp_path, task):
+    """Angles at 100 Hz, the force at 5 kHz, as ROS 2 writes them; rosbags writes the file."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    rng = np.random.default_rng(21)
+    made = shift.rivets(1, rng)
+    table = shift.log(made, rng, length=1.6)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    t, wrench, joints = store.types, "geometry_msgs/msg/WrenchStamped", "sensor_msgs/msg/JointState"
+    vector = t["geometry_msgs/msg/Vector3"]
+
+    def header(ns):
+        stamp = t["builtin_interfaces/msg/Time"](sec=ns // 10**9, nanosec=ns % 10**9)
+        return t["std_msgs/msg/Header"](stamp=stamp, frame_id="base")
+
+    with Writer(tmp_path / "run", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        links = [
+            writer.add_connection(f"/t{i}", k, typestore=store)
+            for i, k in enumerate((wrench, joints))
+        ]
+        for i, row in enumerate(table.itertuples()):
+            push = vector(row.fx, row.fy, row.fz)
+            force = t["geometry_msgs/msg/Wrench"](push, vector(0.0, 0.0, 0.0))
+            message = t[wrench](header(row.stamp), force)
+            writer.write(links[0], row.stamp, store.serialize_cdr(message, wrench))
+            if i % 50 == 0:
+                angles = np.array([row.q1, row.q2, row.q3])
+                names = ["joint_1", "joint_2", "joint_3"]
+                message = t[joints](header(row.stamp), names, angles, np.array([]), np.array([]))
+                writer.write(links[1], row.stamp, store.serialize_cdr(message, joints))
+    path = next((tmp_path / "run").glob("*.db3"))
+    topics = [c.topic for c in links]
+    text = 'format = "picchio-mapping/1"\n[blows]\nthreshold = 150.0\nfoot = 12.0\n'
+    for axis in "xyz":
+        text += f'[[channel]]\nfrom = "{topics[0]}:wrench.force.{axis}"\nto = "force.{axis}"\n'
+    for k in (1, 2, 3):
+        text += f'[[channel]]\nfrom = "{topics[1]}:position.joint_{k}"\nto = "position.joint_{k}"\n'
+    text = text.replace("foot = 12.0", 'foot = 12.0\nframe = "world"')
+    (tmp_path / "m.toml").write_text(text)
+    rules = picchio.campaign.importing.mapping.read_mapping(tmp_path / "m.toml")
+    with Ledger(tmp_path / "l", NAME) as book:
+        add_log(book, path, rules, Model.of(robot), task)
+        found = recount(book, Model.of(robot), curves_of(robot), task)
+    assert len(found.blows) == 12
+    np.testing.assert_allclose([b.peak for b in found.blows], made[0].peaks, rtol=0.01)
+    np.testing.assert_allclose(found.blows[0].pose, shift.POSES[made[0].place], atol=2e-4)
+    np.testing.assert_allclose(found.blows[3].direction, shift.DIRECTIONS[made[0].place], atol=0.01)
