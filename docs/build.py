@@ -24,6 +24,8 @@ GUIDES = {
     "diagnosis": "Diagnosis",
     "counting": "Counting from logs",
     "motion": "Motion records",
+    "explore": "Explore",
+    "path_cost": "A cost for planners",
     "placement": "Placement",
     "priors": "Drive priors",
     "stiffness": "Stiffness from nothing",

@@ -18,6 +18,7 @@ MODULE_OF = {
     "mcap-ros2-support": "mcap_ros2",
     "pydantic": "pydantic pydantic_core",
     "pillow": "PIL",
+    "rerun-sdk": "rerun",
 }
 # Used without being imported: robots that are found among its files; what trimesh reads .dae with.
 NOT_IMPORTED = {"example-robot-data", "pycollada"}

@@ -22,8 +22,8 @@ from picchio.studies.maps.places import joint_grid
 
 FUNCTIONS = {
     "allowable", "annotate", "assess", "check", "compare", "count", "diagnose", "effects",
-    "envelope", "fit_sn", "formats", "identify", "import_record", "place", "plan", "report",
-    "reproduce",
+    "envelope", "explore", "fit_sn", "formats", "identify", "import_record", "place", "plan",
+    "report", "reproduce",
     "robots", "simulate", "start", "uncertain_life", "view", "workspace_map",
 }  # fmt: skip
 SLOW = {"diagnose", "identify", "reproduce"}
@@ -141,6 +141,7 @@ def calls(folder: Path) -> dict[str, Any]:
         "diagnose": lambda: picchio.diagnose(robot, rubbing(robot)),
         "effects": lambda: picchio.effects("payload"),
         "envelope": lambda: picchio.envelope(robot, POSE, BLOWS),
+        "explore": lambda: picchio.explore(robot, task=task, save=folder / "kept.toml"),
         "fit_sn": lambda: picchio.fit_sn(SNTests(stress, cycles, np.ones(16, bool)), knee=False),
         "formats": lambda: picchio.formats("task"),
         "identify": lambda: picchio.identify(robot, rubbing(robot)),

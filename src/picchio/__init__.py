@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from picchio.vibration.closed_form.modes import modal_analysis as modal_analysis
     from picchio.vibration.closed_form.response import response_from_rest as response_from_rest
     from picchio.vibration.closed_form.response import steady_state as steady_state
+    from picchio.visuals.live.explore import explore as explore
     from picchio.visuals.report.page import report as report
     from picchio.visuals.view import view as view
 
@@ -68,6 +69,7 @@ _HOME = {
     "diagnose": "diagnosis.diagnose",
     "effects": "reference.effects",
     "envelope": "studies.envelopes",
+    "explore": "visuals.live.explore",
     "fit_sn": "fatigue.sn.fit",
     "identify": "diagnosis.identify",
     "formats": "reference.formats",

@@ -32,6 +32,8 @@ from picchio.visuals.report.diagnosis import _ask, headline
 from picchio.visuals.report.page import number, spread
 from picchio.visuals.scene.build import diagnosis_scene
 
+from .pages import without_traces
+
 OUTSIDE = re.compile(
     r"""(?:src|href|action|data)\s*=\s*["']\s*(?:https?:)?//|url\(\s*["']?https?:|@import"""
 )
@@ -151,7 +153,7 @@ def test_nothing_comes_from_outside_and_it_can_be_mailed(request, which):
     html = request.getfixturevalue(which)
     assert OUTSIDE.search(html) is None
     assert "default-src 'none'" in html
-    assert "<script" not in html
+    assert "<script" not in without_traces(html)
     assert "prefers-color-scheme: dark" in html
     assert len(html) < 4e6
 
@@ -172,7 +174,7 @@ def test_every_name_is_escaped(case):
                  "screened_gain": 1.0, "chi_square_per_sample": 2.0},),
     )  # fmt: skip
     html = page_of(hostile, command=HOSTILE, warnings=[HOSTILE])
-    assert "<script" not in html
+    assert "<script" not in without_traces(html)
     assert html.count("&lt;script&gt;") > 10
 
 
@@ -201,7 +203,7 @@ def test_the_scene_is_at_the_worst_record_and_in_the_page(case):
     html = page_of(case.found, scene=True)
     (frame,) = lxml_html.fromstring(html).xpath("//iframe")
     assert frame.get("srcdoc") == diagnosis_scene(case.found).html()
-    assert "<script" not in html  # but for what the frame holds, escaped
+    assert "<script" not in without_traces(html)  # but for what the frame holds, escaped
     policy = lxml_html.fromstring(html).xpath("//meta[@http-equiv]/@content")[0]
     assert "default-src 'none'" in policy and "script-src 'unsafe-inline'" in policy
 

@@ -18,7 +18,17 @@ import typer
 from picchio.cli.app import app
 
 # Importing its file adds a command, in the order of `picchio --help`.
-from picchio.cli.life import assess, compare, envelope, fit_sn, map, place, start, view  # noqa: F401
+from picchio.cli.life import (  # noqa: F401
+    assess,
+    compare,
+    envelope,
+    explore,
+    fit_sn,
+    map,
+    place,
+    start,
+    view,
+)
 from picchio.cli.measured import (  # noqa: F401
     check,
     count,

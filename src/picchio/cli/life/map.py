@@ -28,12 +28,17 @@ from picchio.cli.output import (
     progress,
     styled,
     table,
+    telling,
 )
 from picchio.core.errors import InputError
 
 if TYPE_CHECKING:
+    from picchio.excitation.excitation import Excitation
     from picchio.robot.flexible_robot import FlexibleRobot
     from picchio.studies.maps.places import Places
+    from picchio.studies.maps.result import WorkspaceMap
+
+_DRAWN = (".png", ".svg", ".pdf")
 
 
 @app.command(
@@ -127,6 +132,14 @@ def map_(
         str | None,
         typer.Option(metavar="ADDRESS", help="A dask scheduler, instead of own processes."),
     ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw it, a joint below the other: .png, .svg or .pdf."),
+    ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The map in 3-D, to turn and to cut, as one HTML file."),
+    ] = None,
     json: JsonOption = None,
 ) -> None:
     """Peaks, worst directions and frequencies over the workspace.
@@ -138,7 +151,9 @@ def map_(
 
     with notice_first(json):
         loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
-    check_targets((out, json), [*loaded.files, points, surface])
+    check_targets((out, plot, html, json), [*loaded.files, points, surface])
+    if plot is not None and plot.suffix not in _DRAWN:
+        raise InputError("no such kind of picture", key="--plot", value=plot, choices=_DRAWN)
     where = _places(loaded, plane, at, box, points, surface, joint_grid, spacing, bounds)
     if direction is None:
         direction = "worst" if surface is None else "normal"
@@ -162,7 +177,37 @@ def map_(
         )
     with found:
         summary = found.to_dict()
+        _draw(found, loaded, blows, hits, plot, html)
     deliver(summary, json, lambda: _show(summary))
+
+
+def _draw(
+    found: WorkspaceMap,
+    robot: FlexibleRobot,
+    blows: Excitation,
+    hits: int | None,
+    plot: Path | None,
+    html: Path | None,
+) -> None:
+    """The map as a picture and as a page."""
+    if plot is not None:
+        from picchio.core.files import atomic_write
+        from picchio.visuals.plots.workspace import workspace_figure
+
+        with telling("drawing the map"), atomic_write(plot, "wb") as stream:
+            workspace_figure(found).savefig(stream, format=plot.suffix[1:], dpi=150)
+    if html is not None:
+        import numpy as np
+
+        import picchio
+
+        peak = found.dataset["peak_deflection"].values
+        row = int(np.nanargmax(np.nanmax(np.where(np.isfinite(peak), peak, -1.0), axis=1)))
+        pose = found.dataset["pose"].values[row]
+        with telling("drawing the page"):
+            scene = picchio.view(robot, pose=pose, excitation=blows, hits=hits, workspace=found)
+            scene.playing = False
+            scene.save(html)
 
 
 def _places(

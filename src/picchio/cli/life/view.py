@@ -33,6 +33,13 @@ if TYPE_CHECKING:
 def view(
     robot: RobotArgument,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Where the HTML goes.")] = None,
+    rerun: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write the vibration as a Rerun recording (.rrd); needs picchio[rerun].",
+        ),
+    ] = None,
     live: Annotated[
         bool, typer.Option("--live", help="Show it in a live meshcat viewer until Ctrl-C.")
     ] = False,
@@ -77,10 +84,10 @@ def view(
     import picchio
     from picchio.studies.tasks import blows_of
 
-    if out is None and not live:
+    if out is None and rerun is None and not live:
         raise InputError("needs a file", key="--out", hint="--out scene.html, or --live")
     loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
-    check_targets((out, json), [*loaded.files, task, map_, diagnosis])
+    check_targets((out, rerun, json), [*loaded.files, task, map_, diagnosis])
     blows = None
     if pose is not None:
         blows = blows_of(loaded, task, force=force, period=period, width=width)
@@ -104,6 +111,11 @@ def view(
     if out is not None:
         with telling("writing the scene"):
             scene.save(out)
+    if rerun is not None:
+        from picchio.visuals.scene.recording import write_recording
+
+        with telling("writing the recording"):
+            write_recording(scene, rerun)
     deliver(scene.to_dict(), json)
     if live:
         _show_live(scene)

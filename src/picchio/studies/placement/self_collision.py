@@ -74,6 +74,20 @@ class SelfCollision:
         """
         return any(self._touching(pose, until_one_does=True))
 
+    def touching(self, pose: FloatArray) -> list[tuple[str, str]]:
+        """The links that touch at a pose, in pairs.
+
+        Args:
+            pose: (nv,) rad or m.
+        """
+        found = zip(self._geometry.collisionPairs, self._touching(pose), strict=True)
+        ends = {(self._link(pair.first), self._link(pair.second)) for pair, hit in found if hit}
+        return sorted(ends)
+
+    def _link(self, shape: int) -> str:
+        frame = self._geometry.geometryObjects[shape].parentFrame
+        return str(self._model.frames[frame].name)
+
     def _touching(self, pose: FloatArray, *, until_one_does: bool = False) -> list[bool]:
         """Whether each pair touches; pairs after the first that does may be left out."""
         data, shapes = self._model.createData(), self._geometry.createData()

@@ -43,7 +43,7 @@ class Cases:
     def cheap(self) -> bool:
         """Whether many questions take seconds: compiled code answers, of one robot."""
         sampler = self._sampler
-        return sampler._modal and sampler._plain and not sampler._rebuilt
+        return sampler._modal and sampler._plain and not sampler.rebuilt
 
     @cached_property
     def drawn(self) -> Drawn:

@@ -100,15 +100,28 @@ class Sampler:
         return self.stress.residue == "half-cycles" and self.stress.mean_stress == "none"
 
     @property
-    def _rebuilt(self) -> bool:
+    def rebuilt(self) -> bool:
+        """Whether a drawn world needs another robot: masses, say, and not springs alone."""
         return any(each.spread is not None for each in self.inputs)
+
+    def elsewhere(self, task: Task) -> Sampler:
+        """The same worlds at the places of another task.
+
+        Args:
+            task: its work; bursts are made anew only where the blows are others.
+        """
+        moved = Sampler(self.model, task, self.stress, self.inputs)
+        same = [(op.name, op.excitation, op.hits_per_rivet) for op in self.task.operations]
+        if same == [(op.name, op.excitation, op.hits_per_rivet) for op in task.operations]:
+            moved._bursts.update(self._bursts)
+        return moved
 
     @property
     def budget(self) -> int:
         """Samples at most, by what one takes: micro-, tenths of or whole milliseconds a place."""
-        if not self._modal or (self._rebuilt and not self._plain):
+        if not self._modal or (self.rebuilt and not self._plain):
             return 256
-        return 16_384 if self._plain and not self._rebuilt else 2_048 if self._plain else 512
+        return 16_384 if self._plain and not self.rebuilt else 2_048 if self._plain else 512
 
     def run(self, moved: FloatArray, force: FloatArray | None = None) -> Drawn:
         """What drawn worlds do.
@@ -189,7 +202,7 @@ class Sampler:
 
         m, p = draw.count, len(op.poses)
         worlds = [nominal]
-        if self._rebuilt:
+        if self.rebuilt:
             models = (replace(self.model, robot=draw.robot(d)) for d in range(m))
             worlds = [ManyPoses(model, op.poses) for model in models]
         matrices = [world.mass_and_jacobian() for world in worlds]
@@ -201,7 +214,7 @@ class Sampler:
         )
         ratio = np.array([world.damping_ratio for world in worlds])
         d, place = np.repeat(np.arange(m), p), np.tile(np.arange(p), m)
-        world = d if self._rebuilt else np.zeros_like(d)
+        world = d if self.rebuilt else np.zeros_like(d)
         place = place + p * world
         forces = draw.forces(op)
         curves: list[SNCurve | None] = [None] * springs.shape[1]

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from picchio.core.arrays import FloatArray
@@ -13,7 +15,7 @@ from picchio.core.errors import InputError
 from picchio.robot.units import units_of
 from picchio.studies.maps.result import WorkspaceMap, joint_kinds, response_of
 from picchio.studies.maps.stored import values_of
-from picchio.visuals.plots.style import CMAP, HATCH, PAPER, axes_or_new, plain, styled
+from picchio.visuals.plots.style import CMAP, HATCH, PAPER, STYLE, axes_or_new, plain, styled
 
 if TYPE_CHECKING:
     import xarray
@@ -63,6 +65,26 @@ def spacing(places: FloatArray) -> float:
         return 0.1
     distance, _ = cKDTree(places).query(places, k=2)
     return float(np.median(distance[:, 1]))
+
+
+def workspace_figure(workspace: WorkspaceMap | xarray.Dataset) -> Figure:
+    """A map of every joint, below each other.
+
+    Args:
+        workspace: of `picchio.workspace_map`, or its dataset.
+
+    Returns:
+        the figure, to be saved.
+
+    Raises:
+        InputError: a map without values.
+    """
+    names = [str(name) for name in dataset_of(workspace)["joint"].values]
+    with mpl.rc_context(STYLE):  # type: ignore[arg-type]
+        figure = Figure(figsize=(6.2, 4.4 * len(names)), layout="constrained")
+        for name, ax in zip(names, figure.subplots(len(names), squeeze=False)[:, 0], strict=True):
+            plot_workspace_map(workspace, name, ax)
+    return figure
 
 
 @styled

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
+from picchio.core.arrays import FloatArray
 from picchio.fatigue.shaft_stress import shear_stress
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.sn.library import load_sn_curve
@@ -35,8 +36,11 @@ from picchio.visuals.plots.stress import plot_counted_cycles, plot_stress_histor
 from picchio.visuals.plots.style import blank_figure
 from picchio.visuals.report.cover import Cover
 from picchio.visuals.report.page import Picture, inline_svg, render
+from picchio.visuals.report.trace import Trace, traces_html
 from picchio.visuals.scene.portrait import plot_robot
 from picchio.visuals.worst_rivet import WorstRivet, worst_rivet
+
+_DRAWN = 6000  # samples of a plot that zooms, at most
 
 # The report's plots, each with an alt text that says what it shows.
 
@@ -149,6 +153,36 @@ def _figures(
     return made
 
 
+def _traces(worst: WorstRivet, robot: FlexibleRobot) -> list[Trace]:
+    """Every joint's deflection over the worst rivet, the worst joint's first."""
+    response, along = worst.response, worst.operation.direction
+    last = float(response.force.start[-1])
+    end = 2.0 * float(response.force.end) if response.periodic else 3.0 * last
+    if worst.rest is not None:
+        end = max(end, last + 4.0 / max(-float(response.modes.poles.real.max()), 1.0))
+    time = response_times(response, end)
+    time = time[:: -(-len(time) // _DRAWN)]
+    values = response.deflection(time, along)
+    lines: dict[str, FloatArray] = {"steady state" if response.periodic else "from rest": values}
+    if worst.steady is not None and not response.periodic:
+        lines["steady state"] = worst.steady.deflection(time, along)
+    made = []
+    where = f"{worst.operation.name}, pose {worst.pose_number}"
+    order = sorted(range(len(robot.flexible_joints)), key=lambda j: j != worst.index)
+    for j in order:
+        joint = robot.flexible_joints[j]
+        made.append(Trace(
+            where, f"deflection of {joint.name}",
+            joint.units.small, time, {name: 1e3 * every[j] for name, every in lines.items()},
+        ))  # fmt: skip
+        if joint.shaft is not None:
+            stress = {name: shear_stress(worst.rivet.stiffness[j] * every[j], joint.shaft) / 1e6
+                      for name, every in lines.items()}  # fmt: skip
+            what = f"stress in the shaft of {joint.name}"
+            made.append(Trace(where, what, "MPa", time, stress))
+    return made
+
+
 def _portrait(assessment: Assessment, robot: FlexibleRobot, worst: WorstRivet) -> Picture:
     """The robot where the governing part fares worst."""
     where = f"{worst.operation.name}, pose {worst.pose_number}"
@@ -228,6 +262,7 @@ def assessment_report(
         life=life,
         curve=curve,
         figures=_figures(assessment, worst, curve, spread),
+        traces=traces_html(_traces(worst, robot), "The worst rivet, joint by joint"),
         headline=told.headline,
         tone=told.status,
         cover=cover or Cover(),

@@ -25,9 +25,11 @@ from picchio.visuals.plots.style import direction_label
 from picchio.visuals.report.motion_figures import MotionFigures
 from picchio.visuals.report.page import capitalised, number, percent, render, signed, spread, words
 from picchio.visuals.report.percussion_figures import PercussionFigures
+from picchio.visuals.report.trace import traces_html
 from picchio.visuals.scene.build import diagnosis_scene
 
 _DASH = "\N{EN DASH}"
+_KINDS = {"percussion.html.j2": "measured under blows", "motion.html.j2": "measured in motion"}
 _TONE = {"nothing-wrong": "good", "unexplained": "bad", "partial": "bad"}
 
 
@@ -76,6 +78,7 @@ def diagnosis_page(
             command=command
             or f"picchio diagnose {robot.name} --data {details['folder'] or 'CAMPAIGN'}",
             folder=details["folder"] or "in memory",
+            traces=traces_html(content["figures"].traces(), f"What was {_KINDS[template]}"),
             provenance=found.extra.get("provenance") or provenance([]),
             **content,
         )

@@ -29,6 +29,7 @@ from picchio.visuals.plots.diagnosis import (
 from picchio.visuals.plots.residual import bins_of, plot_clouds, plot_orders, plot_restoring
 from picchio.visuals.plots.style import blank_figure, plain
 from picchio.visuals.report.page import Picture, Pictures, capitalised, number, percent, words
+from picchio.visuals.report.trace import Trace
 
 _BINS = 20
 _SHOWN = 8.0  # s that an overlay shows
@@ -214,6 +215,21 @@ class MotionFigures(Pictures):
             alt = f"what the simulation leaves of the {view.words}"
             made.append(self.picture(ax, alt, f"{caption}."))
         return made
+
+    def traces(self) -> list[Trace]:
+        """Every torque and twist of every record, the one that is missed most first."""
+        held = _views(self.diagnosis, "held_out") if "held_out" in self.diagnosis.details else []
+        made: dict[tuple[str, str], Trace] = {}
+        every = [(v, "") for v in self.train] + [(v, ", held out") for v in held]
+        for view, told in sorted(every, key=lambda each: -rms(each[0].before) / each[0].noise):
+            lines = {"measured": view.measured, "before": view.measured - view.before}
+            if self.changed:
+                lines["after"] = view.measured - view.after
+            key = view.file, view.words
+            made.setdefault(
+                key, Trace(view.file + told, view.words, view.channel.unit, view.time, lines)
+            )
+        return list(made.values())
 
     def clouds(self) -> list[Picture]:
         """The residual over what of the motion it goes with most, and over the order."""

@@ -103,7 +103,8 @@ def render(template: str, **content: Any) -> str:
     """
     environment = page_environment()
     # What most pages leave empty.
-    nothing = ("at", "tone", "scene", "moves", "ask", "stiffness", "channels", "warnings")
+    nothing = ("at", "tone", "scene", "moves", "ask", "stiffness", "channels", "warnings",
+               "traces")  # fmt: skip
     environment.globals.update(dict.fromkeys(nothing, ""), level=2, version=package_version())
     return environment.get_template(template).render(**content)
 

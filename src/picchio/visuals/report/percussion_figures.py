@@ -39,6 +39,7 @@ from picchio.visuals.plots.residual import (
 )
 from picchio.visuals.plots.style import blank_figure, direction_label
 from picchio.visuals.report.page import Picture, Pictures, number, words
+from picchio.visuals.report.trace import Trace
 
 # Blow periods that an overlay shows.
 _PERIODS = 10.0
@@ -168,6 +169,32 @@ class PercussionFigures(_Percussion):
             rms = float(np.sqrt(np.mean(after**2)))
             made.append(self.picture(ax, "the residual after, on its own scale",
                         f"After, on its own scale: {rms:.3g} times the noise (RMS)."))  # fmt: skip
+        return made
+
+    def traces(self) -> list[Trace]:
+        """Every channel of every record, the one that the baseline leaves most of first."""
+        problem = self.found.problem
+        records = list(self.found.baseline.records)
+        fits = {"simulated": self.found.baseline.hypothesis}
+        if self.changed:
+            fits = {"before": self.found.baseline.hypothesis,
+                    "after": self.found.extended.hypothesis}  # fmt: skip
+        predicted = {
+            name: problem.predictions(hypothesis.effects, records)
+            for name, hypothesis in fits.items()
+        }
+        views = [
+            View(record, index, channel, row,
+                 float(np.sqrt(np.mean(self.baseline.residuals[index][row] ** 2))))
+            for index, record in enumerate(records)
+            for row, name in enumerate(record.values)
+            for channel in record.setup.channels if channel.name == name
+        ]  # fmt: skip
+        made = []
+        for view in sorted(views, key=lambda view: -view.times):
+            lines = {name: view.aligned(every[view.index]) for name, every in predicted.items()}
+            made.append(Trace(view.record.name, view.channel.name, view.channel.unit, view.time,
+                              {"measured": view.measured, **lines}))  # fmt: skip
         return made
 
     def held_out(self) -> list[Picture]:

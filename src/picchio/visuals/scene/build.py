@@ -26,6 +26,7 @@ from picchio.vibration.closed_form.response import described, unit_vector
 from picchio.visuals.kinematics import frames, world
 from picchio.visuals.plots.style import direction_label
 from picchio.visuals.plots.workspace import best_branch, dataset_of, spacing
+from picchio.visuals.scene.cards import joint_card, rivet_card
 from picchio.visuals.scene.causes.causes import add_causes
 from picchio.visuals.scene.causes.site import Site
 from picchio.visuals.scene.motion import vibration
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
     from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis
 
+_MOST_PLACES = 8000  # of a map in a page
 _SHELL = 2  # subdivisions of the net about what is estimated
 
 
@@ -92,6 +94,8 @@ def build_scene(
     units = [joint.units.small for joint in robot.flexible_joints]
     _add_rings(scene, body, assessment, units)
     _add_envelopes(scene, body, units, subdivisions)
+    for k, joint_shown in enumerate(scene.joints):
+        joint_shown["card"] = joint_card(robot, k, envelope, assessment)
     blow = unit_vector(direction) if direction is not None else None
     _add_tool(scene, body, blow)
     if assessment is not None:
@@ -253,38 +257,48 @@ def _add_tool(scene: Scene, body: Body, direction: FloatArray | None) -> None:
 
 def _add_rivets(scene: Scene, body: Body, assessment: Assessment) -> None:
     values, scale = rivet_values(assessment)
-    scene.scales["rivets"] = scale
+    joints = scene.scales["joints"]
+    if scale.unit == joints.unit and scale.top <= joints.top:
+        scale = joints  # one bar for the joints and for what wears them
+    else:
+        scene.scales["rivets"] = scale
     length = 0.055 * body.reach
     mesh = scene.add(arrow(length, 0.0065 * body.reach, head=0.03 * body.reach))
     for k, (operation, row) in enumerate(zip(assessment.operations, values, strict=True)):
         layer = f"rivets-{k}"
         scene.layers.append((layer, f"rivets: {operation.name}", True))
-        for position, value in zip(operation.tool_position, row, strict=True):
-            start = position - operation.direction * length
-            scene.items.append(
-                Item(mesh, layer, "", turned_to(operation.direction, start), scale.colour(value))
-            )
+        for i, (position, value) in enumerate(zip(operation.tool_position, row, strict=True)):
+            place = turned_to(operation.direction, position - operation.direction * length)
+            told = rivet_card(assessment, operation, i)
+            scene.items.append(Item(mesh, layer, "", place, scale.colour(value), told=told))
 
 
 def _add_workspace(scene: Scene, workspace: xarray.Dataset, units: list[str]) -> None:
     mapped = [str(name) for name in values_of(workspace, "joint", 1)]
+    step, every, count = 0.0, 1, 0
     for k, name in enumerate(scene.envelope.joint_names):
         if name not in mapped and k != scene.chosen:
             continue
         places, peak = best_branch(workspace, name)
+        count = len(places)
+        every = -(-count // _MOST_PLACES)
+        places, peak = places[::every], peak[::every]
+        step = step or spacing(places)
         scale = Scale(f"workspace: peak of {name}", units[k], 1e3 * float(peak.max()))
-        grain = sphere(0.4 * spacing(places), subdivisions=0)
-        count = len(grain.vertices)
+        grain = sphere(0.4 * step, subdivisions=0)
+        corners = len(grain.vertices)
         cloud = Mesh(
             (places[:, None] + grain.vertices[None]).reshape(-1, 3),
-            (np.arange(len(places))[:, None, None] * count + grain.faces[None]).reshape(-1, 3),
-            np.repeat(scale.colours(1e3 * peak), count, axis=0),
+            (np.arange(len(places))[:, None, None] * corners + grain.faces[None]).reshape(-1, 3),
+            np.repeat(scale.colours(1e3 * peak), corners, axis=0),
         )
         scene.joints[k]["map"] = scale.to_dict()
         scene.items.append(Item(scene.add(cloud), "map", "", np.eye(4), joint=k))
         if k == scene.chosen:
             scene.scales["map"] = scale
     text = f"workspace map, {response_of(workspace)}: peak of the joint, best branch"
+    if every > 1:
+        text += f"; one of {every} of the {count} places"
     scene.layers.append(("map", text, True))
 
 

@@ -65,15 +65,15 @@ def joint_values(
     # A damage by estimated values is one of many: how much of what it bears is used, tells more.
     if np.nansum(damage) > 0.0 and not assessment.notice:
         share = 100.0 * damage / np.nanmax(damage)
-        return share, Scale("damage of the joints, worst = 100", "%", 100.0)
+        return share, Scale("damage, worst = 100", "%", 100.0)
     parts = np.array([[joint.utilisation, joint.reducer_utilisation] for joint in joints])
     utilisation = 100.0 * np.where(
         np.isfinite(parts).any(axis=1), np.nan_to_num(parts).max(axis=1), np.nan
     )
     if np.isfinite(utilisation).any():
-        return utilisation, Scale("utilisation of the joints", "%", float(np.nanmax(utilisation)))
+        return utilisation, Scale("utilisation", "%", float(np.nanmax(utilisation)))
     torque = np.array([joint.peak_torque for joint in joints])
-    return torque, Scale("peak torque of the joints", "N m", _largest(torque, ~slides))
+    return torque, Scale("peak torque in a rivet", "N m", _largest(torque, ~slides))
 
 
 def _largest(values: FloatArray, among: BoolArray) -> float:

@@ -74,7 +74,14 @@ def script_json(value: Any) -> str:
 
 
 # One scope, in this order.
-_SCRIPTS = ("0-data.js", "1-robot.js", "2-overlay.js", "3-controls.js", "4-stage.js")
+_SCRIPTS = (
+    "0-data.js",
+    "1-robot.js",
+    "2-overlay.js",
+    "3-controls.js",
+    "4-answers.js",
+    "5-stage.js",
+)
 
 
 def scene_html(scene: Scene) -> str:
@@ -108,7 +115,7 @@ def scene_data(scene: Scene, packer: Packer) -> dict[str, Any]:
     samples = np.asarray(motion["samples"])
     return {
         "title": scene.title,
-        "frames": [_frame(frame) for frame in scene.frames],
+        "frames": [_frame(frame, scene.envelope.joint_names) for frame in scene.frames],
         "meshes": [packer.add_mesh(mesh) for mesh in scene.meshes],
         "items": [{**vars(item), "matrix": _matrix(item.matrix)} for item in scene.items],
         "layers": [{"id": i, "text": text, "on": on} for i, text, on in scene.layers],
@@ -133,7 +140,7 @@ def scene_data(scene: Scene, packer: Packer) -> dict[str, Any]:
     }
 
 
-def _frame(frame: Frame) -> dict[str, Any]:
+def _frame(frame: Frame, joints: tuple[str, ...]) -> dict[str, Any]:
     return {
         "path": frame.path,
         "matrix": _matrix(frame.matrix),
@@ -141,6 +148,7 @@ def _frame(frame: Frame) -> dict[str, Any]:
         "prismatic": frame.prismatic,
         "position": frame.position,
         "follows": frame.follows.tolist() if frame.follows.any() else None,
+        "joint": joints.index(frame.joint) if frame.joint in joints else None,
     }
 
 

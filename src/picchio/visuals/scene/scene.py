@@ -23,7 +23,10 @@ from picchio.visuals.scene.robot.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """A mesh in the scene: on which layer, under which node, where, and in which colour."""
+    """A mesh in the scene: on which layer, under which node, where, in which colour.
+
+    `told` is what a click on it tells: words, value, source.
+    """
 
     mesh: int
     layer: str
@@ -31,6 +34,7 @@ class Item:
     matrix: FloatArray
     colour: str | None = None
     joint: int | None = None
+    told: list[tuple[str, str, str]] | None = None
 
 
 @dataclass(eq=False, repr=False)
@@ -45,7 +49,8 @@ class Scene(Page, Result):
         items: what is placed where.
         layers: (id, words, shown at first).
         labels: text at a place: {"text", "layer", "at" (3,) m, "node" that it is in, "joint"}.
-        joints: the flexible joints: {"name", "scale", "peak", "text", and "map" its colour bar}.
+        joints: the flexible joints: {"name", "scale", "peak", "text", "card", and "map" its colour
+            bar}.
         scales: colour bars by layer.
         swatches: colours of layers that have one, "#rrggbb".
         motion: the vibration, see `picchio.visuals.scene.motion`.

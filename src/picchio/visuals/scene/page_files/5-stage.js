@@ -78,6 +78,7 @@ unpack().then((array) => {
   addItems(array);
   controls();
   stage();
+  answers();
   play(state.playing);
   drawOverlay();
   // Else it stands at rest until it is played.

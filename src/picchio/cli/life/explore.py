@@ -1,0 +1,71 @@
+"""`picchio explore`: drag the tool in the browser, see envelopes and life change."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from picchio.cli.app import app
+from picchio.cli.options import (
+    FlexOption,
+    JsonOption,
+    ReducersOption,
+    RobotArgument,
+    TaskOption,
+    ToolOption,
+)
+from picchio.cli.output import check_targets, deliver, telling
+
+
+@app.command(epilog="Example: picchio explore fanuc_like_3dof --open")
+def explore(
+    robot: RobotArgument,
+    task: TaskOption = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="An extended model, of `picchio diagnose --model`, to stand beside the nominal.",
+        ),
+    ] = None,
+    save: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="The task that a click puts the pose into; ROBOT-explored.toml if not given.",
+        ),
+    ] = None,
+    browser: Annotated[bool, typer.Option("--open", help="Open the page in the browser.")] = False,
+    flex: FlexOption = None,
+    tool: ToolOption = None,
+    reducers: ReducersOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Live: drag the tool and see envelopes and life change.
+
+    A page on this machine alone; its address is printed. Ctrl-C ends it. With --json what was on
+    the screen last is written then.
+    """
+    import picchio
+
+    loaded = picchio.load_robot(robot, flex=flex, tool=tool, reducers=reducers or ())
+    # The task may be both: a pose is added to it.
+    check_targets([json], [*loaded.files, task, model])
+    with telling("loading the robot"):
+        live = picchio.explore(loaded, task=task, model=model, save=save)
+    typer.echo(f"{live.url}\nCtrl-C ends it", err=True)
+    if browser:
+        import webbrowser
+
+        webbrowser.open(live.url)
+    try:
+        while live.alive:
+            time.sleep(0.2)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        live.close()
+    deliver(live.to_dict(), json)

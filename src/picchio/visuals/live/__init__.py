@@ -1,0 +1,1 @@
+"""Live: the robot in a browser, answering while it is moved."""

@@ -1,0 +1,128 @@
+"""`picchio.explore`: drag the tool, see envelopes and life change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from picchio.core.errors import InputError
+from picchio.core.provenance import provenance
+from picchio.core.results import Result
+from picchio.model.model import Model
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.loading.load import load_robot
+from picchio.studies.default_task import task_of
+from picchio.studies.instant import Place
+from picchio.studies.tasks import Task
+from picchio.visuals.live.page import live_html
+from picchio.visuals.live.server import Server
+from picchio.visuals.live.session import FORMAT, Session
+
+
+class Explorer(Result):
+    """A robot that answers while it is moved, in a page of this machine's browser.
+
+    Attributes:
+        url: of the page.
+        session: where the arm stands now, and what that does to it.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self._server = Server(session, live_html(session))
+        self._server.start()
+        self.url = self._server.url
+
+    @property
+    def alive(self) -> bool:
+        """Whether it still answers."""
+        return self._server.alive
+
+    @property
+    def task(self) -> Task:
+        """The place that is on the screen, as a task for `picchio.assess`."""
+        return self.session.place.task
+
+    def close(self) -> None:
+        """End it; the page says that it has ended."""
+        self._server.stop()
+
+    def _headline(self) -> str:
+        pose = ", ".join(f"{q:.4g}" for q in self.session.place.pose)
+        return f"{self.session.robot.name!r} at ({pose}), {self.url}"
+
+    def _content(self) -> Mapping[str, Any]:
+        robot = self.session.robot
+        return {
+            "format": FORMAT,
+            "robot": robot.name,
+            **self.session.values(),
+            "provenance": provenance([*robot.files]),
+        }
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe title="{escape(self.session.robot.name)}" src="{escape(self.url)}" '
+            'style="width:100%;height:640px;border:0" loading="lazy"></iframe>'
+        )
+
+
+def explore(
+    robot: str | Path | FlexibleRobot | Model,
+    *,
+    task: str | Path | Task | None = None,
+    model: str | Path | Model | None = None,
+    flex: str | Path | None = None,
+    tool: str | None = None,
+    save: str | Path | None = None,
+) -> Explorer:
+    """Explore a robot by hand: drag its tool or turn its joints, and see its life change.
+
+    A server on 127.0.0.1 shows the page and answers; nothing leaves this machine. In Jupyter the
+    cell shows it, as long as the kernel runs on the machine of the browser.
+
+    Args:
+        robot: the robot, its name or file, or a model of it. The nominal model stands beside a
+            model that has effects.
+        task: where to begin: its first pose, direction and blows; the robot's example if None.
+        model: an extended model of the same robot, as `picchio diagnose --model` writes it.
+        flex: sidecar of the robot.
+        tool: the frame that carries the tool.
+        save: the task file that a click puts the pose into; ROBOT-explored.toml if None.
+
+    Returns:
+        the explorer: its `url`, its `task` as it stands on the screen, `close()` to end it.
+
+    Raises:
+        InputError: a file that cannot be read, no flexible joint, a model of another robot.
+    """
+    found = robot if isinstance(robot, Model) else load_robot(robot, flex=flex, tool=tool)
+    models = _models(Model.of(found), model)
+    arm = models["nominal"].robot
+    first = task_of(arm, task).operations[0]
+    place = Place(first.poses[0], first.direction, first.excitation, first.hits_per_rivet)
+    file = Path(save) if save is not None else Path(f"{_plain(arm.name)}-explored.toml")
+    return Explorer(Session(models, place, file))
+
+
+def _models(given: Model, extended: str | Path | Model | None) -> dict[str, Model]:
+    """The nominal model, and the extended one where there is one."""
+    bare = replace(given.robot, effect_tables=())
+    nominal = Model(bare, given.gravity_stiffness, given.gravity_balanced)
+    if extended is None:
+        return {"nominal": nominal} | ({"extended": given} if given.effects else {})
+    other = extended if isinstance(extended, Model) else Model.of(load_robot(extended))
+    if other.robot.joint_names != bare.joint_names or (
+        other.robot.flexible_names != bare.flexible_names
+    ):
+        raise InputError("is of another robot: its joints are not the same", key="model",
+                         value=other.robot.name, choices=[bare.name])  # fmt: skip
+    return {"nominal": nominal, "extended": other}
+
+
+def _plain(name: str) -> str:
+    """A name that can be a file's."""
+    return "".join(c if c.isalnum() or c in "-_" else "_" for c in name) or "robot"
