@@ -16,6 +16,7 @@ from .conftest import write_good
         ("pyarrow", ".parquet", "pyarrow.*picchio\\[parquet\\]"),
         ("pyuff", ".uff", "pyuff.*picchio\\[import\\]"),
         ("mcap", ".mcap", "mcap.*picchio\\[import\\]"),
+        ("rosbags", ".bag", "rosbags.*picchio\\[import\\]"),
     ],
 )
 def test_an_extra_that_is_not_installed_is_named(tmp_path, monkeypatch, module, ending, words):

@@ -87,6 +87,9 @@ def _table(
     if layout.units and len(rows) > 1 and len(rows[1]) == len(names):
         units = [cell.strip(" []()") or None for cell in rows[1]]
     body, places = rows[skip:], [n + shift for n, _ in kept[skip:]]
+    if len(body) != len(places):
+        raise InputError("a quoted cell goes over several lines, or its quote is not closed",
+                         file=path)  # fmt: skip
     for number, row in zip(places, body, strict=True):
         if len(row) != len(names):
             raise InputError(f"must have {len(names)} values", file=path,

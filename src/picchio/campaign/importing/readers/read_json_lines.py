@@ -40,10 +40,11 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
                 row = json.loads(line)
                 if not isinstance(row, dict):
                     raise ValueError
+                found = list(_numbers("", row, _DEEPEST))
             except (ValueError, RecursionError):
-                raise InputError("is no JSON object", file=path, key=f"line {number}",
+                raise InputError("is no JSON object of numbers", file=path, key=f"line {number}",
                                  value=line.strip()[:60]) from None  # fmt: skip
-            for name, value in _numbers("", row, _DEEPEST):
+            for name, value in found:
                 column = values.setdefault(name, [])
                 column.extend([np.nan] * (rows - len(column)))
                 column.append(value)
@@ -61,7 +62,9 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
 
 def _numbers(name: str, value: Any, depth: int) -> Iterator[tuple[str, float]]:
     if isinstance(value, (bool, int, float)):
-        yield name, value if isinstance(value, int) and abs(value) < 2**63 else float(value)
+        if isinstance(value, int) and abs(value) >= 2**63:
+            raise ValueError
+        yield name, value
     elif isinstance(value, str):
         if (when := moment(value)) is not None:
             yield name, when

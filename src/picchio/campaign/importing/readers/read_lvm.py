@@ -66,6 +66,8 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
             at += 1
         if at >= len(lines):
             break
+        if at + 1 >= len(lines):
+            raise InputError("ends within a header", file=path, key=f"line {at + 1}")
         labels = [x.strip() for x in lines[at + 1].split(separator)]
         own = [x for x in labels if x not in ("X_Value", "Comment", "")]
         unique = Names()
@@ -76,8 +78,15 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
         names = own
         unit = [x.strip() for x in head.get("Y_Unit_Label", [])]
         units = dict(zip(names, unit, strict=False))
-        offset = [_number(x, decimal) for x in head.get("X0", []) if x.strip()]
-        step = [_number(x, decimal) for x in head.get("Delta_X", []) if x.strip()]
+        try:
+            offset, step = ([_number(x, decimal) for x in head.get(key, []) if x.strip()]
+                            for key in ("X0", "Delta_X"))  # fmt: skip
+        except ValueError as error:
+            raise InputError("X0 or Delta_X is no number", file=path, key=f"line {at + 1}",
+                             value=str(error).partition(": ")[2][:60]) from None  # fmt: skip
+        if columns == "No" and min(len(offset), len(step)) < len(names):
+            raise InputError("has neither an X column nor X0 and Delta_X of each channel",
+                             file=path, key=f"line {at + 1}")  # fmt: skip
         at, row = at + 2, 0
         while at < len(lines) and lines[at].strip():
             cells = lines[at].split(separator)[: _width(columns, len(names))]
