@@ -11,6 +11,7 @@ import sys
 import urllib.request
 from pathlib import Path
 
+import picchio
 from picchio.cli.main import run
 
 
@@ -32,7 +33,10 @@ def test_it_serves_until_ctrl_c_and_writes_the_last_state(tmp_path: Path) -> Non
         os.kill(process.pid, signal.SIGINT)
         out, _ = process.communicate(timeout=60)
     assert process.returncode == 0 and out == ""
-    assert json.loads((tmp_path / "last.json").read_text())["format"] == "picchio-exploration/1"
+    live = picchio.explore("fanuc_like_3dof")
+    returned = live.to_dict()
+    live.close()
+    assert json.loads((tmp_path / "last.json").read_text()) == returned
 
 
 def test_bad_input_is_one_line(tmp_path: Path, capsys) -> None:

@@ -24,6 +24,7 @@ def test_the_state_on_the_screen_has_its_keys(name: str) -> None:
         live.close()
     assert content["format"] == "picchio-exploration/1" and set(content) >= KEYS
     model = content["models"]["nominal"]
+    assert content["joints"] == model["joints"]
     assert len(model["natural_frequencies"]) == len(model["joints"])
     for joint in model["joints"]:
         assert set(joint) >= JOINT

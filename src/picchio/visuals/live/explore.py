@@ -56,10 +56,15 @@ class Explorer(Result):
 
     def _content(self) -> Mapping[str, Any]:
         robot = self.session.robot
+        for _ in self.session.settle():
+            pass
+        values = self.session.values(settled=True)
         return {
             "format": FORMAT,
             "robot": robot.name,
-            **self.session.values(),
+            **values,
+            # Of the model that was asked about: the extended one where there is one.
+            **list(values["models"].values())[-1],
             "provenance": provenance([*robot.files]),
         }
 

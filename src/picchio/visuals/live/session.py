@@ -193,8 +193,9 @@ class Session:
             if name not in self.last:
                 self.last[name] = study.values(self.place)
                 yield
-            cases = STILL if study.fast else DRAGGED
-            self.intervals[name] = study.life_intervals(self.place, cases)
+            if study.compiled:  # else each case takes as long as the model itself
+                cases = STILL if study.fast else DRAGGED
+                self.intervals[name] = study.life_intervals(self.place, cases)
             yield
 
     def values(self, settled: bool = False) -> dict[str, Any]:
@@ -233,6 +234,7 @@ class Session:
         ends = self.intervals.get(name)
         life = found.life
         return {
+            "notes": self.studies[name].model.without_load(),
             "natural_frequencies": found.natural_frequencies,
             "joints": [
                 {

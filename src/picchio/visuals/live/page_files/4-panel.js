@@ -113,7 +113,7 @@ function tell(values) {
   });
   byId("frequencies").textContent = data.models.filter((name) => values.models[name]).map((name) =>
     `natural frequencies${data.models.length > 1 ? `, ${name}` : ""}: ` +
-    values.models[name].natural_frequencies.map(number3).join(", ") + " Hz").join("; ");
+    [values.models[name].natural_frequencies.map(number3).join(", ") + " Hz", ...values.models[name].notes].join("; ")).join("; ");
   byId("robot-life").textContent = weakest(values);
   values.pose.forEach((q, j) => {
     put(sliders[j], q, `${q.toFixed(3)} ${data.joints[j].unit}`);
