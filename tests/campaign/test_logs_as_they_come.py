@@ -110,6 +110,7 @@ HABITS = {
     "commented": ("# robot log\n# of today\ntime,F\n", ",", ".", ("time", "F")),
     "tabs": ("t_ms\tF\n", "\t", ".", ("t_ms", "F")),
     "blanks": ("", " ", ".", ("1", "2")),
+    "numbered": ("time,1\n", ",", ".", ("time", "1")),
     "bars": ("time|F\n", "|", ".", ("time", "F")),
 }
 

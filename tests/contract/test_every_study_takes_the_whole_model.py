@@ -121,6 +121,7 @@ def ask(study: str, model: Model, excitation: Excitation, folder) -> dict[str, f
         "robot": model, "task": a_task(excitation), "pose": POSE, "excitation": excitation,
         "direction": DIRECTION, "rivets": 2e6,
         "places": Listed("pose", np.array([POSE])), "out": folder / f"{study}.nc", "restart": True,
+        "log": a_log(folder), "ledger": folder / "ledger",
     }  # fmt: skip
     parameters = inspect.signature(getattr(picchio, study)).parameters
     if "pose" in parameters and "task" in parameters:  # blows at a pose, instead of a task
@@ -151,6 +152,20 @@ def _flatten(value, path: str, out: dict) -> None:
             _flatten(entry, f"{path}[{k}]", out)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         out[path] = float(value)
+
+
+def a_log(folder):
+    """The tool's trigger over one rivet at the pose: the blows themselves are not seen."""
+    file = folder / "logs" / "shift.csv"
+    file.parent.mkdir(exist_ok=True)
+    angles = ",".join(map(str, POSE))
+    rows = [f"{1772352000 + i / 250:.3f},{int(125 <= i < 240)},{angles}" for i in range(500)]
+    file.write_text("\n".join(["time,on,1,2,3", *rows]) + "\n")
+    channels = [f'{{ from = "{k}", to = "position.joint_{k}" }}' for k in (1, 2, 3)]
+    channels.append('{ from = "on", to = "trigger" }')
+    text = f'format = "picchio-mapping/1"\nchannel = [{", ".join(channels)}]\n'
+    (file.parent / "mapping.toml").write_text(text)
+    return file
 
 
 def a_task(excitation: Excitation) -> Task:

@@ -11,6 +11,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.ledger.store import Kept, magnitude, pieces
+from picchio.model.model import Model
 from picchio.studies.tasks import Operation
 
 # The motor side of a joint that is held stands still to less than this, rad or m.
@@ -226,35 +227,42 @@ def measured(
     return found
 
 
-def assumed(
-    run: Run, operation: Operation, kind: str, count: int, direction: FloatArray | None = None
-) -> list[Blow]:
-    """Blows that nobody saw: as many as the task's blow model gives.
+def assumed(run: Run, operation: Operation, kind: str, count: int, model: Model) -> list[Blow]:
+    """Blows that nobody saw: those of the task, as the model's effects on them have it.
 
     Args:
         run: while the tool was on, or at a blow.
         operation: its blows and direction.
         kind: of the stream.
         count: of blows.
-        direction: (3,) unit, world, where it is not the operation's.
+        model: the robot and its effects.
 
     Returns:
         the blows, by time.
     """
-    force = operation.excitation.blow()
-    ends = np.append(force.start[1:], force.end)
-    time, values = [], []
-    for k, (a, b) in enumerate(zip(force.start, ends, strict=True)):
-        inner = np.linspace(a, b, 33 if force.amplitude[k] else 2)
-        time.append(inner)
-        values.append(force.in_piece(np.full(inner.size, k), inner - a))
-    whole, size = np.concatenate(time), np.concatenate(values)
-    period = round(operation.excitation.period * 1e9)
-    along = operation.direction if direction is None else direction
-    return [
-        Blow(run.onset + i * period, kind, whole, size, along, run.pose, False)
-        for i in range(count)
-    ]
+    period = operation.excitation.period
+    robot = model.robot
+    frame = robot.frame_placement(run.pose, robot.tool_frame)[1]
+    along = model.force_directions(frame) @ operation.direction
+    found = []
+    for first in range(0, count, _LONGEST):
+        hits = min(count - first, _LONGEST)
+        force = model.force(operation.excitation, hits)
+        # A piece belongs to the blow in whose period it begins; the last one is silence.
+        of = np.clip(((force.start[:-1] + 1e-9) / period).astype(int), 0, hits - 1)
+        for k in range(hits):
+            time, values = [np.zeros(1)], [np.zeros(1)]
+            for piece in np.flatnonzero(of == k):
+                start, end = force.start[piece], force.start[piece + 1]
+                inner = np.linspace(0.0, end - start, 33 if force.amplitude[piece] else 2)
+                size = force.in_piece(np.full(inner.size, piece), inner)
+                if size.any():
+                    time.append(start - k * period + inner)
+                    values.append(size)
+            onset = run.onset + round((first + k) * period * 1e9)
+            whole, size = np.concatenate(time), np.concatenate(values)
+            found.append(Blow(onset, kind, whole, size, along, run.pose, False))
+    return found
 
 
 def bursts(blows: Sequence[Blow], rest: Callable[[FloatArray], FloatArray]) -> list[Burst]:

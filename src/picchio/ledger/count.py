@@ -39,6 +39,7 @@ from picchio.ledger.out import opc_ua
 from picchio.ledger.ringing import ring_downs, temperatures
 from picchio.ledger.samples import Samples, read_samples
 from picchio.ledger.store import Kept, Ledger, Stream
+from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.default_task import task_of
@@ -300,6 +301,7 @@ def count(
     mapping: str | Path | Mapping | None = None,
     task: Task | str | Path | None = None,
     sn_curve: str | SNCurve | None = None,
+    samples: int = 256,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
 ) -> Count:
@@ -317,6 +319,7 @@ def count(
         task: whose blows are assumed where none are seen, and a fifth of whose force a blow
             exceeds; the robot's own where it is not given.
         sn_curve: of all shafts, instead of their own.
+        samples: worlds that are drawn, at most 256.
         seed: of the draws.
         progress: called with (logs done, logs in all).
 
@@ -327,7 +330,7 @@ def count(
         InputError: no log that can be read, a mapping that does not fit, another robot's ledger.
         OutputError: the ledger can't be written.
     """
-    model = unscaled(Model.of(robot))
+    model = Model.of(robot)
     bare = model.robot
     curves = curves_of(bare, sn_curve)
     files, rules, rules_file = _files(log, mapping)
@@ -360,9 +363,10 @@ def count(
     drawn = None
     if counted.bursts and any(curve is not None for curve in curves):
         day = np.array([b.onset for b in counted.bursts]) // (_SECONDS_A_DAY * 10**9)
-        drawn = worlds(model, curves, sn_curve, counted.bursts, counted.totals, day, seed)
+        drawn = worlds(unscaled(model), curves, sn_curve, counted.bursts, counted.totals, day,
+                       samples, seed)  # fmt: skip
     inputs = [*bare.files, *work.files, *([rules_file] if rules_file else [])]
-    notes = (*_notes(counted, rules, bare), *exchanged(changes))
+    notes = (*_notes(counted, rules, model), *exchanged(changes))
     return Count(
         model=model, ledger=Path(ledger), logs=logs, added=tuple(added), known=tuple(known),
         refused=tuple(refused), detected=detected, counted=counted, worlds=drawn,
@@ -372,8 +376,9 @@ def count(
     )  # fmt: skip
 
 
-def _notes(counted: Counted, rules: Mapping | None, robot: FlexibleRobot) -> tuple[str, ...]:
+def _notes(counted: Counted, rules: Mapping | None, model: Model) -> tuple[str, ...]:
     """What was taken for granted."""
+    robot = model.robot
     notes = [
         "each burst starts from rest where the robot has moved or come to rest; what the residues "
         "of all bursts close together counts, too, so that this is more than assess tells for the "
@@ -387,6 +392,10 @@ def _notes(counted: Counted, rules: Mapping | None, robot: FlexibleRobot) -> tup
         notes.append("sizes told from accelerations: peak times the mass that the tool feels")
     if kinds & {"trigger", "poses"}:
         notes.append("blows that no log shows are those of the task: number, size and shape")
+    notes += model.without_load()
+    unused = [effect.label for effect in model.effects if effect.where == "blows"]
+    if unused and "force" in kinds:
+        notes.append(f"measured blows are as they are, without {', '.join(unused)}")
     if rules is not None:
         given = {to.partition(".")[2] for _, to, _, _ in rules.entries}
         still = [name for name in robot.joint_names if name not in given]
@@ -566,12 +575,13 @@ def recount(book: Ledger, model: Model, curves: Sequence[SNCurve | None], task: 
     over = np.empty((0, 2), np.int64)
     for kept in book.kept():
         spans = covered(kept.spans, kept.stream.gap)
-        found = blows_of(kept, model.robot, task)
+        found = blows_of(kept, model, task)
         when = np.array([blow.onset for blow in found], np.int64)
         # A moment of the robot counts once: by the surest stream that saw it.
         blows += [b for b, hidden in zip(found, within(when, over), strict=True) if not hidden]
         over = covered(np.concatenate([over, spans]), kept.stream.gap)
     blows.sort(key=lambda blow: blow.onset)
+    model = unscaled(model)  # the blows have their effects in them
     grouped = bursts(blows, resting(model))
     name = fingerprint(model, curves)
     known = book.computed(name)
@@ -586,18 +596,18 @@ def recount(book: Ledger, model: Model, curves: Sequence[SNCurve | None], task: 
     return Counted(blows, grouped, damages, together(damages, curves), over)
 
 
-def blows_of(kept: Kept, robot: FlexibleRobot, task: Task) -> list[Blow]:
+def blows_of(kept: Kept, model: Model, task: Task) -> list[Blow]:
     """The blows of a stream.
 
     Args:
         kept: what the ledger holds of it.
-        robot: for the tool's axes.
+        model: the robot, and the effects on blows that are assumed.
         task: whose blows are assumed where none are seen.
 
     Raises:
         InputError: see `measured`; an operation that is not told.
     """
-    settings = kept.stream.settings
+    settings, robot = kept.stream.settings, model.robot
 
     def turn(pose: FloatArray) -> FloatArray:
         return robot.frame_placement(pose, robot.tool_frame)[1]
@@ -614,7 +624,7 @@ def blows_of(kept: Kept, robot: FlexibleRobot, task: Task) -> list[Blow]:
                              key="channel")  # fmt: skip
         operation = _operation(task, settings.get("operation"), run.pose)
         if kept.stream.kind == "acceleration":
-            found.append(_felt(run, operation, robot))
+            found.append(_felt(run, operation, model))
             continue
         period = operation.excitation.period
         length = (run.last - run.onset) * 1e-9
@@ -623,18 +633,19 @@ def blows_of(kept: Kept, robot: FlexibleRobot, task: Task) -> list[Blow]:
             hits = (
                 operation.hits_per_rivet if length >= 0.5 * period * operation.hits_per_rivet else 0
             )
-        found += assumed(run, operation, kept.stream.kind, hits)
+        found += assumed(run, operation, kept.stream.kind, hits, model)
     return found
 
 
-def _felt(run: Run, operation: Operation, robot: FlexibleRobot) -> Blow:
+def _felt(run: Run, operation: Operation, model: Model) -> Blow:
     """A blow of the task's shape, as large as the peak of the tool's acceleration tells.
 
     While a blow lasts the springs have not moved: F = a / (n J M^-1 J^T n).
     """
-    mass, jacobian = robot.mass_and_jacobian(run.pose[None])
-    along = operation.direction @ jacobian[0]
+    blow = assumed(run, operation, "acceleration", 1, model)[0]
+    many = ManyPoses(unscaled(model), run.pose[None])
+    mass, jacobian = many.mass_and_jacobian()
+    along = blow.direction @ jacobian[0]
     mobility = float(along @ np.linalg.solve(mass[0], along))
     peak = float(np.linalg.norm(run.values, axis=1).max())
-    blow = assumed(run, operation, "acceleration", 1)[0]
-    return replace(blow, force=blow.force * (peak / mobility / operation.excitation.peak_force))
+    return replace(blow, force=blow.force * (peak / mobility / blow.peak))

@@ -127,6 +127,7 @@ def worlds(
     bursts: Sequence[Burst],
     totals: Totals,
     days: FloatArray,
+    samples: int,
     seed: int,
 ) -> Worlds:
     """Draw the worlds: stiffness, damping, force, the model's error, the specimens' strength.
@@ -141,6 +142,7 @@ def worlds(
         bursts: by time.
         totals: their damage.
         days: (b,) the day of each burst.
+        samples: worlds to draw, at most 256.
         seed: of the draws.
 
     Returns:
@@ -161,7 +163,7 @@ def worlds(
     sampler = Sampler.of(model, Task(operations), stress, inputs, [])
     names = [each.name for each in sampler.inputs]
     draws = Draws(len(names), seed)
-    scores = draws.more().reshape(-1, len(names)) @ root_of(names, model.robot.posterior)
+    scores = draws.more().reshape(-1, len(names))[:samples] @ root_of(names, model.robot.posterior)
     per = 1.0 / sampler.run(scores).lives  # (k, m) of a typical burst
     n, m = len(curves), per.shape[1]
     damage = np.full((n, m), np.nan)

@@ -92,11 +92,22 @@ def _tried(lines: list[str], delimiter: str, decimal: str) -> tuple[float, Sourc
     widths = [len(cells) for _, cells in table]
     width = max(set(widths), key=widths.count)
 
+    def told_as(cells: list[str]) -> list[bool]:
+        return [number.fullmatch(c) is not None or moment(c) is not None for c in cells]
+
     def numeric(cells: list[str]) -> int:
-        return sum(number.fullmatch(cell) is not None or moment(cell) is not None for cell in cells)
+        return sum(told_as(cells))
+
+    # The columns that hold numbers in most lines: a header may be called "1", but not all of it.
+    every = [told_as(cells) for _, cells in table if len(cells) == width]
+    usual = [2 * sum(column) > len(every) for column in zip(*every, strict=True)]
 
     def row(at: int) -> bool:
-        return len(table[at][1]) == width and numeric(table[at][1]) > 0
+        cells = table[at][1]
+        if len(cells) != width or not numeric(cells):
+            return False
+        found = told_as(cells)
+        return all(f or not u or not c for f, u, c in zip(found, usual, cells, strict=True))
 
     # The first line of numbers that another follows: prose above may hold a number, too.
     starts = [k for k in range(len(table)) if row(k) and (k + 1 == len(table) or row(k + 1))]
