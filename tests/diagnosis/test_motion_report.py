@@ -138,7 +138,7 @@ def test_the_page_has_every_part_and_needs_nothing_from_outside(robot, diagnosis
 
 def test_names_are_escaped(robot, diagnosis):
     page = page_of(diagnosis, robot, folder="<script>alert(1)</script>")
-    assert "<script" not in page
+    assert "<script>alert" not in page and "&lt;script&gt;alert(1)" in page
 
 
 def test_a_page_of_a_good_simulation(robot):

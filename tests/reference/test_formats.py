@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import picchio
 from picchio.campaign.tables import Tolerance
 from picchio.cli.main import run
 from picchio.core.errors import InputError
@@ -166,9 +167,22 @@ def test_what_a_long_command_writes_is_described(name, line, folder, repository)
     assert_described(written(folder, line, repository), name)
 
 
+# What serves until it is interrupted writes what Python returns: tests/cli/test_explore_command.py.
+SERVED = {"exploration": "explore"}
+
+
+@pytest.mark.parametrize("name", SERVED)
+def test_what_is_served_is_described(name):
+    live = getattr(picchio, SERVED[name])("fanuc_like_3dof")
+    try:
+        assert_described(json.loads(json.dumps(live.to_dict())), name)
+    finally:
+        live.close()
+
+
 def test_every_json_output_is_held_against_a_command():
     outputs = {entry.name for entry in ALL.values() if entry.kind == "JSON"}
-    assert outputs == FAST.keys() | SLOW.keys()
+    assert outputs == FAST.keys() | SLOW.keys() | SERVED.keys()
 
 
 def test_every_format_that_the_source_names_is_listed(repository):

@@ -210,9 +210,12 @@ def test_scenes_of_other_robots(open_page, tmp_path, pictures, name: str) -> Non
     # On a telephone, too, no label covers another or leaves the picture, and each has its line.
     for width, height in ((390, 844), (1100, 700)):
         page.set_viewport_size({"width": width, "height": height})
-        page.wait_for_timeout(300)
+        for _ in range(20):  # a busy machine draws late
+            page.wait_for_timeout(300)
+            labels, bad = page.evaluate(LABELS)
+            if bad == []:
+                break
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-        labels, bad = page.evaluate(LABELS)
         assert labels > len(robot.flexible_names) and bad == []
     shown = picture(page, pictures / f"scene-{name}.png")
     page.locator("#layer-robot").set_checked(False)

@@ -18,7 +18,7 @@ from picchio.core.errors import warn_user
 
 _LONGEST_LINE = 1 << 20
 _BYTES_A_VALUE = 20
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.I)
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.I)
 
 
 class CsvSource(FileSource):

@@ -18,8 +18,8 @@ from picchio.core.errors import InputError
 _HEAD = 1 << 18  # bytes looked at
 _LINES = 60
 _DELIMITERS = ("\t", ";", ",", "|", " ")
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.I)
-_NUMBER_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.I)
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.I)
+_NUMBER_COMMA = re.compile(r"[+-]?(\d+(,\d*)?|,\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.I)
 _COMMENTS = ("#", "%", "//", "!")
 _TIME_NAME = re.compile(
     r"(.*[.:/_ ])?(t|time|times|time ?stamps?|zeit|temps|tempo|clock|date ?time|date|datum|stamp|"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -120,9 +121,12 @@ def _step(raw: RawFile, found: detect.FoundClock) -> float:
 
 def _counts(channel: RawChannel, unit: str) -> bool:
     """Whether stamps in this unit count from 1970."""
-    found = detect.ns_of(channel.values[:1], unit) if channel.values.size else np.zeros(0)
-    low, high = detect._DATES
-    return bool(found.size) and low <= int(found[0]) <= high
+    # Whole numbers without end: stamps in ms that are said to be s are beyond what 64 bits hold.
+    first = channel.values[:1].tolist()
+    factor = round(detect.SCALES[unit] * 1e9)
+    return bool(first) and math.isfinite(first[0]) and (
+        detect._DATES[0] <= first[0] * factor <= detect._DATES[1]
+    )  # fmt: skip
 
 
 def taken_samples(
