@@ -137,12 +137,13 @@ class Draws:
     Args:
         inputs: how many inputs.
         seed: of the scrambling; the same seed gives the same points.
+        most: scores that may be asked for, so that few are begun with; no bound if not given.
 
     Raises:
         InputError: no input.
     """
 
-    def __init__(self, inputs: int, seed: int = 0) -> None:
+    def __init__(self, inputs: int, seed: int = 0, most: int | None = None) -> None:
         from scipy.stats import qmc
 
         if inputs < 1:
@@ -153,12 +154,15 @@ class Draws:
         ]
         self._other = np.random.default_rng(seeds[-1])
         self.scores = np.empty((REPLICATES, 0, inputs))
+        # Sobol points are even in powers of two only.
+        few = 16 if most is None else min(16, max(2, most // REPLICATES))
+        self._first = 1 << (few.bit_length() - 1)
 
     def more(self) -> FloatArray:
-        """As many scores again as there are, (replicates, new, inputs); 16 of each at first."""
+        """As many scores again as there are, (replicates, new, inputs); at first up to 16 of each."""
         from scipy.special import ndtri
 
-        count = self.scores.shape[1] or 16
+        count = self.scores.shape[1] or self._first
         points = np.array([engine.random(count) for engine in self._engines])
         new = np.asarray(ndtri(np.clip(points, 1e-12, 1.0 - 1e-12)))
         self.scores = np.concatenate([self.scores, new], axis=1)

@@ -63,8 +63,8 @@ def uncertain_life(
             `DEFAULT_INPUTS`, without the width where blows have none. One joint's stiffness or
             damping ratio ("stiffness.joint_1"), or any other value with a spread, by its name:
             in place of its own spread.
-        samples: at most so many; if not given, 16,384, and fewer for models that compiled code
-            cannot take.
+        samples: at most so many, 32 at the least; if not given, 16,384, and fewer for models that
+            compiled code cannot take.
         seed: the same seed gives the same result.
         totals: also the total-order indices, which need more runs.
         residue: as in `assess`.
@@ -87,8 +87,8 @@ def uncertain_life(
     sampler = Sampler.of(model, task, stress, inputs, notes)
     names = [each.name for each in sampler.inputs]
     root = root_of(names, model.robot.posterior)
-    draws = Draws(len(names), seed)
     most = samples or sampler.budget
+    draws = Draws(len(names), seed, most)
     drawn: Drawn | None = None
     mixed = None
     while True:
