@@ -159,7 +159,7 @@ class Draws:
         self._first = 1 << (few.bit_length() - 1)
 
     def more(self) -> FloatArray:
-        """As many scores again as there are, (replicates, new, inputs); at first up to 16 of each."""
+        """As many scores again as there are, (replicates, new, inputs); at first 16 or fewer."""
         from scipy.special import ndtri
 
         count = self.scores.shape[1] or self._first
