@@ -282,14 +282,14 @@ class Effect(ABC):
         return type(self)(self.target, **{**kept, **values}).with_hidden(self.hidden)
 
     @classmethod
-    def finer_than(cls, coarse: Effect) -> Self:
-        """This effect where it does what the one does that it refines.
+    def finer_than(cls, coarse: Effect) -> list[Self]:
+        """This effect where it does what the one does that it refines: where to start a fit.
 
         Args:
             coarse: at work at the same target.
         """
         own = {p.name for p in cls.parameters}
-        return cls(coarse.target, **{k: v for k, v in coarse.values.items() if k in own})
+        return [cls(coarse.target, **{k: v for k, v in coarse.values.items() if k in own})]
 
     def bounded(self, **values: float) -> Self:
         """The same effect with other values, brought within their bounds.

@@ -55,7 +55,7 @@ def all_candidates(problem: Problem, without: Iterable[str] = ()) -> list[tuple[
     return [
         (effect, target)
         for name, effect in catalogue().items()
-        if name not in left_out
+        if name not in left_out and not effect.refines
         for target in effect.applies(evidence)
     ]
 

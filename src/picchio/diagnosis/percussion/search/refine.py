@@ -18,7 +18,8 @@ def refined(search: Search, trials: Sequence[Trial]) -> list[Trial]:
     """Trials, the best first; the best gives way to an effect that tells it with more numbers.
 
     That is one that refines its effect (`Effect.refines`), from the values that it has, where more
-    than noise is left, it pays for its numbers and the records held out do not speak against it.
+    than noise is left, and no more than noise (or a remainder that is allowed) with it: many
+    numbers can also stand for several causes. The records held out must not speak against it.
 
     Args:
         search: data and records.
@@ -27,20 +28,22 @@ def refined(search: Search, trials: Sequence[Trial]) -> list[Trial]:
     Returns:
         all of them, the best first; one more where that is told with more numbers.
     """
-    best, *others = trials
+    best = trials[0]
     if not best.finished(search.records) or search.leaves_noise(best.fit):
         return list(trials)
+    (coarse,) = (e for e in best.fit.hypothesis.causes if e.label == best.label)
+    rest, tried = best.fit.hypothesis.minus(best.label), []
     for kind, target in search.finer:
-        if f"{kind.refines}:{target}" != best.label:
+        if (kind.refines, target) == (coarse.name, coarse.target):
+            for start in kind.finer_than(coarse):
+                go = partial(search.fit, rest.plus(start), iterations=_TURNS)
+                tried.append((start.label, attempt(start.label, go)))
+    found = [(label, each) for label, each in tried if each is not None]
+    for label, fitted in sorted(found, key=lambda each: bic(each[1])):
+        quiet = search.leaves_noise(fitted) or search.explains_enough(fitted)
+        if not quiet or search.pays(best.fit, fitted) < search.least:
             continue
-        (coarse,) = (e for e in best.fit.hypothesis.causes if e.label == best.label)
-        finer = kind.finer_than(coarse)
-        hypothesis = best.fit.hypothesis.minus(best.label).plus(finer)
-        fitted = attempt(finer.label, partial(search.fit, hypothesis, iterations=_TURNS))
-        if fitted is None or search.pays(best.fit, fitted) < search.least:
-            continue
-        held = search.held_out_gain(best.fit, fitted, None)
+        held = search.held_out_gain(best.fit, fitted)
         if held is None or held > 0.0:
-            return [replace(best, label=finer.label, fit=fitted, score=bic(fitted), about=None),
-                    *trials]  # fmt: skip
-    return [best, *others]
+            return [replace(best, label=label, fit=fitted, score=bic(fitted), about=None), *trials]
+    return list(trials)

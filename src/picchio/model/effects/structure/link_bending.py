@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from typing import Self
 
 from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.evidence import Evidence
@@ -36,6 +36,7 @@ class LinkBending(Effect):
     )  # fmt: skip
     meaning = "the link that the joint carries bends half-way along"
     mark = "bending"
+    refines = "transverse_compliance"
     source = (
         "pseudo-rigid-body model with one hinge: Howell, Compliant Mechanisms, 2001, ch. 5; "
         "Dwivedy, Eberhard, Mechanism and Machine Theory 41 (2006) 749"
@@ -58,17 +59,16 @@ class LinkBending(Effect):
         plant.add_bending(self.target, values["angle"], values["apart"], pair, values["damping"])
 
     def trials(self, scales: Scales) -> list[dict[str, float]]:
-        """Five times as stiff as the joint, about three axes."""
-        return self._stiffer(scales, (5.0,))
+        """Five times as stiff as the joint."""
+        k, m = 5.0 * scales.stiffness[self.target], scales.inertia[self.target]
+        return [{"stiffness": k, "damping": 0.04 * (k * m) ** 0.5, "ratio": 0.3}]
 
-    def early_trials(self, scales: Scales) -> list[dict[str, float]]:
-        """From three to forty times as stiff as the joint, about three axes."""
-        return self._stiffer(scales, [3.0 * 1.9**i for i in range(5)])
+    @classmethod
+    def finer_than(cls, coarse: Effect) -> list[Self]:
+        """A link that yields as much about one axis as a bearing does, about three axes in turn.
 
-    def _stiffer(self, scales: Scales, times: Sequence[float]) -> list[dict[str, float]]:
-        k, m = scales.stiffness[self.target], scales.inertia[self.target]
-        return [
-            {"stiffness": n * k, "damping": 0.04 * (n * k * m) ** 0.5, "ratio": 0.1, "angle": angle}
-            for n in times
-            for angle in (0.0, math.pi / 3.0, 2.0 * math.pi / 3.0)
-        ]
+        Args:
+            coarse: `transverse_compliance` at work at the same joint.
+        """
+        shared = {key: coarse.values[key] for key in ("stiffness", "damping", "modal_share")}
+        return [cls(coarse.target, **shared, ratio=0.3, angle=k * math.pi / 3.0) for k in range(3)]

@@ -56,13 +56,13 @@ class LinkInertia(Effect):
         return [link for link in super().targets(evidence) if links.get(link) is not None]
 
     @classmethod
-    def finer_than(cls, coarse: Effect) -> Self:
+    def finer_than(cls, coarse: Effect) -> list[Self]:
         """A link of as many times the mass.
 
         Args:
             coarse: `link_mass` at work at the same link.
         """
-        return cls(coarse.target, mass=math.log(coarse.values["scale"]))
+        return [cls(coarse.target, mass=math.log(coarse.values["scale"]))]
 
     def _added(self, own: FloatArray) -> FloatArray:
         return stretched(own, [self.values[name] for name in _NAMES]) - own
