@@ -19,6 +19,8 @@ from picchio.diagnosis.planning.choose import Space, choose
 from picchio.diagnosis.planning.outcome import Life, Outcome, outcome_of
 from picchio.diagnosis.planning.static import StaticTest
 from picchio.diagnosis.planning.tests import Offered, Possible
+from picchio.model.effects.registry import effect_class
+from picchio.robot.loading.saved_model import saved_model_text
 from picchio.studies.default_task import possible_poses
 
 ARM = "fanuc_like_3dof"
@@ -248,6 +250,19 @@ def test_the_form_comes_back_filled_in(loads, planned, tmp_path, in_process):
 def test_what_cannot_be_planned(options, words):
     with pytest.raises(picchio.InputError, match=words):
         picchio.plan(ARM, **options)
+
+
+def test_a_model_with_effects_is_refused(tmp_path, loads):
+    """What yields beside the joints is for the tests to tell."""
+    saved = tmp_path / "model.toml"
+    slack = effect_class("backlash")("joint_2", gap=2e-4)
+    saved.write_text(saved_model_text(ARM, [slack.to_dict()]))
+    with pytest.raises(picchio.InputError, match=r"not a model with effects.*backlash:joint_2"):
+        picchio.plan(saved)
+    record = Record.from_columns("a.csv", loads.draw(3, 1).columns, kind="static")
+    campaign = picchio.Campaign.from_records([record])
+    with pytest.raises(picchio.InputError, match=r"not a model with effects.*backlash:joint_2"):
+        picchio.identify(saved, campaign)
 
 
 def test_a_load_that_no_drive_bears_is_refused():

@@ -67,6 +67,14 @@ def test_an_unknown_that_differs_from_pose_to_pose_shows():
     assert pose_inconsistency(found) > 6.0
 
 
+def test_a_model_without_unknowns_has_no_spread():
+    none = np.zeros((2 * SAMPLES, 0))
+    hypothesis = Hypothesis((), Tolerance(), n_nuisances=0)
+    records = tuple(MeasuredRecord(None, {}, {}, pose) for pose in range(3))
+    found = Fit(hypothesis, [np.ones((2, SAMPLES))] * 3, [none] * 3, 0.0, records, None)
+    assert jackknife_covariance(found).shape == (0, 0)
+
+
 def test_without_slopes_nothing_is_said():
     assert pose_inconsistency(some_fit(None, [np.ones((2, SAMPLES))], [0])) == 0.0
 

@@ -306,6 +306,7 @@ def test_pages_on_a_telephone(open_page, pages, pictures) -> None:
             page.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true })")
             page.screenshot(path=str(pictures / f"{name}-{width}.png"), full_page=True)
             assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), name
+            page.close()  # eight long pages at once were too much for a busy machine
 
 
 def test_report_prints_with_page_numbers(open_page, pages, pictures) -> None:

@@ -111,11 +111,13 @@ def force_of(burst: Burst) -> MeasuredForce:
         burst: any.
     """
     end = burst.start[1:]
-    last = burst.constant[:-1] + burst.slope[:-1] * np.diff(burst.start)
     span = np.diff(burst.start)
+    last = burst.constant[:-1] + burst.slope[:-1] * span
     before = end - np.minimum(1e-9, 0.01 * span)
-    time = np.column_stack([burst.start[:-1], before]).ravel()
-    force = np.column_stack([burst.constant[:-1], last]).ravel()
+    # Where pulses touch, a piece may be as short as the rounding of its times.
+    lasting = span > 1e-9
+    time = np.column_stack([burst.start[:-1], before])[lasting].ravel()
+    force = np.column_stack([burst.constant[:-1], last])[lasting].ravel()
     time, force = np.append(time, burst.start[-1]), np.append(force, 0.0)
     return MeasuredForce(time, force, float(time[-1]))
 

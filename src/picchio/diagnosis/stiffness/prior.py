@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.core.errors import InputError
 from picchio.robot.flexible_robot import FlexibleRobot
 
 FACTOR = 4.0
@@ -45,9 +46,23 @@ def prior_of(robot: FlexibleRobot) -> Prior:
     What a robot's drives are probably like is in its spreads, where `load_robot` estimated them
     (`picchio.robot.drives.priors`), and so is what earlier tests found.
 
+    Every test for stiffness starts here, so a model with effects is refused here: what yields
+    beside the joints is for the tests to tell.
+
     Args:
         robot: flexible.
+
+    Returns:
+        covariance of the logarithms of stiffness over the stated values.
+
+    Raises:
+        InputError: a saved model with effects.
     """
+    if robot.effect_tables:
+        labels = ", ".join(f"{table['effect']}:{table['target']}" for table in robot.effect_tables)
+        raise InputError("tests for stiffness take the robot as its files have it, not a model "
+                         "with effects", key="effect", value=labels,
+                         hint=f"name the robot, {robot.name}")  # fmt: skip
     names = [f"stiffness.{joint.name}" for joint in robot.flexible_joints]
     size = np.full(len(names), UNKNOWN)
     stated = []

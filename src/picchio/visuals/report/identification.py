@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from picchio.diagnosis.identified import Compared, Identification, Identified
 from picchio.visuals.plots.style import BLUE, INK, MUTED, VERMILION, blank_figure, plain, styled
@@ -88,6 +89,7 @@ def plot_compared(compared: Compared, ax: Axes | None = None) -> Axes:
                       markersize=3.5, linewidth=0.8, label="measured")  # fmt: skip
         axes.plot(compared.x, compared.fitted, "x", color=BLUE, markersize=5.0, label="fitted")
         axes.axhline(0.0, color=MUTED, linewidth=0.7)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))  # lines of the table
     axes.set(xlabel=compared.across, ylabel=compared.up, title=plain(compared.title))
     axes.legend(loc="best")
     return axes

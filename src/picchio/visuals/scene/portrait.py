@@ -127,6 +127,7 @@ def plot_pose(
     """
     axes, view, tool, reach = _drawn_robot(robot, pose, axes_or_new(ax, width=4.0, height=3.2))
     at = view.seen(tool)[:2]
+    ends = []
     for arrow in arrows:
         side = -1.0 if arrow.kind == "comes" else 1.0
         along = side * 0.22 * reach * view.seen(arrow.direction)[:2]
@@ -138,11 +139,12 @@ def plot_pose(
         far = at + 1.18 * along
         # What comes to the eye has no length: its name stands beside the tool.
         far = far + (0.0 if np.linalg.norm(along) > 0.05 * reach else 0.05 * reach)
+        ends += [at + along, far]
         axes.text(
             float(far[0]), float(far[1]), arrow.label, color=arrow.colour, fontsize=9,
             ha="center", va="center", fontweight="bold", zorder=7,
         )  # fmt: skip
-    _finished(axes, view, tool, reach)
+    _finished(axes, view, tool, reach, np.array(ends).reshape(-1, 2))
     return axes
 
 
@@ -162,10 +164,22 @@ def _drawn_robot(
     return axes, view, tool, body.reach
 
 
-def _finished(axes: Axes, view: View, tool: FloatArray, reach: float) -> None:
-    """Mark the tool, and show how long something is in place of axes."""
+def _finished(
+    axes: Axes, view: View, tool: FloatArray, reach: float, ends: FloatArray | None = None
+) -> None:
+    """Mark the tool, and show how long something is in place of axes.
+
+    Args:
+        axes: with the robot on them.
+        view: the camera.
+        tool: (3,) m, world.
+        reach: of the robot, m.
+        ends: (k, 2) m, of what else must be in the picture: Matplotlib leaves out arrows beyond.
+    """
     spot = view.seen(tool)
     axes.plot(spot[0], spot[1], "o", markersize=7, fillstyle="none", color=INK, zorder=5)
+    if ends is not None and len(ends):
+        axes.plot(ends[:, 0], ends[:, 1], linestyle="none")
     axes.margins(_MARGIN)
     axes.set_aspect("equal")
     axes.grid(False)
@@ -178,7 +192,7 @@ def _scale_bar(axes: Axes, reach: float) -> None:
     length = 10.0 ** np.floor(np.log10(0.5 * reach))
     right, bottom = axes.get_xlim()[1], axes.get_ylim()[0]
     axes.plot([right - length, right], [bottom, bottom], color=MUTED, linewidth=2.0)
-    axes.text(right, bottom, f"{length:g} m\n", color=MUTED, fontsize=8, ha="right", va="bottom")
+    axes.text(right, bottom, f"\n{length:g} m", color=MUTED, fontsize=8, ha="right", va="center")
 
 
 def _picture(parts: list[Mesh], view: View) -> tuple[FloatArray, tuple[float, float, float, float]]:

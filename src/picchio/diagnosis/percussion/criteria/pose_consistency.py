@@ -67,7 +67,7 @@ def jackknife_covariance(found: Fit) -> FloatArray:
     """
     parts = _by_pose(found)
     size = len(found.hypothesis.unknowns())
-    if len(parts) < 2:
+    if len(parts) < 2 or size == 0:
         return np.zeros((size, size))
     whole = found.normal_matrix()
     scale = np.sqrt(np.maximum(whole.diagonal(), 1e-300))
