@@ -31,10 +31,10 @@ from picchio.campaign.tables import Tolerance
 from picchio.core.files import atomic_write
 from picchio.core.processes import one_thread
 from picchio.diagnosis.planning.choose import Space, choose
+from picchio.diagnosis.planning.kind import Offered, Possible
 from picchio.diagnosis.planning.outcome import Life, Outcome, outcome_of
 from picchio.diagnosis.planning.plan import _poses
 from picchio.diagnosis.planning.static import StaticTest, told
-from picchio.diagnosis.planning.tests import Offered, Possible
 from picchio.diagnosis.stiffness.fit import Problem, climb
 from picchio.diagnosis.stiffness.prior import prior_of
 from picchio.studies.default_task import possible_poses, task_of

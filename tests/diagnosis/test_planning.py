@@ -16,9 +16,9 @@ from picchio.campaign.loadings import read_loadings
 from picchio.campaign.record import Record
 from picchio.campaign.tables import Tolerance
 from picchio.diagnosis.planning.choose import Space, choose
+from picchio.diagnosis.planning.kind import Offered, Possible
 from picchio.diagnosis.planning.outcome import Life, Outcome, outcome_of
 from picchio.diagnosis.planning.static import StaticTest
-from picchio.diagnosis.planning.tests import Offered, Possible
 from picchio.model.effects.registry import effect_class
 from picchio.robot.loading.saved_model import saved_model_text
 from picchio.studies.default_task import possible_poses

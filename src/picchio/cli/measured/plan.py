@@ -97,7 +97,7 @@ def plan(
 
 
 def _show(found: PlannedTests, to: Path | None) -> None:
-    from picchio.diagnosis.planning.tests import along, angles
+    from picchio.diagnosis.planning.kind import along, angles
 
     out = console()
     out.print(styled(f"{found._headline()}."))

@@ -18,8 +18,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.planning.kind import Offered, Possible
 from picchio.diagnosis.planning.outcome import Outcome
-from picchio.diagnosis.planning.tests import Offered, Possible
 
 WORTH = 0.005
 """A record that narrows the outcome's deviation by less than this share changes no answer."""

@@ -25,8 +25,8 @@ from picchio.core.provenance import provenance
 from picchio.core.registry import classes_in
 from picchio.core.results import TableResult
 from picchio.diagnosis.planning.choose import Choice, Chosen, choose
+from picchio.diagnosis.planning.kind import Test, angles, told_in
 from picchio.diagnosis.planning.outcome import Outcome, decades, outcome_of
-from picchio.diagnosis.planning.tests import Test, angles, told_in
 from picchio.prediction.plan import PlannedTest, TestPlan, plan_toml
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.find import typed_name

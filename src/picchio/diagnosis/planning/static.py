@@ -10,8 +10,8 @@ import numpy as np
 from picchio.campaign.loadings import Loadings, Reading
 from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import BoolArray, FloatArray
+from picchio.diagnosis.planning.kind import Offered, Possible, Test, angles
 from picchio.diagnosis.planning.outcome import Outcome
-from picchio.diagnosis.planning.tests import Offered, Possible, Test, angles
 from picchio.diagnosis.stiffness.fit import Problem
 from picchio.diagnosis.stiffness.prior import prior_of
 from picchio.diagnosis.stiffness.statics import make_table

@@ -10,8 +10,8 @@ import numpy as np
 from picchio.campaign.record import Record
 from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.planning.kind import Offered, Possible, Test
 from picchio.diagnosis.planning.outcome import Outcome
-from picchio.diagnosis.planning.tests import Offered, Possible, Test
 from picchio.diagnosis.stiffness.frf import REMAINDER
 from picchio.diagnosis.stiffness.prior import prior_of
 from picchio.diagnosis.stiffness.responses import make_problem

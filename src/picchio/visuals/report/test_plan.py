@@ -10,8 +10,8 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.planning.choose import Chosen
+from picchio.diagnosis.planning.kind import along, angles
 from picchio.diagnosis.planning.plan import PlannedTests
-from picchio.diagnosis.planning.tests import along, angles
 from picchio.visuals.plots.style import BLUE, VERMILION
 from picchio.visuals.report.page import Picture, Pictures, number, render
 from picchio.visuals.scene.portrait import Arrow, ArrowKind, plot_pose
