@@ -65,6 +65,7 @@ def damaged(content, chance):
     return bytes(found)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("name", ["m.nc", "m.zarr"])
 def test_a_damaged_map_is_refused_or_read(name, maps, tmp_path):

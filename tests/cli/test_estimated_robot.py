@@ -159,6 +159,7 @@ def test_hatched_bars_reach_from_p10_to_p90(bare):
     assert "estimated: P10 to P90" in found._repr_html_()
 
 
+@pytest.mark.slow
 def test_work_that_nobody_gave_is_placed_and_written(bare, tmp_path, capsys):
     out = tmp_path / "moved.toml"
     assert run(["place", str(bare), "--move", "0.1,0.1,0.1,10", "--placements", "4",
@@ -170,6 +171,7 @@ def test_work_that_nobody_gave_is_placed_and_written(bare, tmp_path, capsys):
     assert [operation.name for operation in task.operations] == ["along x", "along y", "along z"]
 
 
+@pytest.mark.slow
 def test_what_a_life_allows_is_by_the_estimated_drives(bare):
     robot = picchio.load_robot(bare)
     task = picchio.load_task(find_robot("fanuc_like_3dof").task, robot)

@@ -101,6 +101,7 @@ def test_a_single_pose_counts_only_beyond_doubt(problem, base, less, sure):
     assert confidence(like(100.0), like(100.0 + less)) == sure
 
 
+@pytest.mark.slow
 def test_a_first_look_drops_only_what_promises_nothing():
     """What is worth a fit by all records is not lost by a glance at every third."""
     payload = ("payload", "tool", {"mass": 0.1})

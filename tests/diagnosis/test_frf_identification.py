@@ -147,12 +147,14 @@ def test_peaks_are_the_modes(frfs):
         assert np.abs(np.log(omega / modes)).min() < 0.1
 
 
+@pytest.mark.slow
 def test_everything_slightly_wrong(frfs):
     stiffness, damping = blind_stiffness.frf_trial(frfs, 2, first=0, sizes=(3,))
     assert all(one.told and abs(one.error) < 0.05 for one in stiffness)
     assert all(abs(one.error) < 0.7 for one in damping)
 
 
+@pytest.mark.slow
 def test_the_command(frfs, tmp_path, in_process):
     world = frfs.draw(3, 1, exact=True)
     exactly(world).save(tmp_path / "taps")

@@ -63,6 +63,7 @@ def test_a_null_of_another_simulator_leaves_noise(arm):
         assert effect.values["scale"] == pytest.approx(true, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_hidden_payload_is_named_and_what_it_does_is_told(arm, tmp_path):
     campaign, truth = trial.make({**FEW, "kind": "single", "effect": "payload", "draw": 901})
     campaign.save(tmp_path / "measured")

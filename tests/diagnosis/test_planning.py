@@ -193,6 +193,7 @@ def test_an_arm_tested_as_planned_is_known(loads, planned):
     assert np.median(error["planned"]) < 0.5 * np.median(error["as many at random"])
 
 
+@pytest.mark.slow
 def test_the_form_comes_back_filled_in(loads, planned, tmp_path, in_process):
     """Every number of the form reaches `identify` as the plan has it."""
     folder = tmp_path / "loads"
@@ -302,6 +303,7 @@ def test_candidates_know_their_instruments():
     assert (np.abs(finer.slopes[..., :3]) >= np.abs(gauge.slopes[..., :3]) - 1e-12).all()
 
 
+@pytest.mark.slow
 def test_an_arm_hit_as_planned_is_known(frfs):
     """By functions of an arm whose masses, places and gains are a little wrong."""
     planned = picchio.plan(ARM, instruments=["hammer", "accelerometer"])

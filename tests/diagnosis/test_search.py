@@ -199,6 +199,7 @@ def test_a_search_finds_both_causes_though_the_first_hides_the_second(two_causes
     assert all(t.finished(search.records) for t in tried)
 
 
+@pytest.mark.slow
 def test_a_search_that_starts_with_the_wrong_cause_ends_with_the_right_ones(two_causes):
     """What other records tell may be wrong here: it is taken out again."""
     problem, baseline, wrong, *_ = two_causes

@@ -78,6 +78,7 @@ def test_what_a_record_tells_is_said_in_words(if_best, if_rival, words):
     assert _why(shot(if_best, if_rival), "A", ["B", "C"], "here") == words
 
 
+@pytest.mark.slow
 def test_a_new_sensor_is_as_noisy_where_little_moves():
     """A hundredth of what it reads in all records, not in each: the stillest would tell most."""
     arm = picchio.load_robot("fanuc_like_3dof")

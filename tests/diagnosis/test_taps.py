@@ -48,6 +48,7 @@ def test_the_prediction_is_the_worlds(taps):
             assert left < 0.01 * np.linalg.norm(table.measured)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False])
 def test_stiffness_and_damping_by_taps(taps, known):
     world = taps.draw(3, 4, known=known)

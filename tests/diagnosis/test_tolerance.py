@@ -228,6 +228,7 @@ def test_a_better_fit_is_decisive_only_if_little_is_left_of_it():
     assert decisive_gain(left(0.0, 90.0), left(0.0)) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_tolerances_that_make_up_for_a_turned_sensor_are_improbable(wrong_everywhere):
     robot, campaign = wrong_everywhere
     turned = {"rx": 0.06, "ry": -0.05, "rz": 0.05}

@@ -117,6 +117,7 @@ print(json.dumps({{key: found[key] for key in ("verdict", "causes", "gain")}}))
     assert found["gain"]["explained"] > 0.99
 
 
+@pytest.mark.slow
 def test_channels_from_outside_are_checked_and_planned_for(installed):
     """One declares what the checks need: swapped axes and a wrong unit are found, as of any other.
 

@@ -33,6 +33,7 @@ def test_the_papers_method_is_that_of_assess(study, steps):
     np.testing.assert_allclose(paper_lives(study.base), lives, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_with_all_corrections_the_shafts_have_no_end_as_assess_says(study, steps):
     steel = load_sn_curve(STEEL, quiet=True)
     found = by_assess(study, sn_curve=steel, mean_stress="fkm")

@@ -268,6 +268,7 @@ def test_a_shaft_that_cannot_be_gives_no_yes(robot: FlexibleRobot) -> None:
 SLOPED = SNCurve(name="sloped", strength=60e6, cycles=1e6, slopes=(5.0,), yield_shear=400e6)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::picchio.PicchioWarning")
 def test_an_estimate_gives_intervals_and_no_plain_yes(robot: FlexibleRobot) -> None:
     guess = load_robot("fanuc_like_3dof", values={"joint_2": {"stiffness": 1e5, "estimated": True}})

@@ -216,6 +216,7 @@ def test_the_truth_is_json():
     assert json.loads(json.dumps(campaign.plain(truth))) == campaign.plain(truth)
 
 
+@pytest.mark.slow
 def test_filters_and_friction_are_drawn_of_every_sort():
     found = [cases.causes("filter", seed, **SHORT)[0] for seed in range(16)]
     assert {name for name, _, _ in found} == {"sensor_highpass"}
