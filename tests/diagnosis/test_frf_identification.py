@@ -47,6 +47,34 @@ def problem(world, tolerance=None):
     return make_problem(robot, records, tolerance or Tolerance(), prior_of(robot))
 
 
+def test_modes_are_those_that_poles_show(frfs, monkeypatch):
+    """Another library's poles, fitted to the same functions without any model of an arm."""
+    from sdypy import EMA
+
+    monkeypatch.setitem(frfs.BAND, 3, (0.0, 59.75))  # it wants its lines from zero on
+    world = frfs.draw(3, 5, exact=True, noise=1e-4)
+    found = picchio.identify(world.robot, blind_stiffness.frf_campaign(world))
+    made, n = found.fit.problem, 3
+    springs = np.exp(found.fit.mean[:n]) * made.standings[0].spring
+    ratio = np.exp(found.fit.mean[n : 2 * n]) * made.damping_ratio
+    mass = made.standings[0].mass
+    back = np.linalg.inv(mass)
+    damp = made.damping(mass, springs, ratio, np.ones(n))
+    stiff = np.diag(springs) + made.standings[0].gravity
+    ours = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)],
+                                       [-back @ stiff, -back @ damp]]))  # fmt: skip
+    ours = np.sort_complex(1j * ours[ours.imag > 0.0])[::-1]
+    same = [one for one, table in world.records if table["pose"] == world.records[0][1]["pose"]]
+    functions = np.array([one["real"] + 1j * one["imag"] for one in same])
+    theirs = EMA.Model(functions, same[0]["frequency"], lower=1, upper=59, pol_order_high=12,
+                       frf_type="accelerance")  # fmt: skip
+    theirs.get_poles(show_progress=False)
+    for pole in -1j * ours:
+        near = min(theirs.all_poles[-1], key=lambda one: abs(one - pole))
+        assert abs(near) == pytest.approx(abs(pole), rel=2e-4)
+        assert -near.real / abs(near) == pytest.approx(-pole.real / abs(pole), rel=0.03)
+
+
 @pytest.mark.parametrize("joints", [3, 7])
 def test_the_prediction_is_the_worlds(frfs, joints):
     world = frfs.draw(joints, 2, exact=True, noise=1e-9)

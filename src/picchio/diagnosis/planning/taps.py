@@ -12,9 +12,8 @@ from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.planning.kind import Offered, Possible, Test
 from picchio.diagnosis.planning.outcome import Outcome
-from picchio.diagnosis.stiffness.frf import REMAINDER
 from picchio.diagnosis.stiffness.prior import prior_of
-from picchio.diagnosis.stiffness.responses import make_problem
+from picchio.diagnosis.stiffness.responses import REMAINDER, make_problem
 from picchio.robot.flexible_robot import FlexibleRobot
 
 _POSES = 10  # of those that are tried: a function takes longer to look at than a loading

@@ -31,8 +31,6 @@ from picchio.robot.joint import is_drive
 
 _TAILS = 6.0  # degrees of freedom of the lines' errors
 _FAR = 0.3  # residual over the functions beyond which the answer is doubted
-REMAINDER = 0.01
-"""What a model that is right may leave of the functions, as a share of them."""
 _LOOKS, _BASINS, _STRIDE, _GAIN = 3, 4, 0.12, 2.0  # at other basins; ln of stiffness; ln evidence
 _STRAY, _INCREDIBLE = 1.5, 3.0  # standard deviations before the tests
 _DECISIVE = 5.0  # in log evidence, for a convention of the damping
@@ -188,7 +186,7 @@ def identify_frf(
     fit = _settled(*((modal.problem, modal) if convention == "modal" else (joint.problem, joint)))
     if convention == "modal":
         modal = fit
-    covariance = _with_remainder(fit)
+    covariance = fit.covariance[: problem.springs, : problem.springs]
     joints = _joints(robot, fit, covariance, modal, _by_modes(modal))
     stated = np.zeros(len(problem.precision))
     source = "memory" if campaign.folder is None else campaign.folder.resolve().name
@@ -221,7 +219,7 @@ def _by_modes(fit: Fit) -> FloatArray:
     off by is more than their tolerance.
     """
     problem: FrfProblem = fit.problem
-    found = _with_remainder(fit)
+    found = fit.covariance[: problem.springs, : problem.springs].copy()
     count = problem.modal * len(problem.standings)
     if not count:
         return found
@@ -238,29 +236,6 @@ def _settled(problem: FrfProblem, fit: Fit) -> Fit:
             break
         fit = better
     return fit
-
-
-def _with_remainder(fit: Fit) -> FloatArray:
-    """The covariance (2 n, 2 n) of springs and damping, with what a model never follows.
-
-    Thousands of lines make a fit surer than its model is right: a remainder of a hundredth of the
-    functions, as a diagnosis allows it, passes for any change of the numbers that looks like it. It
-    is taken to lie along each number's own slope by a cosine that may be anything from -1 to 1.
-    """
-    problem: FrfProblem = fit.problem
-    count = 2 * problem.joints
-    parts = problem.predict(fit.mean)
-    relative = []
-    for part, table in zip(parts, problem.tables, strict=True):
-        size = float(np.sqrt(np.mean(np.abs(table.measured) ** 2)))
-        slope = part.slope[..., :count] * (table.scale / size)[:, None, None]
-        relative.append(slope.reshape(-1, count) / math.sqrt(len(table) * len(parts)))
-    seen = np.concatenate(relative)
-    ridge = np.diag(np.concatenate([problem.prior.std, problem.damping_std]) ** -2.0)
-    # Per hundredth of the functions; a number that none shows keeps its prior's spread.
-    alone = np.linalg.inv(seen.T @ seen + REMAINDER**2 / 3.0 * ridge)
-    added = REMAINDER**2 / 3.0 * np.diag(alone)
-    return np.asarray(fit.covariance[:count, :count] + np.diag(added))
 
 
 def _elsewhere(problem: FrfProblem, fit: Fit) -> Fit | None:

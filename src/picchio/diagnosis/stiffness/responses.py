@@ -24,7 +24,7 @@ from picchio.core.errors import InputError
 from picchio.diagnosis.stiffness.fit import Predicted
 from picchio.diagnosis.stiffness.prior import Prior, damping_std
 from picchio.diagnosis.stiffness.statics import moved
-from picchio.diagnosis.stiffness.taps import UNKNOWN_BLOW, Seen, spectra
+from picchio.diagnosis.stiffness.taps import SAMPLING, UNKNOWN_BLOW, Seen, spectra
 from picchio.robot.flexible_robot import FlexibleRobot
 
 Damping = Literal["modal", "joint"]
@@ -33,6 +33,8 @@ _ARM = 0.05  # m, at which masses are put to shift a centre or to change an iner
 _MOST_LINES = 240  # of a function; more are thinned out
 _WITHOUT = 0.02  # relative deviation of a line without coherence, to begin with
 _FLOOR = 1e-3  # of the largest line: nothing is measured better than that
+REMAINDER = 0.01
+"""What a model that is right may leave of the functions, as a share of them."""
 _POWER = {"receptance": 0, "mobility": 1, "accelerance": 2}
 
 
@@ -55,6 +57,9 @@ class Response:
         gains: (k,) likewise, of the whole function's logarithm.
         delays: (k,) likewise, s, by which it comes later.
         widths: (k,) likewise, s^2, the variance in time of a blow that is not known.
+        bends: (k, m) by how much of what it answers at once to a force, less what it answers, a
+            standard deviation of each number changes it; see `picchio.diagnosis.stiffness.taps`.
+        bent: (m,) of that, what is held.
         shift: 1/s, of the lines to the right of the imaginary axis; 0 of a frequency response.
     """
 
@@ -72,6 +77,8 @@ class Response:
     gains: FloatArray
     delays: FloatArray
     widths: FloatArray
+    bends: ComplexArray
+    bent: ComplexArray | float = 0.0
     shift: float = 0.0
 
     @property
@@ -92,6 +99,17 @@ class Response:
     def values(self) -> FloatArray:
         """(m, 2) real and imaginary part over the lines' scale."""
         return np.stack([self.measured.real, self.measured.imag], axis=1) / self.scale[:, None]
+
+    @cached_property
+    def remainder(self) -> FloatArray:
+        """(m,) variance, over the lines' scale, of what a model never follows.
+
+        Thousands of lines make a fit surer than its model is right. A remainder of a hundredth of
+        the function, as a diagnosis allows it, may look like any change of the numbers: its cosine
+        with that is anything from -1 to 1. White noise of this size says as much.
+        """
+        power = float(np.mean(np.abs(self.measured) ** 2))
+        return np.asarray(REMAINDER**2 * power * len(self) / 3.0 / self.scale**2)
 
     groups: tuple[str, ...] = ("frf", "frf")
 
@@ -237,6 +255,7 @@ class FrfProblem:
                 push=one.push + off @ one.pushes, sight=one.sight + off @ one.sights,
                 tilt=one.tilt + off @ one.tilts, pushes=none, sights=none, tilts=none,
                 gains=nothing, delays=nothing, widths=nothing,
+                bends=np.zeros((0, len(one))), bent=one.bent + off @ one.bends,
             )  # fmt: skip
 
         standings = []
@@ -359,23 +378,28 @@ class FrfProblem:
         u = lead[:, None] * solved[:, :, 1] + solved[:, :, 2]
         seen = lead[:, None] * sight + tilt
         gain = response.factor(off)[:, None]
-        value = gain[:, 0] * np.einsum("mn,mn->m", seen, v)
+        bent = (response.bent + off @ response.bends) * np.ones(len(line))
+        plain = np.einsum("mn,mn->m", seen, v)
+        at_once = sight @ np.linalg.solve(mass, push) if response.power == 2 else 0.0
+        value = gain[:, 0] * (plain + bent * (at_once - plain))
         outer = (u[:, :, None] * v[:, None, :]).reshape(len(line), -1)
-        slope = -gain * (outer @ parts[0].T + line * (outer @ parts[1].T)
+        follows = gain * (1.0 - bent[:, None])
+        slope = -follows * (outer @ parts[0].T + line * (outer @ parts[1].T)
                          + line**2 * (outer @ parts[2].T))  # fmt: skip
         own = slice(2 * n, 2 * n + len(self.steps))
-        slope[:, own] += gain * (
+        slope[:, own] += follows * (
             u @ response.pushes.T + lead[:, None] * (v @ response.sights.T) + v @ response.tilts.T
         )
         slope[:, own] += value[:, None] * (
             response.gains - line * response.delays + 0.5 * line**2 * response.widths
         )
+        slope[:, own] += gain * (at_once - plain)[:, None] * response.bends.T
         left = (response.measured - value) / response.scale
         slope = slope / response.scale[:, None]
         return Predicted(
             np.stack([left.real, left.imag], axis=1),
             np.stack([slope.real, slope.imag], axis=1).reshape(len(line), 2, p),
-            None,
+            response.remainder[:, None, None] * np.eye(2),
         )
 
 
@@ -405,8 +429,10 @@ def make_problem(
     if tolerance.direction > 0.0:
         names += [f"direction.{record.file}.{axis}" for record in records for axis in "xyz"]
     for record in records:
-        if record.test == "tap" and "force" not in record.channels:
-            names += [f"{name}.{record.file}" for name, _ in UNKNOWN_BLOW]
+        if record.test == "tap":
+            names += [f"{name}.{record.file}" for name in SAMPLING]
+            if "force" not in record.channels:
+                names += [f"{name}.{record.file}" for name, _ in UNKNOWN_BLOW]
     steps = dict.fromkeys(names)
     index = {name: k for k, name in enumerate(steps)}
     poses: dict[tuple[float, ...], list[Record]] = {}
@@ -518,9 +544,11 @@ def _responses_of(
             for numbers, (name, size) in zip((gains, delays, widths), UNKNOWN_BLOW, strict=True):
                 numbers[index[f"{name}.{record.file}"]] = size
         made = _made(robot, record.file, one.seen, pose, tolerance, index)
+        bends = np.zeros((len(index), len(one.omega)), dtype=complex)
+        bends[[index[f"{name}.{record.file}"] for name in SAMPLING]] = one.bends
         found.append(replace(
             made, omega=one.omega, measured=one.measured, scale=one.scale, shift=one.shift,
-            gains=made.gains + gains, delays=delays, widths=widths,
+            gains=made.gains + gains, delays=delays, widths=widths, bends=bends,
         ))  # fmt: skip
     return found
 
@@ -558,7 +586,7 @@ def _response_of(
     )  # fmt: skip
     made = _made(robot, record.file, seen, pose, tolerance, index)
     return replace(made, omega=2.0 * np.pi * frequency[thin], measured=measured[thin],
-                   scale=scale[thin])  # fmt: skip
+                   scale=scale[thin], bends=np.zeros((len(index), len(thin))))  # fmt: skip
 
 
 def _made(
@@ -614,7 +642,7 @@ def _made(
     none, nothing = np.zeros(0), np.zeros(len(index))
     return Response(
         file, none, none.astype(complex), none, seen.power, own[0], own[1], own[2], changes[0],
-        changes[1], changes[2], gains, nothing, nothing,
+        changes[1], changes[2], gains, nothing, nothing, np.zeros((len(index), 0)),
     )  # fmt: skip
 
 
