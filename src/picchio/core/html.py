@@ -64,12 +64,19 @@ def unfolded(shown: str) -> str:
 
     Args:
         shown: HTML of `sheet`; text cannot hold what is changed, as it is escaped.
+
+    Returns:
+        the HTML.
     """
     return shown.replace(FOLD, "<details open>")
 
 
 def cell(value: Any) -> str:
-    """One value, escaped: numbers to four digits, a dash where there is none."""
+    """One value, escaped: numbers to four digits, a dash where there is none.
+
+    Args:
+        value: a number, text, an array or a sequence of them; None is a dash.
+    """
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, bool):
