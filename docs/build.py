@@ -21,6 +21,7 @@ SOURCE = HERE / "_build" / "source"
 HTML = HERE / "_build" / "html"
 
 GUIDES = {
+    "first_minutes": "The first ten minutes",
     "diagnosis": "Diagnosis",
     "counting": "Counting from logs",
     "motion": "Motion records",

@@ -9,6 +9,7 @@ import tomllib
 import zipfile
 
 import pytest
+import yaml
 
 # Distributions whose modules have another name. pydantic_core is the other half of pydantic, to
 # which it is pinned.
@@ -20,6 +21,8 @@ MODULE_OF = {
     "pillow": "PIL",
     "rerun-sdk": "rerun",
 }
+# Distributions that conda-forge calls otherwise.
+CONDA_NAME = {"pin": "pinocchio", "meshcat": "meshcat-python", "matplotlib": "matplotlib-base"}
 # Used without being imported: robots that are found among its files; what trimesh reads .dae with.
 NOT_IMPORTED = {"example-robot-data", "pycollada"}
 # Imported only where it runs already: Jupyter brings it.
@@ -64,6 +67,40 @@ def test_extras_that_are_advised_exist(repository):
     assert advised and advised <= set(extras["optional-dependencies"])
 
 
+def test_the_conda_recipe_asks_for_what_the_package_asks_for(repository):
+    project = tomllib.loads((repository / "pyproject.toml").read_text())["project"]
+    recipe = yaml.safe_load((repository / "packaging" / "recipe.yaml").read_text())
+    asked = {f"python {project['requires-python']}"}
+    for entry in project["dependencies"]:
+        name, bound = re.fullmatch(r"([\w.-]+)(.*)", entry).groups()
+        asked.add(f"{CONDA_NAME.get(name, name)} {bound}")
+    run = recipe["requirements"]["run"]
+    assert set(run) == asked and len(run) == len(asked)
+    assert recipe["context"]["version"] == project["version"]
+    assert recipe["about"]["license"] == project["license"]
+    (script,) = recipe["build"]["python"]["entry_points"]
+    assert script.split(" = ") == ["picchio", project["scripts"]["picchio"]]
+
+
+def test_the_container_gets_what_the_wheel_is_made_of(repository):
+    project = tomllib.loads((repository / "pyproject.toml").read_text())
+    wheel = project["tool"]["hatch"]["build"]["targets"]["wheel"]
+    ignored = (repository / "packaging" / "Dockerfile.dockerignore").read_text().split()
+    let_in = {line[1:] for line in ignored if line[0] == "!"}
+    made_of = {project["project"]["readme"], *project["project"]["license-files"]}
+    made_of |= {path.partition("/")[0] for path in (*wheel["packages"], *wheel["force-include"])}
+    assert let_in == made_of | {"pyproject.toml", "constraints.txt"}
+    dockerfile = (repository / "packaging" / "Dockerfile").read_text()
+    (version,) = set(re.findall(r"^FROM python:([\d.]+)-slim", dockerfile, re.M))
+    assert f"Programming Language :: Python :: {version}" in project["project"]["classifiers"]
+
+
+def test_one_version_everywhere(repository):
+    version = tomllib.loads((repository / "pyproject.toml").read_text())["project"]["version"]
+    assert f"\nversion: {version}\n" in (repository / "CITATION.cff").read_text()
+    assert "\n## Unreleased\n" in (repository / "CHANGELOG.md").read_text()
+
+
 @pytest.mark.slow
 def test_an_installed_wheel_assesses_the_shipped_robot_in_an_empty_folder(tmp_path, repository):
     wheels, site, empty = tmp_path / "wheels", tmp_path / "site", tmp_path / "empty"
@@ -74,9 +111,16 @@ def test_an_installed_wheel_assesses_the_shipped_robot_in_an_empty_folder(tmp_pa
     )
     (wheel,) = wheels.glob("picchio-*.whl")
     names = zipfile.ZipFile(wheel).namelist()
+    # All files of the package and of the robots, and nothing else.
+    given = {
+        f"{to}/{path.relative_to(repository / start).as_posix()}"
+        for start, to in (("src/picchio", "picchio"), ("robots", "picchio/_robots"))
+        for path in (repository / start).rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    assert {name for name in names if ".dist-info/" not in name} == given
     assert "picchio/py.typed" in names
     assert "picchio/_robots/fanuc_like_3dof/robot.urdf" in names
-    assert not [name for name in names if name.startswith(("tests/", "robots/"))]
     subprocess.run([*pip, "install", "--no-deps", "--target", site, wheel], check=True, timeout=300)
     code = (
         "import picchio; print(picchio.__file__)\n"

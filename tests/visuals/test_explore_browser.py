@@ -120,3 +120,28 @@ def test_limits_are_told_and_a_phone_has_room(page_of, pictures) -> None:
     page.screenshot(path=str(pictures / "explore-phone.png"))
     live.close()
     until(page, "document.getElementById('state').textContent.includes('has ended')")
+
+
+@pytest.mark.parametrize("viewport", [(390, 800), (1280, 900)], ids=["phone", "desk"])
+def test_a_cell_whose_kernel_has_ended_shows_the_robot_and_why(
+    chromium, pictures, tmp_path, viewport
+) -> None:
+    live = picchio.explore("ur10", save=tmp_path / "kept.toml")
+    cell = tmp_path / "cell.html"
+    cell.write_text(f"<!DOCTYPE html><html><body>{live._repr_html_()}</body></html>")
+    width, height = viewport
+    page = chromium.new_page(viewport={"width": width, "height": height})
+    page.goto(cell.as_uri())
+    (inside,) = (frame for frame in page.frames if frame.url == live.url)
+    inside.locator("html[data-ready]").wait_for(state="attached", timeout=120_000)
+    assert inside.locator("h1").inner_text() == "ur10"
+    live.close()
+    page.close()
+    page = chromium.new_page(viewport={"width": width, "height": height})
+    page.goto(cell.as_uri(), wait_until="domcontentloaded")
+    page.locator("object img").wait_for(state="visible")
+    assert page.locator("object a").get_attribute("href") == live.url
+    assert page.evaluate("document.querySelector('img').naturalWidth") > 300
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.screenshot(path=pictures / f"explore-cell-ended-{width}.png")
+    page.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,7 +11,7 @@ import pytest
 from lxml import html as lxml_html
 
 import picchio
-from picchio.core.html import MOST_ROWS, cell, sheet
+from picchio.core.html import MOST_ROWS, cell, sheet, unfolded
 from picchio.fatigue.sn.fit import fit_sn
 from picchio.fatigue.sn.test_table import SNTests
 from picchio.studies.envelopes import envelope as envelope_of
@@ -26,6 +27,16 @@ def tables(shown: object) -> list[list[list[str]]]:
         [[c.text_content() for c in row.xpath("./th|./td")] for row in table.xpath(".//tr")]
         for table in page.xpath(".//table")
     ]
+
+
+def seen(shown: object) -> str:
+    """What stands there before anything is unfolded."""
+    page = lxml_html.fromstring(f"<div>{shown._repr_html_()}</div>")
+    for details in page.iter("details"):
+        assert "open" not in details.attrib and details[0].tag == "summary"
+        for folded in details[1:]:
+            details.remove(folded)
+    return page.text_content()
 
 
 def column(table: list[list[str]], start: str) -> list[str]:
@@ -44,7 +55,7 @@ def test_an_assessment_shows_verdict_and_lives(arm: SimpleNamespace) -> None:
     assert column(joints, "rivets") == ["no end"] * 3
     told = [float(c) for c in column(joints, "peak deflection")]
     np.testing.assert_allclose(told, [1e3 * j.peak_deflection for j in arm.assessment.joints], 1e-3)
-    assert "joint_2" in lxml_html.fromstring(arm.assessment._repr_html_()).xpath("//p")[0].text
+    assert "joint_2" in seen(arm.assessment)
 
 
 def test_without_shafts_there_are_torques_only(ur10: SimpleNamespace) -> None:
@@ -103,6 +114,38 @@ def test_reprs_fit_on_a_line_or_two(arm: SimpleNamespace) -> None:
     assert "joint_2" in told[0] and "45" in told[1] and "joint_3" in told[2] and "Hz" in told[3]
 
 
+def test_the_line_that_is_seen_holds_what_matters(arm: SimpleNamespace) -> None:
+    envelope = envelope_of(picchio.Model(arm.robot), arm.worst.pose, BLOWS)
+    told = (
+        (arm.assessment, arm.assessment.verdict.headline),
+        (envelope, f"joint_3 most, {1e3 * envelope.peak_deflection[2]:.4g} mrad"),
+        (arm.robot, "3 flexible"),
+        (arm.task, "45 rivets a pass"),
+        (picchio.Model(arm.robot), "no effects"),
+        (picchio.load_sn_curve("42CrMo4-QT-shaft"), "endurance limit"),
+        (picchio.allowable(arm.robot, arm.task, 1e6), "The force may be"),
+    )
+    for shown, words in told:
+        line = seen(shown)
+        assert words in line and len(line) < 400
+        assert len(line) < len(lxml_html.fromstring(shown._repr_html_()).text_content())
+
+
+def test_an_estimate_says_so_before_it_is_unfolded() -> None:
+    robot = picchio.load_robot("kinova_gen3")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        life = picchio.assess(robot)
+    assert life.notice and life.notice in seen(life)
+    assert "estimates" in seen(picchio.load_robot("ur10"))
+    assert f"Doubts: {len(life.verdict.reasons)}." in seen(life)
+
+
+def test_a_page_to_print_stands_open(arm: SimpleNamespace) -> None:
+    page = picchio.report(picchio.allowable(arm.robot, arm.task, 1e6)).html()
+    assert "<details open>" in page and "<details>" not in page
+
+
 def test_names_are_data(hostile_urdf: Path) -> None:
     robot = picchio.load_robot(hostile_urdf)
     for shown in (robot, picchio.Model(robot)):
@@ -122,4 +165,15 @@ def test_cells_and_long_tables() -> None:
     )
     assert len(page.xpath(".//tr")) == MOST_ROWS + 1
     assert page.xpath(".//p")[0].text == "and 7 more"
-    assert page.xpath("./strong")[0].text == "<x>"
+    assert page.xpath("./summary/strong")[0].text == "<x>"
+
+
+def test_nothing_in_a_sheet_is_markup() -> None:
+    bad = "<details open><script>alert(1)</script>&\"'"
+    page = lxml_html.fromstring(sheet(bad, {bad: bad}, [bad], [[bad]], bad, bad))
+    assert [e.tag for e in page.iter("details", "script")] == ["details"]
+    for where in (".//strong", ".//tr/th", ".//tr/td", ".//thead//th", ".//tbody//td", ".//p"):
+        assert page.xpath(where)[0].text_content() == bad
+    assert page.xpath("./summary")[0].text_content() == f"{bad}: {bad}"
+    assert unfolded(sheet(bad, note=bad)).count("<details open>") == 1
+    assert sheet("x", head="<y>") == "<div><strong>x</strong>: &lt;y&gt;</div>"

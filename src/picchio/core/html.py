@@ -1,4 +1,4 @@
-"""HTML: small tables for notebooks, and whole pages that are written to a file."""
+"""HTML: sheets that fold for notebooks, and whole pages that are written to a file."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 MOST_ROWS = 30
 """More rows than this are cut off, and the table says how many."""
+FOLD = "<details>"
 
 
 def sheet(
@@ -18,8 +19,9 @@ def sheet(
     columns: Sequence[str] = (),
     rows: Iterable[Sequence[Any]] = (),
     note: str = "",
+    head: str = "",
 ) -> str:
-    """A heading, facts a line each, a table, a note; every text is escaped.
+    """A line that is seen; facts a line each, a table, a note folded below; all text is escaped.
 
     Args:
         title: what it is.
@@ -27,8 +29,9 @@ def sheet(
         columns: headers, units included.
         rows: cells; numbers get four digits.
         note: a sentence below.
+        head: the verdict or the number that matters, and what lowers trust in all of it.
     """
-    parts = [f"<div><strong>{escape(title)}</strong>"]
+    parts = []
     known = {name: value for name, value in (facts or {}).items() if value is not None}
     if known:
         parts.append("<table>")
@@ -40,8 +43,8 @@ def sheet(
         parts.append("</table>")
     if columns:
         shown = list(rows)
-        head = "".join(f'<th scope="col">{escape(name)}</th>' for name in columns)
-        parts.append(f"<table><thead><tr>{head}</tr></thead><tbody>")
+        names = "".join(f'<th scope="col">{escape(name)}</th>' for name in columns)
+        parts.append(f"<table><thead><tr>{names}</tr></thead><tbody>")
         for row in shown[:MOST_ROWS]:
             parts.append("<tr>" + "".join(f"<td>{cell(value)}</td>" for value in row) + "</tr>")
         parts.append("</tbody></table>")
@@ -49,11 +52,31 @@ def sheet(
             parts.append(f"<p>and {len(shown) - MOST_ROWS} more</p>")
     if note:
         parts.append(f"<p>{escape(note)}</p>")
-    return "".join([*parts, "</div>"])
+    line = f"<strong>{escape(title)}</strong>{': ' * bool(head)}{escape(head)}"
+    if not parts:
+        return f"<div>{line}</div>"
+    body = f'<div style="overflow-x:auto">{"".join(parts)}</div>'
+    return f'{FOLD}<summary style="cursor:pointer">{line}</summary>{body}</details>'
+
+
+def unfolded(shown: str) -> str:
+    """Sheets as they stand in a page to print: open.
+
+    Args:
+        shown: HTML of `sheet`; text cannot hold what is changed, as it is escaped.
+
+    Returns:
+        the HTML.
+    """
+    return shown.replace(FOLD, "<details open>")
 
 
 def cell(value: Any) -> str:
-    """One value, escaped: numbers to four digits, a dash where there is none."""
+    """One value, escaped: numbers to four digits, a dash where there is none.
+
+    Args:
+        value: a number, text, an array or a sequence of them; None is a dash.
+    """
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, bool):

@@ -59,7 +59,7 @@ class Result:
     """What the answers of all commands have in common.
 
     A subclass says what it holds in `_content` and what matters in `_headline`; where a notebook
-    shall show more than that line it has a `_repr_html_` (see `picchio.core.html.sheet`). If it
+    shall unfold more below that line it has a `_repr_html_` (see `picchio.core.html.sheet`). If it
     is a dataclass it is declared with `repr=False`, or the dataclass's own repr hides this one.
 
     Attributes:
@@ -95,7 +95,7 @@ class Result:
     def _repr_html_(self) -> str:
         from picchio.core.html import sheet
 
-        return sheet(type(self).__name__, note=self._headline())
+        return sheet(type(self).__name__, head=self._headline())
 
 
 class TableResult(Result):
@@ -130,3 +130,13 @@ class TableResult(Result):
         for column, unit in frame.attrs["units"].items():
             found[column].attrs["units"] = unit
         return found
+
+    def _repr_html_(self) -> str:
+        from picchio.core.html import sheet
+
+        rows = [dict(row) for row in self._rows()]
+        names = list(dict.fromkeys(name for row in rows for name in row))
+        units = [self.UNITS.get(name) for name in names]
+        columns = [f"{n} [{u}]" if u else n for n, u in zip(names, units, strict=True)]
+        cells = [[row.get(name) for name in names] for row in rows]
+        return sheet(type(self).__name__, None, columns, cells, head=self._headline())

@@ -296,7 +296,9 @@ def _sidecar(
 ) -> tuple[dict[str, Any], list[str]]:
     """The sidecar with the values found, and remarks on what has no place in it."""
     if not diagnosis.causes:
-        raise InputError(f"the diagnosis is {diagnosis.verdict!r}: there is nothing to write")
+        stand = diagnosis.verdict == "nothing-wrong"
+        raise InputError(f"the diagnosis is {diagnosis.verdict!r}: there is nothing to write",
+                         hint="the stated stiffness and damping stand" * stand)  # fmt: skip
     drives = [joint for joint in robot.flexible_joints if is_drive(joint.name)]
     joints = {joint.name: joint_entry(robot, joint) for joint in drives}
     table: dict[str, Any] = {"format": SIDECAR, "description": f"{robot.name}, identified"}

@@ -371,7 +371,7 @@ class Diagnosis(Result):
             "measure next": (self.next_measurement or {}).get("why"),
         }
         text = self.note or VERDICTS[self.verdict]
-        return sheet(self._headline(), facts, columns if rows else (), rows, f"{text}.")
+        return sheet(self._headline(), facts, columns if rows else (), rows, head=f"{text}.")
 
 
 def in_tolerances(cause: Cause) -> str:

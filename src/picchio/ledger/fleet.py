@@ -80,7 +80,7 @@ class Fleet(TableResult):
                 left.get("p50"), left.get("p90"), date.get("p50"),
                 "; ".join(c["words"] for c in row["changes"]), row["error"],
             ))  # fmt: skip
-        return sheet(f"A fleet of {self.robot}", None, heads, rows, self._headline())
+        return sheet(f"A fleet of {self.robot}", None, heads, rows, head=self._headline())
 
     def _content(self) -> dict[str, Any]:
         return {

@@ -103,7 +103,9 @@ class Model:
             "gravity balanced": self.gravity_balanced,
             "effects": "; ".join(map(repr, self.effects)) or "none",
         }
-        return sheet(f"Model of {self.robot.name}", facts) + self.robot._repr_html_()
+        names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
+        head = names or "no effects"
+        return sheet(f"Model of {self.robot.name}", facts, head=head) + self.robot._repr_html_()
 
     def holding_torque(self, state: RobotState) -> FloatArray:
         """The torque (n,) that the joints hold against gravity, N m (N).

@@ -73,8 +73,8 @@ class Reproduction(TableResult):
             (t.sentence.page, t.sentence.quote, f"{t.finding.verdict} {t.finding.condition}")
             for t in self.claims
         ]
-        title = f"{self.study.printed.title}: {self._headline()}"
-        return sheet(title, None, ("p.", "claim", "verdict"), rows)
+        columns = ("p.", "claim", "verdict")
+        return sheet(self.study.printed.title, None, columns, rows, head=self._headline())
 
     def _content(self) -> dict[str, Any]:
         printed = self.study.printed

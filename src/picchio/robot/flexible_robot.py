@@ -113,7 +113,7 @@ class FlexibleRobot:
             {"tool frame": self.tool_frame},
             columns,
             rows,
-            "Some stiffnesses are estimates; see .origins." if guess else "",
+            head="some stiffnesses are estimates; see .origins" if guess else "",
         )
 
     @property

@@ -264,7 +264,7 @@ class AllowableLoads(TableResult):
         columns = ("joint", "life now [rivets]", "force factor", "by", "most hits",
                    "least radius [mm]", "least reducer")  # fmt: skip
         facts = {"target life [rivets]": self.joints[0].rivets, "survival": self.joints[0].survival}
-        return sheet("Allowable loads", facts, columns, rows, self.answer)
+        return sheet("Allowable loads", facts, columns, rows, head=self.answer)
 
 
 def told_ends(ends: tuple[float | None, float | None]) -> str:

@@ -163,7 +163,7 @@ class Comparison(Result):
     def _repr_html_(self) -> str:
         rows = [[row.label, *row.shown] for row in (*self.entered, *self.figures)]
         heads = ["", *(item.name for item in self.items)]
-        return sheet("Comparison", None, heads, rows, " ".join(self.notes))
+        return sheet("Comparison", None, heads, rows, " ".join(self.notes), self._headline())
 
     def _content(self) -> dict[str, Any]:
         items = [

@@ -216,7 +216,11 @@ class DirectionEnvelope(TableResult):
             "response": described(self.hits),
             "natural frequencies [Hz]": self.natural_frequencies,
         }
-        return sheet(f"Direction envelope of {self.robot}", facts, columns, rows)
+        k = int(self.peak_deflection.argmax())
+        along = ", ".join(f"{c:.3g}" for c in self.worst_direction[k])
+        most = f"{1e3 * self.peak_deflection[k]:.4g} {self.units[k].small}"
+        head = f"{self.joint_names[k]} most, {most} along ({along})"
+        return sheet(f"Direction envelope of {self.robot}", facts, columns, rows, head=head)
 
     def _content(self) -> dict[str, Any]:
         joints = {

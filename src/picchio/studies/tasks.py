@@ -122,7 +122,8 @@ class Task:
             for op in self.operations
         ]  # fmt: skip
         columns = ("operation", "force along", "poses", "rivets a pose", "hits a rivet", "blows")
-        return sheet(f"Task: {self.rivets_per_pass:g} rivets a pass", None, columns, rows)
+        title = f"Task: {self.rivets_per_pass:g} rivets a pass"
+        return sheet(title, None, columns, rows, head=self.note)
 
     @property
     def rivets_per_pass(self) -> float:

@@ -221,7 +221,7 @@ class Mapping(StrictModel):
     @model_validator(mode="after")
     def _something(self) -> Mapping:
         if not self.channel and not self.coupling:
-            raise ValueError("needs a [[channel]] or a [[coupling]]")
+            raise ValueError("needs a [[channel]] or a [[coupling]] without a # before it")
         return self
 
     @property

@@ -63,6 +63,9 @@ def mapping_template(raw: RawFile) -> str:
         '# robot = "fanuc_like_3dof"',
         "# excitation = { kind = 'pulse_train', force = 300.0, period = 0.040, width = 0.004 }",
         "",
+        "# [blows]                  # of picchio count, which takes the channel trigger, too",
+        '# operation = "..."        # of the task, where its poses do not tell it',
+        "",
         "# Channels: " + ", ".join(patterns()),
         "# value = sign * (scale * stored + offset), in unit",
     ]

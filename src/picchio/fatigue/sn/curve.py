@@ -271,7 +271,11 @@ class SNCurve:
             "source": self.source or None,
             "assumed": "; ".join(self.assumptions) or None,
         }
-        return sheet(f"{self.title} {self.name}", facts, note=self.warning)
+        told = "no endurance limit"
+        if limit is not None:
+            told = f"endurance limit {size * limit:.4g} {unit}"
+        head = "; ".join(filter(None, [told, self.warning]))
+        return sheet(f"{self.title} {self.name}", facts, head=head)
 
     def describe(self) -> str:
         """One line for a report: the curve's numbers and what was assumed."""

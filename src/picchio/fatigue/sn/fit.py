@@ -114,8 +114,8 @@ class SNFit(TableResult):
         }
         rows = [(name, e.value * f, e.low * f, e.high * f) for name, (e, f) in told.items() if e]
         columns = ("", "best", f"{100 * self.level:g} % from", "to")
-        title = f"S-N fit: {self.failures} failures, {self.run_outs} run-outs"
-        return sheet(title, None, columns, rows, "; ".join(self.assumptions))
+        note = "; ".join(self.assumptions)
+        return sheet("S-N fit", None, columns, rows, note, self._headline())
 
     def curve(self, survival: float = 0.5, name: str = "fitted") -> SNCurve:
         """The fitted curve as an `SNCurve`, moved to a probability of survival.

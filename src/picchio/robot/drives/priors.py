@@ -204,7 +204,7 @@ class DrivePriors(Result):
         columns = ("joint", "stiffness [N m/rad]", "5 %", "95 %", "damping ratio",
                    "to a factor of", "from")  # fmt: skip
         return sheet(f"{self.robot}: probable drives", {}, columns, rows,
-                     "Estimates: no value was measured on this robot.")  # fmt: skip
+                     head="estimates, no value was measured on this robot")  # fmt: skip
 
 
 def drive_priors(

@@ -432,14 +432,16 @@ class Assessment(TableResult):
 
     def _repr_html_(self) -> str:
         told = self.verdict
-        note = " ".join([told.headline, *(f"Doubt: {line}." for line in told.reasons)])
+        note = " ".join(f"Doubt: {line}." for line in told.reasons)
+        doubts = f"Doubts: {len(told.reasons)}." if told.reasons else ""
+        head = " ".join(filter(None, [told.headline, doubts]))
         facts = {"method": self.method, "S-N curve": self.sn_curve or None}
         if self.notice:
             load, cells = self.intervals()
             heads = ["joint", f"peak torque [{load}]", "of its limit [%]", "fatigue: used [%]",
                      "rivets to failure", "ends first [% of cases]"]  # fmt: skip
             title = f"Assessment of {self.robot}, estimated: P10 to P90"
-            return sheet(title, facts, heads, cells, f"{self.notice}. {note}")
+            return sheet(title, facts, heads, cells, note, f"{self.notice}. {head}")
         joints = self.joints
         small, peaks = column([j.units.small for j in joints],
                               [f"{1e3 * j.peak_deflection:.4g}" for j in joints])  # fmt: skip
@@ -461,7 +463,7 @@ class Assessment(TableResult):
             table["reducer used [%]"] = [j.told_percent("reducer_utilisation") for j in joints]
             table["reducer's limit"] = [j.reducer_governed_by for j in joints]
         rows = zip(*table.values(), strict=True)
-        return sheet(f"Assessment of {self.robot}", facts, list(table), rows, note)
+        return sheet(f"Assessment of {self.robot}", facts, list(table), rows, note, head)
 
     def _content(self) -> dict[str, Any]:
         hidden = ("doubts", "uncertainty", "task_note")

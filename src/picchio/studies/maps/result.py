@@ -135,8 +135,11 @@ class WorkspaceMap(TableResult):
         facts = {
             key: content[key] for key in ("file", "excitation", "response", "direction", "poses")
         }
+        most = max(range(len(joints)), key=lambda k: joints[k]["peak_deflection"])
+        size = f"{1e3 * joints[most]['peak_deflection']:.4g} {units[most].small}"
+        head = f"{content['poses']} poses; {joints[most]['name']} most, {size}"
         return sheet(f"Workspace map of {content['robot']}", facts, columns, rows,
-                     ". ".join(content["notes"]))  # fmt: skip
+                     ". ".join(content["notes"]), head)  # fmt: skip
 
     def _likely(self, best: list[dict[str, Any]], first: int, rows: slice) -> None:
         """Of an estimated robot, where each joint's P90 is largest: its quantiles there."""

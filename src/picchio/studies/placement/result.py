@@ -232,9 +232,9 @@ class Placement(TableResult):
         ]  # fmt: skip
         columns = ("joint", "rivets, now", "utilisation [%]", "rivets, best", "utilisation [%]")
         facts = {"work moved by [m, rad]": self.best.spot.move}
-        title = f"Placement of the work of {self.robot}"
         told = [self.explained(), self.sure.words() if self.sure else ""]
-        return sheet(title, facts, columns, rows, " ".join(filter(None, told)))
+        note = " ".join(filter(None, told))
+        return sheet("Placement of the work", facts, columns, rows, note, self._headline())
 
     def _headline(self) -> str:
         if not self.moved:

@@ -144,7 +144,8 @@ class UncertainLife(TableResult):
             for name, s in {**self.joints, "robot": self.robot}.items()
         ]
         columns = ("rivets to failure", "P10", "P50", "P90", "without end [%]")
-        return sheet("How sure the life is", {"varied": ", ".join(self.inputs)}, columns, rows)
+        facts = {"varied": ", ".join(self.inputs)}
+        return sheet("How sure the life is", facts, columns, rows, head=self._headline())
 
     def _headline(self) -> str:
         lives = (format_count(self.robot.rounded(key)) for key in self.robot.quantiles)

@@ -53,7 +53,8 @@ class Modes:
         rows = zip(range(1, 1 + len(self.natural_frequencies)), self.natural_frequencies,
                    100 * self.damping_ratios, strict=True)  # fmt: skip
         columns = ("mode", "natural frequency [Hz]", "damping ratio [%]")
-        return sheet(f"Modes of {', '.join(self.output_names)}", None, columns, rows)
+        head = f"{', '.join(f'{f:.4g}' for f in self.natural_frequencies)} Hz"
+        return sheet(f"Modes of {', '.join(self.output_names)}", None, columns, rows, head=head)
 
     def frequency_response(self, angular_frequency: FloatArray) -> ComplexArray:
         """The deflection per newton (m, 3, k), complex, rad/N.

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Mapping
 from dataclasses import replace
 from html import escape
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,8 @@ from picchio.studies.tasks import Task
 from picchio.visuals.live.page import live_html
 from picchio.visuals.live.server import Server
 from picchio.visuals.live.session import FORMAT, Session
+from picchio.visuals.plots.style import BLUE, PAPER, blank_figure
+from picchio.visuals.scene.portrait import Arrow, plot_pose
 
 
 class Explorer(Result):
@@ -69,10 +73,30 @@ class Explorer(Result):
         }
 
     def _repr_html_(self) -> str:
+        # Where the page cannot be had (the kernel has ended, or runs elsewhere) a browser shows
+        # what stands within the object instead: the robot as it stood, and why.
+        name, url = escape(self.session.robot.name), escape(self.url)
         return (
-            f'<iframe title="{escape(self.session.robot.name)}" src="{escape(self.url)}" '
-            'style="width:100%;height:640px;border:0" loading="lazy"></iframe>'
+            f'<object title="{name}" type="text/html" data="{url}" '
+            'style="display:block;width:100%;height:640px">'
+            f'<p><strong>{name}</strong> is live at <a href="{url}">{url}</a> while its kernel '
+            "runs, in a browser on the kernel's machine. Run the cell again to explore it; "
+            "<code>picchio.view</code> makes a page that needs no kernel.</p>"
+            f'<img src="{self._picture()}" style="max-width:100%" '
+            f'alt="{name} at the pose explored; the arrow is the force">'
+            "</object>"
         )
+
+    def _picture(self) -> str:
+        """The robot and the force where they stand now, as a PNG's data URL."""
+        place = self.session.place
+        axes = blank_figure(4.0, 3.2)
+        plot_pose(self.session.robot, place.pose, [Arrow(place.direction, "", "comes", BLUE)], axes)
+        stream = BytesIO()
+        figure = axes.get_figure(root=True)
+        assert figure is not None
+        figure.savefig(stream, format="png", dpi=100, facecolor=PAPER)
+        return f"data:image/png;base64,{b64encode(stream.getvalue()).decode('ascii')}"
 
 
 def explore(

@@ -17,7 +17,7 @@ from markupsafe import Markup, escape
 from matplotlib.axes import Axes
 
 from picchio.core.errors import InputError
-from picchio.core.html import Page
+from picchio.core.html import Page, unfolded
 from picchio.core.provenance import package_version
 from picchio.core.results import Result
 from picchio.studies.assessment.result import format_count
@@ -253,7 +253,7 @@ def plain_page(result: Result, *, command: str | None = None, warnings: Sequence
     return render(
         "plain.html.j2",
         headline=result._headline(),
-        body=Markup(result._repr_html_()),
+        body=Markup(unfolded(result._repr_html_())),
         command=command,
         warnings=warnings,
         provenance=result.to_dict().get("provenance"),
