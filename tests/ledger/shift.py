@@ -114,6 +114,24 @@ def truth(name, made, after=12.0):
     return np.array(whole), np.array(alone)
 
 
+def felt(name, made, length):
+    """(m, 3) m/s^2, the tool point's acceleration, world axes; a sample each `STEP`.
+
+    As of a robot that comes to each rivet at rest.
+    """
+    time = np.arange(0.0, length, STEP)
+    total = np.zeros((time.size, 3))
+    for rivet in made:
+        omega, shapes, ratio, levers, _ = oscillators(name, POSES[rivet.place])
+        push = shapes.T @ levers.T @ DIRECTIONS[rivet.place]
+        force = rivet.force(time)
+        for k, w in enumerate(omega):
+            plant = ([1.0, 0.0, 0.0], [1.0, 2.0 * ratio * w, w * w])
+            b, a, _ = cont2discrete(plant, STEP, method="foh")
+            total += np.outer(lfilter(np.ravel(b), a, push[k] * force), levers @ shapes[:, k])
+    return total
+
+
 def cost(stress):
     """Miner's sum of a history."""
     return sum(

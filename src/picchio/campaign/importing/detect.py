@@ -16,6 +16,7 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 
 _HEAD = 1 << 18  # bytes looked at
+_MOST = 1000  # lines of them
 _LINES = 60
 _DELIMITERS = ("\t", ";", ",", "|", " ")
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.I)
@@ -51,6 +52,7 @@ def layout(path: Path) -> SourceTable:
     lines = text.splitlines()
     if len(head) == _HEAD:
         lines = lines[:-1]
+    lines = lines[:_MOST]
     # Prose or comments may stand above: the numbers say what the rest is.
     best: tuple[float, SourceTable] | None = None
     for delimiter in _DELIMITERS:

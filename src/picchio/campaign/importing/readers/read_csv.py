@@ -19,6 +19,7 @@ from picchio.core.files import csv_rows, read_text, regular_file
 _LARGEST = 4 << 30
 _EXACT = 2.0**53
 _BYTES_A_LINE = 60
+_DATE = len("2026-03-01T08:00:00")
 _SIGNS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "blanks", "|": "bar"}
 _MARKS = {".": "point", ",": "comma"}
 
@@ -140,16 +141,21 @@ def _dates(cells: list[str]) -> FloatArray | None:
     """The column as ns from 1970, where every cell is a date and time."""
     if not cells or moment(cells[0]) is None:
         return None
+    if min(map(len, cells)) >= _DATE and "-" in cells[0][:5]:
+        try:  # UTC, with or without a Z: a hundred times as fast
+            return np.array([c.rstrip("Z") for c in cells], "datetime64[ns]").astype(np.int64)
+        except ValueError:
+            pass
     found = [moment(cell) for cell in cells]
     return None if None in found else np.array(found, dtype=np.int64)
 
 
-def blocks(path: Path, mapping: Mapping, size: int) -> Iterator[RawFile]:
+def blocks(path: Path, mapping: Mapping | None, size: int) -> Iterator[RawFile]:
     """The same, in blocks of so many lines: memory does not grow with the file.
 
     Args:
         path: the file.
-        mapping: whose series are needed.
+        mapping: whose series are needed; None takes what are numbers.
         size: lines.
 
     Raises:
