@@ -692,10 +692,9 @@ def blows_of(kept: Kept, model: Model, task: Task) -> list[Blow]:
             raise InputError("no position was logged, so that nobody knows where the robot stood",
                              key="channel")  # fmt: skip
         if kept.stream.kind == "acceleration":
-            peak = _jump(run)
-            # What gravity and the ringing add up to is no blow.
-            if np.linalg.norm(peak) > kept.stream.threshold or run.cut:
-                found.append(_felt(run, peak, settings, task, model))
+            meant = _operations(task, settings.get("operation"), run.pose)
+            for jolt, peak in _jolts(run, kept.stream.threshold, meant[0]):
+                found.append(_felt(jolt, peak, settings, meant, task, model))
             continue
         operation = _operation(task, settings.get("operation"), run.pose)
         period = operation.excitation.period
@@ -709,19 +708,39 @@ def blows_of(kept: Kept, model: Model, task: Task) -> list[Blow]:
     return found
 
 
-def _jump(run: Run) -> FloatArray:
-    """(k,) m/s^2, the largest reading of a run, less what was read just before."""
-    reading = run.values - (run.values[0] if run.stamps[0] < run.onset else 0.0)
-    return np.asarray(reading[int(np.argmax(np.linalg.norm(reading, axis=1)))])
+def _jolts(run: Run, threshold: float, operation: Operation) -> list[tuple[Run, FloatArray]]:
+    """The blows of a run, each with the largest reading, (k,) m/s^2.
+
+    The arm's ringing and gravity hardly change while a blow lasts: they are the median of the
+    samples around, over four times as long as a blow.
+    """
+    from scipy.ndimage import median_filter
+
+    if run.stamps.size < 2:
+        return []
+    period = operation.excitation.period
+    length = min(4.0 * (operation.excitation.width or 0.1 * period), 0.8 * period)
+    around = max(1, round(0.5 * length * 1e9 / float(np.median(np.diff(run.stamps)))))
+    slow = median_filter(run.values, (2 * around + 1, 1), mode="nearest")
+    quick = run.values - slow
+    size = np.linalg.norm(quick, axis=1)
+    edge = np.diff((size > threshold).astype(np.int8), prepend=0, append=0)
+    found = []
+    for a, b in zip(np.flatnonzero(edge == 1), np.flatnonzero(edge == -1), strict=True):
+        own = replace(run, onset=int(run.stamps[a]), last=int(run.stamps[b - 1]))
+        found.append((own, quick[a + int(np.argmax(size[a:b]))]))
+    return found
 
 
-def _felt(run: Run, peak: FloatArray, settings: dict[str, Any], task: Task, model: Model) -> Blow:
+def _felt(
+    run: Run, peak: FloatArray, settings: dict[str, Any], meant: list[Operation], task: Task,
+    model: Model,
+) -> Blow:  # fmt: skip
     """A blow of the task's shape, as large as the peak of the tool's acceleration tells.
 
     While a blow lasts the springs have not moved: a = J M^-1 J^T n F. Of the operations that may be
     meant that one is taken whose n fits the reading best.
     """
-    meant = _operations(task, settings.get("operation"), run.pose)
     if len(meant) > 1 and peak.size < 2:
         meant = [_operation(task, settings.get("operation"), run.pose)]
     best: tuple[float, float, Operation] | None = None
