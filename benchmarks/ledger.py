@@ -43,7 +43,7 @@ print("ready", flush=True)
 picchio.count(robot, sys.argv[1], sys.argv[2], sn_curve=sys.argv[3])"""
 
 
-def splits(folder: Path, count: int) -> None:
+def splits(folder: Path, count: int, first: int) -> None:
     robot = picchio.load_robot(tests.NAME)
     task = load_task(robot.task_path, robot)
     rng = np.random.default_rng(5)
@@ -58,7 +58,7 @@ def splits(folder: Path, count: int) -> None:
         book.add("log", "m", "log", stream, [samples])
         expected = tests.counted(book, robot, curves, task, cache).totals.damage
     worst, faults, begin = 0.0, 0, time.perf_counter()
-    for trial in range(count):
+    for trial in range(first, first + count):
         rng = np.random.default_rng(trial)
         file = folder / "cut"
         for name in (file, Path(f"{file}-wal"), Path(f"{file}-shm")):
@@ -115,12 +115,13 @@ def kills(folder: Path, count: int, asked: float) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--splits", type=int, default=10_000)
+    parser.add_argument("--first", type=int, default=0, help="the first split's seed")
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--within", type=float, default=1.5, help="s: a kill comes within these")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         if asked.splits:
-            splits(Path(place), asked.splits)
+            splits(Path(place), asked.splits, asked.first)
         if asked.kills:
             kills(Path(place), asked.kills, asked.within)
 

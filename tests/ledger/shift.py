@@ -100,7 +100,7 @@ def truth(name, made, after=12.0, *, load=1.0, **world):
     stays = [made[a:b] for a, b in zip([0, *changes], [*changes, len(made)], strict=True)]
     histories = []
     for stay in stays:
-        begin, end = stay[0].begin, stay[-1].begin
+        begin, end = stay[0].begin - 0.01, stay[-1].begin  # the first blow may come early
         omega, shapes, ratio, levers, springs = oscillators(name, POSES[stay[0].place], **world)
         time = begin + np.arange(0.0, end - begin + after, STEP)
         force = sum(rivet.force(time) for rivet in stay)

@@ -175,13 +175,20 @@ def runs(kept: Kept) -> list[Run]:
     return found
 
 
-def shaped(stamps: IndexArray, values: FloatArray, onset: int) -> tuple[FloatArray, FloatArray]:
+def shaped(
+    stamps: IndexArray, values: FloatArray, onset: int, last: int
+) -> tuple[FloatArray, FloatArray]:
     """A blow's force between its samples: Akima's curve, which no jump makes swing.
+
+    A blow begins and ends between samples: where its first two, or its last two, lie on a line that
+    comes from zero in the step beyond them, it is there. Without this a half-sine of 20 samples has
+    0.2 % too much impulse.
 
     Args:
         stamps: (m,) ns.
         values: (m,) N.
-        onset: ns.
+        onset: ns, of the first sample above the foot.
+        last: ns, of the last one.
 
     Returns:
         (r,) s after the onset, (r,) N: straight lines between these are near enough.
@@ -193,7 +200,28 @@ def shaped(stamps: IndexArray, values: FloatArray, onset: int) -> tuple[FloatArr
         return time, values
     from picchio.ledger.damage_kernel import akima
 
+    values = values.copy()
+    if stamps[0] < onset:
+        time[0], values[0] = _zero(time[:3], values[:3])
+    if stamps[-1] > last:
+        time[-1], values[-1] = _zero(time[:-4:-1], values[:-4:-1])
     return akima(time, np.ascontiguousarray(values), _FINER)
+
+
+def _zero(time: FloatArray, values: FloatArray) -> tuple[float, float]:
+    """Where a force that stands at a first sample is zero before it; else the sample as it is.
+
+    Args:
+        time: (3,) s: beyond the blow, its outermost sample, the next one.
+        values: (3,) N.
+    """
+    step = values[2] - values[1]
+    back = values[1] / step if step * values[1] > 0.0 else np.inf  # of the inner step
+    at = time[1] - back * (time[2] - time[1])
+    share = (at - time[1]) / (time[0] - time[1])  # of the outer step
+    if not share < 1.0:
+        return float(time[0]), float(values[0])
+    return float(time[1] + max(share, 0.05) * (time[0] - time[1])), 0.0
 
 
 def measured(
@@ -222,7 +250,7 @@ def measured(
             whole = run.values.sum(axis=0)
             along = whole / np.linalg.norm(whole)
             values = run.values @ along
-        time, force = shaped(run.stamps, values, run.onset)
+        time, force = shaped(run.stamps, values, run.onset, run.last)
         found.append(Blow(run.onset, "force", time, force, turn @ along, run.pose, run.cut))
     return found
 

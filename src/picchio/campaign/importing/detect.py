@@ -361,8 +361,8 @@ def require(found: FoundClock | None, raw: RawFile, key: str = "time") -> FoundC
     """
     if found is None:
         for channel in raw.channels.values():
-            back = np.flatnonzero(np.diff(channel.values) < 0) if channel.values.size else []
-            if _TIME_NAME.fullmatch(channel.name.strip()) and len(back):
+            back = np.flatnonzero(np.diff(channel.values) < 0)
+            if _TIME_NAME.fullmatch(channel.name.strip()) and back.size:
                 at = int(back[0])
                 a, b = (f"{float(value):.10g}" for value in channel.values[at : at + 2])
                 raise InputError(f"{channel.name!r} is named as a time, but goes back in sample "
