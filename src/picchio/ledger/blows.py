@@ -255,7 +255,18 @@ def measured(
     return found
 
 
-def assumed(run: Run, operation: Operation, kind: str, count: int, model: Model) -> list[Blow]:
+Shape = tuple[float, FloatArray, FloatArray]
+"""Of a blow that is assumed: s after the first one, s after its own onset, N."""
+
+
+def assumed(
+    run: Run,
+    operation: Operation,
+    kind: str,
+    count: int,
+    model: Model,
+    shapes: dict[tuple[int, int], list[Shape]] | None = None,
+) -> list[Blow]:
     """Blows that nobody saw: those of the task, as the model's effects on them have it.
 
     Args:
@@ -264,32 +275,44 @@ def assumed(run: Run, operation: Operation, kind: str, count: int, model: Model)
         kind: of the stream.
         count: of blows.
         model: the robot and its effects.
+        shapes: those that were made before for the same operations, and are added to.
 
     Returns:
         the blows, by time.
     """
-    period = operation.excitation.period
     robot = model.robot
     frame = robot.frame_placement(run.pose, robot.tool_frame)[1]
     along = model.force_directions(frame) @ operation.direction
+    known: dict[tuple[int, int], list[Shape]] = {} if shapes is None else shapes
     found = []
     for first in range(0, count, _LONGEST):
-        hits = min(count - first, _LONGEST)
-        force = model.force(operation.excitation, hits)
-        # A piece belongs to the blow in whose period it begins; the last one is silence.
-        of = np.clip(((force.start[:-1] + 1e-9) / period).astype(int), 0, hits - 1)
-        for k in range(hits):
-            time, values = [np.zeros(1)], [np.zeros(1)]
-            for piece in np.flatnonzero(of == k):
-                start, end = force.start[piece], force.start[piece + 1]
-                inner = np.linspace(0.0, end - start, 33 if force.amplitude[piece] else 2)
-                size = force.in_piece(np.full(inner.size, piece), inner)
-                if size.any():
-                    time.append(start - k * period + inner)
-                    values.append(size)
-            onset = run.onset + round((first + k) * period * 1e9)
-            whole, size = np.concatenate(time), np.concatenate(values)
-            found.append(Blow(onset, kind, whole, size, along, run.pose, False))
+        key = id(operation), min(count - first, _LONGEST)
+        if key not in known:
+            known[key] = _shapes(operation, key[1], model)
+        begin = first * operation.excitation.period
+        for after, time, force in known[key]:
+            onset = run.onset + round((begin + after) * 1e9)
+            found.append(Blow(onset, kind, time, force, along, run.pose, False))
+    return found
+
+
+def _shapes(operation: Operation, hits: int, model: Model) -> list[Shape]:
+    """So many blows of an operation."""
+    period = operation.excitation.period
+    force = model.force(operation.excitation, hits)
+    # A piece belongs to the blow in whose period it begins; the last one is silence.
+    of = np.clip(((force.start[:-1] + 1e-9) / period).astype(int), 0, hits - 1)
+    found = []
+    for k in range(hits):
+        time, values = [np.zeros(1)], [np.zeros(1)]
+        for piece in np.flatnonzero(of == k):
+            start, end = force.start[piece], force.start[piece + 1]
+            inner = np.linspace(0.0, end - start, 33 if force.amplitude[piece] else 2)
+            size = force.in_piece(np.full(inner.size, piece), inner)
+            if size.any():
+                time.append(start - k * period + inner)
+                values.append(size)
+        found.append((k * period, np.concatenate(time), np.concatenate(values)))
     return found
 
 

@@ -24,7 +24,18 @@ from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.ledger.blows import Blow, Burst, Run, assumed, bursts, covered, measured, runs, within
+from picchio.ledger.blows import (
+    Blow,
+    Burst,
+    Run,
+    Shape,
+    assumed,
+    bursts,
+    covered,
+    measured,
+    runs,
+    within,
+)
 from picchio.ledger.changes import exchanged, find, readings_of
 from picchio.ledger.damage import (
     BurstDamage,
@@ -247,7 +258,8 @@ class Count(TableResult):
         if first is None or left is None:
             return text
         low, middle, high = (float(f"{left[p]:.2g}") for p in ("p10", "p50", "p90"))
-        return f"{text}; {names[first]} lasts {middle:,.0f} blows more ({low:,.0f} to {high:,.0f})"
+        text += f"; {names[first]} lasts {middle:,.0f} blows more"
+        return f"{text} (P10 to P90: {low:,.0f} to {high:,.0f})"
 
     @property
     def _any_damage(self) -> bool:
@@ -687,6 +699,7 @@ def blows_of(kept: Kept, model: Model, task: Task) -> list[Blow]:
         along = None if given is None or kept.stream.columns == 3 else unit_vector(given)
         return measured(kept, along, rotation)
     found: list[Blow] = []
+    shapes: dict[tuple[int, int], list[Shape]] = {}
     for run in runs(kept):
         if not run.pose.size:
             raise InputError("no position was logged, so that nobody knows where the robot stood",
@@ -694,7 +707,7 @@ def blows_of(kept: Kept, model: Model, task: Task) -> list[Blow]:
         if kept.stream.kind == "acceleration":
             meant = _operations(task, settings.get("operation"), run.pose)
             for jolt, peak in _jolts(run, kept.stream.threshold, meant[0]):
-                found.append(_felt(jolt, peak, settings, meant, task, model))
+                found.append(_felt(jolt, peak, settings, meant, task, model, shapes))
             continue
         operation = _operation(task, settings.get("operation"), run.pose)
         period = operation.excitation.period
@@ -704,7 +717,7 @@ def blows_of(kept: Kept, model: Model, task: Task) -> list[Blow]:
             hits = (
                 operation.hits_per_rivet if length >= 0.5 * period * operation.hits_per_rivet else 0
             )
-        found += assumed(run, operation, kept.stream.kind, hits, model)
+        found += assumed(run, operation, kept.stream.kind, hits, model, shapes)
     return found
 
 
@@ -734,7 +747,7 @@ def _jolts(run: Run, threshold: float, operation: Operation) -> list[tuple[Run, 
 
 def _felt(
     run: Run, peak: FloatArray, settings: dict[str, Any], meant: list[Operation], task: Task,
-    model: Model,
+    model: Model, shapes: dict[tuple[int, int], list[Shape]],
 ) -> Blow:  # fmt: skip
     """A blow of the task's shape, as large as the peak of the tool's acceleration tells.
 
@@ -751,7 +764,7 @@ def _felt(
         if best is None or left < best[0] * (1.0 - 1e-9):
             best = left, abs(force), operation
     assert best is not None
-    blow = assumed(run, best[2], "acceleration", 1, model)[0]
+    blow = assumed(run, best[2], "acceleration", 1, model, shapes)[0]
     return replace(blow, force=blow.force * (best[1] / blow.peak))
 
 

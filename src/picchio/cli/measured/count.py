@@ -220,8 +220,9 @@ def _show(found: Count) -> None:
         out.print(f"{name} ends the life, at {found.blows_a_day:.4g} blows a day.{longer}")
     elif found.blows:
         out.print("No life has an end: no blow damages a shaft or a drive.")
-    places = found.stations()[:3]
-    if places and found.first_to_fail is not None:
+    places = found.stations()
+    if places and first is not None:
+        places = sorted(places, key=lambda s: -float(s["share"][first]))[:3]
         shares = ", ".join(
             f"{100 * s['share'][first]:.3g} % at ({_angles(s['pose'])})" for s in places
         )
