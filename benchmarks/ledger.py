@@ -43,7 +43,7 @@ print("ready", flush=True)
 picchio.count(robot, sys.argv[1], sys.argv[2], sn_curve=sys.argv[3])"""
 
 
-def splits(folder: Path, count: int) -> None:
+def splits(folder: Path, count: int, first: int) -> None:
     robot = picchio.load_robot(tests.NAME)
     task = load_task(robot.task_path, robot)
     rng = np.random.default_rng(5)
@@ -51,14 +51,14 @@ def splits(folder: Path, count: int) -> None:
     path = tests.folder(folder / "logs", made, rng, length=6.0)
     rules = read_mapping(path / "mapping.toml")
     (samples,) = read_samples(path / "part0.parquet", rules, robot)
-    stream = counting.stream_of(samples, rules, task)
+    stream = counting.stream_of(samples, rules, task, robot)
     curves = curves_of(robot, load_sn_curve(str(folder / "curve.toml")))
     cache = (counting.fingerprint(Model.of(robot), curves), {})
     with Ledger(folder / "whole", tests.NAME) as book:
         book.add("log", "m", "log", stream, [samples])
         expected = tests.counted(book, robot, curves, task, cache).totals.damage
     worst, faults, begin = 0.0, 0, time.perf_counter()
-    for trial in range(count):
+    for trial in range(first, first + count):
         rng = np.random.default_rng(trial)
         file = folder / "cut"
         for name in (file, Path(f"{file}-wal"), Path(f"{file}-shm")):
@@ -80,7 +80,7 @@ def splits(folder: Path, count: int) -> None:
           f"{worst:.3g} at most, relative ({time.perf_counter() - begin:.0f} s)")  # fmt: skip
 
 
-def kills(folder: Path, count: int) -> None:
+def kills(folder: Path, count: int, asked: float) -> None:
     rng = np.random.default_rng(9)
     made = shift.rivets(6, rng, apart=1.6, places=2)
     path = tests.folder(folder / "many", made, rng, parts=24)
@@ -88,6 +88,7 @@ def kills(folder: Path, count: int) -> None:
     robot = picchio.load_robot(tests.NAME)
     whole = picchio.count(robot, path, folder / "all", sn_curve=str(curve)).counted.totals.damage
     ledger, killed, during, rounds, differ = folder / "killed", 0, 0, 0, 0.0
+    added = 0
     while killed < count:
         ledger.unlink(missing_ok=True)
         rounds += 1
@@ -96,27 +97,33 @@ def kills(folder: Path, count: int) -> None:
                                      stdout=subprocess.PIPE)  # fmt: skip
             assert child.stdout is not None
             child.stdout.readline()
-            time.sleep(rng.uniform(0.0, 0.7))
+            time.sleep(rng.uniform(0.0, asked))
             during += child.poll() is None
             child.send_signal(signal.SIGKILL)
             child.wait()
             killed += 1
+        with Ledger(ledger, tests.NAME) as book:
+            added += len(book.logs())
         found = picchio.count(robot, path, ledger, sn_curve=str(curve)).counted.totals.damage
         differ = max(differ, float(np.abs(found / whole - 1.0).max()))
-    print(f"{killed} kills, {during} of them while it ran, in {rounds} ledgers: the damage differs "
-          f"by {differ:.3g} at most, relative")  # fmt: skip
+    print(
+        f"{killed} kills, {during} of them while it ran, in {rounds} ledgers, which then held "
+        f"{added / rounds:.3g} of 24 logs: the damage differs by {differ:.3g} at most, relative"
+    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--splits", type=int, default=10_000)
+    parser.add_argument("--first", type=int, default=0, help="the first split's seed")
     parser.add_argument("--kills", type=int, default=200)
+    parser.add_argument("--within", type=float, default=1.5, help="s: a kill comes within these")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         if asked.splits:
-            splits(Path(place), asked.splits)
+            splits(Path(place), asked.splits, asked.first)
         if asked.kills:
-            kills(Path(place), asked.kills)
+            kills(Path(place), asked.kills, asked.within)
 
 
 if __name__ == "__main__":

@@ -352,3 +352,56 @@ def test_the_command_tells_what_it_sees(tmp_path):
     found = json.loads((tmp_path / "d.json").read_text())
     assert found["format"] == "picchio-detection/1"
     assert [s["name"] for s in found["series"]] == ["t", "F"]
+
+
+def test_several_runs_in_one_table_have_a_clock_each(tmp_path):
+    path = tmp_path / "runs.csv"
+    rows = [f"{run},{i / 100:.2f},{100 * run + i}\n" for run in (3, 7, 9) for i in range(40)]
+    path.write_text("run,time,q1\n" + "".join(rows))
+    assert detection(path).lines[-1] == (
+        "no clock: 'time' is named as a time, but goes back in sample 41, from 0.39 to 0"
+    )
+    rules = channel("q1", "position.a") + MOTION
+    with pytest.raises(InputError, match=r"goes back in sample 41.*\[\[filter\]\]"):
+        read_mapped(path, mapping(tmp_path, rules))
+    rules += '[[filter]]\nseries = "run"\nleast = 7\nmost = 7\n'
+    found = read_mapped(path, mapping(tmp_path, rules)).records[0]
+    assert found["position.a"].tolist() == [700 + i for i in range(40)]
+
+
+def test_uneven_steps_are_told_with_their_average(tmp_path):
+    path = tmp_path / "uneven.csv"
+    stamps = np.cumsum([0.01, 0.01, 0.012] * 40)
+    path.write_text("time,q1\n" + "".join(f"{t:.3f},{i}\n" for i, t in enumerate(stamps)))
+    average = (stamps.size - 1) / (stamps[-1] - stamps[0])
+    assert f"the steps are uneven: {average:.4g} samples a second on the average" in (
+        detection(path).lines
+    )
+
+
+def test_stamps_in_ns_are_read_in_the_fast_way_digit_by_digit(tmp_path):
+    from picchio.campaign.importing.readers import read_csv
+
+    path = tmp_path / "ns.csv"
+    stamps = 1_772_323_200_000_000_001 + 2_000_003 * np.arange(300)
+    cells = [f"{s},{i % 2},{i * 0.5}\n" for i, s in enumerate(stamps)]
+    path.write_text("stamp,on,q1\n" + "".join(cells))
+    head, lines = ["stamp,on,q1\n"], cells
+    found = read_csv._fast(path, head, lines, read_csv.layout_of(path, None))
+    assert found is not None
+    assert (found.channels["stamp"].values == stamps).all()
+    for name, series in read_raw(path).channels.items():
+        assert (found.channels[name].values == series.values).all()
+        assert found.channels[name].values.dtype == series.values.dtype
+
+
+def test_dates_as_text_are_the_same_in_any_habit(tmp_path):
+    """Those of one habit are read at once, others one by one."""
+    path, found = tmp_path / "dates.csv", []
+    for form in ("{}T{}.{:03d}", "{}T{}.{:03d}Z", "{} {}.{:03d}", "{}T{}.{:03d}+00:00"):
+        rows = [form.format("2026-03-01", f"08:00:{k // 100:02d}", 10 * (k % 100)) + f",{k}\n"
+                for k in range(200)]  # fmt: skip
+        path.write_text("time,q1\n" + "".join(rows))
+        found.append(read_raw(path).channels["time"].values)
+    expected = 1_772_352_000_000_000_000 + 10_000_000 * np.arange(200)
+    assert all((stamps == expected).all() for stamps in found)

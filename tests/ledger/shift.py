@@ -35,12 +35,15 @@ DIRECTIONS = np.array([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0, 1.0, 0.0]])
 RADIUS = (0.01765, 0.0132, 0.0132)
 
 
-def oscillators(name, pose):
-    """Natural frequencies rad/s, mode shapes, damping ratio, levers (3, n) of the tool's point."""
+def oscillators(name, pose, stiffness=1.0, damping=1.0):
+    """Natural frequencies rad/s, mode shapes, damping ratio, levers (3, n) of the tool's point.
+
+    Of a robot whose springs and damping are so many times the nominal ones.
+    """
     robot = robots.load(name)
     chain = bench.nominal_chain(name)
     mass, gravity, work = bench.rest(chain, pose)
-    springs = robot.springs(gravity)
+    springs = robot.springs(gravity) * stiffness
     squared, shapes = eigh(np.diag(springs), mass)
     tool = bench.rest(chain, pose)[2]
     del work
@@ -54,7 +57,7 @@ def oscillators(name, pose):
     levers = np.array(
         [jacobian_column(chain.arrays(), tool, i, body, *point) for i in range(len(pose))]
     ).T
-    return np.sqrt(squared), shapes, robot.damping_ratio, levers, springs
+    return np.sqrt(squared), shapes, robot.damping_ratio * damping, levers, springs
 
 
 @dataclass
@@ -87,17 +90,18 @@ def rivets(count, rng, *, force=2000.0, apart=4.0, places=3):
     ]  # fmt: skip
 
 
-def truth(name, made, after=12.0):
+def truth(name, made, after=12.0, *, load=1.0, **world):
     """Miner's sum of each joint: of all rivets as one history, and of each stay by itself.
 
     While the robot stays at a place it rings on from rivet to rivet; elsewhere it begins at rest.
+    The stresses are `load` times as large (of each joint); `world` as of `oscillators`.
     """
     changes = [k for k in range(1, len(made)) if made[k].place != made[k - 1].place]
     stays = [made[a:b] for a, b in zip([0, *changes], [*changes, len(made)], strict=True)]
     histories = []
     for stay in stays:
-        begin, end = stay[0].begin, stay[-1].begin
-        omega, shapes, ratio, levers, springs = oscillators(name, POSES[stay[0].place])
+        begin, end = stay[0].begin - 0.01, stay[-1].begin  # the first blow may come early
+        omega, shapes, ratio, levers, springs = oscillators(name, POSES[stay[0].place], **world)
         time = begin + np.arange(0.0, end - begin + after, STEP)
         force = sum(rivet.force(time) for rivet in stay)
         push = shapes.T @ levers.T @ DIRECTIONS[stay[0].place]
@@ -106,12 +110,31 @@ def truth(name, made, after=12.0):
             plant = ([push[k]], [1.0, 2.0 * ratio * w, w * w])
             b, a, _ = cont2discrete(plant, STEP, method="foh")
             joints += np.outer(shapes[:, k], lfilter(np.ravel(b), a, force))
+        joints *= np.broadcast_to(load, len(joints))[:, None]
         radius = np.array(RADIUS)
         histories.append(joints * springs[:, None] * (2.0 / (np.pi * radius**3))[:, None])
     n = len(histories[0])
     whole = [cost(np.concatenate([h[j] for h in histories])) for j in range(n)]
     alone = [sum(cost(h[j]) for h in histories) for j in range(n)]
     return np.array(whole), np.array(alone)
+
+
+def felt(name, made, length, **world):
+    """(m, 3) m/s^2, the tool point's acceleration, world axes; a sample each `STEP`.
+
+    As of a robot that comes to each rivet at rest.
+    """
+    time = np.arange(0.0, length, STEP)
+    total = np.zeros((time.size, 3))
+    for rivet in made:
+        omega, shapes, ratio, levers, _ = oscillators(name, POSES[rivet.place], **world)
+        push = shapes.T @ levers.T @ DIRECTIONS[rivet.place]
+        force = rivet.force(time)
+        for k, w in enumerate(omega):
+            plant = ([1.0, 0.0, 0.0], [1.0, 2.0 * ratio * w, w * w])
+            b, a, _ = cont2discrete(plant, STEP, method="foh")
+            total += np.outer(lfilter(np.ravel(b), a, push[k] * force), levers @ shapes[:, k])
+    return total
 
 
 def cost(stress):

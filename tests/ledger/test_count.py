@@ -74,7 +74,7 @@ def stretch(robot, tmp_path_factory):
     path = folder(tmp_path_factory.mktemp("shift") / "logs", made, rng, length=6.0)
     rules = picchio.campaign.importing.mapping.read_mapping(path / "mapping.toml")
     (samples,) = read_samples(path / "part0.parquet", rules, robot)
-    stream = counting.stream_of(samples, rules, load_task(robot.task_path, robot))
+    stream = counting.stream_of(samples, rules, load_task(robot.task_path, robot), robot)
     return samples, stream, path.parent / "curve.toml"
 
 
@@ -257,20 +257,20 @@ def test_accelerations_tell_the_size_of_a_blow(tmp_path, robot, task):
     omega, shapes, _, levers, _ = shift.oscillators(NAME, shift.POSES[0])
     del omega
     along = np.array([0.0, 0.0, 1.0])
-    mobility = float(((shapes.T @ levers.T @ along) ** 2).sum())
+    answer = levers @ shapes @ shapes.T @ levers.T @ along  # m/s^2 a newton, not along the blow
+    mobility = float(along @ answer)
     time = np.arange(0.0, 2.0, 1e-4)
     blow = np.zeros_like(time)
     for k in range(12):
         u = (time - 0.5 - 0.04 * k) / 0.004
         blow += np.where((u > 0.0) & (u < 1.0), 800.0, 0.0)
     stamps = shift.BEGIN + np.rint(time * 1e9).astype(np.int64)
-    reading = (mobility * blow)[:, None] * along + 0.05 * np.random.default_rng(1).normal(
-        size=(time.size, 3)
-    )
+    reading = blow[:, None] * answer + 0.05 * np.random.default_rng(1).normal(size=(time.size, 3))
     samples = Samples("acceleration", stamps, reading, stamps[::50],
                       np.tile(shift.POSES[0], (time[::50].size, 1)))  # fmt: skip
+    sensor = [f"acceleration.tool.{axis}" for axis in "xyz"]
     stream = Stream("acceleration", samples.gap, 3, 0.3 * mobility * 800.0,
-                    0.1 * mobility * 800.0, {"operation": "upward"})  # fmt: skip
+                    0.1 * mobility * 800.0, {"sensor": sensor})  # fmt: skip
     with Ledger(tmp_path / "l", NAME) as book:
         book.add("a", "m", "a", stream, [samples])
         found = recount(book, Model.of(robot), curves_of(robot), task)
@@ -411,7 +411,7 @@ def test_the_command_counts_and_its_page_shows_it(tmp_path, stretch, in_process,
     page = (tmp_path / "p.html").read_text()
     assert "life used and left" in page and "joint_2" in page
     done = in_process("count", NAME, "--log", tmp_path, "--ledger", "m", cwd=tmp_path)
-    assert done.returncode == 2 and "--mapping" in done.stderr and not (tmp_path / "m").exists()
+    assert done.returncode == 2 and "holds no log" in done.stderr and not (tmp_path / "m").exists()
 
 
 def test_a_model_that_must_be_computed_one_by_one_counts_the_same(robot, stretch, tmp_path, task):

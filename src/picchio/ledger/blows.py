@@ -175,13 +175,20 @@ def runs(kept: Kept) -> list[Run]:
     return found
 
 
-def shaped(stamps: IndexArray, values: FloatArray, onset: int) -> tuple[FloatArray, FloatArray]:
+def shaped(
+    stamps: IndexArray, values: FloatArray, onset: int, last: int
+) -> tuple[FloatArray, FloatArray]:
     """A blow's force between its samples: Akima's curve, which no jump makes swing.
+
+    A blow begins and ends between samples: where its first two, or its last two, lie on a line that
+    comes from zero in the step beyond them, it is there. Without this a half-sine of 20 samples has
+    0.2 % too much impulse.
 
     Args:
         stamps: (m,) ns.
         values: (m,) N.
-        onset: ns.
+        onset: ns, of the first sample above the foot.
+        last: ns, of the last one.
 
     Returns:
         (r,) s after the onset, (r,) N: straight lines between these are near enough.
@@ -193,7 +200,28 @@ def shaped(stamps: IndexArray, values: FloatArray, onset: int) -> tuple[FloatArr
         return time, values
     from picchio.ledger.damage_kernel import akima
 
+    values = values.copy()
+    if stamps[0] < onset:
+        time[0], values[0] = _zero(time[:3], values[:3])
+    if stamps[-1] > last:
+        time[-1], values[-1] = _zero(time[:-4:-1], values[:-4:-1])
     return akima(time, np.ascontiguousarray(values), _FINER)
+
+
+def _zero(time: FloatArray, values: FloatArray) -> tuple[float, float]:
+    """Where a force that stands at a first sample is zero before it; else the sample as it is.
+
+    Args:
+        time: (3,) s: beyond the blow, its outermost sample, the next one.
+        values: (3,) N.
+    """
+    step = values[2] - values[1]
+    back = values[1] / step if step * values[1] > 0.0 else np.inf  # of the inner step
+    at = time[1] - back * (time[2] - time[1])
+    share = (at - time[1]) / (time[0] - time[1])  # of the outer step
+    if not share < 1.0:
+        return float(time[0]), float(values[0])
+    return float(time[1] + max(share, 0.05) * (time[0] - time[1])), 0.0
 
 
 def measured(
@@ -222,12 +250,23 @@ def measured(
             whole = run.values.sum(axis=0)
             along = whole / np.linalg.norm(whole)
             values = run.values @ along
-        time, force = shaped(run.stamps, values, run.onset)
+        time, force = shaped(run.stamps, values, run.onset, run.last)
         found.append(Blow(run.onset, "force", time, force, turn @ along, run.pose, run.cut))
     return found
 
 
-def assumed(run: Run, operation: Operation, kind: str, count: int, model: Model) -> list[Blow]:
+Shape = tuple[float, FloatArray, FloatArray]
+"""Of a blow that is assumed: s after the first one, s after its own onset, N."""
+
+
+def assumed(
+    run: Run,
+    operation: Operation,
+    kind: str,
+    count: int,
+    model: Model,
+    shapes: dict[tuple[int, int], list[Shape]] | None = None,
+) -> list[Blow]:
     """Blows that nobody saw: those of the task, as the model's effects on them have it.
 
     Args:
@@ -236,32 +275,44 @@ def assumed(run: Run, operation: Operation, kind: str, count: int, model: Model)
         kind: of the stream.
         count: of blows.
         model: the robot and its effects.
+        shapes: those that were made before for the same operations, and are added to.
 
     Returns:
         the blows, by time.
     """
-    period = operation.excitation.period
     robot = model.robot
     frame = robot.frame_placement(run.pose, robot.tool_frame)[1]
     along = model.force_directions(frame) @ operation.direction
+    known: dict[tuple[int, int], list[Shape]] = {} if shapes is None else shapes
     found = []
     for first in range(0, count, _LONGEST):
-        hits = min(count - first, _LONGEST)
-        force = model.force(operation.excitation, hits)
-        # A piece belongs to the blow in whose period it begins; the last one is silence.
-        of = np.clip(((force.start[:-1] + 1e-9) / period).astype(int), 0, hits - 1)
-        for k in range(hits):
-            time, values = [np.zeros(1)], [np.zeros(1)]
-            for piece in np.flatnonzero(of == k):
-                start, end = force.start[piece], force.start[piece + 1]
-                inner = np.linspace(0.0, end - start, 33 if force.amplitude[piece] else 2)
-                size = force.in_piece(np.full(inner.size, piece), inner)
-                if size.any():
-                    time.append(start - k * period + inner)
-                    values.append(size)
-            onset = run.onset + round((first + k) * period * 1e9)
-            whole, size = np.concatenate(time), np.concatenate(values)
-            found.append(Blow(onset, kind, whole, size, along, run.pose, False))
+        key = id(operation), min(count - first, _LONGEST)
+        if key not in known:
+            known[key] = _shapes(operation, key[1], model)
+        begin = first * operation.excitation.period
+        for after, time, force in known[key]:
+            onset = run.onset + round((begin + after) * 1e9)
+            found.append(Blow(onset, kind, time, force, along, run.pose, False))
+    return found
+
+
+def _shapes(operation: Operation, hits: int, model: Model) -> list[Shape]:
+    """So many blows of an operation."""
+    period = operation.excitation.period
+    force = model.force(operation.excitation, hits)
+    # A piece belongs to the blow in whose period it begins; the last one is silence.
+    of = np.clip(((force.start[:-1] + 1e-9) / period).astype(int), 0, hits - 1)
+    found = []
+    for k in range(hits):
+        time, values = [np.zeros(1)], [np.zeros(1)]
+        for piece in np.flatnonzero(of == k):
+            start, end = force.start[piece], force.start[piece + 1]
+            inner = np.linspace(0.0, end - start, 33 if force.amplitude[piece] else 2)
+            size = force.in_piece(np.full(inner.size, piece), inner)
+            if size.any():
+                time.append(start - k * period + inner)
+                values.append(size)
+        found.append((k * period, np.concatenate(time), np.concatenate(values)))
     return found
 
 

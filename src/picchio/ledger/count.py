@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from picchio.campaign.channels import AXES
 from picchio.campaign.importing.importer import ENDINGS
 from picchio.campaign.importing.mapping import Mapping, read_mapping
 from picchio.core.arrays import FloatArray, IndexArray
@@ -23,7 +24,18 @@ from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.ledger.blows import Blow, Burst, Run, assumed, bursts, covered, measured, runs, within
+from picchio.ledger.blows import (
+    Blow,
+    Burst,
+    Run,
+    Shape,
+    assumed,
+    bursts,
+    covered,
+    measured,
+    runs,
+    within,
+)
 from picchio.ledger.changes import exchanged, find, readings_of
 from picchio.ledger.damage import (
     BurstDamage,
@@ -37,7 +49,7 @@ from picchio.ledger.damage import (
 from picchio.ledger.forecast import Worlds, quantiles, worlds
 from picchio.ledger.out import opc_ua
 from picchio.ledger.ringing import ring_downs, temperatures
-from picchio.ledger.samples import Samples, read_samples
+from picchio.ledger.samples import Samples, by_names, read_samples
 from picchio.ledger.store import Kept, Ledger, Stream
 from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model
@@ -49,6 +61,7 @@ from picchio.vibration.closed_form.response import unit_vector
 
 _SHARE = 0.2  # of the task's force: what a blow exceeds where nobody says
 _FOOT = 0.1  # of the threshold
+_AT_REST = 12.0  # m/s^2: an accelerometer reads gravity, and its noise
 _NEAR = 0.02  # rad or m: a robot that stands so near to a pose of the task works there
 _SECONDS_A_DAY = 86_400
 _LATELY = 28  # days that today's pace is taken from
@@ -169,6 +182,19 @@ class Count(TableResult):
                 found[name] = (last + timedelta(days=days)).date().isoformat()
         return found
 
+    def reached(self, left: dict[str, float] | None) -> str | None:
+        """The month in which the median of the blows left will have come, for people.
+
+        Args:
+            left: as `left` gives it.
+
+        Returns:
+            such as "2041-07"; None without end.
+        """
+        if left is None or not math.isfinite(left["p50"]):
+            return None
+        return (self.dates(left)["p50"] or "> 100 y")[: len("> 100 y")]
+
     @property
     def first_to_fail(self) -> int | None:
         """The joint that ends the life: the fewest blows left in the median; None of none."""
@@ -225,8 +251,15 @@ class Count(TableResult):
         j = int(np.nanargmax(self.counted.totals.damage)) if self._any_damage else None
         if j is None:
             return f"{text}, no damage"
-        name = self.model.robot.flexible_names[j]
-        return f"{text}, {name} has used {100 * self.counted.totals.damage[j]:.3g} % of its life"
+        names = self.model.robot.flexible_names
+        text += f", {names[j]} has used {100 * self.counted.totals.damage[j]:.3g} % of its life"
+        first = self.first_to_fail
+        left = None if first is None else self.left(first)
+        if first is None or left is None:
+            return text
+        low, middle, high = (float(f"{left[p]:.2g}") for p in ("p10", "p50", "p90"))
+        text += f"; {names[first]} lasts {middle:,.0f} blows more"
+        return f"{text} (P10 to P90: {low:,.0f} to {high:,.0f})"
 
     @property
     def _any_damage(self) -> bool:
@@ -315,7 +348,7 @@ def count(
         log: a log, some of them, or a folder of them; None counts what the ledger holds.
         ledger: its file, made where it is missing.
         mapping: what the logs' series are (`picchio-mapping/1`); `mapping.toml` in the folder
-            where it is not given.
+            where it is not given; without either the names of the first log's series must say.
         task: whose blows are assumed where none are seen, and a fifth of whose force a blow
             exceeds; the robot's own where it is not given.
         sn_curve: of all shafts, instead of their own.
@@ -333,7 +366,7 @@ def count(
     model = Model.of(robot)
     bare = model.robot
     curves = curves_of(bare, sn_curve)
-    files, rules, rules_file = _files(log, mapping)
+    files, rules, rules_file, names = _files(log, mapping, bare)
     work = task_of(bare, task)
     added: list[str] = []
     known: list[str] = []
@@ -345,8 +378,8 @@ def count(
             try:
                 lines = add_log(book, file, rules, model, work)
             except InputError as error:
-                if len(files) == 1:
-                    raise
+                if len(files) == 1 or (error.key or "").startswith("blows."):
+                    raise _to_map(error, file, bare, names) from None
                 refused.append((file.name, str(error)))
                 warn_user(f"not counted: {error}")
             else:
@@ -357,7 +390,10 @@ def count(
                 progress(number + 1, len(files))
         if files and not added and not known:
             raise InputError("no log could be read", file=files[0].parent)
-        counted = recount(book, model, curves, work)
+        try:
+            counted = recount(book, model, curves, work)
+        except InputError as error:
+            raise _to_map(error, files[0] if files else None, bare, names) from None
         logs = len(book.logs())
         changes = find(readings_of(model, counted.blows, book.features()))
     drawn = None
@@ -366,7 +402,7 @@ def count(
         drawn = worlds(unscaled(model), curves, sn_curve, counted.bursts, counted.totals, day,
                        samples, seed)  # fmt: skip
     inputs = [*bare.files, *work.files, *([rules_file] if rules_file else [])]
-    notes = (*_notes(counted, rules, model), *exchanged(changes))
+    notes = (*names, *_notes(counted, rules, model), *exchanged(changes))
     return Count(
         model=model, ledger=Path(ledger), logs=logs, added=tuple(added), known=tuple(known),
         refused=tuple(refused), detected=detected, counted=counted, worlds=drawn,
@@ -389,7 +425,10 @@ def _notes(counted: Counted, rules: Mapping | None, model: Model) -> tuple[str, 
         notes.append(f"{cut} blows are cut by the end of a log whose neighbour is not there yet")
     kinds = {blow.kind for blow in counted.blows}
     if "acceleration" in kinds:
-        notes.append("sizes told from accelerations: peak times the mass that the tool feels")
+        notes.append(
+            "sizes told from accelerations: peak times the mass that the tool feels; where "
+            "several operations may be meant, the one that fits the axes best"
+        )
     if kinds & {"trigger", "poses"}:
         notes.append("blows that no log shows are those of the task: number, size and shape")
     notes += model.without_load()
@@ -401,15 +440,20 @@ def _notes(counted: Counted, rules: Mapping | None, model: Model) -> tuple[str, 
         still = [name for name in robot.joint_names if name not in given]
         if still:
             notes.append(f"not logged, taken at zero: {', '.join(still)}")
+        axes = {to[-1] for _, to, _, _ in rules.entries if to.startswith("force.")}
+        if axes and (lacking := [f"force.{axis}" for axis in AXES if axis not in axes]):
+            notes.append(f"not logged, taken as zero: {', '.join(lacking)}")
     return tuple(notes)
 
 
 def _files(
-    log: str | Path | Sequence[str | Path] | None, mapping: str | Path | Mapping | None
-) -> tuple[list[Path], Mapping | None, Path | None]:
-    """The logs, and their mapping."""
+    log: str | Path | Sequence[str | Path] | None,
+    mapping: str | Path | Mapping | None,
+    robot: FlexibleRobot,
+) -> tuple[list[Path], Mapping | None, Path | None, tuple[str, ...]]:
+    """The logs, their mapping, its file, and what was taken by its name where there is none."""
     if log is None:
-        return [], mapping if isinstance(mapping, Mapping) else None, None
+        return [], mapping if isinstance(mapping, Mapping) else None, None, ()
     given = [Path(log)] if isinstance(log, str | Path) else [Path(x) for x in log]
     files: list[Path] = []
     for path in given:
@@ -419,33 +463,52 @@ def _files(
             )
         else:
             files.append(path)
-    rules_file = None
-    if isinstance(mapping, Mapping):
-        rules = mapping
-    else:
-        beside = given[0] / MAPPING if given[0].is_dir() else given[0].parent / MAPPING
-        rules_file = Path(mapping) if mapping is not None else beside
-        if mapping is None and not beside.is_file():
-            example = files[0] if files else given[0]
-            raise InputError("needs a mapping from the logs' series to channels", file=given[0],
-                             key="--mapping", hint=f"`picchio import {example} --write-mapping "
-                             f"{beside}` writes one to edit")  # fmt: skip
-        rules = read_mapping(rules_file)
     if not files:
         raise InputError("holds no log", file=given[0], choices=ENDINGS)
-    # A file that is joined to another is no log of its own.
-    names = {p.stem: p for p in files}
-    joined = {table.file.replace("{stem}", stem) for table in rules.join for stem in names}
-    return [p for p in files if p.name not in joined], rules, rules_file
+    if isinstance(mapping, Mapping):
+        return _unjoined(files, mapping), mapping, None, ()
+    beside = given[0] / MAPPING if given[0].is_dir() else given[0].parent / MAPPING
+    if mapping is None and not beside.is_file():
+        rules, told = by_names(files[0], robot)
+        if rules is None:
+            raise InputError("needs a mapping from the logs' series to channels: no name says "
+                             "which are the joints' angles", file=files[0], key="--mapping",
+                             hint=_how_to_map(files[0], robot))  # fmt: skip
+        return files, rules, None, tuple(f"no mapping: {line}" for line in told)
+    rules_file = Path(mapping) if mapping is not None else beside
+    rules = read_mapping(rules_file)
+    return _unjoined(files, rules), rules, rules_file, ()
 
 
-def stream_of(samples: Samples, rules: Mapping, task: Task) -> Stream:
+def _how_to_map(file: Path, robot: FlexibleRobot) -> str:
+    return (f"`picchio import {file} --robot {robot.files[0]} --write-mapping "
+            f"{file.parent / MAPPING}` writes one to edit")  # fmt: skip
+
+
+def _to_map(
+    error: InputError, file: Path | None, robot: FlexibleRobot, names: tuple[str, ...]
+) -> InputError:
+    """The error; where there is no mapping that could say what is asked, how to make one."""
+    if file is None or not names or not (error.key or "").startswith("blows."):
+        return error
+    return InputError(error.problem, file=error.file or file, key=error.key, choices=error.choices,
+                      hint=f"it stands in a mapping: {_how_to_map(file, robot)}")  # fmt: skip
+
+
+def _unjoined(files: list[Path], rules: Mapping) -> list[Path]:
+    """The files less those that are joined to another, which are no logs of their own."""
+    joined = {table.file.replace("{stem}", p.stem) for table in rules.join for p in files}
+    return [p for p in files if p.name not in joined]
+
+
+def stream_of(samples: Samples, rules: Mapping, task: Task, robot: FlexibleRobot) -> Stream:
     """The stream that a log belongs to.
 
     Args:
         samples: its first stretch.
         rules: its mapping.
         task: whose force tells what a blow exceeds.
+        robot: whose masses tell which acceleration that is.
 
     Raises:
         InputError: a force along one direction that nobody states, a threshold that must be given.
@@ -457,41 +520,53 @@ def stream_of(samples: Samples, rules: Mapping, task: Task) -> Stream:
         threshold = 0.5
     if threshold is None and kind == "force":
         threshold = _SHARE * max(op.excitation.peak_force for op in task.operations)
-    if not threshold:
-        raise InputError("say what the reading exceeds in a blow", key="blows.threshold",
-                         hint="such as 100.0, m/s^2 of an accelerometer")  # fmt: skip
-    foot = asked.foot if asked and asked.foot else _FOOT * threshold
+    told = asked.model_dump(mode="json") if asked else {}
+    settings = {k: told.get(k) for k in ("direction", "frame", "trigger", "operation")}
+    rest = 0.0
+    if kind == "acceleration":
+        settings["sensor"] = list(samples.names)
+        rest = _AT_REST * samples.names[0].startswith("accelerometer")
+        if threshold is None:
+            weakest = _felt_least(settings, task, robot)
+            if weakest < 2.5 * rest:
+                raise InputError(f"say what the reading exceeds in a blow: the task's blows are "
+                                 f"{weakest:.3g} m/s^2, which gravity hides",
+                                 key="blows.threshold", hint="such as 100.0, m/s^2")  # fmt: skip
+            threshold = float(f"{max(_SHARE * weakest, 1.25 * rest):.2g}")
+    assert threshold is not None
+    usual = min(max(_FOOT * threshold, rest), threshold)
+    foot = asked.foot if asked and asked.foot else usual
     if kind in ("trigger", "poses"):
         foot = threshold
     if foot > threshold:
         raise InputError("must not exceed the threshold", key="blows.foot", value=foot)
-    told = asked.model_dump(mode="json") if asked else {}
-    settings = {k: told.get(k) for k in ("direction", "frame", "trigger", "operation")}
     if kind == "force" and columns == 1 and settings["direction"] is None:
         only = _operation(task, settings["operation"], None)
         settings["direction"], settings["frame"] = only.direction.tolist(), "world"
     return Stream(kind, samples.gap, columns, threshold, foot, settings)
 
 
-def _operation(task: Task, name: str | None, pose: FloatArray | None) -> Operation:
-    """The operation that is meant: by its name, by where the robot stands, or the only one."""
+def _operations(task: Task, name: str | None, pose: FloatArray | None) -> list[Operation]:
+    """Those that may be meant: by name, by where the robot stands, or all."""
     if name is not None:
         for operation in task.operations:
             if operation.name == name:
-                return operation
+                return [operation]
         raise InputError("the task has no such operation", key="blows.operation", value=name,
                          choices=[op.name for op in task.operations])  # fmt: skip
-    if len(task.operations) == 1:
-        return task.operations[0]
-    near = []
-    if pose is not None:
-        near = [op for op in task.operations
-                if (np.abs(op.poses - pose).max(axis=1) < _NEAR).any()]  # fmt: skip
-    if len(near) == 1:
-        return near[0]
-    names = [op.name for op in task.operations]
+    if len(task.operations) == 1 or pose is None:
+        return list(task.operations)
+    near = [op for op in task.operations if (np.abs(op.poses - pose).max(axis=1) < _NEAR).any()]
+    return near or list(task.operations)
+
+
+def _operation(task: Task, name: str | None, pose: FloatArray | None) -> Operation:
+    """The operation that is meant: by its name, by where the robot stands, or the only one."""
+    meant = _operations(task, name, pose)
+    if len(meant) == 1:
+        return meant[0]
     raise InputError("several operations of the task may be meant: say which one",
-                     key="blows.operation", choices=names)  # fmt: skip
+                     key="blows.operation", choices=[op.name for op in meant])  # fmt: skip
 
 
 def standing(samples: Samples, task: Task) -> Samples:
@@ -541,12 +616,14 @@ def add_log(
     try:
         stretches = read_samples(file, rules, robot)
         first = standing(next(stretches), task)
-        stream = book.stream(stream_of(first, rules, task))
+        stream = book.stream(stream_of(first, rules, task, robot))
         rest: Iterator[Samples] = (standing(part, task) for part in stretches)
         features: list[tuple[str, int, float]] = []
+        spans: list[int] = []
 
         def looked_at() -> Iterator[Samples]:
             for part in chain([first], rest):
+                spans.append(part.stamps.size)
                 features.extend(ring_downs(part, stream, model))
                 features.extend(temperatures(part))
                 yield part
@@ -556,7 +633,11 @@ def add_log(
         raise InputError("is empty", file=file) from None
     except InputError as error:
         raise error if error.file is not None else error.placed(file=file) from None
-    return first.detected
+    if len(spans) == 1:
+        return first.detected
+    # What was told of the rate was that of the first stretch.
+    lines = (line.partition(", measured from")[0] for line in first.detected)
+    return (*lines, f"{sum(spans)} samples")
 
 
 def recount(book: Ledger, model: Model, curves: Sequence[SNCurve | None], task: Task) -> Counted:
@@ -618,14 +699,17 @@ def blows_of(kept: Kept, model: Model, task: Task) -> list[Blow]:
         along = None if given is None or kept.stream.columns == 3 else unit_vector(given)
         return measured(kept, along, rotation)
     found: list[Blow] = []
+    shapes: dict[tuple[int, int], list[Shape]] = {}
     for run in runs(kept):
         if not run.pose.size:
             raise InputError("no position was logged, so that nobody knows where the robot stood",
                              key="channel")  # fmt: skip
-        operation = _operation(task, settings.get("operation"), run.pose)
         if kept.stream.kind == "acceleration":
-            found.append(_felt(run, operation, model))
+            meant = _operations(task, settings.get("operation"), run.pose)
+            for jolt, peak in _jolts(run, kept.stream.threshold, meant[0]):
+                found.append(_felt(jolt, peak, settings, meant, task, model, shapes))
             continue
+        operation = _operation(task, settings.get("operation"), run.pose)
         period = operation.excitation.period
         length = (run.last - run.onset) * 1e-9
         hits = 1 if settings.get("trigger") == "blow" else 1 + int(length / period)
@@ -633,19 +717,83 @@ def blows_of(kept: Kept, model: Model, task: Task) -> list[Blow]:
             hits = (
                 operation.hits_per_rivet if length >= 0.5 * period * operation.hits_per_rivet else 0
             )
-        found += assumed(run, operation, kept.stream.kind, hits, model)
+        found += assumed(run, operation, kept.stream.kind, hits, model, shapes)
     return found
 
 
-def _felt(run: Run, operation: Operation, model: Model) -> Blow:
+def _jolts(run: Run, threshold: float, operation: Operation) -> list[tuple[Run, FloatArray]]:
+    """The blows of a run, each with the largest reading, (k,) m/s^2.
+
+    The arm's ringing and gravity hardly change while a blow lasts: they are the median of the
+    samples around, over four times as long as a blow.
+    """
+    from scipy.ndimage import median_filter
+
+    if run.stamps.size < 2:
+        return []
+    period = operation.excitation.period
+    length = min(4.0 * (operation.excitation.width or 0.1 * period), 0.8 * period)
+    around = max(1, round(0.5 * length * 1e9 / float(np.median(np.diff(run.stamps)))))
+    slow = median_filter(run.values, (2 * around + 1, 1), mode="nearest")
+    quick = run.values - slow
+    size = np.linalg.norm(quick, axis=1)
+    edge = np.diff((size > threshold).astype(np.int8), prepend=0, append=0)
+    found = []
+    for a, b in zip(np.flatnonzero(edge == 1), np.flatnonzero(edge == -1), strict=True):
+        own = replace(run, onset=int(run.stamps[a]), last=int(run.stamps[b - 1]))
+        found.append((own, quick[a + int(np.argmax(size[a:b]))]))
+    return found
+
+
+def _felt(
+    run: Run, peak: FloatArray, settings: dict[str, Any], meant: list[Operation], task: Task,
+    model: Model, shapes: dict[tuple[int, int], list[Shape]],
+) -> Blow:  # fmt: skip
     """A blow of the task's shape, as large as the peak of the tool's acceleration tells.
 
-    While a blow lasts the springs have not moved: F = a / (n J M^-1 J^T n).
+    While a blow lasts the springs have not moved: a = J M^-1 J^T n F. Of the operations that may be
+    meant that one is taken whose n fits the reading best.
     """
-    blow = assumed(run, operation, "acceleration", 1, model)[0]
-    many = ManyPoses(unscaled(model), run.pose[None])
-    mass, jacobian = many.mass_and_jacobian()
-    along = blow.direction @ jacobian[0]
-    mobility = float(along @ np.linalg.solve(mass[0], along))
-    peak = float(np.linalg.norm(run.values, axis=1).max())
-    return replace(blow, force=blow.force * (peak / mobility / blow.peak))
+    if len(meant) > 1 and peak.size < 2:
+        meant = [_operation(task, settings.get("operation"), run.pose)]
+    best: tuple[float, float, Operation] | None = None
+    for operation in meant:
+        per = _answers(settings, operation, unscaled(model), run.pose[None])[0]
+        force = float(peak @ per) / float(per @ per)
+        left = float(np.linalg.norm(peak - force * per))
+        if best is None or left < best[0] * (1.0 - 1e-9):
+            best = left, abs(force), operation
+    assert best is not None
+    blow = assumed(run, best[2], "acceleration", 1, model, shapes)[0]
+    return replace(blow, force=blow.force * (best[1] / blow.peak))
+
+
+def _answers(
+    settings: dict[str, Any], operation: Operation, model: Model, poses: FloatArray
+) -> FloatArray:
+    """(p, k) what the sensor reads of a blow, m/s^2 a newton, in its own axes."""
+    robot, found = model.robot, []
+    mass, jacobian = ManyPoses(model, poses).mass_and_jacobian()
+    sensor = settings.get("sensor") or ["acceleration"]
+    kind, _, rest = sensor[0].partition(".")
+    for k, pose in enumerate(poses):
+        frame = robot.frame_placement(pose, robot.tool_frame)[1]
+        along = model.force_directions(frame) @ operation.direction
+        moved = jacobian[k] @ np.linalg.solve(mass[k], along @ jacobian[k])
+        if not rest:  # its axis is not told: that of the blow
+            found.append(np.array([along @ moved]))
+            continue
+        if kind == "accelerometer":
+            moved = robot.frame_placement(pose, rest.rpartition(".")[0])[1].T @ moved
+        found.append(moved[[AXES.index(name[-1]) for name in sensor]])
+    return np.array(found)
+
+
+def _felt_least(settings: dict[str, Any], task: Task, robot: FlexibleRobot) -> float:
+    """m/s^2, what the sensor reads of the task's weakest blow."""
+    model = Model.of(robot)
+    return min(
+        float(np.linalg.norm(_answers(settings, op, model, op.poses), axis=1).min())
+        * op.excitation.peak_force
+        for op in _operations(task, settings.get("operation"), None)
+    )

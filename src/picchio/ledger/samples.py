@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from picchio.campaign.channels import LOG_KINDS, Channel, kinds, parse_channel
+from picchio.campaign.channels import AXES, LOG_KINDS, Channel, kinds, parse_channel
 from picchio.campaign.importing.importer import combined, joined, kind_of, read_raw
 from picchio.campaign.importing.mapping import Mapping
+from picchio.campaign.importing.named import named
 from picchio.campaign.importing.raw import RawFile
 from picchio.campaign.importing.readers import read_csv, read_parquet
 from picchio.campaign.importing.resample import clocked, taken_samples
@@ -39,6 +40,7 @@ class Samples:
         poses: (p, nv) rad or m.
         others: further channels by name: (stamps, values).
         detected: what was found out about the file.
+        names: k channels, of which the values are.
     """
 
     kind: str
@@ -48,6 +50,7 @@ class Samples:
     poses: FloatArray
     others: dict[str, tuple[IndexArray, FloatArray]] = field(default_factory=dict)
     detected: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
 
     def between(self, first: int, last: int) -> Samples:
         """The part of it that lies in an interval, both ends included.
@@ -99,9 +102,37 @@ def read_samples(path: Path, mapping: Mapping, robot: FlexibleRobot) -> Iterator
         yield plan.samples(found)
 
 
-def _blocks(path: Path, mapping: Mapping) -> Iterator[RawFile]:
+def by_names(path: Path, robot: FlexibleRobot) -> tuple[Mapping | None, tuple[str, ...]]:
+    """A mapping for logs whose series are named as channels or as the robot's joints.
+
+    Args:
+        path: one of the logs.
+        robot: whose it is.
+
+    Returns:
+        the mapping, None where no blow and no pose would be told by it; what was taken for what,
+        a sentence each.
+
+    Raises:
+        InputError: the file can't be read.
+    """
+    raw = next(_blocks(path, None), None)
+    if raw is None:
+        raise InputError("is empty", file=path)
+    found = named(raw, robot.joint_names, [*robot.tree.links, *robot.tree.joints])
+    taken = [one for one in found if one.to]
+    lines = [f"{one.series} is {one.to}: {one.why}" for one in taken]
+    left = [one.series for one in found if not one.to]
+    if left:
+        lines.append(f"not used: {', '.join(left)}")
+    if not any(one.to.startswith("position.") for one in taken):
+        return None, tuple(lines)
+    return Mapping(channel=[one.entry for one in taken]), tuple(lines)
+
+
+def _blocks(path: Path, mapping: Mapping | None) -> Iterator[RawFile]:
     kind = kind_of(path, mapping)
-    if mapping.join or mapping.filter or kind not in ("csv", "parquet"):
+    if (mapping and (mapping.join or mapping.filter)) or kind not in ("csv", "parquet"):
         yield read_raw(path, mapping)
     elif kind == "csv":
         yield from read_csv.blocks(path, mapping, BLOCK)
@@ -149,13 +180,24 @@ class _Plan:
                     self.poses[to] = list(names).index(rest)
             elif word in ("force", "trigger"):
                 self.seen.setdefault(word, []).append(to)
-            elif word in ("accelerometer", "acceleration"):
+            elif word in ("accelerometer", "acceleration") and self._at_tool(key, rest):
                 self.seen.setdefault("acceleration", []).append(to)
+        for kind, found in self.seen.items():
+            sensor = max(to.rpartition(".")[0] for to in found)  # one is enough
+            self.seen[kind] = sorted(to for to in found if to.rpartition(".")[0] == sensor)
         self.kind = next((kind for kind in KINDS if self.seen.get(kind)), "poses")
         if self.kind == "poses" and not self.poses:
             raise InputError("maps no force, acceleration, trigger or position, so that nothing "
                              "can be counted", key="channel")  # fmt: skip
         self.missing = [n for n in names if n not in {p.partition(".")[2] for p in self.poses}]
+
+    def _at_tool(self, key: str, rest: str) -> bool:
+        """Whether an acceleration is that of the link that carries the tool."""
+        try:
+            link = self.robot.link_of(rest.rpartition(".")[0])
+        except InputError as error:
+            raise error.placed(key=key) from None
+        return link == self.robot.link_of(self.robot.tool_frame)
 
     def samples(self, raw: RawFile) -> Samples:
         if raw.epoch is None:
@@ -176,13 +218,18 @@ class _Plan:
             stamps = raw.epoch + np.rint(first.time * 1e9).astype(np.int64)
             values[channel.name] = (stamps[take], convert(stored)[take])
         nothing = (np.empty(0, np.int64), np.empty((0, 1)))
-        stamps, table = _together([values[n] for n in self.seen.get(self.kind, ())], *nothing)
+        names = tuple(self.seen.get(self.kind, ()))
+        stamps, table = _together([values[n] for n in names], *nothing)
+        if self.kind == "force" and "force" not in names:  # an axis that is not logged has none
+            whole = np.zeros((len(table), len(AXES)))
+            whole[:, [AXES.index(n[-1]) for n in names]] = table
+            table = whole
         at, rows = _together([values[n] for n in self.poses], nothing[0], np.empty((0, 0)))
         poses = np.zeros((at.size, len(self.robot.joint_names)))
         poses[:, list(self.poses.values())] = rows.reshape(at.size, len(self.poses))
-        used = {*self.seen.get(self.kind, ()), *self.poses}
+        used = {*names, *self.poses}
         others = {n: v for n, v in values.items() if n not in used}
-        return Samples(self.kind, stamps, table, at, poses, others, raw.detected)
+        return Samples(self.kind, stamps, table, at, poses, others, raw.detected, names)
 
 
 def _channel(name: str, unit: str | None) -> tuple[Channel, Conversion]:

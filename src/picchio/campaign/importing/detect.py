@@ -16,6 +16,7 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 
 _HEAD = 1 << 18  # bytes looked at
+_MOST = 1000  # lines of them
 _LINES = 60
 _DELIMITERS = ("\t", ";", ",", "|", " ")
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.I)
@@ -34,6 +35,7 @@ SCALES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 # ns from 1970 to 2001 and to 2100: stamps in between are dates, in whichever unit they fall there.
 _DATES = (978_307_200_000_000_000, 4_102_444_800_000_000_000)
 _LARGEST_GAP = 5.0
+_UNEVEN = 0.01
 
 
 def layout(path: Path) -> SourceTable:
@@ -51,6 +53,7 @@ def layout(path: Path) -> SourceTable:
     lines = text.splitlines()
     if len(head) == _HEAD:
         lines = lines[:-1]
+    lines = lines[:_MOST]
     # Prose or comments may stand above: the numbers say what the rest is.
     best: tuple[float, SourceTable] | None = None
     for delimiter in _DELIMITERS:
@@ -315,6 +318,10 @@ def told(raw: RawFile, ns: FloatArray, dates: bool) -> tuple[str, ...]:
     rate, gaps = rate_and_gaps(ns)
     length = (ns[-1] - ns[0]) * 1e-9
     lines = [f"rate {rate:.6g} Hz, measured from {ns.size} stamps over {length:.6g} s"]
+    held = length - sum(step for _, step in gaps)
+    average = (ns.size - 1 - len(gaps)) / held if held > 0.0 else rate
+    if abs(average / rate - 1.0) > _UNEVEN:
+        lines.append(f"the steps are uneven: {average:.4g} samples a second on the average")
     if dates:
         begin = datetime.fromtimestamp(int(ns[0]) // 1_000_000_000, UTC)
         lines.append(f"begins {begin:%Y-%m-%d %H:%M:%S} UTC")
@@ -353,6 +360,15 @@ def require(found: FoundClock | None, raw: RawFile, key: str = "time") -> FoundC
         InputError: there is none.
     """
     if found is None:
+        for channel in raw.channels.values():
+            back = np.flatnonzero(np.diff(channel.values) < 0)
+            if _TIME_NAME.fullmatch(channel.name.strip()) and back.size:
+                at = int(back[0])
+                a, b = (f"{float(value):.10g}" for value in channel.values[at : at + 2])
+                raise InputError(f"{channel.name!r} is named as a time, but goes back in sample "
+                                 f"{at + 2}, from {a} to {b}", file=raw.path, key=channel.name,
+                                 hint="a [[filter]] takes one of several runs in a file, [time] "
+                                 "series another clock, [time] rate none")  # fmt: skip
         raise InputError("this file has no clock of its own, and no series is named as one",
                          file=raw.path, key=key,
                          hint="give [time] series (which holds the time) or rate")  # fmt: skip

@@ -74,9 +74,30 @@ def read_raw(path: str | Path, mapping: Mapping | None = None) -> RawFile:
     source = regular_file(path)
     kind = kind_of(source, mapping)
     if kind == "csv":
-        return read_csv.read(source, mapping)
-    clock = mapping.time.model_dump(mode="json") if mapping else {}
-    return read_isolated(f"{_ROOM}.{_ISOLATED[kind]}", source, clock)
+        raw = read_csv.read(source, mapping)
+    else:
+        clock = mapping.time.model_dump(mode="json") if mapping else {}
+        raw = read_isolated(f"{_ROOM}.{_ISOLATED[kind]}", source, clock)
+    return _rows(raw, mapping) if mapping and mapping.filter else raw
+
+
+def _rows(raw: RawFile, mapping: Mapping) -> RawFile:
+    """The rows of a table that pass the filters, before its clock is asked for.
+
+    Several runs, one below the other, have a clock only each by itself.
+    """
+    filters = [entry for entry in mapping.filter if entry.series in raw.channels]
+    sizes = {channel.values.size for channel in raw.channels.values()}
+    if not filters or len(sizes) > 1 or any(c.time is not None for c in raw.channels.values()):
+        return raw
+    held = np.ones(sizes.pop(), bool)
+    for entry in filters:
+        values = raw.channels[entry.series].values
+        held &= (values >= (-np.inf if entry.least is None else entry.least)) & (
+            values <= (np.inf if entry.most is None else entry.most)
+        )
+    channels = {n: replace(c, values=c.values[held]) for n, c in raw.channels.items()}
+    return replace(raw, channels=channels)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,44 +1,63 @@
-"""A mapping to start from: every series of a file, to be given its channel."""
+"""A mapping to start from: every series of a file, with its channel where its name says it."""
 
 from __future__ import annotations
 
 import json
 import math
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from picchio.campaign.channels import patterns
+from picchio.campaign.channels import LOG_KINDS, patterns
 from picchio.campaign.importing.detect import clock, layout
 from picchio.campaign.importing.importer import read_raw
 from picchio.campaign.importing.mapping import FORMAT, TimeTable
+from picchio.campaign.importing.named import Named, named
 from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.campaign.importing.resample import clocked
 from picchio.core.errors import InputError
 from picchio.core.files import write_text
 
 
-def write_mapping(file: str | Path, out: str | Path) -> None:
+def write_mapping(
+    file: str | Path,
+    out: str | Path,
+    joints: Collection[str] | None = None,
+    frames: Collection[str] | None = None,
+) -> list[Named]:
     """Write a mapping to start from, for a file that is to be imported.
 
     Args:
         file: to be imported.
         out: where the mapping goes; a file that stands there is left alone.
+        joints: of the robot; None where it is not known.
+        frames: likewise.
+
+    Returns:
+        what the names and units of the series say; the others are left to be filled in.
 
     Raises:
         InputError: the file cannot be read, or `out` exists or cannot be written.
     """
     if Path(out).exists():
         raise InputError("exists already and is left alone", file=out)
-    write_text(out, mapping_template(read_raw(file)))
+    raw = read_raw(file)
+    known = named(raw, joints, frames)
+    write_text(out, mapping_template(raw, known))
+    return known
 
 
-def mapping_template(raw: RawFile) -> str:
-    """The text of a `picchio-mapping/1` file that lists the series, each commented out.
+def mapping_template(raw: RawFile, known: Sequence[Named] | None = None) -> str:
+    """The text of a `picchio-mapping/1` file that lists the series.
+
+    Those whose names and units say what they are stand ready, the others are commented out.
 
     Args:
         raw: as `read_raw` gives it.
+        known: as `named` gives it; it is asked without a robot where None.
     """
+    told_of = {one.series: one for one in (named(raw) if known is None else known)}
     times, told = _time(raw)
     lines = [
         f"# What the series of {raw.path.name} become; see picchio import --help.",
@@ -63,14 +82,19 @@ def mapping_template(raw: RawFile) -> str:
         '# robot = "fanuc_like_3dof"',
         "# excitation = { kind = 'pulse_train', force = 300.0, period = 0.040, width = 0.004 }",
         "",
-        "# [blows]                  # of picchio count, which takes the channel trigger, too",
-        '# operation = "..."        # of the task, where its poses do not tell it',
+        "# [blows]                  # for picchio count; else told by the task",
+        "# threshold = 100.0        # N; of an acceleration m/s^2",
+        '# operation = "..."        # of the task, where it has several',
+        '# frame = "tool"           # or "world": the axes of force.x, .y, .z',
         "",
-        "# Channels: " + ", ".join(patterns()),
+        "# Channels: "
+        + ", ".join(patterns())
+        + "; for picchio count also "
+        + ", ".join(kind.pattern for kind in LOG_KINDS),
         "# value = sign * (scale * stored + offset), in unit",
     ]
     for channel in raw.channels.values():
-        lines += ["", *_channel(channel)]
+        lines += ["", *_channel(channel, told_of.get(channel.name))]
     return "\n".join(lines) + "\n"
 
 
@@ -106,19 +130,25 @@ def _time(raw: RawFile) -> tuple[list[str], tuple[str, ...]]:
     return lines, told
 
 
-def _channel(channel: RawChannel) -> list[str]:
-    known = channel.values[np.isfinite(channel.values)] if channel.values.size else channel.values
-    low, high = (known.min(), known.max()) if known.size else (math.nan, math.nan)
+def _channel(channel: RawChannel, known: Named | None) -> list[str]:
+    if known is None:
+        return [f"# {channel.values.size} stamps: the time", f"# from = {_quoted(channel.name)}"]
+    finite = channel.values[np.isfinite(channel.values)] if channel.values.size else channel.values
+    low, high = (finite.min(), finite.max()) if finite.size else (math.nan, math.nan)
     about = f"# {channel.values.size} samples, {low:.6g} to {high:.6g}"
     note = f" ({channel.note})" if channel.note else ""
-    unit = channel.unit or "..."
-    return [
-        about + note,
-        "# [[channel]]",
-        f"# from = {_quoted(channel.name)}",
-        f"# to = {_quoted(channel.suggestion or '...')}",
-        f"# unit = {_quoted(unit)}",
-    ]
+    why = f"; {known.why}" if known.why else ""
+    lines = ["[[channel]]", f"from = {_quoted(channel.name)}"]
+    if known.to:
+        lines.append(f"to = {_quoted(known.to)}")
+        return [
+            about + note + why,
+            *lines,
+            *(["unit = " + _quoted(known.unit)] if known.unit else []),
+        ]
+    lines += [f"to = {_quoted(channel.suggestion or '...')}",
+              f"unit = {_quoted(channel.unit or known.unit or '...')}"]  # fmt: skip
+    return [about + note + why, *(f"# {line}" for line in lines)]
 
 
 def _quoted(text: str) -> str:

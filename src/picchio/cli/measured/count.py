@@ -205,13 +205,13 @@ def _show(found: Count) -> None:
         low, high = joint["damage_interval"] or (math.nan, math.nan)
         rows.append((
             joint["name"], _share(joint["damage"]),
-            "-" if math.isnan(low) else f"{_share(low)} to {_share(high)}",
-            *("-" if left is None else format_count(left[p]) for p in ("p10", "p50", "p90")),
-            (joint["date"] or {}).get("p50") or "-",
+            "-" if math.isnan(low) else f"{100 * low:.2g} to {100 * high:.2g}",
+            *("-" if left is None else _many(left[p]) for p in ("p10", "p50", "p90")),
+            found.reached(left) or "-",
         ))  # fmt: skip
     heads = ("joint", ">life\nused, %", ">90 % interval,\n%", ">blows left,\nP10", ">P50", ">P90",
              ">P50 is\nreached")  # fmt: skip
-    out.print(table(heads, rows, title="Life used and left"))
+    out.print(table(heads, rows, title="Life used and left (M: millions of blows)"))
     first = found.first_to_fail
     if first is not None:
         name = found.model.robot.flexible_names[first]
@@ -220,8 +220,9 @@ def _show(found: Count) -> None:
         out.print(f"{name} ends the life, at {found.blows_a_day:.4g} blows a day.{longer}")
     elif found.blows:
         out.print("No life has an end: no blow damages a shaft or a drive.")
-    places = found.stations()[:3]
-    if places and found.first_to_fail is not None:
+    places = found.stations()
+    if places and first is not None:
+        places = sorted(places, key=lambda s: -float(s["share"][first]))[:3]
         shares = ", ".join(
             f"{100 * s['share'][first]:.3g} % at ({_angles(s['pose'])})" for s in places
         )
@@ -234,6 +235,12 @@ def _show(found: Count) -> None:
 
 def _angles(pose: np.ndarray) -> str:
     return ", ".join(f"{value:.3g}" for value in pose)
+
+
+def _many(blows: float) -> str:
+    if 1e6 <= blows < math.inf:
+        return f"{float(f'{blows / 1e6:.3g}'):,g} M"
+    return format_count(blows)
 
 
 def _share(value: float) -> str:

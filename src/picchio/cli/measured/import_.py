@@ -38,7 +38,14 @@ def import_(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Write a mapping that lists the file's series, to edit, and stop there.",
+            help="Write a mapping that lists the file's series, to edit, and stop there. Series "
+            "that are named as channels or joints, with their units, are filled in.",
+        ),
+    ] = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ROBOT", help="For --write-mapping: the robot whose joints the series are of."
         ),
     ] = None,
     name: Annotated[
@@ -63,8 +70,19 @@ def import_(
         if to is not None or mapping is not None:
             raise InputError("stands alone: edit the mapping, then import", key="--write-mapping")
         check_targets([write_mapping], [file])
-        template.write_mapping(file, write_mapping)
+        model = None if robot is None else picchio.load_robot(robot)
+        joints = None if model is None else model.joint_names
+        frames = None if model is None else [*model.tree.links, *model.tree.joints]
+        known = template.write_mapping(file, write_mapping, joints, frames)
+        for one in known:
+            if one.to:
+                console().print(f"{one.series} is {one.to}: {one.why}")
+        left = [one.series for one in known if not one.to]
+        if left:
+            console().print(f"left to be filled in, if it is needed: {', '.join(left)}")
         return
+    if robot is not None:
+        raise InputError("is for --write-mapping", key="--robot")
     if to is None and mapping is None:
         from picchio.campaign.importing.importer import detection
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 
 _POINTS = 1000
+_FEW_DAYS = 5
 
 
 def count_page(found: Count, *, command: str | None = None, warnings: Sequence[str] = ()) -> str:
@@ -36,14 +37,14 @@ def count_page(found: Count, *, command: str | None = None, warnings: Sequence[s
     rows = []
     for joint in joints:
         low, high = joint["damage_interval"] or (math.nan, math.nan)
-        left, date = joint["blows_left"], joint["date"] or {}
+        left = joint["blows_left"]
         cells = (
             ["–"] * 3 if left is None else [format_count(left[p]) for p in ("p10", "p50", "p90")]
         )
         rows.append([
             joint["name"], _share(joint["damage"]),
             "–" if math.isnan(low) else f"{_share(low)} to {_share(high)}", *cells,
-            date.get("p50") or "–",
+            found.reached(left) or "–",
         ])  # fmt: skip
     first = found.first_to_fail
     places = [
@@ -126,6 +127,13 @@ def plot_blows(found: Count) -> Axes:
     axes.bar(dates, [day["blows"] for day in days], width=0.8)
     axes.set_ylabel("blows a day")
     _dated(axes)
+    if len(dates) and (dates[-1] - dates[0]).astype(int) < _FEW_DAYS:
+        from matplotlib.dates import DateFormatter, DayLocator
+
+        day = np.timedelta64(1, "D")
+        axes.set_xlim(dates[0] - day, dates[0] + (_FEW_DAYS + 1) * day)
+        axes.xaxis.set_major_locator(DayLocator())
+        axes.xaxis.set_major_formatter(DateFormatter("%d %b"))
     return axes
 
 

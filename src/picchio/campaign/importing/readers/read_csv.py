@@ -19,6 +19,7 @@ from picchio.core.files import csv_rows, read_text, regular_file
 _LARGEST = 4 << 30
 _EXACT = 2.0**53
 _BYTES_A_LINE = 60
+_DATE = len("2026-03-01T08:00:00")
 _SIGNS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "blanks", "|": "bar"}
 _MARKS = {".": "point", ",": "comma"}
 
@@ -140,16 +141,21 @@ def _dates(cells: list[str]) -> FloatArray | None:
     """The column as ns from 1970, where every cell is a date and time."""
     if not cells or moment(cells[0]) is None:
         return None
+    if min(map(len, cells)) >= _DATE and cells[0][4] == "-" and not set("+-") & set(cells[0][10:]):
+        try:  # UTC, with or without a Z: a hundred times as fast
+            return np.array([c.rstrip("Z") for c in cells], "datetime64[ns]").astype(np.int64)
+        except ValueError:
+            pass
     found = [moment(cell) for cell in cells]
     return None if None in found else np.array(found, dtype=np.int64)
 
 
-def blocks(path: Path, mapping: Mapping, size: int) -> Iterator[RawFile]:
+def blocks(path: Path, mapping: Mapping | None, size: int) -> Iterator[RawFile]:
     """The same, in blocks of so many lines: memory does not grow with the file.
 
     Args:
         path: the file.
-        mapping: whose series are needed.
+        mapping: whose series are needed; None takes what are numbers.
         size: lines.
 
     Raises:
@@ -189,21 +195,25 @@ def _fast(path: Path, head: list[str], lines: list[str], layout: SourceTable) ->
     try:
         frame = pandas.read_csv(
             io.StringIO("".join(lines)), header=None, sep=separator, decimal=layout.decimal,
-            dtype=np.float64,
+            keep_default_na=False,
         )  # fmt: skip
     except ValueError:
         return None
-    table = frame.to_numpy()
-    if table.shape != (len(lines), cells) or not np.isfinite(table).all():
+    if frame.shape != (len(lines), cells) or any(t.kind not in "if" for t in frame.dtypes):
         return None
-    if (np.abs(table[0]) >= _EXACT).any():
-        return None
+    columns = []
+    for _, column in frame.items():
+        values = column.to_numpy()
+        # Whole numbers that a float would cut, such as ns since 1970, stay whole.
+        if values.dtype.kind == "f" or abs(int(values[0])) < _EXACT:
+            values = values.astype(np.float64)
+            if not np.isfinite(values).all() or abs(values[0]) >= _EXACT:
+                return None
+        columns.append(values)
     names = _names(head, cells, layout)
     if len(names) != cells:
         return None
-    channels = {
-        n: RawChannel(n, np.ascontiguousarray(c)) for n, c in zip(names, table.T, strict=True)
-    }
+    channels = {n: RawChannel(n, c) for n, c in zip(names, columns, strict=True)}
     return RawFile(path, "csv", channels, detected=(told(layout),))
 
 
