@@ -35,6 +35,7 @@ SCALES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 # ns from 1970 to 2001 and to 2100: stamps in between are dates, in whichever unit they fall there.
 _DATES = (978_307_200_000_000_000, 4_102_444_800_000_000_000)
 _LARGEST_GAP = 5.0
+_ALIKE = 0.1  # relative difference of steps that are the same but for rounding
 _UNEVEN = 0.01
 
 
@@ -304,6 +305,9 @@ def rate_and_gaps(ns: FloatArray) -> tuple[float, list[tuple[int, float]]]:
     steps = np.diff(ns).astype(np.float64) * 1e-9
     usual = float(np.median(steps)) if steps.size else math.nan
     gaps = np.flatnonzero(steps > _LARGEST_GAP * usual)
+    # Stamps are rounded: of steps alike the mean is nearer than any one of them.
+    alike = steps[np.abs(steps - usual) < _ALIKE * usual]
+    usual = float(alike.mean()) if alike.size else usual
     return 1.0 / usual if usual > 0.0 else math.nan, [(int(k), float(steps[k])) for k in gaps]
 
 
