@@ -110,8 +110,8 @@ def _grow(search: Search, stack: ExitStack) -> None:
     problem = search.problem
     for _ in range(MOST_CAUSES):
         here = search.best
-        if search.explains_enough(here):
-            break
+        # What is left may be a remainder, or a cause that is small beside those that are known.
+        enough = search.explains_enough(here)
         search.say(f"looking for cause {len(search.labels) + 1}")
         quiet = search.leaves_noise(here)
         if quiet and not search.pinned:
@@ -136,7 +136,10 @@ def _grow(search: Search, stack: ExitStack) -> None:
         trials[:] = [best, *(replace(t, about=None) for t in trials if t is not best)]
         # What the model itself is not exact to may look like a last small cause in some pose.
         known = bool(here.hypothesis.labels)
-        if quiet and known and confidence(best.fit, here) < BEYOND_DOUBT:
+        if (quiet or enough) and known and confidence(best.fit, here) < BEYOND_DOUBT:
+            break
+        # A remainder that is allowed needs no cause that explains but a part of it.
+        if enough and not search.leaves_noise(best.fit):
             break
         search.best = prune(search, best.fit, alone=gain <= _CLEAR * search.least)
         if known and not quiet:

@@ -37,6 +37,8 @@ _SETTLED = 0.002
 _ELSE = 3.0
 # What is not exact explains little where it leaves more than this share of chi-square.
 _LITTLE = 0.5
+# Standard deviations, root mean square, at which slopes say nothing any more.
+_ABSURD = 10.0
 _TEMPERS = (1.0, 10.0, 100.0)
 
 
@@ -165,15 +167,24 @@ def settled(
 def _unless_little(problem: Problem, found: Fit) -> Fit:
     """A fit without what is not exact, where that explains but little of what is left; else it.
 
-    Slopes about a model that is far off lead astray: what is wrong is looked for without them.
+    Slopes about a model that is far off lead astray: what is wrong is looked for without them. So
+    it is where what is not exact would have to be far beyond what it can be.
     """
     with problem.set_aside():
         plain = fit(problem, found.hypothesis, found.records, None, with_jacobian=True)
-    if found.chi_square < _LITTLE * plain.chi_square:
+    if found.chi_square < _LITTLE * plain.chi_square and _size(problem, found) < _ABSURD:
         return found
     _move(problem, {})
     problem.marginal = None
     return plain
+
+
+def _size(problem: Problem, found: Fit) -> float:
+    """How far off what is not exact would be, all of it: root mean square, standard deviations."""
+    assert problem.marginal is not None
+    raw = problem.unmarginalised(found.hypothesis.effects, found.records, found.end)
+    sizes = problem.marginal.estimated(raw, [record.name for record in found.records])
+    return math.sqrt(float(np.mean(np.concatenate(list(sizes.values())) ** 2)))
 
 
 @dataclass(frozen=True, eq=False)
