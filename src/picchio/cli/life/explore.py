@@ -56,12 +56,12 @@ def explore(
     check_targets([json], [*loaded.files, task, model])
     with telling("loading the robot"):
         live = picchio.explore(loaded, task=task, model=model, save=save)
-    typer.echo(f"{live.url}\nCtrl-C ends it", err=True)
-    if browser:
-        import webbrowser
-
-        webbrowser.open(live.url)
     try:
+        typer.echo(f"{live.url}\nCtrl-C ends it", err=True)
+        if browser:
+            import webbrowser
+
+            webbrowser.open(live.url)
         while live.alive:
             time.sleep(0.2)
     except KeyboardInterrupt:
