@@ -1,8 +1,9 @@
 """Taps in time on flexible arms: an independent world, integrated step by step.
 
 Pinocchio's mass matrix and Jacobians at the true bodies and pose; a half-sine blow of unknown
-height and width; SciPy's integration of the state space on a grid finer than the samples. Wrong a
-little: link masses, joint zeros, where hammer and sensor are, gains, the modes' damping.
+height and width, that begins and ends between samples; SciPy's integration of the state space on a
+grid finer than they are. Wrong a little: link masses, joint zeros, where hammer and sensor are,
+gains, the modes' damping.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ FINE = 8  # steps of the integration for one sample
 
 def draw(joints: int, seed: int, *, known: bool = True, rate: float = 2000.0, length: float = 2.0,
          exact: bool = False, noise: float = 0.02, poses: int = 3, taps: int = 2,
-         factors=None) -> Frfs:  # fmt: skip
+         factors=None, late: float | None = None) -> Frfs:  # fmt: skip
     """A campaign of an arm with 3, 6 or 7 joints: taps read by an accelerometer of three axes.
 
     Args:
@@ -37,8 +38,10 @@ def draw(joints: int, seed: int, *, known: bool = True, rate: float = 2000.0, le
         poses: how many.
         taps: at each.
         factors: (n,) of the stiffness; drawn if None.
+        late: samples after t = 0 at which a blow begins, less than one; drawn if None.
     """
     rng = np.random.default_rng((seed, joints, 11))
+    onsets = np.random.default_rng((seed, joints, 12))
     own = shipped(ROBOTS[joints])
     off = 0.0 if exact else 1.0
     model = own.model.copy()
@@ -94,7 +97,9 @@ def draw(joints: int, seed: int, *, known: bool = True, rate: float = 2000.0, le
                                 (turn.T @ see @ entry)[:, None])  # fmt: skip
             time = np.arange(round(length * rate * FINE)) / (rate * FINE)
             width, height = rng.uniform(0.003, 0.005), own.force * rng.uniform(0.7, 1.5)
-            blow = np.where(time < width, height * np.sin(np.pi * time / width), 0.0)
+            since = time - (onsets.uniform() if late is None else late) / rate
+            blow = np.where((since > 0.0) & (since < width),
+                            height * np.sin(np.pi * since / width), 0.0)  # fmt: skip
             read = gain * lsim(system, blow, time)[1][::FINE]
             before = round(0.1 * rate)
             count = len(read)

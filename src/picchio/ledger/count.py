@@ -54,6 +54,7 @@ from picchio.ledger.store import Kept, Ledger, Stream
 from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.loading.find import shipped_robot
 from picchio.studies.default_task import task_of
 from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.tasks import Operation, Task
@@ -193,7 +194,8 @@ class Count(TableResult):
         """
         if left is None or not math.isfinite(left["p50"]):
             return None
-        return (self.dates(left)["p50"] or "> 100 y")[: len("> 100 y")]
+        date = self.dates(left)["p50"]
+        return "> 100 y" if date is None else date.rpartition("-")[0]
 
     @property
     def first_to_fail(self) -> int | None:
@@ -481,8 +483,10 @@ def _files(
 
 
 def _how_to_map(file: Path, robot: FlexibleRobot) -> str:
-    return (f"`picchio import {file} --robot {robot.files[0]} --write-mapping "
-            f"{file.parent / MAPPING}` writes one to edit")  # fmt: skip
+    shipped = shipped_robot(robot.name)
+    known = shipped is not None and shipped.urdf == robot.files[0]
+    return (f"`picchio import {file} --robot {robot.name if known else robot.files[0]} "
+            f"--write-mapping {file.parent / MAPPING}` writes one to edit")  # fmt: skip
 
 
 def _to_map(

@@ -92,10 +92,7 @@ def _rows(raw: RawFile, mapping: Mapping) -> RawFile:
         return raw
     held = np.ones(sizes.pop(), bool)
     for entry in filters:
-        values = raw.channels[entry.series].values
-        held &= (values >= (-np.inf if entry.least is None else entry.least)) & (
-            values <= (np.inf if entry.most is None else entry.most)
-        )
+        held &= entry.passes(raw.channels[entry.series].values)
     channels = {n: replace(c, values=c.values[held]) for n, c in raw.channels.items()}
     return replace(raw, channels=channels)
 

@@ -6,9 +6,11 @@ from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Literal, get_args
 
+import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from picchio.campaign.tables import FreeTable, SampleRate
+from picchio.core.arrays import BoolArray, FloatArray
 from picchio.core.toml import Finite, FiniteVector, Positive, StrictModel, parse_toml
 
 FORMAT = "picchio-mapping/1"
@@ -98,6 +100,17 @@ class FilterTable(StrictModel):
     series: str
     least: Finite | None = None
     most: Finite | None = None
+
+    def passes(self, values: FloatArray) -> BoolArray:
+        """(m,) which samples lie within the bounds.
+
+        Args:
+            values: (m,) of the series, as stored.
+        """
+        low = -np.inf if self.least is None else self.least
+        return np.asarray(
+            (values >= low) & (values <= (np.inf if self.most is None else self.most))
+        )
 
 
 class CouplingTable(StrictModel):

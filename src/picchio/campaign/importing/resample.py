@@ -163,11 +163,7 @@ def taken_samples(
         kept = kept & ((series.time >= moment) if after else (series.time <= moment))
     for i, entry in enumerate(filters):
         other = raw.channel(entry.series, mapping=mapping, key=f"filter[{i}].series")
-        held = np.ones(other.values.size, bool)
-        if entry.least is not None:
-            held &= other.values >= entry.least
-        if entry.most is not None:
-            held &= other.values <= entry.most
+        held = entry.passes(other.values)
         if other.time is series.time or np.array_equal(other.time, series.time):  # type: ignore[arg-type]
             kept = kept & held
         else:

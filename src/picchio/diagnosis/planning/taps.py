@@ -13,7 +13,7 @@ from picchio.core.arrays import FloatArray
 from picchio.diagnosis.planning.kind import Offered, Possible, Test
 from picchio.diagnosis.planning.outcome import Outcome
 from picchio.diagnosis.stiffness.prior import prior_of
-from picchio.diagnosis.stiffness.responses import REMAINDER, make_problem
+from picchio.diagnosis.stiffness.responses import make_problem, remainder_of
 from picchio.robot.flexible_robot import FlexibleRobot
 
 _POSES = 10  # of those that are tried: a function takes longer to look at than a loading
@@ -108,7 +108,7 @@ def _told(
             # A remainder is no noise that more lines average out.
             if not value.max() > 0.0:
                 continue  # the sensor shows nothing of this hit
-            size = np.hypot(size, REMAINDER * np.sqrt(np.mean(value**2) * len(value) / 3.0))
+            size = np.sqrt(size**2 + remainder_of(value))
             slope = part.slope * (table.scale / size)[:, None, None]
             flat = slope.reshape(-1, slope.shape[-1])
             told = flat.T @ flat

@@ -104,12 +104,9 @@ class Response:
     def remainder(self) -> FloatArray:
         """(m,) variance, over the lines' scale, of what a model never follows.
 
-        Thousands of lines make a fit surer than its model is right. A remainder of a hundredth of
-        the function, as a diagnosis allows it, may look like any change of the numbers: its cosine
-        with that is anything from -1 to 1. White noise of this size says as much.
+        See `remainder_of`.
         """
-        power = float(np.mean(np.abs(self.measured) ** 2))
-        return np.asarray(REMAINDER**2 * power * len(self) / 3.0 / self.scale**2)
+        return np.asarray(remainder_of(self.measured) / self.scale**2)
 
     groups: tuple[str, ...] = ("frf", "frf")
 
@@ -401,6 +398,22 @@ class FrfProblem:
             np.stack([slope.real, slope.imag], axis=1).reshape(len(line), 2, p),
             response.remainder[:, None, None] * np.eye(2),
         )
+
+
+def remainder_of(values: ComplexArray | FloatArray) -> float:
+    """The variance that lets a function's lines have a remainder.
+
+    Thousands of lines make a fit surer than its model is right. A remainder of a hundredth of the
+    function, as a diagnosis allows it, may look like any change of the numbers: its cosine with
+    that is anything from -1 to 1. White noise of this size says as much.
+
+    Args:
+        values: (m,) the function, SI.
+
+    Returns:
+        of the real and of the imaginary part of each line, SI squared.
+    """
+    return float(REMAINDER**2 * np.mean(np.abs(values) ** 2) * len(values) / 3.0)
 
 
 def make_problem(

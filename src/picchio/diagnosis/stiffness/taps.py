@@ -33,7 +33,8 @@ _IMPULSE, _DELAY, _VARIANCE = 1.0, 1.5e-3, 4e-7  # N s, s, s^2: a hammer's, abou
 _USUAL = 4e-3, 0.5 * math.pi**2  # s, a blow; how much its force bends there, over impulse / s^2
 _BENDS = 1.0 / math.sqrt(720.0)  # of T^2 times the bend: B_2 / 2 of what may lie anywhere
 _DECAY = 6.0  # of the window, over the record's length
-_SAMPLED, _STRUCK = 0.4, 0.3  # highest line over the sample rate; least force over the largest
+_SAMPLED = 0.4  # highest line, over the sample rate
+_SHAKEN, _STRUCK = 0.3, 0.1  # least force over the largest, of a line and of a sample
 _MOST_UNKNOWN = 120.0  # Hz, to which a blow of unknown shape is nearly an impulse
 _MOST_LINES = 240
 _MODEL = 0.005  # of a line: nothing is measured better than that
@@ -139,7 +140,7 @@ def spectra(robot: FlexibleRobot, record: Record, pose: FloatArray) -> list[Spec
 
     if force is not None:
         blow = transformed(force)
-        kept = np.abs(blow) > _STRUCK * np.abs(blow).max()
+        kept = np.abs(blow) > _SHAKEN * np.abs(blow).max()
         kept &= np.cumprod(kept).astype(bool)  # beyond the first gap nothing
         ends = time[np.flatnonzero(struck)[[0, -1]]] + np.array([-0.5, 0.5]) * step
         bend = float(np.abs(np.diff(force)).max()) / step
