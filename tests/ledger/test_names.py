@@ -66,8 +66,10 @@ def test_what_is_asked_is_told_with_what_to_run(tmp_path, robot):
     with pytest.raises(InputError, match=r"valid: forward, left, upward.*picchio import.*--robot"):
         picchio.count(robot, tmp_path / "day.csv", tmp_path / "l")
     (tmp_path / "day.csv").write_text(text.replace("joint_", "axis "))
-    with pytest.raises(InputError, match=r"no name says.*angles.*picchio import"):
+    with pytest.raises(InputError, match=r"no name says.*angles; valid: joint_1.*picchio import"):
         picchio.count(robot, tmp_path / "day.csv", tmp_path / "l")
+    with pytest.raises(InputError, match=r"nothere: no such file or folder"):
+        picchio.count(robot, tmp_path / "nothere", tmp_path / "l")
 
 
 def test_nothing_is_guessed(tmp_path):

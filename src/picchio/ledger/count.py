@@ -459,6 +459,8 @@ def _files(
     given = [Path(log)] if isinstance(log, str | Path) else [Path(x) for x in log]
     files: list[Path] = []
     for path in given:
+        if not path.exists():
+            raise InputError("no such file or folder", file=path)
         if path.is_dir():
             files += sorted(
                 p for p in path.rglob("*") if p.suffix.lower() in ENDINGS and p.is_file()
@@ -475,6 +477,7 @@ def _files(
         if rules is None:
             raise InputError("needs a mapping from the logs' series to channels: no name says "
                              "which are the joints' angles", file=files[0], key="--mapping",
+                             choices=robot.joint_names,
                              hint=_how_to_map(files[0], robot))  # fmt: skip
         return files, rules, None, tuple(f"no mapping: {line}" for line in told)
     rules_file = Path(mapping) if mapping is not None else beside
