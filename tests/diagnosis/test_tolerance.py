@@ -112,6 +112,29 @@ def test_links_are_changed_as_bodies_are(wrong_everywhere):
         )
 
 
+def test_a_centre_of_mass_is_moved_as_a_body_is(wrong_everywhere):
+    """To the second order as well, across its axes, and from where it was moved to already."""
+    robot, campaign = wrong_everywhere
+    problem = Problem(robot, campaign)
+    geometry: Geometry = problem.records[0].setup.geometry
+    own = robot.tree.links["link_3"]
+    com, axes, _ = principal(own)
+    ways = {one.name: one for one in inexact(problem, problem.records[0], Tolerance())}
+    plant = Model(robot).plant(geometry)
+    for k, size in ((1, 1.5), (2, -2.0), (3, 3.0), (1, -0.5)):
+        ways[f"link_com.link_3.{k}"].change(plant, size)
+    moved = plant.build(np.array([0.0, 0.0, 1.0])).mass
+    still = Model(robot).plant(geometry).build(np.array([0.0, 0.0, 1.0])).mass
+    link = geometry.motion("link_3")
+
+    def alone(point):
+        jacobian = link.at(point).jacobian[:3, :3]
+        return own.mass * jacobian.T @ jacobian
+
+    expected = alone(com + 0.002 * axes @ np.array([1.0, -2.0, 3.0])) - alone(com)
+    assert moved - still == pytest.approx(expected, abs=1e-12 * np.abs(still).max())
+
+
 def test_the_mass_of_all_is_told_by_no_record(wrong_everywhere):
     """Springs, blows and all masses larger alike move nothing: slopes must say so exactly."""
     robot, campaign = wrong_everywhere
@@ -173,6 +196,23 @@ def test_a_world_that_is_a_little_wrong_leaves_noise(wrong_everywhere):
     # No record tells the mass of all, so none tells a stiffness to less than that.
     spread = np.sqrt(found.covariance().diagonal())
     assert (spread[:3] > 0.003).all() and (spread[:3] < 0.03).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["ur10", "fanuc_r2000ic", "kinova_gen3"])
+def test_a_world_of_six_joints_leaves_noise(robot):
+    """Fast wrists tell a centre of mass to the second order, and lead slopes far astray."""
+    case = {"robot": robot, "kind": "null", "snr": 40, "draw": 0, "mismatch": 1.0}
+    campaign, _ = trial.make(case)
+    problem = Problem(picchio.load_robot(robot), campaign)
+    start = Hypothesis.baseline(problem.robot, campaign.tolerance)
+    with one_thread():
+        raw = fit_growing(problem, start)
+        found = settled(problem, raw, problem.records)
+    assert raw.chi_square / raw.samples > 10.0
+    assert found.chi_square / found.samples == pytest.approx(1.0, abs=0.02)
+    evidence = fit_evidence(problem, found)
+    assert evidence.is_noise, (evidence.worst_band, evidence.worst_pose)
 
 
 def test_where_everything_is_exact_nothing_is_integrated_out():

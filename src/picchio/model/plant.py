@@ -57,6 +57,7 @@ class Changes:
             and motor side alone, as if nothing else moved (0), or in between: where an effect
             lets something else yield, the two differ, and data can tell.
         force_offset: (3,) m, in the tool frame, from where the force is taken to act.
+        centres: (3,) m by which links' centres of mass were moved, along the links' own axes.
         added_inertias: (coordinate, kg m^2) of inertias that move with a coordinate.
         coordinates: those of the wide chain that move, then those that effects add.
     """
@@ -81,6 +82,7 @@ class Changes:
         self._motors: dict[str, str] = {}
         self._bent: dict[str, tuple[float, float]] = {}
         self._masses: list[Mass] = [(1.0, "robot", None)]
+        self.centres: dict[str, FloatArray] = {}
         self.added_inertias: list[tuple[str, float]] = []
         self._springs: list[_Spring] = []
         self._anchors: list[_Spring] = []

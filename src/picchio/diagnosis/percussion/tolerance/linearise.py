@@ -26,12 +26,11 @@ from picchio.diagnosis.percussion.tolerance.slopes import Slopes, all_slopes
 
 # Numbers are moved by so many standard deviations at most.
 _FARTHEST = 3.5
-# The stretch, s, that is looked at first; how often slopes are taken at most, and what fall of the
-# cost asks for it once more; and by how much more what is not exact is held back where a move to
-# where it seems to be leads nowhere.
+# The stretch, s, that is looked at first; how often numbers are moved at most, and what fall of the
+# cost asks for it once more.
 _SHORT = 0.16
 _KINKED = (_SHORT, 0.3, 0.6, None)  # where a small error early is a large one late
-_ROUNDS = 3
+_ROUNDS = 5
 _SETTLED = 0.002
 # Chi-square per sample above which more is wrong than what is not exact.
 _ELSE = 3.0
@@ -39,7 +38,8 @@ _ELSE = 3.0
 _LITTLE = 0.5
 # Standard deviations, root mean square, at which slopes say nothing any more.
 _ABSURD = 10.0
-_TEMPERS = (1.0, 10.0, 100.0)
+# How far numbers are moved towards where slopes have them, until that is for the better.
+_SHARES = (1.0, 0.5, 0.2, 0.05)
 
 
 def linearise(
@@ -146,18 +146,25 @@ def settled(
         problem.idle = frozenset()  # a cause may set free what stood still without it
     here = start.hypothesis
     for end in _KINKED if is_nonsmooth(here) else (_SHORT, None):
-        before = math.inf
+        before, known = math.inf, False  # whether slopes are those of an earlier round
         for _ in range(rounds):
-            linearise(problem, here, records, end)
+            if not known:
+                linearise(problem, here, records, end)
             found = fit(problem, here, records, end, iterations=4)
             power = found.chi_square / max(found.samples, 1)
             if power > _ELSE:
                 here = _at_stated(problem, found, end)
                 break
-            here = _recentred(problem, found)
-            if before - found.cost < _SETTLED * found.cost:
-                break
-            before = found.cost
+            here, cost = _recentred(problem, found)
+            # Slopes serve on as long as they lead on; where they no longer do, those of where all
+            # stands now have the last word, but for a stretch that is only on the way.
+            if before - cost < _SETTLED * cost:
+                if end is not None or not known:
+                    break
+                known = False
+            else:
+                known = True
+            before = cost
     found = fit(problem, here, records, None, with_jacobian=True)
     if found.chi_square > _ELSE * found.samples:
         return _unless_little(problem, found)
@@ -250,35 +257,55 @@ def _at_stated(problem: Problem, found: Fit, end: float | None) -> Hypothesis:
     return found.hypothesis
 
 
-def _recentred(problem: Problem, found: Fit) -> Hypothesis:
-    """The fit's hypothesis about inexact numbers that explain more, if any do."""
-    best, before = found.hypothesis, problem.sizes
-    cost = _cost(problem, best, found.end)
+def _recentred(problem: Problem, found: Fit) -> tuple[Hypothesis, float]:
+    """The fit's hypothesis about inexact numbers that explain more, if any do; its cost there.
+
+    Slopes foretell more than is true of a move that is far: it goes as far as it really helps.
+    """
+    best, before, marginal = found.hypothesis, problem.sizes, problem.marginal
+    if marginal is None:
+        return best, found.cost
+    staying = marginal.only(POSE)
+    cost = _cost(problem, best, found.end, staying)
     temper = max(1.0, found.chi_square / max(found.samples, 1))
-    for harder in _TEMPERS:
-        other = recentre(problem, found, harder * temper)
-        now = _cost(problem, other, found.end)
+    for share in _SHARES:
+        other = recentre(problem, found, temper, share)
+        now = _cost(problem, other, found.end, staying)
         if now < cost:
-            return other
+            return other, now
         _move(problem, before)
-    return best
+    return best, cost
 
 
-def _cost(problem: Problem, hypothesis: Hypothesis, end: float | None) -> float:
+def _cost(problem: Problem, hypothesis: Hypothesis, end: float | None, staying: Marginal) -> float:
+    """What it costs to have everything just where it is: no slope but of what always stays."""
+    names = [record.name for record in problem.records]
+    labels = [effect.label for effect in hypothesis.effects]
     try:
-        there = problem.residuals(hypothesis.effects, None, end)
+        there = problem.unmarginalised(hypothesis.effects, None, end)
     except InputError:
         return math.inf
-    return sum(float((r * r).sum()) for r in there) + prior_cost(hypothesis)
+    held = 0.0
+    for k, name in enumerate(names):
+        moved, sizes = problem.moved.get(name), problem.sizes.get(name)
+        if moved is not None and moved.shift is not None:
+            there[k] = there[k] + moved.shift[:, : there[k].shape[1]]
+        if sizes is not None and problem.marginal is not None:
+            own = problem.marginal.slopes[name].own
+            held += float((sizes[:own] ** 2).sum())
+            held += float((sizes[own:] ** 2).sum()) / len(names)
+    left = sum(float((r * r).sum()) for r in staying.whitened(there, names, labels))
+    return left + held + prior_cost(hypothesis)
 
 
-def recentre(problem: Problem, found: Fit, temper: float = 1.0) -> Hypothesis:
+def recentre(problem: Problem, found: Fit, temper: float = 1.0, share: float = 1.0) -> Hypothesis:
     """Move the inexact numbers to where the records have them, the slopes being kept.
 
     Args:
         problem: what is changed.
         found: a fit.
         temper: variance of what the residuals hold beside the inexact numbers, 1 for noise.
+        share: of the way there.
 
     Returns:
         the fit's hypothesis, less what its unknowns had taken up of what was moved.
@@ -288,10 +315,14 @@ def recentre(problem: Problem, found: Fit, temper: float = 1.0) -> Hypothesis:
         return hypothesis
     names = [record.name for record in problem.records]
     raw = problem.unmarginalised(hypothesis.effects, None, found.end)
-    sizes = marginal.estimated(raw, names, temper)
-    # A pose's geometry takes long to find, and its small errors act in proportion.
-    stays = {n: np.array([w.where == POSE for w in s.what]) for n, s in marginal.slopes.items()}
-    new = {n: np.where(stays[n], 0.0, np.clip(v, -_FARTHEST, _FARTHEST)) for n, v in sizes.items()}
+    sizes = marginal.estimated(raw, names, temper, (e.label for e in hypothesis.effects))
+    new = {}
+    for name, size in sizes.items():
+        # A pose's geometry takes long to find, and its small errors act in proportion.
+        stays = np.array([what.where == POSE for what in marginal.slopes[name].what])
+        there = np.where(stays, 0.0, np.clip(size, -_FARTHEST, _FARTHEST))
+        here = problem.sizes.get(name, np.zeros_like(there))
+        new[name] = here + share * (there - here)
     own = marginal.slopes[names[0]].own
     change = new[names[0]][own:]
     if names[0] in problem.sizes:

@@ -67,6 +67,15 @@ class Marginal:
         some = next(iter(self.slopes.values()))
         return tuple(one.name for one in some.what[some.own :])
 
+    def only(self, where: str) -> Marginal:
+        """What integrates out nothing but what is changed in one place.
+
+        Args:
+            where: as of `Inexact`.
+        """
+        others = {w.name for s in self.slopes.values() for w in s.what if w.where != where}
+        return Marginal({name: s.without(others) for name, s in self.slopes.items()})
+
     def whitened(
         self, residuals: Sequence[FloatArray], names: Sequence[str], claimed: Iterable[str] = ()
     ) -> list[FloatArray]:
@@ -239,7 +248,8 @@ class Marginal:
         key = (name, samples)
         if key not in self._grams:
             columns = self.slopes[name].columns[:, :samples]
-            flat = columns.reshape(-1, columns.shape[2]).astype(float)
+            channels, count, numbers = columns.shape
+            flat = columns.reshape(channels * count, numbers).astype(float)
             self._grams[key] = flat.T @ flat
         return self._grams[key]
 

@@ -166,11 +166,10 @@ def _links(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterat
                       f"link_mass:{link}")  # fmt: skip
         for k in range(3):
 
-            def moved(plant: Changes, size: float, link: str = link, mass: float = own.mass,
-                      ends: Sequence[tuple[float, ...]] = ends[k]) -> None:  # fmt: skip
-                weight = size * sigma.link_com * mass / (2.0 * _APART)
-                plant.add_mass(weight, link, ends[0])
-                plant.add_mass(-weight, link, ends[1])
+            def moved(plant: Changes, size: float, link: str = link, k: int = k,
+                      mass: float = own.mass, centre: FloatArray = com,
+                      axes: FloatArray = axes) -> None:  # fmt: skip
+                _move_centre(plant, link, mass, centre, axes, k, size * sigma.link_com)
 
             def larger(plant: Changes, size: float, link: str = link, k: int = k,
                        moment: float = moments[k], centre: FloatArray = com,
@@ -186,6 +185,33 @@ def _links(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterat
 
             yield Inexact(f"link_com.{link}.{k + 1}", "link_com", True, "structure", moved)
             yield Inexact(f"link_inertia.{link}.{k + 1}", "link_inertia", True, "structure", larger)
+
+
+def _move_centre(
+    plant: Changes, link: str, mass: float, centre: FloatArray, axes: FloatArray, k: int, by: float
+) -> None:
+    """Move a link's centre of mass along one of its axes, m, its inertia about it as it was.
+
+    What is moved already counts: (b + d)(b + d)^T - b b^T of the second moments, by point masses
+    that stand where they always do, so that their own inertia need not be found anew.
+    """
+    before = plant.centres.get(link, np.zeros(3))
+    plant.centres[link] = before + by * np.eye(3)[k]
+    reach = _APART * axes.T
+
+    def add(weight: float, *at: FloatArray) -> None:
+        plant.add_mass(weight, link, tuple((centre + sum(at)).tolist()))
+
+    ahead = mass * by / (2.0 * _APART)
+    square = mass * by * (by + 2.0 * before[k]) / (2.0 * _APART**2)
+    crossed = mass * by * before / _APART**2
+    crossed[k] = 0.0
+    add(square + ahead - crossed.sum(), reach[k])
+    add(square - ahead, -reach[k])
+    add(crossed.sum() - 2.0 * square)
+    for j in np.flatnonzero(crossed):
+        add(crossed[j], reach[j], reach[k])
+        add(-crossed[j], reach[j])
 
 
 def principal(own: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
