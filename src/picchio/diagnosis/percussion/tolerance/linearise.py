@@ -26,11 +26,14 @@ from picchio.diagnosis.percussion.tolerance.slopes import Slopes, all_slopes
 
 # Numbers are moved by so many standard deviations at most.
 _FARTHEST = 3.5
-# The stretch, s, that is looked at first; how often numbers are moved at most, and what fall of the
-# cost asks for it once more.
+# The stretch, s, that is looked at first; how often slopes are taken at most, how often numbers are
+# moved by the same ones, what share of the fall that they foretold must come for that, and what
+# fall of the cost asks for one move more.
 _SHORT = 0.16
 _KINKED = (_SHORT, 0.3, 0.6, None)  # where a small error early is a large one late
-_ROUNDS = 5
+_ROUNDS = 3
+_MOVES = 3
+_TRUSTED = 0.5
 _SETTLED = 0.002
 # Chi-square per sample above which more is wrong than what is not exact.
 _ELSE = 3.0
@@ -146,29 +149,40 @@ def settled(
         problem.idle = frozenset()  # a cause may set free what stood still without it
     here = start.hypothesis
     for end in _KINKED if is_nonsmooth(here) else (_SHORT, None):
-        before, known = math.inf, False  # whether slopes are those of an earlier round
-        for _ in range(rounds):
-            if not known:
-                linearise(problem, here, records, end)
-            found = fit(problem, here, records, end, iterations=4)
-            power = found.chi_square / max(found.samples, 1)
-            if power > _ELSE:
-                here = _at_stated(problem, found, end)
-                break
-            here, cost = _recentred(problem, found)
-            # Slopes serve on as long as they lead on; where they no longer do, those of where all
-            # stands now have the last word, but for a stretch that is only on the way.
-            if before - cost < _SETTLED * cost:
-                if end is not None or not known:
-                    break
-                known = False
-            else:
-                known = True
-            before = cost
+        here = _settled_up_to(problem, here, records, end, rounds)
     found = fit(problem, here, records, None, with_jacobian=True)
     if found.chi_square > _ELSE * found.samples:
         return _unless_little(problem, found)
     return found
+
+
+def _settled_up_to(
+    problem: Problem,
+    here: Hypothesis,
+    records: Sequence[MeasuredRecord],
+    end: float | None,
+    rounds: int,
+) -> Hypothesis:
+    """As `settled`, of a first part of the records; slopes serve as long as they lead on."""
+    before = math.inf
+    for _ in range(rounds):
+        linearise(problem, here, records, end)
+        moves = 0
+        while moves < _MOVES:
+            found = fit(problem, here, records, end, iterations=4)
+            if found.chi_square > _ELSE * max(found.samples, 1):
+                return _at_stated(problem, found, end)
+            here, cost, kept = _moved_on(problem, here, found)
+            little = before - cost < _SETTLED * cost
+            before, moves = cost, moves + 1
+            if little or kept < _TRUSTED:
+                break
+        # What is but on the way need not be settled to the last.
+        if little and (moves == 1 or end is not None):
+            return here
+    if end is None:  # it has moved on since slopes were taken
+        linearise(problem, here, records, end)
+    return here
 
 
 def _unless_little(problem: Problem, found: Fit) -> Fit:
@@ -257,24 +271,42 @@ def _at_stated(problem: Problem, found: Fit, end: float | None) -> Hypothesis:
     return found.hypothesis
 
 
-def _recentred(problem: Problem, found: Fit) -> tuple[Hypothesis, float]:
-    """The fit's hypothesis about inexact numbers that explain more, if any do; its cost there.
+def _moved_on(problem: Problem, here: Hypothesis, found: Fit) -> tuple[Hypothesis, float, float]:
+    """A hypothesis and its inexact numbers, moved towards a fit.
 
     Slopes foretell more than is true of a move that is far: it goes as far as it really helps.
+
+    Returns:
+        the hypothesis, what it costs there, and what share of the fall that was foretold came.
     """
-    best, before, marginal = found.hypothesis, problem.sizes, problem.marginal
+    before, marginal = problem.sizes, problem.marginal
     if marginal is None:
-        return best, found.cost
+        return found.hypothesis, found.cost, 1.0
     staying = marginal.only(POSE)
-    cost = _cost(problem, best, found.end, staying)
+    cost = _cost(problem, here, found.end, staying)
     temper = max(1.0, found.chi_square / max(found.samples, 1))
+    # Of all records, as what it costs is: the fit's own are but those that it was fitted to.
+    linear = problem.residuals(found.hypothesis.effects, None, found.end)
+    foretold = sum(float((r * r).sum()) for r in linear) + prior_cost(found.hypothesis)
+    whole = recentre(problem, found, temper)
+    start, way, sizes = here.vector(), whole.vector() - here.vector(), problem.sizes
     for share in _SHARES:
-        other = recentre(problem, found, temper, share)
+        other = whole.at(start + share * way)
+        _move(problem, _between(before, sizes, share))
         now = _cost(problem, other, found.end, staying)
         if now < cost:
-            return other, now
-        _move(problem, before)
-    return best, cost
+            return other, now, (cost - now) / max(cost - foretold, 1e-300)
+    _move(problem, before)
+    return here, cost, 0.0
+
+
+def _between(
+    before: Mapping[str, FloatArray], after: Mapping[str, FloatArray], share: float
+) -> dict[str, FloatArray]:
+    """Numbers on the way from where they were, or from where they are stated."""
+    return {
+        n: share * v + (1.0 - share) * before.get(n, np.zeros_like(v)) for n, v in after.items()
+    }
 
 
 def _cost(problem: Problem, hypothesis: Hypothesis, end: float | None, staying: Marginal) -> float:
@@ -298,14 +330,13 @@ def _cost(problem: Problem, hypothesis: Hypothesis, end: float | None, staying: 
     return left + held + prior_cost(hypothesis)
 
 
-def recentre(problem: Problem, found: Fit, temper: float = 1.0, share: float = 1.0) -> Hypothesis:
+def recentre(problem: Problem, found: Fit, temper: float = 1.0) -> Hypothesis:
     """Move the inexact numbers to where the records have them, the slopes being kept.
 
     Args:
         problem: what is changed.
         found: a fit.
         temper: variance of what the residuals hold beside the inexact numbers, 1 for noise.
-        share: of the way there.
 
     Returns:
         the fit's hypothesis, less what its unknowns had taken up of what was moved.
@@ -320,9 +351,7 @@ def recentre(problem: Problem, found: Fit, temper: float = 1.0, share: float = 1
     for name, size in sizes.items():
         # A pose's geometry takes long to find, and its small errors act in proportion.
         stays = np.array([what.where == POSE for what in marginal.slopes[name].what])
-        there = np.where(stays, 0.0, np.clip(size, -_FARTHEST, _FARTHEST))
-        here = problem.sizes.get(name, np.zeros_like(there))
-        new[name] = here + share * (there - here)
+        new[name] = np.where(stays, 0.0, np.clip(size, -_FARTHEST, _FARTHEST))
     own = marginal.slopes[names[0]].own
     change = new[names[0]][own:]
     if names[0] in problem.sizes:
