@@ -199,12 +199,11 @@ def test_a_world_that_is_a_little_wrong_leaves_noise(wrong_everywhere):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", ["ur10", "fanuc_r2000ic", "kinova_gen3"])
-def test_a_world_of_six_joints_leaves_noise(robot):
+def test_a_world_of_six_joints_leaves_noise():
     """Fast wrists tell a centre of mass to the second order, and lead slopes far astray."""
-    case = {"robot": robot, "kind": "null", "snr": 40, "draw": 0, "mismatch": 1.0}
+    case = {"robot": "ur10", "kind": "null", "snr": 40, "draw": 0, "mismatch": 1.0}
     campaign, _ = trial.make(case)
-    problem = Problem(picchio.load_robot(robot), campaign)
+    problem = Problem(picchio.load_robot("ur10"), campaign)
     start = Hypothesis.baseline(problem.robot, campaign.tolerance)
     with one_thread():
         raw = fit_growing(problem, start)
@@ -230,6 +229,9 @@ def test_a_remainder_counts_by_its_power():
     assert not large.within_tolerance
     assert not Remainder(4e3, 1e8).may_be_named(Remainder(1e4, 1e8))
     assert not Remainder(6e3, 1e8).may_be_partial(Remainder(1e4, 1e8))
+    # A time of its own for every blow follows much of whatever disturbs them.
+    assert Remainder(2e3, 1e8).may_be_partial(Remainder(1e4, 1e8))
+    assert not Remainder(2e3, 1e8).may_be_partial(Remainder(1e4, 1e8), follows=True)
 
 
 @pytest.mark.slow

@@ -73,7 +73,9 @@ def may_be_partial(
     """
     mostly = explained is not None and explained >= MOSTLY
     if left is not None:
-        mostly = left[1].may_be_partial(left[0])
+        latents = [effect_class(cause.effect).latent for cause in causes]
+        follows = any(latent is not None and latent.times for latent in latents)
+        mostly = left[1].may_be_partial(left[0], follows)
     return mostly and all(c.confidence >= BEYOND_DOUBT and not _is_nothing(c) for c in causes)
 
 

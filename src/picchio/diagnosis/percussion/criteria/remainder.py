@@ -77,13 +77,15 @@ class Remainder:
         """
         return self.within_tolerance and self.share_of(before) <= _NAMED
 
-    def may_be_partial(self, before: Remainder) -> bool:
+    def may_be_partial(self, before: Remainder, follows: bool = False) -> bool:
         """Whether causes that leave this may be claimed in part.
 
         Args:
             before: what was left without them.
+            follows: whether one of them has a number for every blow: those follow much of whatever
+                disturbs the blows, so that no more may be left than of a cause that is named.
         """
-        return self.share_of(before) <= _PARTIAL
+        return self.share_of(before) <= (_NAMED if follows else _PARTIAL)
 
 
 def allowed(problem: Problem) -> bool:
