@@ -9,7 +9,7 @@ T = TypeVar("T")
 
 
 class Recent(Generic[T]):
-    """The last few results of an expensive computation; the oldest is dropped first.
+    """The last few results of an expensive computation; what was not asked for longest goes first.
 
     Args:
         most: how many results are kept.
@@ -27,10 +27,9 @@ class Recent(Generic[T]):
             make: computes it.
         """
         try:
-            return self._made[key]
+            made = self._made.pop(key)
         except KeyError:
-            pass
-        made = make()
+            made = make()
         while len(self._made) >= self._most:
             self._made.pop(next(iter(self._made)), None)
         self._made[key] = made
