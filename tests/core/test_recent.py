@@ -5,7 +5,7 @@ import pytest
 from picchio.core.recent import Recent
 
 
-def test_what_was_made_first_goes_first():
+def test_what_was_not_asked_for_longest_goes_first():
     made = []
     kept = Recent(2)
 
@@ -15,10 +15,11 @@ def test_what_was_made_first_goes_first():
     assert get("a", 1) == 1 and get("b", None) is None
     assert get("a", 2) == 1 and get("b", 3) is None
     assert made == ["a", "b"]
+    assert get("a", 3) == 1
     get("c")
-    assert get("a", 4) == 4  # was made first, and had gone
-    assert get("c", 5) == "x"
-    assert made == ["a", "b", "c", "a"]
+    assert get("a", 4) == 1  # was made first, and asked for since
+    assert get("b", 5) == 5  # had gone
+    assert made == ["a", "b", "c", "b"]
 
 
 def test_what_fails_is_not_kept():
