@@ -175,10 +175,14 @@ def test_slopes_about_moved_numbers_are_what_differences_are(wrong_everywhere):
             size = sizes[one.name][1] + step
             return residual_under(record, model, *nudged(record, [*there, (one, size)]), end)
 
-        for one, column in zip(slopes.what, np.moveaxis(slopes.columns, -1, 0), strict=True):
-            if one.each_blow or one.where == "pose":
+        blow = 0  # of a number that every blow has: each by itself, or a force seems to drift
+        for k, one in enumerate(slopes.what):
+            blow = blow + 1 if k and slopes.what[k - 1] is one else 0
+            if one.where == "pose":
                 continue
-            expected = (moved(one, 0.02) - moved(one, -0.02)) / 0.04
+            column = slopes.columns[:, :, k]
+            step = 0.02 * np.eye(len(sizes[one.name][1]))[blow]
+            expected = (moved(one, step) - moved(one, -step)) / 0.04
             apart = np.linalg.norm(column - expected)
             assert apart < 0.05 * np.linalg.norm(expected) + 0.05, one.name
 

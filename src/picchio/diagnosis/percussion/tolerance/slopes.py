@@ -85,8 +85,8 @@ def all_slopes(
         problem: data and noise, and where its inexact numbers are now.
         effects: of the model.
         end: s, up to when; None for whole records.
-        both: whether the structure is moved either way, and every blow by itself: slopes are then
-            exact to the second order.
+        both: whether the structure is moved either way: its slopes are then exact to the second
+            order.
 
     Returns:
         by the record's name.
@@ -185,17 +185,15 @@ def _number_by_number(
             if index not in turned:
                 turned[index] = (
                     sigma,
-                    _columns(
-                        problem, record, effects, about[True][1], one, about[True][0], end, both
-                    ),
+                    _columns(problem, record, effects, about[True][1], one, about[True][0], end),
                 )
             known, columns = turned[index]
             yield [sigma / known * column for column in columns]
             continue
         there, base = about[False]
-        ahead = _columns(problem, record, effects, base, one, there, end, both)
+        ahead = _columns(problem, record, effects, base, one, there, end)
         if both and one.where == "structure":
-            behind = _columns(problem, record, effects, base, one, there, end, both, -1.0)
+            behind = _columns(problem, record, effects, base, one, there, end, -1.0)
             ahead = [0.5 * (a + b) for a, b in zip(ahead, behind, strict=True)]
         yield ahead
     if not every:
@@ -259,7 +257,6 @@ def _columns(
     one: Inexact,
     here: Mapping[str, tuple[Inexact, FloatArray]],
     end: float | None,
-    exact: bool,
     way: float = 1.0,
 ) -> list[FloatArray]:
     """The change of the residual (channels, m): of every blow, where each has its own number."""
@@ -272,10 +269,9 @@ def _columns(
         moved = attempt(one.name, lambda: _moved_residual(problem, record, effects, there, end))
         return np.zeros_like(base) if moved is None else (moved - base) / step
 
-    if not one.each_blow:
-        return [change(0)]
-    starts = _starts(record)
-    return [change(k) for k in range(len(starts))] if exact else _every_blow(record, change(0))
+    # Each blow by itself: the first one's change, moved to the others, falls between samples, and
+    # the little that is then wrong of all of them alike passes for a force that drifts.
+    return [change(k) for k in range(len(_starts(record)) if one.each_blow else 1)]
 
 
 def _moved_residual(
@@ -287,17 +283,6 @@ def _moved_residual(
 ) -> FloatArray:
     there, more = nudged(record, list(sizes))
     return residual_under(record, problem.model.with_effects(effects), there, more, end)
-
-
-def _every_blow(record: MeasuredRecord, first: FloatArray) -> list[FloatArray]:
-    """The first blow's change, moved to every blow: the answer to a blow is nearly its own."""
-    found = []
-    samples = np.arange(first.shape[1], dtype=float)
-    starts = _starts(record)
-    for start in starts:
-        shift = (start - starts[0]) / record.setup.samples.step
-        found.append(np.array([np.interp(samples - shift, samples, row, left=0) for row in first]))
-    return found
 
 
 def _starts(record: MeasuredRecord) -> list[float]:
