@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
@@ -10,14 +11,13 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.recent import Recent
 from picchio.model.expansion import Bent, Inertia, Motion, WideChain
-from picchio.robot.dynamics.rigid_model import Mass
 from picchio.robot.flexible_robot import FlexibleRobot
 
 if TYPE_CHECKING:
     from picchio.model.plant import Plant
 
-# How many sums of inertias are kept: those of a robot with many small masses, each tried in turn.
-_KEPT_TOTALS = 512
+# Of which sets of masses the inertias are kept side by side: weights change more often than they.
+_KEPT_STACKS = 8
 _KEPT_PLANTS = 256
 _KEPT_BESIDE = 32
 
@@ -35,7 +35,7 @@ class Geometry:
         self.pose = pose
         self._inertias: dict[object, Inertia] = {}
         self._motions: dict[object, Motion] = {}
-        self._totals: Recent[Inertia] = Recent(_KEPT_TOTALS)
+        self._stacks: Recent[dict[str, FloatArray]] = Recent(_KEPT_STACKS)
         # Records of one pose share theirs.
         self.plants: Recent[Plant] = Recent(_KEPT_PLANTS)
         self._beside: Recent[Geometry] = Recent(_KEPT_BESIDE)
@@ -89,28 +89,29 @@ class Geometry:
             return self
         return self._bent.get(bent, lambda: Geometry(self.chain.bending(bent), self.pose))
 
-    def total(self, masses: tuple[Mass, ...], taken: tuple[int, ...]) -> Inertia:
+    def total(
+        self, masses: Mapping[tuple[str, tuple[float, ...] | None], float], taken: tuple[int, ...]
+    ) -> Inertia:
         """The weighted sum of inertias, of some of the coordinates.
 
         Args:
-            masses: (weight, link or "robot", point) each.
+            masses: weight of (link or "robot", point) each.
             taken: which coordinates of the chain.
         """
+        every = tuple(masses)
 
-        def make() -> Inertia:
-            (weight, what, point), before = masses[-1], masses[:-1]
-            part = self.inertia(what, point)
-            # One more mass is often tried beside many that stay.
-            rest = self.total(before, taken) if before else None
+        def make() -> dict[str, FloatArray]:
+            parts = [self.inertia(what, point) for what, point in every]
+            return {
+                f.name: np.stack([
+                    own[np.ix_(*[taken] * own.ndim)] for own in (getattr(p, f.name) for p in parts)
+                ])
+                for f in fields(Inertia)
+            }  # fmt: skip
 
-            def add(name: str) -> FloatArray:
-                own = getattr(part, name)
-                own = weight * own[np.ix_(*[taken] * own.ndim)]
-                return np.asarray(own if rest is None else getattr(rest, name) + own)
-
-            return Inertia(**{f.name: add(f.name) for f in fields(Inertia)})
-
-        return self._totals.get((masses, taken), make)
+        weights = np.array(list(masses.values()))
+        stacks = self._stacks.get((every, taken), make)
+        return Inertia(**{name: np.tensordot(weights, own, 1) for name, own in stacks.items()})
 
     def motion(self, frame: str, taken: tuple[int, ...] | None = None) -> Motion:
         """As `WideChain.motion`; a joint's name means the link that it carries.

@@ -10,6 +10,7 @@ Source: Wensing, Kim, Slotine, IEEE Robotics and Automation Letters 3(1), 2018.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 
@@ -59,6 +60,29 @@ def body(mass: float, centre: Sequence[float] | FloatArray, extent: Sequence[flo
     pseudo[:3, :3] = np.outer(centre, centre) + np.diag(extent)
     pseudo[:3, 3] = pseudo[3, :3] = centre
     return ten_numbers(mass * pseudo)
+
+
+def point(mass: float, place: Sequence[float] | FloatArray) -> FloatArray:
+    """The ten inertial numbers (10,) of a point mass.
+
+    Args:
+        mass: kg.
+        place: (3,) m, in the frame.
+    """
+    x, y, z = map(float, place)
+    own = (1.0, x, y, z, y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y)
+    return mass * np.array(own)
+
+
+def turning(moment: float, axis: FloatArray) -> FloatArray:
+    """The ten inertial numbers (10,) of what has no mass and turns about one axis only.
+
+    Args:
+        moment: kg m^2, about the axis.
+        axis: (3,) unit vector.
+    """
+    inertia = moment * np.outer(axis, axis)
+    return np.array([0.0, 0.0, 0.0, 0.0, *(inertia[i, j] for i, j in _INERTIA)])
 
 
 def in_frame(rotation: FloatArray, place: FloatArray) -> FloatArray:
@@ -111,8 +135,14 @@ def point_masses(ten: FloatArray, reach: float) -> list[tuple[float, tuple[float
     Returns:
         (kg, (3,) m) each.
     """
+    points, inverse = _ten_points(reach)
+    return list(zip((inverse @ ten).tolist(), points, strict=True))
+
+
+@cache
+def _ten_points(reach: float) -> tuple[list[tuple[float, ...]], FloatArray]:
+    """Where ten point masses stand, and what makes their kg of a body's ten numbers, (10, 10)."""
     x, y, z = reach * np.eye(3)
     points = np.array([0 * x, x, -x, y, -y, z, -z, x + y, x + z, y + z])
-    columns = np.column_stack([body(1.0, p, (0.0, 0.0, 0.0)) for p in points])
-    weights = np.linalg.solve(columns, ten)
-    return [(float(w), tuple(map(float, p))) for w, p in zip(weights, points, strict=True)]
+    columns = np.column_stack([point(1.0, p) for p in points])
+    return [tuple(p) for p in points.tolist()], np.linalg.inv(columns)

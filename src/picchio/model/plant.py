@@ -57,7 +57,7 @@ class Changes:
             and motor side alone, as if nothing else moved (0), or in between: where an effect
             lets something else yield, the two differ, and data can tell.
         force_offset: (3,) m, in the tool frame, from where the force is taken to act.
-        centres: (3,) m by which links' centres of mass were moved, along the links' own axes.
+        centres: (3,) m by which links' centres of mass were moved, in the links' frames.
         added_inertias: (coordinate, kg m^2) of inertias that move with a coordinate.
         coordinates: those of the wide chain that move, then those that effects add.
     """
@@ -81,7 +81,7 @@ class Changes:
         self.coordinates: list[str] = list(robot.flexible_names)
         self._motors: dict[str, str] = {}
         self._bent: dict[str, tuple[float, float]] = {}
-        self._masses: list[Mass] = [(1.0, "robot", None)]
+        self._masses: dict[tuple[str, tuple[float, ...] | None], float] = {("robot", None): 1.0}
         self.centres: dict[str, FloatArray] = {}
         self.added_inertias: list[tuple[str, float]] = []
         self._springs: list[_Spring] = []
@@ -108,7 +108,7 @@ class Changes:
 
     def add_mass(self, weight: float, link: str, point: tuple[float, ...] | None = None) -> None:
         """Add `weight` times a link's own inertia, or kg at a point (3,) m of it."""
-        self._masses.append((weight, link, point))
+        self._masses[link, point] = self._masses.get((link, point), 0.0) + weight
 
     def add_body(self, link: str, ten: FloatArray) -> None:
         """Add a body that is fixed in a link, as in `picchio.model.inertia`.
@@ -243,7 +243,7 @@ class Changes:
     @property
     def added_masses(self) -> tuple[Mass, ...]:
         """(weight, link, point) of every mass beside the robot's own."""
-        return tuple(self._masses[1:])
+        return tuple((weight, *of) for of, weight in self._masses.items())[1:]
 
 
 class Plant(Changes):
@@ -323,7 +323,7 @@ class Plant(Changes):
             out[np.ix_(*[wide] * values.ndim)] = values
             return out
 
-        inertia = geometry.total(tuple(self._masses), tuple(taken))
+        inertia = geometry.total(self._masses, tuple(taken))
         mass, gradient = among_all(inertia.mass), among_all(inertia.mass_gradient)
         gravity, curvature = np.zeros((size, size)), np.zeros((size, size, size))
         if self.gravity_stiffness:

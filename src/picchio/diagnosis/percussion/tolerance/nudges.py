@@ -23,12 +23,11 @@ from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
 from picchio.model.effects.effect import Effect, Where
 from picchio.model.geometry import Geometry
+from picchio.model.inertia import point, turning
 from picchio.model.plant import Changes
 from picchio.model.sensing import Sensors
 from picchio.robot.dynamics.rigid_model import symmetric
 
-# Half the distance, m, of the two points between which mass is moved to shift a centre of mass.
-_APART = 0.05
 # What moves less than this share of the arm's inertia is not told from nothing.
 _LIGHT = 1e-6
 # What a nudge changes that is no effect's: where the robot stands.
@@ -155,7 +154,6 @@ def _links(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterat
         if not any(_share(geometry, link, n) > _LIGHT for geometry in moving):
             continue
         com, axes, moments = principal(own)
-        ends = [[tuple(com + sign * _APART * axis) for sign in (1.0, -1.0)] for axis in axes.T]
 
         def heavier(plant: Changes, size: float, link: str = link) -> None:
             plant.add_mass(size * sigma.link_mass, link)
@@ -167,49 +165,20 @@ def _links(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterat
             def moved(plant: Changes, size: float, link: str = link, k: int = k,
                       mass: float = own.mass, centre: FloatArray = com,
                       axes: FloatArray = axes) -> None:  # fmt: skip
-                _move_centre(plant, link, mass, centre, axes, k, size * sigma.link_com)
+                before = centre + plant.centres.get(link, 0.0)
+                after = before + size * sigma.link_com * axes[:, k]
+                plant.centres[link] = after - centre
+                # Its inertia about it stays: only what its mass makes of where it is changes.
+                plant.add_body(link, point(mass, after) - point(mass, before))
 
-            def larger(plant: Changes, size: float, link: str = link, k: int = k,
-                       moment: float = moments[k], centre: FloatArray = com,
-                       ends: Sequence[Sequence[tuple[float, ...]]] = ends) -> None:  # fmt: skip
-                # Mass along the other two axes turns about this one; along this one it evens out
-                # what the others would have of it.
-                spread = size * sigma.link_inertia * moment / (4.0 * _APART**2)
-                for axis, pair in enumerate(ends):
-                    weight = -spread if axis == k else spread
-                    for end in pair:
-                        plant.add_mass(weight, link, end)
-                plant.add_mass(-2.0 * spread, link, tuple(centre))
+            turns = turning(moments[k], axes[:, k])
+
+            def larger(plant: Changes, size: float, link: str = link,
+                       turns: FloatArray = turns) -> None:  # fmt: skip
+                plant.add_body(link, size * sigma.link_inertia * turns)
 
             yield Inexact(f"link_com.{link}.{k + 1}", "link_com", True, "structure", moved)
             yield Inexact(f"link_inertia.{link}.{k + 1}", "link_inertia", True, "structure", larger)
-
-
-def _move_centre(
-    plant: Changes, link: str, mass: float, centre: FloatArray, axes: FloatArray, k: int, by: float
-) -> None:
-    """Move a link's centre of mass along one of its axes, m, its inertia about it as it was.
-
-    What is moved already counts: (b + d)(b + d)^T - b b^T of the second moments, by point masses
-    that stand where they always do, so that their own inertia need not be found anew.
-    """
-    before = plant.centres.get(link, np.zeros(3))
-    plant.centres[link] = before + by * np.eye(3)[k]
-    reach = _APART * axes.T
-
-    def add(weight: float, *at: FloatArray) -> None:
-        plant.add_mass(weight, link, tuple((centre + sum(at)).tolist()))
-
-    ahead = mass * by / (2.0 * _APART)
-    square = mass * by * (by + 2.0 * before[k]) / (2.0 * _APART**2)
-    crossed = mass * by * before / _APART**2
-    crossed[k] = 0.0
-    add(square + ahead - crossed.sum(), reach[k])
-    add(square - ahead, -reach[k])
-    add(crossed.sum() - 2.0 * square)
-    for j in np.flatnonzero(crossed):
-        add(crossed[j], reach[j], reach[k])
-        add(-crossed[j], reach[j])
 
 
 def principal(own: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
