@@ -40,3 +40,11 @@ def traces_in(page: str) -> list[dict[str, Any]]:
                 lines[line["name"]] = np.where(code == 65535, np.nan, values)
             found.append(trace | {"time": array(trace["time"]), "lines": lines})
     return found
+
+
+def until_drawn(page: Any) -> None:
+    """Wait until what came before is seen: a browser hands on moves of the mouse with the
+    next picture, and a busy machine draws few of them a second."""
+    page.evaluate("""async () => {
+      for (let i = 0; i < 3; i++) await new Promise(requestAnimationFrame);
+    }""")

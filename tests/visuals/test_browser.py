@@ -24,6 +24,8 @@ from picchio.visuals.report.page import plain_page
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.compare import compare_scene
 
+from .pages import until_drawn
+
 pytestmark = pytest.mark.slow
 
 BLOWS = PulseTrain(50.0, 0.040, 0.004)
@@ -33,7 +35,8 @@ SEEN = 24
 
 def picture(page: Any, keep: Path | None = None) -> np.ndarray:
     """The 3-D pane's pixels."""
-    page.wait_for_timeout(250)
+    until_drawn(page)
+    page.wait_for_timeout(150)
     content = page.locator("#pane").screenshot()
     if keep is not None:
         page.screenshot(path=str(keep))

@@ -11,6 +11,8 @@ from PIL import Image
 
 from picchio.cli.main import run
 
+from .pages import until_drawn
+
 
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -45,7 +47,8 @@ def test_a_map_can_be_turned_and_cut(open_page, drawn: Path, pictures) -> None:
     page.add_style_tag(content="#labels { display: none; }")
 
     def coloured() -> int:
-        page.wait_for_timeout(400)
+        until_drawn(page)
+        page.wait_for_timeout(150)
         image = Image.open(io.BytesIO(page.locator("#pane").screenshot())).convert("RGB")
         return int((np.ptp(np.asarray(image).astype(int), axis=2) > 60).sum())
 

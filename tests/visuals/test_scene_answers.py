@@ -14,6 +14,8 @@ from PIL import Image
 
 from picchio.visuals.scene.build import build_scene
 
+from .pages import until_drawn
+
 MOST = 3e6  # bytes
 
 # Where the middle of an item is seen, in pixels.
@@ -22,6 +24,7 @@ SEEN = """(chosen) => {
     .getBoundingClientRect();
   const { object } = made.filter(({ item }) => item.layer === chosen[0])[chosen[1]];
   object.updateWorldMatrix(true, false);
+  viewer.camera.updateMatrixWorld();  // the view may not have been drawn yet
   const at = new T.Box3().setFromObject(object).getCenter(new T.Vector3()).project(viewer.camera);
   return [box.left + ((at.x + 1) / 2) * box.width, box.top + ((1 - at.y) / 2) * box.height];
 }"""
@@ -85,7 +88,7 @@ def test_clicks_and_hovers_are_answered(open_page, scene, tmp_path: Path, pictur
     page.wait_for_selector("html[data-ready]", timeout=60_000)
     for layer in ("envelope", "worst", "robot"):
         page.locator(f"#layer-{layer}").set_checked(False)
-    page.wait_for_timeout(300)
+    until_drawn(page)
     at = page.evaluate(SEEN, ["rivets-1", 0])
     page.mouse.click(*at)
     assert page.locator("#card-title").inner_text() == "Rivet"
@@ -105,12 +108,12 @@ def test_clicks_and_hovers_are_answered(open_page, scene, tmp_path: Path, pictur
     page.locator("#layer-envelope").set_checked(True)
     page.locator("#joint").select_option(label="joint_2")
     page.locator("[data-view=x]").click()
-    page.wait_for_timeout(200)
+    until_drawn(page)
     x, y = page.evaluate(SEEN, ["envelope", 1])
     told = ""
     for aside in (18, 30, 45, 60):
         page.mouse.move(x + aside, y + aside)
-        page.wait_for_timeout(60)
+        until_drawn(page)
         if page.locator("#value").is_visible():
             told = page.locator("#value").inner_text()
             break
