@@ -1,17 +1,23 @@
 """What a difference leaves when unknowns, known so far, make up for it: against the closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import picchio
+from picchio.core.processes import one_thread
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.follow_up.next_measurement import _Proposal, _why
 from picchio.diagnosis.percussion.follow_up.records import possible_records
-from picchio.diagnosis.percussion.follow_up.separation import _left, _root, new_noise
+from picchio.diagnosis.percussion.follow_up.separation import Contest, _left, _root, new_noise
+from picchio.diagnosis.percussion.tolerance.linearise import about_another, beside, linearise
+from picchio.model.effects.blows.force_amplitude import ForceAmplitude
 from picchio.prediction.plan import Plan
 from picchio.prediction.simulation import simulate
+from worlds import campaign as worlds
 
 
 @pytest.fixture
@@ -100,3 +106,47 @@ def test_a_new_sensor_is_as_noisy_where_little_moves():
     assert "accelerometer.tool" not in found  # it is there, with a noise of its own
     both = np.sqrt(np.mean(rms[[still, moving]] ** 2))
     assert found["deflection"] == pytest.approx(0.01 * both, rel=1e-9)
+
+
+@pytest.fixture(scope="module")
+def wrong_everywhere():
+    """Records of an arm whose files are a little wrong, about a model that is off by a tenth."""
+    robot = picchio.load_robot("fanuc_like_3dof")
+    campaign, _ = worlds.make("fanuc_like_3dof", seed=4, records=4, mismatch=1.0)
+    problem = Problem(robot, campaign)
+    nominal = Hypothesis.baseline(robot, campaign.tolerance)
+    with one_thread():
+        linearise(problem, nominal, problem.records)
+        fits = [
+            fit(problem, hypothesis, None, None, iterations=3, with_jacobian=True)
+            for hypothesis in (nominal, nominal.plus(ForceAmplitude("tool", scale=1.1)))
+        ]
+    return problem, nominal, fits
+
+
+def test_one_more_record_has_the_slopes_that_it_would_have_among_the_others(wrong_everywhere):
+    problem, nominal, _ = wrong_everywhere
+    record = replace(problem.records[1], setup=replace(problem.records[1].setup, name="next"))
+    with about_another(problem), one_thread():
+        assert beside(problem, record, nominal) is None
+        own, its = (problem.marginal.slopes[r.name] for r in (problem.records[1], record))
+        assert [one.name for one in own.what] == [one.name for one in its.what]
+        scale = np.abs(own.columns).max(axis=(0, 1))
+        assert (np.abs(own.columns - its.columns).max(axis=(0, 1)) < 1e-3 * scale + 1e-3).all()
+    assert "next" not in problem.marginal.slopes
+
+
+def test_what_is_never_exact_makes_a_record_tell_less(wrong_everywhere):
+    """It failed before, untold: a record that was but thought of had no tolerances."""
+    problem, _, (best, harder) = wrong_everywhere
+    setup = next(iter(possible_records(problem, problem.records[0])))
+    contest = Contest(problem, best, [harder], new_noise(problem, [setup], best))
+    with one_thread():
+        found = contest.expected_rise(setup, "accelerometer", harder, best)
+        assert contest.expected_rise(setup, "accelerometer", best, best) < 0.1
+    read = [setup.predict(problem.model.with_effects(f.hypothesis.effects)) for f in (best, harder)]
+    bare = sum(
+        float((((read[1][name] - read[0][name]) / noise.std) ** 2).sum())
+        for name, noise in problem.noise.items()
+    )
+    assert 1.0 < found < 0.1 * bare, (found, bare)

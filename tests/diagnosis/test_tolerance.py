@@ -15,7 +15,11 @@ from picchio.campaign.tables import Tolerance
 from picchio.core.processes import one_thread
 from picchio.diagnosis.percussion.criteria.exceeded import exceeded
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
-from picchio.diagnosis.percussion.criteria.remainder import Remainder, decisive_gain
+from picchio.diagnosis.percussion.criteria.remainder import (
+    Remainder,
+    decisive_gain,
+    tempered_evidence,
+)
 from picchio.diagnosis.percussion.data.problem import Problem, residual_under
 from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing
@@ -74,6 +78,18 @@ def test_where_the_numbers_most_probably_are(dense):
     found = Marginal(slopes).estimated(parts, ["a", "b"])
     assert found["a"] == pytest.approx(np.r_[expected[:3], expected[5:]], abs=1e-10)
     assert found["b"] == pytest.approx(expected[3:], abs=1e-10)
+
+
+def test_beside_more_than_noise_the_numbers_stay_nearer(dense):
+    slopes, whole, residual, parts = dense
+    expected = -np.linalg.solve(50.0 * np.eye(9) + whole.T @ whole, whole.T @ residual)
+    found = Marginal(slopes).taken_up(parts, ["a", "b"], 50.0)
+    assert found.held == pytest.approx(expected @ expected, rel=1e-9)
+    left = np.concatenate([each.ravel() for each in found.left])
+    assert left == pytest.approx(residual + whole @ expected, abs=1e-9)
+    assert not found.is_absurd
+    far = [1e3 * part for part in parts]
+    assert Marginal(slopes).taken_up(far, ["a", "b"]).is_absurd
 
 
 @pytest.fixture(scope="module")
@@ -272,6 +288,37 @@ def test_a_better_fit_is_decisive_only_if_little_is_left_of_it():
     # What is known beforehand counts in full, whatever the remainder.
     assert decisive_gain(left(0.0, 90.0), left(0.0, 40.0)) == pytest.approx(50.0, abs=3.0)
     assert decisive_gain(left(0.0, 90.0), left(0.0)) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_numbers_that_are_absurdly_far_off_speak_for_no_model():
+    """A cause that leaves a tenth is not refuted by slopes, followed far beyond where they lead."""
+    rng = np.random.default_rng(3)
+    signal = 100.0 * np.sin(np.arange(1000.0))
+    records = tuple(
+        SimpleNamespace(pose=pose, values={"x": signal}, noise={"x": SimpleNamespace(std=1.0)})
+        for pose in range(6)
+    )
+    names = [str(pose) for pose in range(6)]
+    slope, other = np.linalg.qr(rng.normal(size=(1000, 2)))[0].T
+    what = (_number("own", False),)
+    marginal = Marginal({n: Slopes(what, 1, 10.0 * slope[None, :, None]) for n in names})
+
+    def left(along, beside):
+        """A fit that leaves so many deviations of what is not exact, and as much of something."""
+        noise = rng.normal(size=(6, 1, 1000))
+        raw = [10.0 * (along * slope + beside * other) + each for each in noise]
+        whitened, taken = marginal.whitened(raw, names), marginal.taken_up(raw, names)
+        cost = float(sum((rows**2).sum() for rows in whitened))
+        fit = Fit(SimpleNamespace(effects=()), whitened, None, cost, records, None, held=taken.held)
+
+        def taken_up(effects, records, temper):
+            return marginal.taken_up(raw, names, temper)
+
+        return fit, tempered_evidence(SimpleNamespace(taken_up=taken_up), fit), taken.is_absurd
+
+    nothing, before, _ = left(100.0, 300.0)
+    cause, after, absurd = left(150.0, 30.0)
+    assert absurd and decisive_gain(nothing, cause) < 0.0 < before - after
 
 
 @pytest.mark.slow

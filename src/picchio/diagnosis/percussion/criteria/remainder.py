@@ -24,6 +24,8 @@ ALLOWED = 0.01
 # Its usual size: the standard deviation of a half-normal distribution; and sizes to integrate over.
 USUAL = 0.005
 _SIZES = np.geomspace(1e-5, 10.0, 300)
+# Variances of what is left, in units of the noise's, beside which what is not exact is sought.
+_TEMPERS = np.geomspace(1.0, 1e6, 7)
 # Of the power of what the causes explain: what a named cause may leave, and a partial one.
 _NAMED = 0.1
 _PARTIAL = 0.5
@@ -112,24 +114,55 @@ def decisive_gain(without: Fit, found: Fit) -> float:
 
 
 def _evidence_against(found: Fit, with_held: bool) -> float:
-    """Minus twice the logarithm of the likelihood of what a fit leaves at each of its poses.
+    """Minus twice the logarithm of the likelihood of a fit, the remainder integrated out."""
+    costs = np.array([(residual**2).sum() for residual in found.residuals])
+    samples = np.array([residual.size for residual in found.residuals])
+    # What is known beforehand counts in full: no remainder makes it any likelier.
+    held = found.held if with_held and found.held is not None else 0.0
+    known = held + found.cost - float(costs.sum())
+    return known + _evidence_of_poses(found, costs - held * samples / samples.sum())
+
+
+def tempered_evidence(problem: Problem, found: Fit) -> float:
+    """As `decisive_gain` has it, where what is not exact would be absurdly far off.
+
+    It then comes no nearer to where it is stated than the remainder leaves it: the two are sought
+    together. That a model leaves less since slopes have been followed to where they say nothing
+    speaks neither for it nor against it.
+
+    Args:
+        problem: linearised about the fit.
+        found: the fit.
+
+    Returns:
+        minus twice the logarithm of the likelihood.
+    """
+    known = found.cost - found.chi_square
+    tried = []
+    for temper in _TEMPERS:
+        taken = problem.taken_up(found.hypothesis.effects, found.records, temper)
+        left = found.residuals if taken is None else taken.left
+        held = 0.0 if taken is None else taken.held
+        costs = np.array([(rows**2).sum() for rows in left])
+        tried.append(known + held + _evidence_of_poses(found, costs))
+    return min(tried)
+
+
+def _evidence_of_poses(found: Fit, costs: FloatArray) -> float:
+    """Minus twice the logarithm of the likelihood of what is left of records, (records,).
 
     A pose's share of the signal that is left is normal about nothing, its variance that of the
     remainder and of what noise leaves open; the remainder's size is half-normal.
     """
-    left: dict[int, FloatArray] = {}
-    for record, residual in zip(found.records, found.residuals, strict=True):
-        own = np.array([(residual**2).sum(), residual.size, signal_power([record])])
-        left[record.pose] = left.get(record.pose, np.zeros(3)) + own
-    cost, samples, signal = np.array(list(left.values())).T
-    # What is known beforehand counts in full: no remainder makes it any likelier.
-    held = found.held if with_held and found.held is not None else 0.0
-    known = held + found.cost - cost.sum()
-    cost = cost - held * samples / samples.sum()
+    by_pose: dict[int, FloatArray] = {}
+    for record, residual, left in zip(found.records, found.residuals, costs, strict=True):
+        own = np.array([left, residual.size, signal_power([record])])
+        by_pose[record.pose] = by_pose.get(record.pose, np.zeros(3)) + own
+    cost, samples, signal = np.array(list(by_pose.values())).T
     excess = np.maximum(cost - samples, 0.0) / signal
     variance = _SIZES**2 + (np.sqrt(2.0 * samples) / signal)[:, None]
     poses = (np.log(variance) + excess[:, None] / variance).sum(axis=0)
     # Even steps of the logarithm: a size counts by its density times itself.
     exponents = -0.5 * (poses + (_SIZES / USUAL) ** 2) + np.log(_SIZES)
     most = exponents.max()
-    return float(known - 2.0 * (most + np.log(np.exp(exponents - most).sum())))
+    return float(-2.0 * (most + np.log(np.exp(exponents - most).sum())))

@@ -29,7 +29,7 @@ from picchio.vibration.integration.integrate import Samples
 
 if TYPE_CHECKING:
     from picchio.diagnosis.percussion.fit.parallel import _Helpers
-    from picchio.diagnosis.percussion.tolerance.marginal import Marginal
+    from picchio.diagnosis.percussion.tolerance.marginal import Marginal, TakenUp
 
 # A sample this near a jump of the force, but not on it, holds neither side for sure: a sensor of
 # finite bandwidth smears a jump, and what keeps it from aliasing by about half a sample.
@@ -280,31 +280,29 @@ class Problem:
         names = [record.name for record in chosen]
         return self.marginal.whitened(found, names, (effect.label for effect in wanted))
 
-    def held(
-        self, effects: Iterable[Effect], records: Sequence[MeasuredRecord] | None = None
-    ) -> float | None:
-        """What it costs to have what is not exact where a model asks it to be.
+    def taken_up(
+        self,
+        effects: Iterable[Effect],
+        records: Sequence[MeasuredRecord] | None = None,
+        temper: float = 1.0,
+    ) -> TakenUp | None:
+        """Where a model asks what is not exact to be, and what that leaves.
 
         Args:
             effects: of the model.
             records: all where None.
+            temper: variance of what the residuals hold beside the inexact numbers, 1 for noise.
 
         Returns:
-            the sum of squares of their standard deviations; part of that of the residuals. None
-            where nothing is integrated out.
+            None where nothing is integrated out.
         """
         chosen = self.records if records is None else records
         if self.marginal is None or not chosen:
             return None
         wanted = tuple(effects)
-        names = [record.name for record in chosen]
         raw = self.unmarginalised(wanted, chosen)
-        found = self.marginal.estimated(raw, names, claimed=(e.label for e in wanted))
-        own = self.marginal.slopes[names[0]].own
-        shared = float((found[names[0]][own:] ** 2).sum())
-        return shared + sum(
-            float((found[n][: self.marginal.slopes[n].own] ** 2).sum()) for n in names
-        )
+        names = [record.name for record in chosen]
+        return self.marginal.taken_up(raw, names, temper, (e.label for e in wanted))
 
     def unmarginalised(
         self,

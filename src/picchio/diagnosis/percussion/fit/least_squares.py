@@ -194,7 +194,8 @@ def fit(
     if with_jacobian and problem.marginal is not None:
         unknown = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
         absorbed = problem.marginal.absorbed_covariance(unknown)
-    held = None if end is not None else problem.held(here.effects, chosen)
+    taken = None if end is not None else problem.taken_up(here.effects, chosen)
+    held = None if taken is None else taken.held
     return Fit(
         here, residuals, slopes if with_jacobian else None, cost, chosen, end, absorbed, held
     )

@@ -12,6 +12,7 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
+from picchio.diagnosis.percussion.tolerance.linearise import about_another, beside
 from picchio.measurement.noise.autoregression import AutoRegression
 from picchio.measurement.noise.level import Noise
 from picchio.prediction.percussion import PercussionSetup
@@ -107,18 +108,28 @@ class Contest:
             other: fitted to all records.
         """
         problem = self.problem
-        record = self._simulated(setup, sensor, true)
-        records = [*problem.records, record]
-        after = fit(problem, other.hypothesis, records, None, iterations=_TURNS)
-        # Samples near edges count as noise, whatever is true.
-        (own,) = problem.residuals(true.hypothesis.effects, [record])
-        return max(after.cost - other.cost - float((own**2).sum()), 0.0)
-
-    def _simulated(self, setup: PercussionSetup, sensor: str, true: Fit) -> MeasuredRecord:
-        problem = self.problem
         # Under a name of its own: what is known by the others' names is not asked for.
-        setup = replace(setup, name="next")
-        read = setup.predict(problem.model.with_effects(true.hypothesis.effects))
+        record = self._imagined(replace(setup, name="next"), sensor)
+        with about_another(problem):
+            moved = beside(problem, record, other.hypothesis)
+            there, more = (record, ()) if moved is None else (moved.record, moved.effects)
+            model = problem.model.with_effects((*true.hypothesis.effects, *more))
+            read = there.setup.predict(model)
+            record = replace(record, values={name: read[name] for name in record.values})
+            if moved is not None:
+                there = replace(there, values=record.values)
+                problem.moved = {**problem.moved, record.name: replace(moved, record=there)}
+                problem.renew()
+            records = [*problem.records, record]
+            after = fit(problem, other.hypothesis, records, None, iterations=_TURNS)
+            # Samples near edges count as noise, whatever is true.
+            own = _square(problem.residuals(true.hypothesis.effects, records))
+            own -= _square(problem.residuals(true.hypothesis.effects))
+            return max(after.cost - other.cost - own, 0.0)
+
+    def _imagined(self, setup: PercussionSetup, sensor: str) -> MeasuredRecord:
+        """A record that might be taken: nothing is read yet."""
+        problem = self.problem
         rate = 1.0 / setup.samples.step
         noise: dict[str, Noise] = {}
         for channel in setup.channels:
@@ -129,8 +140,12 @@ class Contest:
                 std = self.fresh[channel.group]
                 white = AutoRegression(np.zeros(0), std**2)
                 noise[channel.name] = Noise(channel.name, channel.unit, rate, std, 1.0, white)
-        values = {name: read[name] for name in noise}
+        values = dict.fromkeys(noise, np.zeros(setup.samples.count))
         return MeasuredRecord(setup, values, noise, problem.n_poses)
+
+
+def _square(residuals: Sequence[FloatArray]) -> float:
+    return float(sum((r * r).sum() for r in residuals))
 
 
 def _moves(

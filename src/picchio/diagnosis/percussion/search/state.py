@@ -8,7 +8,12 @@ from dataclasses import dataclass, field, replace
 
 from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.criteria.equivalence import bic
-from picchio.diagnosis.percussion.criteria.remainder import Remainder, allowed, decisive_gain
+from picchio.diagnosis.percussion.criteria.remainder import (
+    Remainder,
+    allowed,
+    decisive_gain,
+    tempered_evidence,
+)
 from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
@@ -137,26 +142,39 @@ class Search:
         gain = bic(without) - bic(found)
         if not allowed(self.problem):
             return gain
+        before = self._with_held_out(without)
         with about_another(self.problem, about):
             whole = attempt("records held out", lambda: self._with_held_out(found))
-        before = self._with_held_out(without)
-        if whole is None or len(whole.records) != len(before.records):
+        if whole is None or len(whole[0].records) != len(before[0].records):
             return min(gain, decisive_gain(without, found))
-        return min(gain, decisive_gain(before, whole))
+        if not (before[1] or whole[1]):
+            return min(gain, decisive_gain(before[0], whole[0]))
+        with about_another(self.problem, about):
+            after = tempered_evidence(self.problem, whole[0])
+        return min(gain, tempered_evidence(self.problem, before[0]) - after)
 
-    def _with_held_out(self, found: Fit) -> Fit:
-        """A fit with what it leaves of the records held out, where they can tell."""
-        if not self.kept or any(e.latent is not None for e in found.hypothesis.causes):
-            return found
-        left = self.problem.residuals(found.hypothesis.effects, self.kept)
-        return replace(
+    def _with_held_out(self, found: Fit) -> tuple[Fit, bool]:
+        """A fit with what it leaves of the records held out, where they can tell.
+
+        And whether what is not exact would be absurdly far off for it.
+        """
+        effects, kept = found.hypothesis.effects, self.kept
+        if any(e.latent is not None for e in found.hypothesis.causes):
+            kept = ()
+        taken = self.problem.taken_up(effects, (*found.records, *kept))
+        absurd = taken is not None and taken.is_absurd
+        if not kept:
+            return found, absurd
+        left = self.problem.residuals(effects, kept)
+        whole = replace(
             found,
-            records=(*found.records, *self.kept),
+            records=(*found.records, *kept),
             residuals=[*found.residuals, *left],
             jacobians=None,
-            held=self.problem.held(found.hypothesis.effects, (*found.records, *self.kept)),
+            held=None if taken is None else taken.held,
             cost=found.cost + float(sum((r * r).sum() for r in left)),
         )
+        return whole, absurd
 
     def explains_enough(self, found: Fit) -> bool:
         """Whether what a fit with causes leaves is no more than a remainder that is allowed.

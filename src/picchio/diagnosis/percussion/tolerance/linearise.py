@@ -22,7 +22,7 @@ from picchio.diagnosis.percussion.fit.least_squares import (
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.tolerance.marginal import Marginal
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, inexact, nudged
-from picchio.diagnosis.percussion.tolerance.slopes import Slopes, all_slopes
+from picchio.diagnosis.percussion.tolerance.slopes import Slopes, all_slopes, slopes_of
 
 # Numbers are moved by so many standard deviations at most.
 _FARTHEST = 3.5
@@ -39,8 +39,6 @@ _SETTLED = 0.002
 _ELSE = 3.0
 # What is not exact explains little where it leaves more than this share of chi-square.
 _LITTLE = 0.5
-# Standard deviations, root mean square, at which slopes say nothing any more.
-_ABSURD = 10.0
 # How far numbers are moved towards where slopes have them, until that is for the better.
 _SHARES = (1.0, 0.5, 0.2, 0.05)
 
@@ -80,6 +78,41 @@ def linearise(
     unknowns = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
     problem.marginal = Marginal(shared, dict(zip(unknowns, absorbed, strict=True)))
     _move(problem, problem.sizes)
+
+
+def beside(problem: Problem, record: MeasuredRecord, here: Hypothesis) -> Moved | None:
+    """Have what is never exact integrated out of one more record, which is not the campaign's.
+
+    Args:
+        problem: what is changed, until its slopes are taken anew or restored.
+        record: as it is stated; what its channels read does not matter.
+        here: the hypothesis.
+
+    Returns:
+        where its inexact numbers are taken to be; None where everything is exact, or as stated.
+    """
+    marginal = problem.marginal
+    if marginal is None:
+        return None
+    some = next(iter(marginal.slopes.values()))
+    slopes = slopes_of(problem, record, here.effects, some.what[some.own :])
+    problem.marginal = None
+    (raw,) = problem.unmarginalised(here.effects, [record])
+    (jacobian_of,) = jacobian(problem, here, [record], None, [raw], both=True)
+    taken = np.zeros((jacobian_of.shape[1], len(some.what) - some.own))
+    for k, u in enumerate(here.unknowns()):
+        taken[k] = marginal.absorbed.get((here.effects[u.effect].label, u.name), 0.0)
+    slopes.columns[:, :, slopes.own :] -= (jacobian_of @ taken).reshape(*raw.shape, -1)
+    problem.marginal = Marginal({**marginal.slopes, record.name: slopes}, marginal.absorbed)
+    if not problem.sizes:
+        return None
+    # What the campaign shares is where the campaign has it.
+    size = next(iter(problem.sizes.values()))[some.own :]
+    size = np.concatenate([np.zeros(slopes.own), size])
+    moved = Moved(*nudged(record, slopes.moved(size)), slopes.columns @ size)
+    problem.moved = {**problem.moved, record.name: moved}
+    problem.renew()
+    return moved
 
 
 def _without(
@@ -193,19 +226,13 @@ def _unless_little(problem: Problem, found: Fit) -> Fit:
     """
     with problem.set_aside():
         plain = fit(problem, found.hypothesis, found.records, None, with_jacobian=True)
-    if found.chi_square < _LITTLE * plain.chi_square and _size(problem, found) < _ABSURD:
+    taken = problem.taken_up(found.hypothesis.effects, found.records)
+    absurd = taken is not None and taken.is_absurd
+    if found.chi_square < _LITTLE * plain.chi_square and not absurd:
         return found
     _move(problem, {})
     problem.marginal = None
     return plain
-
-
-def _size(problem: Problem, found: Fit) -> float:
-    """How far off what is not exact would be, all of it: root mean square, standard deviations."""
-    assert problem.marginal is not None
-    raw = problem.unmarginalised(found.hypothesis.effects, found.records, found.end)
-    sizes = problem.marginal.estimated(raw, [record.name for record in found.records])
-    return math.sqrt(float(np.mean(np.concatenate(list(sizes.values())) ** 2)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,8 @@ from picchio.diagnosis.percussion.tolerance.slopes import Slopes
 _KEPT = 24
 # A number of which the records know less than this share is not told from where it is stated.
 _UNKNOWN = 0.02
+# Standard deviations, root mean square, at which slopes say nothing any more.
+ABSURD = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +41,29 @@ class _Own:
     inverse: FloatArray
     cross: FloatArray
     shared: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class TakenUp:
+    """Where what is not exact is taken to be, for the sake of some residuals.
+
+    Attributes:
+        numbers: all of it, standard deviations.
+        left: what the residuals are then, (channels, m) a record, in units of the noise.
+    """
+
+    numbers: FloatArray
+    left: list[FloatArray]
+
+    @property
+    def held(self) -> float:
+        """What that costs: minus twice the logarithm of its density."""
+        return float((self.numbers**2).sum())
+
+    @property
+    def is_absurd(self) -> bool:
+        """Whether it is so far off, as a whole, that slopes say nothing any more."""
+        return self.held > ABSURD**2 * self.numbers.size
 
 
 class Marginal:
@@ -145,6 +170,30 @@ class Marginal:
             (columns,) of each record.
         """
         return self._estimated(residuals, names, temper, frozenset(claimed))[0]
+
+    def taken_up(
+        self,
+        residuals: Sequence[FloatArray],
+        names: Sequence[str],
+        temper: float = 1.0,
+        claimed: Iterable[str] = (),
+    ) -> TakenUp:
+        """How far off what is not exact most probably is, and what it leaves of the residuals.
+
+        Args:
+            residuals: (channels, m) in units of the noise alone.
+            names: of their records.
+            temper: as in `estimated`.
+            claimed: as in `estimated`.
+        """
+        found = self.estimated(residuals, names, temper, claimed)
+        own = self.slopes[names[0]].own
+        numbers = [found[names[0]][own:], *(found[n][: self.slopes[n].own] for n in names)]
+        left = [
+            rows + self.slopes[name].columns[:, : rows.shape[1]] @ found[name]
+            for name, rows in zip(names, residuals, strict=True)
+        ]
+        return TakenUp(np.concatenate(numbers), left)
 
     def shared_estimate(
         self,

@@ -134,7 +134,8 @@ def inexact(problem: Problem, record: MeasuredRecord, tolerance: Tolerance) -> l
     makers = (_links, _poses, _modes, _gravity, _tool_points, _directions, _blows, _sensors)
     # What is drawn once a pose is taken to be drawn anew in each of its records, and so much wider
     # that together they say no more than one.
-    alike = math.sqrt(sum(other.pose == record.pose for other in problem.records))
+    together = sum(other.pose == record.pose for other in problem.records)
+    alike = math.sqrt(max(together, 1))
     wider = {key: alike * getattr(tolerance, key) for key in _ONCE_A_POSE}
     tolerance = tolerance.model_copy(update=wider)
     found = [one for make in makers for one in make(problem, record, tolerance)]

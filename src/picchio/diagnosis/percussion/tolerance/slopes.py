@@ -120,6 +120,37 @@ def all_slopes(
     return slopes
 
 
+def slopes_of(
+    problem: Problem, record: MeasuredRecord, effects: Sequence[Effect], shared: Sequence[Inexact]
+) -> Slopes:
+    """The slopes of one more record, which is not one of the campaign's.
+
+    Args:
+        problem: data and noise.
+        record: as it is stated.
+        effects: of the model.
+        shared: what the campaign shares, in the order of its slopes. What the record would share
+            beside that, such as the gain of a sensor that is new, is its own.
+    """
+    names = {one.name for one in shared}
+    every = [
+        replace(one, once=one.name in names)
+        for one in inexact(problem, record, problem.campaign.tolerance)
+        if one.name not in problem.idle
+    ]
+    (columns,) = _of_records(problem, [record], tuple(effects), {record.name: every}, None, False)
+    blows = len(_starts(record))
+    what = [one for one in every for _ in range(blows if one.each_blow else 1)]
+    own = [k for k, one in enumerate(what) if not one.once]
+    order = {one.name: k for k, one in enumerate(what) if one.once}
+    together = np.zeros((*columns.shape[:2], len(own) + len(shared)), columns.dtype)
+    together[:, :, : len(own)] = columns[:, :, own]
+    for k, one in enumerate(shared, len(own)):
+        if one.name in order:
+            together[:, :, k] = columns[:, :, order[one.name]]
+    return Slopes((*(what[k] for k in own), *shared), len(own), together)
+
+
 def _idle(slopes: Iterable[Slopes]) -> frozenset[str]:
     """Names of what moves no record by as much as counts."""
     power: dict[str, float] = {}
