@@ -4,7 +4,7 @@ import pytest
 
 from picchio.diagnosis.percussion.conclude.verdict import verdict_of, why_not_claimed
 from picchio.diagnosis.percussion.criteria.whiteness import BAND_LIMIT, Evidence, Level
-from picchio.diagnosis.result import Cause
+from picchio.diagnosis.result import Cause, Value
 
 
 def evidence(z):
@@ -50,3 +50,19 @@ def test_which_of_several_causes_is_doubted_is_said():
     assert "joint_0" not in why
     assert why_not_claimed(causes(0.999, 0.999), ()) == "" == why_not_claimed(causes(0.5), ())
     assert "all sensors" in why_not_claimed(causes(0.5, 0.5), COMMON)
+
+
+def test_a_single_cause_that_may_as_well_do_nothing_is_not_named():
+    def said(size, confidence, improbable):
+        value = Value(size, 0.025, "")
+        cause = [Cause("link_mass", "link_3", confidence, {"scale": value})]
+        verdict = verdict_of(cause, MORE, NOISE, False, 0.99, (), improbable=improbable)
+        return verdict, why_not_claimed(cause, (), improbable)
+
+    assert said(0.9, 0.96, False) == ("named", "")
+    verdict, why = said(0.98, 0.96, False)
+    assert verdict == "unexplained" and "without it" in why
+    # Nor one that is doubtful, where tolerances would have to be exceeded beside it.
+    verdict, why = said(0.9, 0.96, True)
+    assert verdict == "unexplained" and "tolerances" in why
+    assert said(0.9, 0.995, True) == ("named", "")

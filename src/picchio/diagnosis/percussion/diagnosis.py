@@ -233,7 +233,7 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
             same, refuted = _on_all_records(problem, whole, same)
         causes = fitted_causes(search, whole, rivals, refuted)
     common = common_faults(whole.hypothesis, reported_covariance(whole), problem.groups)
-    verdict = verdict_of(causes, before, after, bool(same), gain.explained, common, left)
+    verdict = verdict_of(causes, before, after, bool(same), gain.explained, common, left, beyond)
     remainder = held_out_remainder(problem, stands, judged)
     if verdict == "nothing-wrong" and (
         beyond or not (before.is_noise or remainder.within_tolerance)
@@ -248,7 +248,7 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         pairs = tuple(sorted(pair_of(label) for label in t.fit.hypothesis.labels))
         others.setdefault(pairs, t.fit.hypothesis)
     little = leaves_little(after, left)
-    note = why_not_claimed(causes, common) if little and verdict == "unexplained" else ""
+    note = why_not_claimed(causes, common, beyond) if little and verdict == "unexplained" else ""
     if verdict == "unexplained" and not causes and beyond and off is not None:
         note = off.told()
     leads: tuple[tuple[str, str], ...] = ()

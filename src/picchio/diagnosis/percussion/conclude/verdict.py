@@ -24,6 +24,7 @@ def verdict_of(
     explained: float | None,
     common: Sequence[str],
     left: BeforeAndAfter | None = None,
+    improbable: bool = False,
 ) -> Verdict:
     """The verdict.
 
@@ -36,6 +37,7 @@ def verdict_of(
         others_do_as_well: whether another set of causes explains as much.
         explained: share of the held-out excess.
         common: effects that all sensors, though of different kinds, would have alike.
+        improbable: whether tolerances would have to be exceeded even with the causes.
     """
     if not causes:
         little = before.is_noise or (left is not None and left[0].within_tolerance)
@@ -45,7 +47,7 @@ def verdict_of(
     if leaves_little(after, left):
         if others_do_as_well:
             return "ambiguous"
-        return "unexplained" if _doubted(causes) else "named"
+        return "unexplained" if _doubted(causes, improbable) else "named"
     if may_be_partial(causes, explained, left) and not others_do_as_well:
         return "partial"
     return "unexplained"
@@ -109,18 +111,21 @@ def _is_nothing(cause: Cause) -> bool:
     return bool(fitted) and all(near)
 
 
-def _doubted(causes: Sequence[Cause]) -> list[Cause]:
-    """Of several causes, those that are not beyond doubt.
+def _doubted(causes: Sequence[Cause], improbable: bool) -> list[Cause]:
+    """Of the causes, those that are not beyond doubt.
 
     Two or three effects of the catalogue together imitate a lot that it does not have; the last of
-    them is then hardly needed. That a single one leaves noise is another matter.
+    them is then hardly needed. That a single one leaves noise is another matter, unless tolerances
+    would have to be exceeded beside it, or it is as near to nothing as it is unsure.
     """
-    if len(causes) < 2:
-        return []
+    if len(causes) < 2 and not improbable:
+        return [cause for cause in causes if _is_nothing(cause)]
     return [cause for cause in causes if cause.confidence < BEYOND_DOUBT]
 
 
-def why_not_claimed(causes: Sequence[Cause], common: Sequence[str]) -> str:
+def why_not_claimed(
+    causes: Sequence[Cause], common: Sequence[str], improbable: bool = False
+) -> str:
     """Why no cause is claimed though they leave noise."""
     if common:
         said = " and ".join(name.replace("_", " ") for name in common)
@@ -129,9 +134,17 @@ def why_not_claimed(causes: Sequence[Cause], common: Sequence[str]) -> str:
             "that are wrong but something before them, in the blows or in the clock that starts "
             "the records, which no known cause describes; a force sensor at the tool would tell"
         )
-    doubted = _doubted(causes)
+    doubted = _doubted(causes, improbable)
     if not doubted:
         return ""
+    if len(causes) == 1:
+        name, target = causes[0].effect.replace("_", " "), causes[0].target
+        why = (
+            "tolerances would still have to be exceeded several times"
+            if improbable
+            else "its value may as well be that of a robot without it"
+        )
+        return f"{name} ({target}) leaves nothing but noise, but {why}"
     said = " and ".join(
         f"{cause.effect.replace('_', ' ')} ({cause.target}, confidence {cause.confidence:.2f})"
         for cause in doubted
