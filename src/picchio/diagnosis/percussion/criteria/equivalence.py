@@ -47,7 +47,8 @@ def confidence(better: Fit, other: Fit) -> float:
     """That a fit is better than another one of the same records.
 
     From the differences of the poses' scores and their spread (Student's t). A single pose has no
-    spread: what it says counts only where it decides beyond doubt on its own.
+    spread: what it says counts only where it decides beyond doubt on its own. What is known
+    beforehand of fitted numbers, such as a tolerance, belongs to no pose: all have a share of it.
 
     Args:
         better: the one with less left.
@@ -59,6 +60,8 @@ def confidence(better: Fit, other: Fit) -> float:
     difference = np.zeros(len(poses))
     for record, a, b in zip(better.records, better.residuals, other.residuals, strict=True):
         difference[poses.index(record.pose)] += float((b * b).sum() - (a * a).sum())
+    known = (other.cost - other.chi_square) - (better.cost - better.chi_square)
+    difference += known / len(poses)
     if len(poses) < 2:
         return 1.0 if difference.sum() > _DECISIVE else 0.5
     # A pose that decides beyond doubt on its own counts as one: how far beyond says nothing.
