@@ -15,6 +15,14 @@ import pytest
 # pytest-xdist gives its workers a width of 80 columns; tests that want one set it.
 os.environ.pop("COLUMNS", None)
 
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # Every core has a worker of its own: threads of linear algebra would only wait for each other,
+    # and what takes 10 s takes minutes.
+    import scipy.linalg  # noqa: F401  # a library that is not loaded yet cannot be limited
+    from threadpoolctl import threadpool_limits
+
+    threadpool_limits(1, user_api="blas")
+
 ROOT = Path(__file__).resolve().parent.parent
 NO_DATA = "no measured data here: "
 _skipped: list[str] = []

@@ -10,6 +10,7 @@ import numpy as np
 
 from picchio.campaign.campaign import Campaign
 from picchio.core.arrays import FloatArray
+from picchio.core.processes import one_thread
 from picchio.measurement.noise.autoregression import (
     AutoRegression,
     fit_autoregression,
@@ -189,6 +190,7 @@ def _model(pieces: list[Piece]) -> AutoRegression:
     )
 
 
+@one_thread()
 def noise_levels(campaign: Campaign) -> dict[str, Noise]:
     """The noise of every channel, estimated from the records themselves.
 
