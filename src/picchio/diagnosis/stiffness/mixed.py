@@ -39,8 +39,8 @@ class ByBoth(Method):
     """Springs and damping from static loadings and frequency response functions together."""
 
     name = "static and frf"
-    kinds = frozenset({"static", "frf", "tap"})
-    needs_springs = frozenset({"static", "frf", "tap"})
+    kinds = frozenset({"static", "clamped", "frf", "tap"})
+    needs_springs = kinds
 
     def identify(
         self,
@@ -53,7 +53,7 @@ class ByBoth(Method):
         """The loadings first."""
 
         def of(static: bool) -> Campaign:
-            kept = tuple(r for r in campaign if (r.kind == "static") == static)
+            kept = tuple(r for r in campaign if (r.kind in ("static", "clamped")) == static)
             return replace(campaign, records=kept)
 
         loads = identify_static(robot, of(True), progress=progress)
@@ -132,8 +132,7 @@ class BothIdentification(Identification):
 
     def _headline(self) -> str:
         return (
-            f"{self._told()} told by {len(self.loads.lines)} loadings and "
-            f"{self.functions.fit.problem.rows} lines"
+            f"{self._told()} told by {self.loads.read} and {self.functions.fit.problem.rows} lines"
         )
 
 
