@@ -23,6 +23,8 @@ from picchio.diagnosis.identified import (
     Identification,
     IdentifiedJoint,
     Method,
+    ModeSeen,
+    PoseLeft,
 )
 from picchio.diagnosis.stiffness.frf import FrfIdentification, identify_frf
 from picchio.diagnosis.stiffness.joints import MOST_HALF
@@ -106,6 +108,14 @@ class BothIdentification(Identification):
     def compared(self) -> list[Compared]:
         """Those of both."""
         return [*self.loads.compared(), *self.functions.compared()]
+
+    def modes(self) -> list[ModeSeen]:
+        """Those of the functions."""
+        return self.functions.modes()
+
+    def by_pose(self) -> list[PoseLeft]:
+        """Those of both."""
+        return [*self.loads.by_pose(), *self.functions.by_pose()]
 
     def sidecar_text(self) -> str:
         """See `Identification`: spreads and correlations after both."""

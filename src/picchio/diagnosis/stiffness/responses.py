@@ -301,6 +301,22 @@ class FrfProblem:
         between = weighted * (2.0 * own * np.sqrt(squared))[..., None, :]
         return np.asarray(between @ weighted.swapaxes(-1, -2))
 
+    def ratio_of(self, at: FloatArray, standing: Standing, mode: int) -> float:
+        """The damping ratio of a mode of a pose.
+
+        Args:
+            at: (2 n,) the numbers; all others held.
+            standing: the pose.
+            mode: its number, by ascending frequency.
+        """
+        n = self.joints
+        springs = standing.spring * np.exp(at[:n])
+        ratio = self.damping_ratio * np.exp(at[n : 2 * n])
+        damp = self.damping(standing.mass, springs, ratio, standing.factors)
+        squared, shapes = natural(self, standing, springs)
+        own = shapes[:, mode]
+        return float(own @ damp @ own / (2.0 * np.sqrt(squared[mode])))
+
     def predict(self, at: FloatArray, known: Sequence[Predicted] | None = None) -> list[Predicted]:
         """The real and imaginary parts over the lines' scale, measured less predicted.
 

@@ -21,6 +21,7 @@ from picchio.diagnosis.identified import (
     Identified,
     IdentifiedJoint,
     Method,
+    PoseLeft,
 )
 from picchio.diagnosis.result import Cause, Value
 from picchio.diagnosis.stiffness.fit import Problem
@@ -185,6 +186,32 @@ class StaticIdentification(Identification):
                 ))  # fmt: skip
         return found
 
+    def by_pose(self) -> list[PoseLeft]:
+        """Pose by pose, the instruments together, each alike; a press by its record."""
+        fit, found = self.answer.fit, []
+        for record, table, part in zip(
+            self.campaign, fit.problem.tables, fit.problem.predict(fit.mean), strict=True
+        ):
+            if isinstance(table, Press):
+                shares = [one.left for one in _pressed(table, table.values - part.residual)]
+                found.append(PoseLeft(record.file, len(shares), _rms(shares)))
+                continue
+            poses = np.column_stack([*read_loadings(record).pose.values()])
+            _, which = np.unique(poses, axis=0, return_inverse=True)
+            for number in dict.fromkeys(which.ravel().tolist()):
+                rows = np.flatnonzero(which.ravel() == number)
+                of = [np.array([g == group for g in table.groups]) for group in set(table.groups)]
+                shares = [
+                    float(np.linalg.norm(part.residual[rows][:, one]))
+                    / max(float(np.linalg.norm(table.values[rows][:, one])), 1e-300)
+                    for one in of
+                ]
+                lines = rows + record.source.first_row
+                many = f" to {lines[-1]}" if len(lines) > 1 else ""
+                where = f"{record.file} {record.source.row_word} {lines[0]}{many}"
+                found.append(PoseLeft(where, len(rows), _rms(shares)))
+        return found
+
     def sidecar_text(self) -> str:
         """See `Identification`; a joint that is not told has a wide spread."""
         return sidecar(
@@ -312,6 +339,10 @@ def identify_static(
     return StaticIdentification(robot, source, joints, campaign, answer, told.half, lines)
 
 
+def _rms(shares: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(shares)))) if shares else 0.0
+
+
 def _told(robot: FlexibleRobot, answer: Answer, lines: tuple[str, ...],
           shadowed: Sequence[tuple[Suspect, int | None]]) -> Told:  # fmt: skip
     fit, n = answer.fit, answer.fit.problem.joints
@@ -372,7 +403,7 @@ def _pressed(table: Press, fitted: FloatArray) -> list[Compared]:
         found.append(Compared(
             f"{table.file}: {table.names[k]}", "motor's turn [mrad]", "torque [N m]",
             1e3 * table.turn[:, k], torque, torque - left, np.full(len(left), left.std()), share,
-            False,
+            True,
         ))  # fmt: skip
     return found
 
