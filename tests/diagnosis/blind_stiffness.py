@@ -106,6 +106,22 @@ def tap_campaign(world) -> Campaign:
     return Campaign.from_records(records, robot=world.robot)
 
 
+def press_campaign(world) -> Campaign:
+    """The world's presses as a campaign, a record each."""
+    records = [
+        Record.from_arrays(f"p{k}.csv", held["time"],
+                           {name: x for name, x in held.items() if name != "time"},
+                           kind="clamped", **table)
+        for k, (held, table) in enumerate(world.records)
+    ]  # fmt: skip
+    return Campaign.from_records(records, robot=world.robot)
+
+
+def press_trial(worlds, count: int, first: int = 0) -> tuple[list, list]:
+    """So many campaigns of motors that press; of damping they say nothing."""
+    return _trial(worlds.draw, press_campaign, count, first, SIZES)
+
+
 def frf_trial(worlds, count: int, first: int = 0, sizes=SIZES) -> tuple[list, list]:
     """So many campaigns; stiffness, and damping ratios, judged alike."""
     return _trial(worlds.draw, frf_campaign, count, first, sizes)
@@ -122,10 +138,10 @@ def _trial(draw, campaign_of, count, first, sizes) -> tuple[list, list]:
         world = draw(sizes[seed % len(sizes)], seed)
         found = picchio.identify(world.robot, campaign_of(world))
         for k, joint in enumerate(found.joints):
-            for kind, one, truth in (
-                (stiffness, joint.stiffness, world.truth[k]),
-                (damping, joint.damping_ratio, world.damping[k]),
-            ):
+            pairs = [(stiffness, joint.stiffness, world.truth[k])]
+            if hasattr(world, "damping"):
+                pairs.append((damping, joint.damping_ratio, world.damping[k]))
+            for kind, one, truth in pairs:
                 kind.append(Judged(
                     world.robot, joint.name, seed, math.log(one.value / truth),
                     math.log(one.high / one.low) / (2.0 * 1.645), one.told,

@@ -81,7 +81,17 @@ def test_both_kinds_tell_more_than_one(worlds, tmp_path):
         left = np.linalg.norm(one.measured - one.fitted) / np.linalg.norm(one.measured)
         assert left < 0.25 and one.left < 0.25
     page = picchio.report(found, warnings=["a < b"]).html()
-    assert page.count("<svg") == 5 and "a &lt; b" in page
+    modes = found.modes()
+    assert page.count("<svg") == 5 + len(modes) and "a &lt; b" in page
+    assert 2 <= len(modes) <= 6
+    for mode in modes:
+        assert mode.mac > 0.9 and abs(mode.fitted / mode.measured - 1.0) < 0.05
+        assert np.abs(mode.shape).max() == pytest.approx(1.0)
+    functions = [one for one in compared if one.coherence is not None]
+    assert len(functions) == 4 and all(one.coherence.max() <= 1.0 for one in functions)
+    poses = found.by_pose()
+    assert sum(one.readings for one in poses if one.where.startswith("loads.csv")) == 15
+    assert sum(one.readings for one in poses if one.where.startswith("pose")) == 4
     for joint in found.joints:
         assert joint.name in page
 

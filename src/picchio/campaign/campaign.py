@@ -135,8 +135,8 @@ class Campaign:
         columns = ("record", "kind", "force along", "channels")
         return sheet(f"Campaign of {len(rows)} records", facts, columns, rows)
 
-    def in_time(self, of: str) -> Campaign:
-        """The records whose rows are samples in time; a warning tells those that are left out.
+    def of_work(self, of: str) -> Campaign:
+        """The records of blows and motions; a warning tells tests that are left out.
 
         Args:
             of: who has no use for the others, in words.
@@ -144,10 +144,10 @@ class Campaign:
         Raises:
             InputError: none is left.
         """
-        kept = tuple(record for record in self.records if record.in_time)
+        kept = tuple(record for record in self.records if record.kind in ("percussion", "motion"))
         if len(kept) == len(self.records):
             return self
-        others = sorted({record.kind for record in self.records if not record.in_time})
+        others = sorted({record.kind for record in self.records if record not in kept})
         text = f"{of} has no use for {' and '.join(others)} records"
         if not kept:
             file = self.folder / CAMPAIGN_FILE if self.folder is not None else None
@@ -242,6 +242,12 @@ def _check_record(record: Record, key: str, file: Path | None) -> None:
                                  file=file, key=f"{key}.{name}")  # fmt: skip
         if missing := [name for name in ("real", "imag") if name not in record.channels]:
             raise record.source.error("has no such column", channel=missing[0])
+    if record.kind == "clamped":
+        if record.pose is None:
+            raise InputError(f"a clamped record ({record.file}) needs this key",
+                             file=file, key=f"{key}.pose")  # fmt: skip
+        if not any(record.channel(name).kind.name == "torque" for name in record.channels):
+            raise record.source.error("has no column torque.<joint>, of no motor that presses")
     if record.kind != "percussion":
         if useless := record.table.percussion_keys():
             text = f"{file}: {key} ({record.file}): a {record.kind} record has no use for "

@@ -152,7 +152,7 @@ class Record:
 
     @property
     def kind(self) -> str:
-        """What was done: "percussion", "motion", "static" or "frf"."""
+        """What was done: "percussion", "motion", "static", "frf" or "clamped"."""
         return self.table.kind
 
     @property

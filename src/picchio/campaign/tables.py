@@ -187,8 +187,9 @@ class RecordTable(StrictModel):
     Attributes:
         file: CSV or Parquet file, relative to the campaign's folder.
         kind: "percussion" (the robot stands, the tool hits), "motion" (it moves, nothing hits)
-            "static" (a row a loading: weights and pulls, and what moved) or "frf" (a row a
-            line of one frequency response function).
+            "static" (a row a loading: weights and pulls, and what moved), "frf" (a row a
+            line of one frequency response function) or "clamped" (the tool is held, and motors
+            press).
         pose: rad or m, by joint name or in the robot's joint order; not of motion. Of a static
             record: of the joints that have no column.
         force_direction: frf only: the way of the force, world, of any length.
@@ -217,7 +218,7 @@ class RecordTable(StrictModel):
     """
 
     file: DataFile
-    kind: Literal["percussion", "motion", "static", "frf"] = "percussion"
+    kind: Literal["percussion", "motion", "static", "frf", "clamped"] = "percussion"
     pose: Pose | None = None
     joint_map: JointMap | None = None
     force_direction: Direction | None = None
@@ -249,7 +250,7 @@ class RecordTable(StrictModel):
     def percussion_keys(self) -> list[str]:
         """The keys given here that only a percussion record has a use for."""
         names = ("pose", "direction", "excitation", "hits", "force", "period", "width", "preload")
-        kept = ("pose",) if self.kind in ("static", "frf") else ()
+        kept = ("pose",) if self.kind in ("static", "frf", "clamped") else ()
         return [name for name in names if name not in kept and getattr(self, name) is not None]
 
     def frf_keys(self) -> list[str]:

@@ -79,7 +79,7 @@ def diagnose(
     """
     for name in without:
         effect_class(name)
-    records = load_campaign(campaign).in_time("a diagnosis")
+    records = load_campaign(campaign).of_work("a diagnosis")
     kinds = {record.kind for record in records}
     if (train or held_out) and "motion" not in kinds:
         raise InputError("names motion records, and there is none: of blows, whole poses are held "

@@ -66,7 +66,9 @@ class Compared:
         measured, fitted: (m,).
         spread: (m,) standard deviation of what was measured.
         left: residual over signal.
-        lines: whether the readings follow each other, on a logarithmic scale.
+        lines: whether the readings follow each other.
+        logarithmic: whether they are told on such a scale.
+        coherence: (m,) of a function, 0 to 1; None where it is not told.
     """
 
     title: str
@@ -78,6 +80,46 @@ class Compared:
     spread: FloatArray
     left: float
     lines: bool
+    logarithmic: bool = False
+    coherence: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ModeSeen:
+    """A peak of the functions measured at a pose, and the mode of the fit that it is.
+
+    Attributes:
+        stand: number of the pose, from 1.
+        pose: (nv,) rad or m.
+        measured, fitted: Hz.
+        damping_ratio: of the fit.
+        mac: modal assurance criterion of the functions there, measured against fitted (Allemang,
+            Sound and Vibration 37 (2003) 14); NaN of a single function, whose shape is one number.
+        shape: (nv,) how the joints turn in it, the largest by one.
+    """
+
+    stand: int
+    pose: FloatArray
+    measured: float
+    fitted: float
+    damping_ratio: float
+    mac: float
+    shape: FloatArray
+
+
+@dataclass(frozen=True)
+class PoseLeft:
+    """What is left at one pose.
+
+    Attributes:
+        where: its records or rows.
+        readings: how many.
+        left: residual over signal.
+    """
+
+    where: str
+    readings: int
+    left: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -118,6 +160,14 @@ class Identification(TableResult):
 
     def compared(self) -> list[Compared]:
         """What was measured over what was fitted, where the method fits readings."""
+        return []
+
+    def modes(self) -> list[ModeSeen]:
+        """Peaks that were measured, each with its mode, where the method fits functions."""
+        return []
+
+    def by_pose(self) -> list[PoseLeft]:
+        """What is left at each pose, where the method fits readings."""
         return []
 
     def _told(self) -> str:

@@ -12,8 +12,8 @@ from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.planning.kind import Offered, Possible, Test
 from picchio.diagnosis.planning.outcome import Outcome
-from picchio.diagnosis.stiffness.prior import prior_of
-from picchio.diagnosis.stiffness.responses import make_problem, remainder_of
+from picchio.diagnosis.stiffness.prior import prior_of, remainder_of
+from picchio.diagnosis.stiffness.responses import make_problem
 from picchio.robot.flexible_robot import FlexibleRobot
 
 _POSES = 10  # of those that are tried: a function takes longer to look at than a loading

@@ -22,14 +22,14 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 
 from picchio.core.arrays import BoolArray, FloatArray
+from picchio.diagnosis.stiffness.presses import Press
 from picchio.diagnosis.stiffness.prior import Prior, Spring, Suspect
-from picchio.diagnosis.stiffness.statics import Table, Yield, yields
+from picchio.diagnosis.stiffness.statics import Table, Yield
 
 TAILS = (3.0, 6.0, 15.0, math.inf)
 """Degrees of freedom that are tried; infinite: normal."""
 _NOISE_STD = math.log(10.0) / 1.645  # the instrument's stated noise is right within a factor of ten
 _LEAST_NOISE = 1e-9  # m or rad, of files that are exact
-_ZERO = 0.01  # m or rad: a set's zero may be anything
 _PLAY = 1e-3  # rad or m: what play a joint may have, one standard deviation
 _STEPS, _ROUNDS = 60, 12
 
@@ -47,7 +47,7 @@ class Problem:
         robust: whether rows may be outliers.
     """
 
-    tables: tuple[Table, ...]
+    tables: tuple[Table | Press, ...]
     prior: Prior
     noise: dict[str, float]
     causes: tuple[Suspect, ...] = ()
@@ -56,8 +56,9 @@ class Problem:
 
     @cached_property
     def extra(self) -> tuple[Spring, ...]:
-        """The springs beside the joints'."""
-        return tuple(cause.spring for cause in self.causes if cause.spring is not None)
+        """The springs beside the joints': what every such record has, then the causes'."""
+        own = tuple(spring for table in self.tables for spring in table.always)
+        return own + tuple(cause.spring for cause in self.causes if cause.spring is not None)
 
     @cached_property
     def groups(self) -> tuple[str, ...]:
@@ -138,6 +139,7 @@ class Problem:
                 (table.names.index(name), n + j)
                 for j, spring in enumerate(self.extra)
                 for name in spring.coordinates
+                if name in table.names
             ]
             active = [*range(n), *(index for index, _ in coordinates)]
             owner = np.array([*range(n), *(spring for _, spring in coordinates)], dtype=np.intp)
@@ -147,8 +149,8 @@ class Problem:
                 [table.spring * scale[:n]]
                 + [np.full(len(table), base[s - n] * scale[s]) for s in owner[n:]]
             )
-            out = yields(
-                table, active, stiffness, gravity=self.gravity,
+            out = table.yields(
+                active, stiffness, gravity=self.gravity,
                 known=known[k].yielded if known is not None else None,
             )  # fmt: skip
             slope = np.zeros((*out.values.shape, len(at)))
@@ -166,8 +168,9 @@ class Problem:
             first = self.springs + len(self.steps)
             for j, (which, number, reading) in enumerate(self.zeros, start=first):
                 if which == k:
-                    slope[table.set == number, reading, j] = _ZERO
-                    values[table.set == number, reading] += _ZERO * at[j]
+                    zero = table.zero[reading]
+                    slope[table.set == number, reading, j] = zero
+                    values[table.set == number, reading] += zero * at[j]
             own = out.own @ out.own.swapaxes(1, 2)
             found.append(Predicted(table.values - values, slope, own, out))
         return found
@@ -233,7 +236,8 @@ class Predicted:
     Attributes:
         residual: (m, r) m or rad, measured less predicted.
         slope: (m, r, p) of the prediction.
-        own: (m, r, r) covariance of what is drawn for each loading anew; None for none.
+        own: (m, r, r) covariance of what is drawn for each row anew, or (m, r) variances where
+            no two readings share it; None for none.
         yielded: what it rests on.
     """
 
@@ -323,17 +327,21 @@ def _starts(problem: Problem, rows: BoolArray | None) -> list[FloatArray]:
     nothing = np.zeros(len(problem.precision))
     n = problem.joints
     found = [nothing.copy()]
+    if not any(isinstance(table, Table) for table in problem.tables):
+        return found  # torques are nearly linear in the stiffness
     for step in (-math.log(2.0), math.log(2.0)):
         found.append(nothing.copy())
         found[-1][: problem.springs] = step
-    # A reading is nearly linear in compliances: d y / d c = - k d y / d ln k at the stated values.
-    parts = problem.predict(nothing)
-    matrix = np.concatenate([-part.slope[..., :n].reshape(-1, n) for part in parts])
-    values = np.concatenate([table.values.ravel() for table in problem.tables])
-    if rows is not None:
-        of = zip(_split(problem, rows), problem.tables, strict=True)
-        kept = np.concatenate([np.repeat(keep, table.values.shape[1]) for keep, table in of])
-        matrix, values = matrix[kept], values[kept]
+    # A loading's reading is nearly linear in compliances: d y / d c = - k d y / d ln k at the
+    # stated values.
+    keep = _split(problem, np.ones(problem.rows, bool) if rows is None else rows)
+    parts = [
+        (-part.slope[kept][..., :n].reshape(-1, n), table.values[kept].ravel())
+        for table, part, kept in zip(problem.tables, problem.predict(nothing), keep, strict=True)
+        if isinstance(table, Table)
+    ]
+    matrix = np.concatenate([slope for slope, _ in parts])
+    values = np.concatenate([of for _, of in parts])
     size = np.linalg.norm(matrix, axis=0)
     usable = size > 0.0
     if usable.any():
@@ -368,8 +376,10 @@ class _State:
         for table, part, keep in zip(problem.tables, self.parts, self.keep, strict=True):
             size = np.array([noise[problem.groups.index(group)] for group in table.groups])
             both = np.concatenate([part.slope, part.residual[..., None]], axis=-1)
-            if part.own is None:
-                white, logdet = both / size[:, None], 2.0 * np.log(size).sum()
+            if part.own is None or part.own.ndim == 2:
+                each = np.sqrt(size**2 + (0.0 if part.own is None else part.own))
+                white = both / each[..., None]
+                logdet = 2.0 * np.log(each).sum(axis=-1)
             else:
                 lower = np.linalg.cholesky(part.own + np.diag(size**2))
                 logdet = 2.0 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)

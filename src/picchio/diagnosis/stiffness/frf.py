@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from picchio.campaign.campaign import Campaign
+from picchio.campaign.channels import FREQUENCY
 from picchio.core.arrays import FloatArray
 from picchio.core.provenance import provenance
 from picchio.diagnosis.identified import (
@@ -19,10 +20,12 @@ from picchio.diagnosis.identified import (
     Identified,
     IdentifiedJoint,
     Method,
+    ModeSeen,
+    PoseLeft,
 )
 from picchio.diagnosis.stiffness.fit import Fit, climb, score
 from picchio.diagnosis.stiffness.joints import MOST_HALF, Told, stiffness_of
-from picchio.diagnosis.stiffness.modes import starts
+from picchio.diagnosis.stiffness.modes import paired, starts
 from picchio.diagnosis.stiffness.prior import prior_of
 from picchio.diagnosis.stiffness.responses import Damping, FrfProblem, make_problem
 from picchio.diagnosis.stiffness.written import sidecar
@@ -108,13 +111,58 @@ class FrfIdentification(Identification):
     def compared(self) -> list[Compared]:
         """Every function, by its magnitude; the spread is what its coherence leaves."""
         problem, found = self.fit.problem, []
+        known = {record.file: record for record in self.campaign if record.kind == "frf"}
         for part, table in zip(problem.predict(self.fit.mean), problem.tables, strict=True):
+            record, coherence = known.get(table.file), None
+            if record is not None and "coherence" in record.channels:
+                columns = record.read(["coherence"])
+                lines = 2.0 * np.pi * columns[FREQUENCY]
+                coherence = np.interp(table.omega, lines, columns["coherence"])
             fitted = (table.values - part.residual) @ np.array([1.0, 1j]) * table.scale
             left = np.linalg.norm(table.measured - fitted) / np.linalg.norm(table.measured)
             found.append(Compared(
                 table.file, "frequency [Hz]", f"magnitude [{_READ[table.power]}]",
                 table.omega / (2.0 * np.pi), np.abs(table.measured), np.abs(fitted),
                 table.scale * self.fit.noise["frf"], float(left), True,
+                True, coherence,
+            ))  # fmt: skip
+        return found
+
+    def modes(self) -> list[ModeSeen]:
+        """Every peak of every pose that a mode of the fit explains."""
+        problem: FrfProblem = self.fit.problem
+        n = problem.joints
+        held = problem.bare(self.fit.mean, problem.convention)
+        parts = iter(held.predict(self.fit.mean[: 2 * n]))
+        poses = dict.fromkeys(tuple(self.robot.pose(r.pose or {}).tolist()) for r in self.campaign)
+        springs, found = np.exp(self.fit.mean[:n]), []
+        for stand, (standing, pose) in enumerate(zip(held.standings, poses, strict=True), start=1):
+            fitted = [
+                (one.values - next(parts).residual) @ np.array([1.0, 1j]) * one.scale
+                for one in standing.responses
+            ]
+            for pair in paired(held, standing, standing.spring * springs, fitted):
+                whole = np.zeros(len(pose))
+                whole[self.robot.flexible_index] = pair.shape
+                found.append(ModeSeen(stand, np.array(pose), *pair[:2],
+                                      held.ratio_of(self.fit.mean[: 2 * n], standing, pair.number),
+                                      pair.mac, whole / np.abs(whole).max()))  # fmt: skip
+        return found
+
+    def by_pose(self) -> list[PoseLeft]:
+        """Pose by pose, its functions together, each alike."""
+        problem, found = self.fit.problem, []
+        parts = iter(problem.predict(self.fit.mean))
+        for stand, standing in enumerate(problem.standings, start=1):
+            shares = [
+                np.linalg.norm(next(parts).residual * one.scale[:, None])
+                / np.linalg.norm(one.measured)
+                for one in standing.responses
+            ]
+            files = list(dict.fromkeys(one.file for one in standing.responses))
+            found.append(PoseLeft(
+                f"pose {stand}: {files[0]}" + (f" to {files[-1]}" if len(files) > 1 else ""),
+                len(shares), math.sqrt(float(np.mean(np.square(shares)))),
             ))  # fmt: skip
         return found
 

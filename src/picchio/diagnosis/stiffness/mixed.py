@@ -23,6 +23,8 @@ from picchio.diagnosis.identified import (
     Identification,
     IdentifiedJoint,
     Method,
+    ModeSeen,
+    PoseLeft,
 )
 from picchio.diagnosis.stiffness.frf import FrfIdentification, identify_frf
 from picchio.diagnosis.stiffness.joints import MOST_HALF
@@ -39,8 +41,8 @@ class ByBoth(Method):
     """Springs and damping from static loadings and frequency response functions together."""
 
     name = "static and frf"
-    kinds = frozenset({"static", "frf", "tap"})
-    needs_springs = frozenset({"static", "frf", "tap"})
+    kinds = frozenset({"static", "clamped", "frf", "tap"})
+    needs_springs = kinds
 
     def identify(
         self,
@@ -53,7 +55,7 @@ class ByBoth(Method):
         """The loadings first."""
 
         def of(static: bool) -> Campaign:
-            kept = tuple(r for r in campaign if (r.kind == "static") == static)
+            kept = tuple(r for r in campaign if (r.kind in ("static", "clamped")) == static)
             return replace(campaign, records=kept)
 
         loads = identify_static(robot, of(True), progress=progress)
@@ -107,6 +109,14 @@ class BothIdentification(Identification):
         """Those of both."""
         return [*self.loads.compared(), *self.functions.compared()]
 
+    def modes(self) -> list[ModeSeen]:
+        """Those of the functions."""
+        return self.functions.modes()
+
+    def by_pose(self) -> list[PoseLeft]:
+        """Those of both."""
+        return [*self.loads.by_pose(), *self.functions.by_pose()]
+
     def sidecar_text(self) -> str:
         """See `Identification`: spreads and correlations after both."""
         return replace(self.functions, joints=self.joints, campaign=self.campaign).sidecar_text()
@@ -132,8 +142,7 @@ class BothIdentification(Identification):
 
     def _headline(self) -> str:
         return (
-            f"{self._told()} told by {len(self.loads.lines)} loadings and "
-            f"{self.functions.fit.problem.rows} lines"
+            f"{self._told()} told by {self.loads.read} and {self.functions.fit.problem.rows} lines"
         )
 
 

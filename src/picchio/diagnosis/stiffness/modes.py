@@ -8,7 +8,9 @@ Gauss-Newton on the logarithms of the frequencies, matched anew at every step.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -122,6 +124,58 @@ def starts(problem: FrfProblem, seed: int = 0) -> list[FloatArray]:
             at[n : 2 * n] = damping
             kept.append(at)
     return kept[:_KEPT]
+
+
+class Pair(NamedTuple):
+    """A peak and the mode that it is.
+
+    Attributes:
+        measured, fitted: Hz.
+        number: of the mode, by ascending frequency.
+        mac: see `ModeSeen`.
+        shape: (n,) of the mode.
+    """
+
+    measured: float
+    fitted: float
+    number: int
+    mac: float
+    shape: FloatArray
+
+
+def paired(
+    problem: FrfProblem, standing: Standing, springs: FloatArray, fitted: Sequence[ComplexArray]
+) -> list[Pair]:
+    """Peaks of a pose with the modes of a fit.
+
+    Args:
+        problem: whose pose it is, everything but springs and damping held.
+        standing: the pose.
+        springs: (n,) N m/rad.
+        fitted: of each function its lines, as the fit has them.
+
+    Returns:
+        those that match to three times what peaks are off by.
+    """
+    measured = peaks(standing)
+    squared, shapes = natural(problem, standing, springs)
+    _, rows, columns = _match(standing, measured, squared, shapes)
+    own = np.sqrt(np.maximum(squared, 0.0))
+    found = []
+    for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
+        here, there = float(measured.omega[row]), float(own[column])
+        if abs(np.log(here / max(there, 1e-9))) > 3.0 * _OFF:
+            continue
+        seen = measured.shape[row]
+        like = np.array([
+            np.interp(there, one.omega, lines.real) + 1j * np.interp(there, one.omega, lines.imag)
+            for one, lines in zip(standing.responses, fitted, strict=True)
+        ])  # fmt: skip
+        mac = abs(np.vdot(seen, like)) ** 2 / max(float(np.vdot(like, like).real), 1e-300)
+        told = float(mac) if len(seen) > 1 else float("nan")
+        hertz = here / (2.0 * np.pi), there / (2.0 * np.pi)
+        found.append(Pair(*hertz, column, told, shapes[:, column]))
+    return found
 
 
 def _normal(uniform: FloatArray) -> FloatArray:

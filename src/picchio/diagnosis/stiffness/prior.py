@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from picchio.core.arrays import FloatArray
+from picchio.core.arrays import ComplexArray, FloatArray
 from picchio.core.errors import InputError
 from picchio.robot.flexible_robot import FlexibleRobot
 
@@ -17,9 +17,12 @@ UNKNOWN = math.log(FACTOR) / 1.645
 """Standard deviation of its logarithm."""
 SIDEWAYS = 5.0
 """A bearing tilts as if it were so many times as stiff as its joint turns, in the median."""
+REMAINDER = 0.01
+"""What a model that is right may leave of functions and torques, as a share of them."""
 OFFSET = 0.1
 """m, along each axis: how far from where it is told the force may act, if that is suspected."""
-_LOOSE = math.log(10.0) / 1.645  # it does so within a factor of ten, at 90 %
+LOOSE = math.log(10.0) / 1.645
+"""Standard deviation of the logarithm of any other stiffness: a factor of ten, at 90 %."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +156,7 @@ def suspects(robot: FlexibleRobot, lever: float) -> list[Suspect]:
         turns = axis.startswith("r")
         size, unit = (stiffest, "N*m/rad") if turns else (stiffest / lever**2, "N/m")
         words = f"the base {'turns about' if turns else 'moves along'} {axis[-1]}"
-        spring = Spring((f"base.{axis}",), size, _LOOSE, unit)
+        spring = Spring((f"base.{axis}",), size, LOOSE, unit)
         found.append(Suspect("base_compliance", axis, words, spring))
     for joint in turning:
         for target, where, words in (
@@ -161,8 +164,24 @@ def suspects(robot: FlexibleRobot, lever: float) -> list[Suspect]:
             (robot.tree.joints[joint.name].child, "bend", f"the link behind {joint.name} bends"),
         ):
             names = (f"{where}.{joint.name}.1", f"{where}.{joint.name}.2")
-            spring = Spring(names, SIDEWAYS * joint.stiffness, _LOOSE, "N*m/rad")
+            spring = Spring(names, SIDEWAYS * joint.stiffness, LOOSE, "N*m/rad")
             found.append(Suspect("transverse_compliance", target, words, spring))
         number = robot.flexible_names.index(joint.name)
         found.append(Suspect("backlash", joint.name, f"{joint.name} has play", play=(number,)))
     return found
+
+
+def remainder_of(values: ComplexArray | FloatArray) -> float:
+    """The variance that lets lines of a function, or rows of a torque, have a remainder.
+
+    Thousands of them make a fit surer than its model is right. A remainder of a hundredth of the
+    whole, as a diagnosis allows it, may look like any change of the numbers: its cosine with
+    that is anything from -1 to 1. White noise of this size says as much.
+
+    Args:
+        values: (m,) the function or the torque, SI.
+
+    Returns:
+        of each row, or of the real and of the imaginary part of each line, SI squared.
+    """
+    return float(REMAINDER**2 * np.mean(np.abs(values) ** 2) * len(values) / 3.0)

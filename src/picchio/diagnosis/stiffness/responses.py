@@ -22,7 +22,7 @@ from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import ComplexArray, FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.stiffness.fit import Predicted
-from picchio.diagnosis.stiffness.prior import Prior, damping_std
+from picchio.diagnosis.stiffness.prior import Prior, damping_std, remainder_of
 from picchio.diagnosis.stiffness.statics import moved
 from picchio.diagnosis.stiffness.taps import SAMPLING, UNKNOWN_BLOW, Seen, spectra
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -33,8 +33,6 @@ _ARM = 0.05  # m, at which masses are put to shift a centre or to change an iner
 _MOST_LINES = 240  # of a function; more are thinned out
 _WITHOUT = 0.02  # relative deviation of a line without coherence, to begin with
 _FLOOR = 1e-3  # of the largest line: nothing is measured better than that
-REMAINDER = 0.01
-"""What a model that is right may leave of the functions, as a share of them."""
 _POWER = {"receptance": 0, "mobility": 1, "accelerance": 2}
 
 
@@ -303,6 +301,22 @@ class FrfProblem:
         between = weighted * (2.0 * own * np.sqrt(squared))[..., None, :]
         return np.asarray(between @ weighted.swapaxes(-1, -2))
 
+    def ratio_of(self, at: FloatArray, standing: Standing, mode: int) -> float:
+        """The damping ratio of a mode of a pose.
+
+        Args:
+            at: (2 n,) the numbers; all others held.
+            standing: the pose.
+            mode: its number, by ascending frequency.
+        """
+        n = self.joints
+        springs = standing.spring * np.exp(at[:n])
+        ratio = self.damping_ratio * np.exp(at[n : 2 * n])
+        damp = self.damping(standing.mass, springs, ratio, standing.factors)
+        squared, shapes = natural(self, standing, springs)
+        own = shapes[:, mode]
+        return float(own @ damp @ own / (2.0 * np.sqrt(squared[mode])))
+
     def predict(self, at: FloatArray, known: Sequence[Predicted] | None = None) -> list[Predicted]:
         """The real and imaginary parts over the lines' scale, measured less predicted.
 
@@ -396,24 +410,8 @@ class FrfProblem:
         return Predicted(
             np.stack([left.real, left.imag], axis=1),
             np.stack([slope.real, slope.imag], axis=1).reshape(len(line), 2, p),
-            response.remainder[:, None, None] * np.eye(2),
+            np.stack([response.remainder] * 2, axis=1),
         )
-
-
-def remainder_of(values: ComplexArray | FloatArray) -> float:
-    """The variance that lets a function's lines have a remainder.
-
-    Thousands of lines make a fit surer than its model is right. A remainder of a hundredth of the
-    function, as a diagnosis allows it, may look like any change of the numbers: its cosine with
-    that is anything from -1 to 1. White noise of this size says as much.
-
-    Args:
-        values: (m,) the function, SI.
-
-    Returns:
-        of the real and of the imaginary part of each line, SI squared.
-    """
-    return float(REMAINDER**2 * np.mean(np.abs(values) ** 2) * len(values) / 3.0)
 
 
 def make_problem(

@@ -101,7 +101,11 @@ def held_out(found: Fit, parts: IndexArray) -> HeldOut:
             residual, slope = predicted[k].residual[keep], predicted[k].slope[keep]
             size = np.array([other.noise[group] for group in table.groups])
             own = predicted[k].own
-            spread = np.diag(size**2) + (0.0 if own is None else own[keep])
+            spread = np.diag(size**2) + np.zeros((int(keep.sum()), 1, 1))
+            if own is not None:
+                spread = (
+                    spread + (own if own.ndim == 3 else own[..., None] * np.eye(len(size)))[keep]
+                )
             spread = spread + slope @ other.covariance @ slope.swapaxes(1, 2)
             scores[rows] = _log_density(residual, spread, other.tails)
             for group in problem.groups:

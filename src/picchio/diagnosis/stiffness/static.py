@@ -1,4 +1,4 @@
-"""Joint stiffness from static loadings: weights and pulls, and what moved."""
+"""Joint stiffness from what stands still: weights and pulls, and motors that press."""
 
 from __future__ import annotations
 
@@ -21,10 +21,12 @@ from picchio.diagnosis.identified import (
     Identified,
     IdentifiedJoint,
     Method,
+    PoseLeft,
 )
 from picchio.diagnosis.result import Cause, Value
 from picchio.diagnosis.stiffness.fit import Problem
 from picchio.diagnosis.stiffness.joints import Told, stiffness_of
+from picchio.diagnosis.stiffness.presses import EXACT, Press, make_press
 from picchio.diagnosis.stiffness.prior import Suspect, prior_of, suspects
 from picchio.diagnosis.stiffness.select import Answer, select
 from picchio.diagnosis.stiffness.statics import Table, make_table
@@ -39,15 +41,18 @@ _SHOWN = 0.05  # of a set of causes
 _LINES = 3  # loadings that a reason names
 _UNITS = {"pose": "rad", "tool_point": "m", "sensor_position": "m", "sensor_angle": "rad",
           "play": "rad"}  # fmt: skip
+_READ = {"deflection": ("rad", 1e3, "mrad"), "torque": ("1", 100.0, "% of the largest")}
+"""By group of readings: its unit, and how it is told."""
+_METRES = ("m", 1e3, "mm")
 _LOOSE = {"static_force": "the scale of the forces", "gravity_stiffness": "gravity's stiffness"}
 
 
 class ByLoads(Method):
-    """Springs fitted to static loadings, from nothing."""
+    """Springs fitted to static loadings and to motors that press on a tool held fast."""
 
     name = "static"
-    kinds = frozenset({"static"})
-    needs_springs = frozenset({"static"})
+    kinds = frozenset({"static", "clamped"})
+    needs_springs = frozenset({"static", "clamped"})
 
     def identify(
         self,
@@ -63,13 +68,13 @@ class ByLoads(Method):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StaticIdentification(Identification):
-    """What static loadings say of the joints' stiffness.
+    """What static loadings and motors that press say of the joints' stiffness.
 
     Attributes:
         campaign: the loadings.
         answer: the fit, and what else was tried.
         half: standard deviations to either end of a 90 % interval.
-        lines: (rows,) where each loading stands: "loads.csv line 4".
+        lines: (rows,) where each stands: "loads.csv line 4", "press.csv joint_2".
     """
 
     campaign: Campaign
@@ -112,13 +117,14 @@ class StaticIdentification(Identification):
         """What is left on loadings left out, what else yields, and which rows are outliers."""
         left, alone = self.answer.left_out, self.answer.alone
         noise = ", ".join(
-            f"{1e3 * size:.2g} {'mm' if group != 'deflection' else 'mrad'} ({group})"
+            f"{scale * size:.2g} {told} ({group})"
             for group, size in self.answer.fit.noise.items()
+            for _, scale, told in (_READ.get(group, _METRES),)
         )
         said = [
-            f"{len(self.lines)} loadings. On loadings left out, {100 * alone.before:.3g} % of the "
-            f"signal is left with the stated stiffness, {100 * alone.nrmse:.3g} % with joint "
-            "springs fitted to the others"
+            f"{self.read}. On what was left out, {100 * alone.before:.3g} % of the signal is left "
+            f"with the stated stiffness, {100 * alone.nrmse:.3g} % with joint springs fitted to "
+            "the others"
             + (
                 f", {100 * left.nrmse:.3g} % with what else is most probable."
                 if self.named
@@ -144,15 +150,30 @@ class StaticIdentification(Identification):
             said.append(f"Outliers, which hardly count: {', '.join(self.outliers)}.")
         return tuple(said)
 
+    @property
+    def read(self) -> str:
+        """How many readings there are, in words."""
+        tables = self.answer.fit.problem.tables
+        pressed = [table for table in tables if isinstance(table, Press)]
+        loads = len(self.lines) - sum(map(len, pressed))
+        said = [f"{loads} loadings"] if loads else []
+        if pressed:
+            motors = len({k for table in pressed for k in np.flatnonzero(table.moves).tolist()})
+            said.append(f"{motors} motors that press in {len(pressed)} records")
+        return " and ".join(said)
+
     def compared(self) -> list[Compared]:
-        """Every instrument of every record, loading by loading."""
+        """Every instrument of every record, loading by loading; of a motor its turn and torque."""
         fit, found = self.answer.fit, []
         problem = fit.problem
         for record, table, part in zip(
             self.campaign, problem.tables, problem.predict(fit.mean), strict=True
         ):
+            if isinstance(table, Press):
+                found += _pressed(table, table.values - part.residual)
+                continue
             for k, group in enumerate(table.groups):
-                scale, unit = (1e3, "mrad") if group == "deflection" else (1e3, "mm")
+                _, scale, unit = _READ.get(group, _METRES)
                 measured, left = table.values[:, k], part.residual[:, k]
                 shared = table.groups.count(group) > 1
                 size = max(float(np.linalg.norm(measured)), 1e-300)
@@ -163,6 +184,32 @@ class StaticIdentification(Identification):
                     scale * (measured - left), np.full(len(table), scale * fit.noise[group]),
                     float(np.linalg.norm(left)) / size, False,
                 ))  # fmt: skip
+        return found
+
+    def by_pose(self) -> list[PoseLeft]:
+        """Pose by pose, the instruments together, each alike; a press by its record."""
+        fit, found = self.answer.fit, []
+        for record, table, part in zip(
+            self.campaign, fit.problem.tables, fit.problem.predict(fit.mean), strict=True
+        ):
+            if isinstance(table, Press):
+                shares = [one.left for one in _pressed(table, table.values - part.residual)]
+                found.append(PoseLeft(record.file, len(shares), _rms(shares)))
+                continue
+            poses = np.column_stack([*read_loadings(record).pose.values()])
+            _, which = np.unique(poses, axis=0, return_inverse=True)
+            for number in dict.fromkeys(which.ravel().tolist()):
+                rows = np.flatnonzero(which.ravel() == number)
+                of = [np.array([g == group for g in table.groups]) for group in set(table.groups)]
+                shares = [
+                    float(np.linalg.norm(part.residual[rows][:, one]))
+                    / max(float(np.linalg.norm(table.values[rows][:, one])), 1e-300)
+                    for one in of
+                ]
+                lines = rows + record.source.first_row
+                many = f" to {lines[-1]}" if len(lines) > 1 else ""
+                where = f"{record.file} {record.source.row_word} {lines[0]}{many}"
+                found.append(PoseLeft(where, len(rows), _rms(shares)))
         return found
 
     def sidecar_text(self) -> str:
@@ -193,7 +240,7 @@ class StaticIdentification(Identification):
             ],
             "outliers": list(self.outliers),
             "noise": {
-                group: {"std": size, "unit": "rad" if group == "deflection" else "m"}
+                group: {"std": size, "unit": _READ.get(group, _METRES)[0]}
                 for group, size in fit.noise.items()
             },
             "nuisances": {
@@ -210,7 +257,7 @@ class StaticIdentification(Identification):
         }  # fmt: skip
 
     def _headline(self) -> str:
-        return f"{self._told()} told by {len(self.lines)} loadings"
+        return f"{self._told()} told by {self.read}"
 
 
 def identify_static(
@@ -221,16 +268,16 @@ def identify_static(
     search: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> StaticIdentification:
-    """The stiffness of every joint from static loadings, from nothing.
+    """The stiffness of every joint from static loadings and clamped tests, from nothing.
 
     Every flexible joint's stiffness, on a logarithmic scale, starts at what the robot's files say
     with a spread of a factor of four unless they state one, and is fitted together with all that
     `[tolerance]` says is never exact. Base, bearings, bending links, play and another point of
-    attack are tried, and taken where the loadings ask for them.
+    attack are tried, and taken where the loadings ask for them; not where motors alone press.
 
     Args:
         robot: flexible, its stiffness stated or estimated.
-        campaign: static records.
+        campaign: static and clamped records.
         gravity_stiffness: whether gravity's change with the deflection counts.
         search: whether anything beside the joints' springs is tried.
         progress: told what is being done.
@@ -243,27 +290,38 @@ def identify_static(
     """
     say = progress or (lambda text: None)
     say("static loadings: the robot at every pose")
-    chain = WideChain(robot)
+    chain, tolerance = WideChain(robot), campaign.tolerance
     tables = tuple(
-        make_table(robot, chain, read_loadings(record), campaign.tolerance) for record in campaign
-    )
-    stated = {"displacement": campaign.tolerance.dial, "dial": campaign.tolerance.dial,
-              "deflection": _ENCODER}  # fmt: skip
+        make_press(robot, chain, record, tolerance) if record.kind == "clamped"
+        else make_table(robot, chain, read_loadings(record), tolerance)
+        for record in campaign
+    )  # fmt: skip
+    stated = {"displacement": tolerance.dial, "dial": tolerance.dial, "deflection": _ENCODER,
+              "torque": EXACT}  # fmt: skip
     problem = Problem(tables, prior_of(robot), stated, gravity=gravity_stiffness)
     for table, record in zip(tables, campaign, strict=True):
-        if not np.abs(table.force).max() > 0.0:
+        if isinstance(table, Table) and not np.abs(table.force).max() > 0.0:
             raise InputError("no loading of this record has a force", file=record.source.path,
                              key=record.source.key)  # fmt: skip
     say("static loadings: springs")
-    every = suspects(robot, _lever(tables))
-    # What no loading tells from a joint is not tried: both together are the joint.
+    lever = float(max(np.median([table.lever for table in tables]), 1e-3))
+    numbers = {name for table in tables for name in table.step}
+    every = [one for one in suspects(robot, lever) if all(name in numbers for name, _ in one.loose)]
+    # What no loading tells from a joint is not tried: both together are the joint. Of motors that
+    # press the fixture is all that yields besides, wherever it does.
+    if all(isinstance(table, Press) for table in tables):
+        every = []
     shadows = [(one, _shadowed(tables, problem.joints, one)) for one in every]
     answer = select(problem, [one for one, joint in shadows if joint is None] if search else ())
     lines = tuple(
-        f"{record.file} {record.source.row_word} {row + record.source.first_row}"
+        line
         for record, table in zip(campaign, tables, strict=True)
-        for row in range(len(table))
-    )
+        for line in (
+            [f"{record.file} {table.names[k]}" for k in table.pressed] if isinstance(table, Press)
+            else [f"{record.file} {record.source.row_word} {row + record.source.first_row}"
+                  for row in range(len(table))]
+        )
+    )  # fmt: skip
     told = _told(robot, answer, lines, shadows)
     unseen = "loads that stand still show no damping: the nominal value and its tolerance"
     width = campaign.tolerance.damping_ratio
@@ -281,13 +339,8 @@ def identify_static(
     return StaticIdentification(robot, source, joints, campaign, answer, told.half, lines)
 
 
-def _lever(tables: tuple[Table, ...]) -> float:
-    """m, how far from the base the loads act, about: what a turning base adds over a moving one."""
-    arms = []
-    for table in tables:
-        turns = [table.names.index(f"base.{axis}") for axis in ("rx", "ry", "rz")]
-        arms.append(np.linalg.norm(table.columns.push[:, :3][..., turns], axis=(1, 2)).ravel())
-    return float(max(np.median(np.concatenate(arms)) / math.sqrt(2.0), 1e-3))
+def _rms(shares: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(shares)))) if shares else 0.0
 
 
 def _told(robot: FlexibleRobot, answer: Answer, lines: tuple[str, ...],
@@ -295,6 +348,9 @@ def _told(robot: FlexibleRobot, answer: Answer, lines: tuple[str, ...],
     fit, n = answer.fit, answer.fit.problem.joints
     problem = fit.problem
     spring_names = [f"the stiffness of {name}" for name in robot.flexible_names]
+    spring_names += [
+        f"what holds the tool in {table.file}" for table in problem.tables for _ in table.always
+    ]
     spring_names += [one.words for one in fit.problem.causes if one.spring is not None]
     names = (
         *spring_names,
@@ -323,6 +379,8 @@ def _moved(information: FloatArray, lines: tuple[str, ...]) -> str:
     first = np.argsort(-information, kind="stable")[:_LINES]
     half = int(np.searchsorted(np.cumsum(np.sort(information)[::-1]), 0.5 * total)) + 1
     named = [lines[k] for k in first if information[k] > 0.02 * total]
+    if not all(name.rsplit(" ", 1)[1].isdigit() for name in named):
+        return f"{half} of {len(lines)} rows tell half of it, most of all {', '.join(named)}"
     file = named[0].split(" ")[0]
     if all(name.startswith(f"{file} ") for name in named):
         word = named[0].split(" ")[-2]
@@ -333,7 +391,24 @@ def _moved(information: FloatArray, lines: tuple[str, ...]) -> str:
     return f"{half} of {len(lines)} loadings tell half of it, most of all {text}"
 
 
-def _shadowed(tables: Sequence[Table], joints: int, suspect: Suspect) -> int | None:
+def _pressed(table: Press, fitted: FloatArray) -> list[Compared]:
+    """A motor's torque over its turn, of each that presses, with friction as it was split."""
+    found = []
+    for r, k in enumerate(table.pressed):
+        if not table.moves[k]:
+            continue
+        springs = table.turn @ (fitted[r] / table.scale[r] * table.moves)
+        torque, left = table.torque[:, r], table.torque[:, r] - springs - table.friction[:, r]
+        share = float(np.linalg.norm(left)) / max(float(np.linalg.norm(torque)), 1e-300)
+        found.append(Compared(
+            f"{table.file}: {table.names[k]}", "motor's turn [mrad]", "torque [N m]",
+            1e3 * table.turn[:, k], torque, torque - left, np.full(len(left), left.std()), share,
+            True,
+        ))  # fmt: skip
+    return found
+
+
+def _shadowed(tables: Sequence[Table | Press], joints: int, suspect: Suspect) -> int | None:
     """The joint that turns the arm as a suspect's spring does in all loadings; None for none."""
     if suspect.spring is None or len(suspect.spring.coordinates) > 1:
         return None
@@ -342,9 +417,7 @@ def _shadowed(tables: Sequence[Table], joints: int, suspect: Suspect) -> int | N
         apart = [
             min(np.abs(own - other).max(), np.abs(own + other).max()) / max(np.abs(own).max(), 1e-9)
             for table in tables
-            for own, other in [
-                (table.columns.push[:, :3, k], table.columns.push[:, :3, table.names.index(name)])
-            ]
+            for own, other in [(table.ways(table.names[k]), table.ways(name))]
         ]
         if max(apart) < 1e-6:
             return k

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -22,11 +23,13 @@ from picchio.campaign.loadings import Loadings, Reading
 from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
+from picchio.diagnosis.stiffness.prior import Spring
 from picchio.model.expansion import WideChain
 from picchio.robot.dynamics.statics import stiffness_at_torque
 from picchio.robot.flexible_robot import FlexibleRobot
 
 _TURN, _SHIFT = 1e-4, 1e-3  # rad and m, of the differences
+_ZERO = 0.01  # m or rad: a set's zero may be anything
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +99,44 @@ class Table:
 
     def __len__(self) -> int:
         return len(self.values)
+
+    always: ClassVar[tuple[Spring, ...]] = ()
+    """Springs that no such table is without."""
+
+    @property
+    def zero(self) -> FloatArray:
+        """(r,) m or rad, what a zero that nobody knows may be."""
+        return np.full(self.values.shape[1], _ZERO)
+
+    @property
+    def lever(self) -> float:
+        """m, how far from the base the loads act, about: what turning adds over moving."""
+        turns = [self.names.index(f"base.{axis}") for axis in ("rx", "ry", "rz")]
+        arms = np.linalg.norm(self.columns.push[:, :3][..., turns], axis=(1, 2))
+        return float(np.median(arms) / np.sqrt(2.0))
+
+    def ways(self, coordinate: str) -> FloatArray:
+        """(m, 3) how the force's point moves with a coordinate.
+
+        Args:
+            coordinate: its name.
+        """
+        return self.columns.push[:, :3, self.names.index(coordinate)]
+
+    def yields(self, active: Sequence[int], stiffness: FloatArray, *,
+               gravity: bool = True, known: Yield | None = None) -> Yield:  # fmt: skip
+        """See `yields`.
+
+        Args:
+            active: (q,) the coordinates that yield, the n joints first.
+            stiffness: (m, q) N m/rad or N/m, at each loading.
+            gravity: whether gravity's change with the deflection counts.
+            known: for springs not far off.
+
+        Returns:
+            values and derivatives.
+        """
+        return yields(self, active, stiffness, gravity=gravity, known=known)
 
     def play(self, joint: int) -> FloatArray:
         """(m, r) what the readings show of one radian or metre of play in a joint.
@@ -233,8 +274,12 @@ def _crossed(gravity: FloatArray, load: FloatArray) -> FloatArray:
     return 0.5 * (held - after)
 
 
-class _Stand:
+class Stand:
     """A robot at one pose: how points of it move with all coordinates.
+
+    Attributes:
+        tool: the link that carries it.
+        bends: names of the hinges' coordinates, behind the chain's.
 
     Args:
         robot: flexible.
@@ -250,15 +295,28 @@ class _Stand:
         self.tool = robot.link_of(robot.tool_frame)
         self._known: dict[str, tuple[FloatArray, FloatArray, FloatArray]] = {}
         self.hinges = self._hinges() if bends else []
+        self.bends = _bends(robot) if bends else []
 
     def place(self, link: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Jacobian, position and axes of a link's frame, see `WideChain.placed`."""
+        """Jacobian, position and axes of a link's frame.
+
+        Args:
+            link: its name.
+
+        Returns:
+            see `WideChain.placed`.
+        """
         if link not in self._known:
             self._known[link] = self.chain.placed(self.pose, link)
         return self._known[link]
 
     def of(self, link: str, shift: FloatArray) -> FloatArray:
-        """The Jacobian (6, c) of a point (3,) m in a link's frame."""
+        """The Jacobian (6, c) of a point in a link's frame.
+
+        Args:
+            link: its name.
+            shift: (3,) m.
+        """
         jacobian, origin, turn = self.place(link)
         lever = turn @ shift
         body = self.tool if link == self.robot.tool_point else link
@@ -272,7 +330,12 @@ class _Stand:
         return np.concatenate([moved(jacobian, lever), bent], axis=1)
 
     def at_tool(self, point: FloatArray | None, shift: FloatArray) -> FloatArray:
-        """The same of a point told in the tool frame, or else where the sidecar has the force."""
+        """The same of a point told in the tool frame, or else where the sidecar has the force.
+
+        Args:
+            point: (3,) m; None for that of the sidecar.
+            shift: (3,) m, from there.
+        """
         if point is None:
             return self.of(self.robot.tool_point, shift)
         return self.of(self.tool, point + shift)
@@ -319,7 +382,7 @@ def _columns(
     pushed, seen = [], []
     c = len(chain.coordinates)
 
-    def see(stand: _Stand, reading: Reading, row: int) -> FloatArray:
+    def see(stand: Stand, reading: Reading, row: int) -> FloatArray:
         if reading.joint is not None:
             return np.zeros((6, c + 2 * len(stand.hinges)))
         if reading.frame is not None:
@@ -327,7 +390,7 @@ def _columns(
         return stand.at_tool(None if reading.point is None else reading.point[row], dial)
 
     for row, pose in enumerate(poses):
-        stand = _Stand(robot, chain, pose, near is None)
+        stand = Stand(robot, chain, pose, near is None)
         point = None if loadings.point is None else loadings.point[row]
         pushed.append(stand.at_tool(point, push))
         seen.append([see(stand, reading, row) for reading in loadings.readings])

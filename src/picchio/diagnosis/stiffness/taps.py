@@ -23,6 +23,7 @@ import numpy as np
 from picchio.campaign.channels import AXES
 from picchio.campaign.record import Record
 from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.diagnosis.stiffness.prior import prior_of
 from picchio.robot.flexible_robot import FlexibleRobot
 
 SAMPLING = ("blow_begins", "blow_ends")
@@ -40,6 +41,7 @@ _MOST_LINES = 240
 _MODEL = 0.005  # of a line: nothing is measured better than that
 _WIDTH = 3.0  # samples that a measured blow must last
 _QUIET = 20  # samples, at least, that tell a channel's noise
+_LIKELY = 1.645  # standard deviations of what is known of a joint
 _REACH = 250.0  # Hz, to which a hammer's blow of 4 ms shakes an arm
 _POWER = {"accelerometer": 2, "acceleration": 2, "velocity": 1, "displacement": 0}
 
@@ -175,15 +177,24 @@ def spectra(robot: FlexibleRobot, record: Record, pose: FloatArray) -> list[Spec
 
 
 def _sampled_well(robot: FlexibleRobot, record: Record, pose: FloatArray, step: float) -> None:
-    """Refuse what folds: no filter is known of, and modes may lie beyond half the sample rate."""
-    state = robot.state(pose)
+    """Refuse what may fold, with each joint as stiff as what is known of it allows.
+
+    No filter is known of, and a mode beyond half the sample rate, folded, looks like a low one.
+    """
+    state, prior = robot.state(pose), prior_of(robot)
     inverse = np.linalg.inv(np.linalg.cholesky(state.mass_matrix))
-    squared = np.linalg.eigvalsh(inverse @ np.diag(state.stiffness) @ inverse.T)
-    modes = np.sqrt(squared) / (2.0 * np.pi)
-    folds = modes[(modes > 0.5 / step) & (modes < _REACH)]
-    if len(folds):
+    raised = np.exp(_LIKELY * np.diag(prior.std))
+    for joint, factors in zip(("", *robot.flexible_names), (np.ones(len(raised)), *raised),
+                              strict=True):  # fmt: skip
+        squared = np.linalg.eigvalsh(inverse @ np.diag(factors * state.stiffness) @ inverse.T)
+        modes = np.sqrt(squared) / (2.0 * np.pi)
+        folds = modes[(modes > 0.5 / step) & (modes < _REACH)]
+        if not len(folds):
+            continue
+        when = f"if {joint} is as stiff as it may be, " if joint else ""
+        known = ", or tell the stiffness by loads first" if joint else ", as no phone does"
         raise record.source.error(
-            f"is sampled at {1.0 / step:.0f} Hz: a mode near {folds[0]:.0f} Hz, if nothing filters "
-            "it, folds into what is read", channel="time",
-            hint=f"sample at {2.5 * folds[-1]:.0f} Hz or more, as no phone does",
+            f"is sampled at {1.0 / step:.0f} Hz: {when}a mode near {folds[0]:.0f} Hz, if nothing "
+            "filters it, folds into what is read", channel="time",
+            hint=f"sample at {2.5 * folds[-1]:.0f} Hz or more{known}",
         )  # fmt: skip

@@ -235,7 +235,7 @@ def check(
     Raises:
         InputError: a campaign, a robot or a record that cannot be read.
     """
-    campaign = load_campaign(campaign, clock_tolerance=math.inf).in_time("a check of measured data")
+    campaign = load_campaign(campaign, clock_tolerance=math.inf).of_work("a check of measured data")
     found, problem = _robot(campaign, robot, flex, tool, reducers) if use_robot else (None, None)
     records = [replace(record, clock_tolerance=math.inf) for record in campaign.records]
     campaign = replace(campaign, records=tuple(records))

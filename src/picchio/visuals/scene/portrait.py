@@ -14,12 +14,22 @@ from picchio.core.arrays import FloatArray
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import Assessment
 from picchio.visuals.kinematics import frames, world
-from picchio.visuals.plots.style import INK, MUTED, axes_or_new, look, plain, styled
+from picchio.visuals.plots.style import (
+    BLUE,
+    INK,
+    MUTED,
+    VERMILION,
+    axes_or_new,
+    look,
+    plain,
+    styled,
+)
 from picchio.visuals.scene.robot.body import build_body
 from picchio.visuals.scene.robot.mesh import Mesh, moved, rgb
 
 _PIXELS = 1400  # along the longer side of the picture, before it is halved
 _MARGIN = 0.06
+_SWING = 0.2  # rad or m, of the joint that moves most in a mode
 
 
 class View(NamedTuple):
@@ -145,6 +155,42 @@ def plot_pose(
             ha="center", va="center", fontweight="bold", zorder=7,
         )  # fmt: skip
     _finished(axes, view, tool, reach, np.array(ends).reshape(-1, 2))
+    return axes
+
+
+@styled
+def plot_mode(
+    robot: FlexibleRobot, pose: ArrayLike, shape: FloatArray, ax: Axes | None = None
+) -> Axes:
+    """The robot at a pose, and its chain swung to either side of it in a mode.
+
+    Args:
+        robot: the robot; its meshes are read.
+        pose: (nv,) rad or m.
+        shape: (nv,) of the joints, the largest by one.
+        ax: where to draw.
+
+    Returns:
+        the Axes, metres to the right and up in the picture.
+    """
+    axes, view, tool, reach = _drawn_robot(robot, pose, axes_or_new(ax, width=3.4, height=3.0))
+    checked = robot.pose(pose)
+    links = [robot.tree.root]
+    links += [joint.child for joint in robot.tree.chain(robot.link_of(robot.tool_frame))]
+    ends = []
+    for side, colour, dashes in (
+        (0.0, MUTED, "-"),
+        (_SWING, VERMILION, "-"),
+        (-_SWING, BLUE, "--"),
+    ):
+        at = checked + side * shape
+        places = world(frames(robot, at))
+        points = [places[link][:3, 3] for link in links] + [robot.state(at).tool_position]
+        seen = view.seen(np.array(points))
+        ends.append(seen[:, :2])
+        axes.plot(seen[:, 0], seen[:, 1], color=colour, linestyle=dashes, linewidth=2.0,
+                  marker="o", markersize=3.0, zorder=4)  # fmt: skip
+    _finished(axes, view, tool, reach, np.concatenate(ends))
     return axes
 
 

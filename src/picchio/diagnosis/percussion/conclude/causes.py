@@ -16,7 +16,7 @@ from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_
 from picchio.diagnosis.percussion.criteria.pose_consistency import jackknife_covariance
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.drawn import width_spread
-from picchio.diagnosis.percussion.fit.least_squares import Fit
+from picchio.diagnosis.percussion.fit.least_squares import Fit, prior_precision
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.state import EXACT, Search, Trial
 from picchio.diagnosis.result import Cause, Correlation, Value, unit_of
@@ -141,8 +141,11 @@ def fitted_correlation(whole: Fit) -> Correlation:
 def nominal_spread(robot: FlexibleRobot, tolerance: Tolerance) -> Uncertain:
     """How well the nominal values are known before anything was measured."""
     hypothesis = Hypothesis.baseline(robot, tolerance)
-    spread = np.array([u.prior[1] if u.prior else 0.0 for u in hypothesis.unknowns()])
-    return _uncertain(hypothesis, np.diag(spread**2))
+    precision = prior_precision(hypothesis)
+    at = np.ix_(*[np.flatnonzero(precision.diagonal() > 0.0)] * 2)
+    covariance = np.zeros_like(precision)
+    covariance[at] = np.linalg.inv(precision[at])
+    return _uncertain(hypothesis, covariance)
 
 
 def _uncertain(hypothesis: Hypothesis, covariance: FloatArray) -> Uncertain:

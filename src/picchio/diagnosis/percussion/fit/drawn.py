@@ -19,7 +19,7 @@ from picchio.diagnosis.percussion.fit.least_squares import (
     from_prior,
     jacobian,
     prior_cost,
-    prior_weights,
+    prior_precision,
 )
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.model.effects.effect import Effect, Latent
@@ -417,9 +417,8 @@ def _together(
     if not unknowns:
         return None
     slopes = jacobian(problem, here.hypothesis, here.records, here.end, here.residuals)
-    vector, weights = here.hypothesis.vector(), prior_weights(here.hypothesis)
-    normal = np.diag(weights**2)
-    gradient = weights**2 * from_prior(here.hypothesis)
+    vector, normal = here.hypothesis.vector(), prior_precision(here.hypothesis)
+    gradient = normal @ from_prior(here.hypothesis)
     for residual, common, own in zip(here.residuals, slopes, columns, strict=True):
         alive = np.linalg.norm(own, axis=0) > 0.0
         basis = np.linalg.qr(own[:, alive])[0] if alive.any() else own[:, :0]

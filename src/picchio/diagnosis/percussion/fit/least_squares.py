@@ -72,7 +72,7 @@ class Fit:
         if self.jacobians is None:
             raise InputError("this fit has no Jacobian")
         total = sum(j.T @ j for j in self.jacobians)
-        return np.asarray(total + np.diag(prior_weights(self.hypothesis) ** 2))
+        return np.asarray(total + prior_precision(self.hypothesis))
 
     def covariance(self) -> FloatArray:
         """(unknowns, unknowns) of the transformed unknowns."""
@@ -82,9 +82,16 @@ class Fit:
         return np.asarray(inverse if self.absorbed is None else inverse + self.absorbed)
 
 
-def prior_weights(hypothesis: Hypothesis) -> FloatArray:
-    """(unknowns,) 1 / standard deviation of what is known beforehand, 0 where nothing is."""
-    return np.array([1.0 / u.prior[1] if u.prior else 0.0 for u in hypothesis.unknowns()])
+def prior_precision(hypothesis: Hypothesis) -> FloatArray:
+    """(unknowns, unknowns) of what is known beforehand, 0 where nothing is."""
+    unknowns = hypothesis.unknowns()
+    found = np.diag([u.prior[1] ** -2 if u.prior else 0.0 for u in unknowns])
+    told = {label for label, *_ in hypothesis.priors}
+    where = {hypothesis.effects[u.effect].label: k for k, u in enumerate(unknowns) if u.prior}
+    kept, precision = hypothesis.known.precision(where.keys() - told - hypothesis.freed)
+    at = [where[label] for label in kept]
+    found[np.ix_(at, at)] = precision
+    return found
 
 
 def from_prior(hypothesis: Hypothesis) -> FloatArray:
@@ -95,7 +102,8 @@ def from_prior(hypothesis: Hypothesis) -> FloatArray:
 
 def prior_cost(hypothesis: Hypothesis) -> float:
     """Sum of squares of the priors."""
-    return float(((prior_weights(hypothesis) * from_prior(hypothesis)) ** 2).sum())
+    off = from_prior(hypothesis)
+    return float(off @ prior_precision(hypothesis) @ off)
 
 
 # A trial far off may diverge: what is no number then ends it.
@@ -145,10 +153,10 @@ def fit(
                 first = borrowed(here, residuals, near.hypothesis, near.jacobians, near.residuals)
             slopes = jacobian(problem, here, chosen, end, residuals, steps, first)
             steps, fresh = fine_steps(slopes, unknowns), first is None
-        weights, vector = prior_weights(here), here.vector()
-        normal = sum(j.T @ j for j in slopes) + np.diag(weights**2)
+        known, vector = prior_precision(here), here.vector()
+        normal = sum(j.T @ j for j in slopes) + known
         gradient = sum(j.T @ r.ravel() for j, r in zip(slopes, residuals, strict=True))
-        gradient = gradient + weights**2 * from_prior(here)
+        gradient = gradient + known @ from_prior(here)
         if not (np.isfinite(normal).all() and np.isfinite(gradient).all()):
             break
         improved = False

@@ -10,6 +10,7 @@ import numpy as np
 
 from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.percussion.fit.known import NOTHING, Known, known_of
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.registry import catalogue
@@ -110,6 +111,7 @@ class Hypothesis:
         scales: label.parameter -> size of a linear parameter.
         drawn: (label, fall of chi-square, count) of numbers drawn anew in every record.
         priors: (label, parameter, value, standard deviation) of what other records tell of a cause.
+        known: what the robot's files state of nuisances, in place of the tolerance.
     """
 
     effects: tuple[Effect, ...]
@@ -119,6 +121,7 @@ class Hypothesis:
     scales: tuple[tuple[str, float], ...] = ()
     drawn: tuple[tuple[str, float, int], ...] = ()
     priors: tuple[tuple[str, str, float, float], ...] = ()
+    known: Known = NOTHING
 
     @classmethod
     def baseline(cls, robot: FlexibleRobot, tolerance: Tolerance) -> Hypothesis:
@@ -126,10 +129,10 @@ class Hypothesis:
 
         Args:
             robot: as its files say.
-            tolerance: how far stiffness and damping may be off.
+            tolerance: how far stiffness and damping may be off, where its files state no spread.
         """
         found = nuisances(robot)
-        return cls(found, tolerance, len(found))
+        return cls(found, tolerance, len(found), known=known_of(robot, found, tolerance))
 
     @property
     def causes(self) -> tuple[Effect, ...]:
@@ -222,9 +225,15 @@ class Hypothesis:
         return nuisance.with_values(scale=min(max(nuisance.values["scale"], lower), upper))
 
     def _tolerance(self, nuisance: Effect) -> tuple[float, float]:
-        sigma = getattr(self.tolerance, nuisance.tolerance)
+        sigma = self._sigma(nuisance)
         reach = TOLERATED if self.tolerance.beyond(FITTED) else _AMONG_EXACT
+        if self.known.sigma(nuisance.label) is not None:  # of the logarithm
+            return max(math.exp(-reach * sigma), 0.05), min(math.exp(reach * sigma), 20.0)
         return max(1.0 - reach * sigma, 0.05), 1.0 + reach * sigma
+
+    def _sigma(self, nuisance: Effect) -> float:
+        known = self.known.sigma(nuisance.label)
+        return float(getattr(self.tolerance, nuisance.tolerance)) if known is None else known
 
     def unknowns(self) -> list[Unknown]:
         """What the fit may move."""
@@ -239,7 +248,7 @@ class Hypothesis:
                 prior = None
                 lower, upper = p.lower, p.upper
                 if nuisance:
-                    sigma = getattr(self.tolerance, effect.tolerance)
+                    sigma = self._sigma(effect)
                     if sigma == 0.0:
                         continue
                     if effect.label not in self.freed:

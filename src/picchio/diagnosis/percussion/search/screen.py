@@ -18,7 +18,7 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.drawn import blow_by_blow, drawn_cost, hidden_columns
-from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, prior_cost, prior_weights
+from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, prior_cost, prior_precision
 from picchio.diagnosis.percussion.fit.unknowns import TOLERATED
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
@@ -116,8 +116,9 @@ class Projector:
 
     def __init__(self, fit: Fit) -> None:
         assert fit.jacobians is not None
-        weights = prior_weights(fit.hypothesis)
-        jacobian = np.concatenate([*fit.jacobians, np.diag(weights)])
+        size, shapes = np.linalg.eigh(prior_precision(fit.hypothesis))
+        root = np.sqrt(np.maximum(size, 0.0))[:, None] * shapes.T
+        jacobian = np.concatenate([*fit.jacobians, root])
         norms = np.linalg.norm(jacobian, axis=0)
         # What stands at its bound is no longer free to explain anything.
         vector = fit.hypothesis.vector()
@@ -126,7 +127,7 @@ class Projector:
         q, r = np.linalg.qr(jacobian[:, keep] / norms[keep])
         good = np.abs(r.diagonal()) > 1e-8
         self.basis = q[:, good]
-        self.extra = weights.size
+        self.extra = len(root)
 
     def __call__(self, flat: FloatArray) -> FloatArray:
         """(samples,) or (samples, k) made orthogonal to the nuisances."""
