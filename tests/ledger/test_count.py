@@ -480,3 +480,36 @@ def test_a_bag_whose_topics_have_clocks_of_their_own(robot, tmp_path, task):
     np.testing.assert_allclose([b.peak for b in found.blows], made[0].peaks, rtol=0.01)
     np.testing.assert_allclose(found.blows[0].pose, shift.POSES[made[0].place], atol=2e-4)
     np.testing.assert_allclose(found.blows[3].direction, shift.DIRECTIONS[made[0].place], atol=0.01)
+
+
+def test_a_topic_that_is_silent_for_blocks_holds_its_value(robot, tmp_path, monkeypatch):
+    """A trigger that is told only as it changes; in blocks or at once the log holds the same."""
+    from picchio.campaign.importing import importer
+    from picchio.campaign.importing.raw import RawChannel, RawFile
+
+    clock = np.arange(4000) * 0.002
+    when = np.array([0.5, 1.9, 6.3])
+    series = {"/j:a": (clock, 0.1 + 0.0 * clock), "/k:b": (when, np.array([0.2, 0.4, 0.6])),
+              "/on:on": (clock, (clock % 1.0 < 0.3).astype(float))}  # fmt: skip
+
+    def blocks(module, path, how, names):
+        for begin in np.arange(0.0, 8.0, 1.0):
+            own = {n: (t >= begin) & (t < begin + 1.0) for n, (t, _) in series.items()}
+            made = {n: RawChannel(n, series[n][1][k], series[n][0][k])
+                    for n, k in own.items() if k.any()}  # fmt: skip
+            yield RawFile(path, "mcap", made, None, shift.BEGIN)
+
+    monkeypatch.setattr(importer, "blocks_isolated", blocks)
+    links = {"/j:a": "position.joint_1", "/k:b": "position.joint_2", "/on:on": "trigger"}
+    rules = Mapping.model_validate({"channel": [{"from": a, "to": b} for a, b in links.items()]})
+    parts = list(read_samples(tmp_path / "x.mcap", rules, robot))
+    assert sum(part.stamps.size for part in parts) == 4000
+    stamps = np.concatenate([part.pose_stamps for part in parts])
+    poses = np.concatenate([part.poses for part in parts])
+    assert (stamps == shift.BEGIN + np.rint(clock * 1e9)).all()
+    second = np.select([clock < 1.9, clock < 6.3], [0.2, 0.4], 0.6)
+    assert (poses == np.column_stack([0.1 + 0.0 * clock, second, 0.0 * clock])).all()
+    last = rules.channel[2].model_copy(update={"series": "/on:off"})
+    wrong = rules.model_copy(update={"channel": [*rules.channel[:2], last]})
+    with pytest.raises(InputError, match=r"no such series.*/on:off.*/on:on"):
+        list(read_samples(tmp_path / "x.mcap", wrong, robot))
