@@ -10,10 +10,19 @@ noise in each reading, one of which follows the temperature.
 from __future__ import annotations
 
 import argparse
+import sys
+from pathlib import Path
 
 import numpy as np
 
 from picchio.ledger.changes import ALARMS, Reading, find
+from picchio.ledger.exchange import exchange
+
+sys.path[:0] = [
+    str(Path(__file__).resolve().parents[1] / part) for part in ("tests", "tests/ledger")
+]
+
+from test_changes import no_swaps, swapped  # noqa: E402
 
 DAY = 86_400 * 10**9
 COUNT, BEGIN, SIZE, NOISE = 200, 60, -0.03, 0.01
@@ -31,6 +40,27 @@ def moved(kind):
         return SIZE * (index >= BEGIN)
     length = 60 if kind == "ramp over 60 shifts" else COUNT - BEGIN
     return SIZE * np.clip((index - BEGIN) / length, 0.0, 1.0)
+
+
+def swaps(count: int) -> None:
+    """Fleets of four, of which two robots are swapped; histories in which none is."""
+    told = right = dated = alarms = 0
+    for seed in range(1000, 1000 + count):
+        found, near, late = swapped(seed)
+        alarms += sum(found[n] is not None for n in (2, 3))
+        for a in (0, 1):
+            told += found[a] is not None
+            right += near[a] is not None and near[a][0] == 1 - a
+            dated += late[a] is not None and abs(late[a]) <= 2
+    print(f"{count} swaps of two robots in fleets of four: told of {told} of {2 * count} robots, "
+          f"whose logs they are of {right}, within two shifts of {dated}; told of {alarms} of "
+          f"{2 * count} others (set: {100 * ALARMS:g} %)")  # fmt: skip
+    tally: dict[str, int] = {}
+    for seed in range(1000, 1000 + count):
+        for kind, readings in no_swaps(seed).items():
+            tally[kind] = tally.get(kind, 0) + (exchange(readings) is not None)
+    words = ", ".join(f"{kind}: {number}" for kind, number in tally.items())
+    print(f"no swap, {count} histories each, told as one: {words}")
 
 
 def main() -> None:
@@ -63,6 +93,7 @@ def main() -> None:
         values = -1e-3 * warmth + NOISE * rng.standard_normal(COUNT)
         readings.append(history(values, "warm", warmth[None]))
         alarms += bool(find(readings))
+    swaps(count)
     print(f"nothing changed: {alarms} of {count} told (set: {100 * ALARMS:g} %)")
 
 

@@ -252,20 +252,21 @@ def test_a_moment_counts_once_whoever_saw_it(tmp_path, robot, task, stretch):
     assert len(both.blows) == 36 + len(later) and later and not any(b.seen for b in later)
 
 
+class Square(shift.Rivet):
+    """Rectangular blows, as the task has them."""
+
+    def force(self, time):
+        since = (time - self.begin)[:, None] - self.times
+        return self.peaks[0] * ((since > 0.0) & (since < self.widths)).any(axis=1)
+
+
 def test_accelerations_tell_the_size_of_a_blow(tmp_path, robot, task):
-    """The tool's acceleration in a blow is the force over what it feels of the masses."""
-    omega, shapes, _, levers, _ = shift.oscillators(NAME, shift.POSES[0])
-    del omega
-    along = np.array([0.0, 0.0, 1.0])
-    answer = levers @ shapes @ shapes.T @ levers.T @ along  # m/s^2 a newton, not along the blow
-    mobility = float(along @ answer)
-    time = np.arange(0.0, 2.0, 1e-4)
-    blow = np.zeros_like(time)
-    for k in range(12):
-        u = (time - 0.5 - 0.04 * k) / 0.004
-        blow += np.where((u > 0.0) & (u < 1.0), 800.0, 0.0)
+    """A simulated arm, whose springs pull while a blow lasts: not for the blow's fault."""
+    blows = Square(0.5, 0, 0.04 * np.arange(12), np.full(12, 800.0), np.full(12, 0.004))
+    reading = shift.felt(NAME, [blows], 2.0)
+    time, mobility = 1e-4 * np.arange(len(reading)), np.abs(reading).max() / 800.0
     stamps = shift.BEGIN + np.rint(time * 1e9).astype(np.int64)
-    reading = blow[:, None] * answer + 0.05 * np.random.default_rng(1).normal(size=(time.size, 3))
+    reading = reading + 0.05 * np.random.default_rng(1).normal(size=reading.shape)
     samples = Samples("acceleration", stamps, reading, stamps[::50],
                       np.tile(shift.POSES[0], (time[::50].size, 1)))  # fmt: skip
     sensor = [f"acceleration.tool.{axis}" for axis in "xyz"]
@@ -275,7 +276,9 @@ def test_accelerations_tell_the_size_of_a_blow(tmp_path, robot, task):
         book.add("a", "m", "a", stream, [samples])
         found = recount(book, Model.of(robot), curves_of(robot), task)
     assert len(found.blows) == 12
-    assert [blow.peak for blow in found.blows] == pytest.approx([800.0] * 12, rel=0.03)
+    peaks = np.array([blow.peak for blow in found.blows])
+    assert peaks.mean() == pytest.approx(800.0, rel=0.01)
+    assert peaks == pytest.approx([800.0] * 12, rel=0.05)
 
 
 def test_poses_alone_stand_for_rivets(tmp_path, robot, task):

@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Mapping as Mapped
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from itertools import chain
@@ -36,7 +37,7 @@ from picchio.ledger.blows import (
     runs,
     within,
 )
-from picchio.ledger.changes import exchanged, find, readings_of
+from picchio.ledger.changes import find, readings_of
 from picchio.ledger.damage import (
     BurstDamage,
     Totals,
@@ -46,10 +47,12 @@ from picchio.ledger.damage import (
     together,
     unscaled,
 )
+from picchio.ledger.drives import drives
+from picchio.ledger.exchange import Exchange, exchange, signature
 from picchio.ledger.forecast import Worlds, quantiles, worlds
 from picchio.ledger.out import opc_ua
 from picchio.ledger.ringing import ring_downs, temperatures
-from picchio.ledger.samples import Samples, by_names, read_samples
+from picchio.ledger.samples import STEPS, Samples, by_names, read_samples
 from picchio.ledger.store import Kept, Ledger, Stream
 from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model
@@ -57,6 +60,7 @@ from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.find import shipped_robot
 from picchio.studies.default_task import task_of
 from picchio.studies.rivet.life_rules import curves_of
+from picchio.studies.rivet.pose import ModelAtPose
 from picchio.studies.tasks import Operation, Task
 from picchio.vibration.closed_form.response import unit_vector
 
@@ -104,6 +108,8 @@ class Count(TableResult):
         counted: blows and damage.
         worlds: what they may have done; None where nothing was counted.
         changes: what is no longer as it was.
+        exchange: since when these look like another robot's logs; None where they do not.
+        signature: what the robot's own readings are like, see `picchio.ledger.exchange`.
         curves: of the flexible joints.
         notes: what was taken for granted.
         origin: provenance.
@@ -123,6 +129,8 @@ class Count(TableResult):
     counted: Counted
     worlds: Worlds | None
     changes: tuple[dict[str, Any], ...]
+    exchange: Exchange | None
+    signature: Mapped[str, tuple[float, float]]
     curves: tuple[SNCurve | None, ...]
     notes: tuple[str, ...]
     origin: dict[str, Any]
@@ -311,6 +319,7 @@ class Count(TableResult):
                 zip(self.model.robot.flexible_names, self.if_force(0.9), strict=True)
             ),
             "changes": list(self.changes),
+            "another_robot": self.exchange.to_dict() if self.exchange else None,
             "days": self.days(),
             "stations": self.stations(),
             "added": list(self.added),
@@ -397,18 +406,20 @@ def count(
         except InputError as error:
             raise _to_map(error, files[0] if files else None, bare, names) from None
         logs = len(book.logs())
-        changes = find(readings_of(model, counted.blows, book.features()))
+        readings = readings_of(model, counted.blows, book.features())
+    changes, other = find(readings), exchange(readings)
     drawn = None
     if counted.bursts and any(curve is not None for curve in curves):
         day = np.array([b.onset for b in counted.bursts]) // (_SECONDS_A_DAY * 10**9)
         drawn = worlds(unscaled(model), curves, sn_curve, counted.bursts, counted.totals, day,
                        samples, seed)  # fmt: skip
     inputs = [*bare.files, *work.files, *([rules_file] if rules_file else [])]
-    notes = (*names, *_notes(counted, rules, model), *exchanged(changes))
+    notes = (*names, *_notes(counted, rules, model))
     return Count(
         model=model, ledger=Path(ledger), logs=logs, added=tuple(added), known=tuple(known),
         refused=tuple(refused), detected=detected, counted=counted, worlds=drawn,
         changes=tuple(change.to_dict() for change in changes),
+        exchange=other, signature=signature(readings) if other is None else other.before,
         curves=curves, notes=notes,
         origin=provenance(inputs, seed=seed),
     )  # fmt: skip
@@ -633,6 +644,7 @@ def add_log(
                 spans.append(part.stamps.size)
                 features.extend(ring_downs(part, stream, model))
                 features.extend(temperatures(part))
+                features.extend(drives(part, model))
                 yield part
 
         book.add(log, how, file.name, stream, looked_at(), features)
@@ -707,6 +719,7 @@ def blows_of(kept: Kept, model: Model, task: Task) -> list[Blow]:
         return measured(kept, along, rotation)
     found: list[Blow] = []
     shapes: dict[tuple[int, int], list[Shape]] = {}
+    gains: dict[tuple[Any, ...], float] = {}
     for run in runs(kept):
         if not run.pose.size:
             raise InputError("no position was logged, so that nobody knows where the robot stood",
@@ -714,7 +727,8 @@ def blows_of(kept: Kept, model: Model, task: Task) -> list[Blow]:
         if kept.stream.kind == "acceleration":
             meant = _operations(task, settings.get("operation"), run.pose)
             for jolt, peak in _jolts(run, kept.stream.threshold, meant[0]):
-                found.append(_felt(jolt, peak, settings, meant, task, model, shapes))
+                blow = _felt(jolt, peak, settings, meant, task, model, shapes)
+                found.append(_corrected(blow, kept, meant[0], model, gains))
             continue
         operation = _operation(task, settings.get("operation"), run.pose)
         period = operation.excitation.period
@@ -773,6 +787,41 @@ def _felt(
     assert best is not None
     blow = assumed(run, best[2], "acceleration", 1, model, shapes)[0]
     return replace(blow, force=blow.force * (best[1] / blow.peak))
+
+
+def _corrected(
+    blow: Blow, kept: Kept, operation: Operation, model: Model, gains: dict[tuple[Any, ...], float]
+) -> Blow:
+    """The blow, less what the springs' pull is taken for.
+
+    They do move a little while a blow lasts, and the arm's ringing is not quite what was read
+    around it: how much too large that makes the task's own blows is computed, read as often as the
+    log was and kept as it is, and taken out.
+    """
+    if model.nonlinear:
+        return blow
+    step = kept.stream.gap / STEPS
+    key = (operation.name, *np.round(blow.pose / _NEAR), *np.round(blow.direction, 2))
+    if key not in gains and step:
+        excitation, hits = operation.excitation, operation.hits_per_rivet
+        quiet = int(excitation.period / step * 1e9)
+        time = step * 1e-9 * np.arange(quiet + int(hits * excitation.period / step * 1e9))
+        response = ModelAtPose(unscaled(model), blow.pose).tool_response(excitation, hits)
+        read = np.zeros((time.size, 3))
+        read[quiet:] = response.acceleration(time[: time.size - quiet], blow.direction).T
+        stamps = np.rint(1e9 * time).astype(np.int64)
+        size = blow.peak / excitation.peak_force
+        made = Kept(kept.stream, np.empty((0, 2), np.int64), stamps, size * read, stamps[:1],
+                    blow.pose[None])  # fmt: skip
+        mass, jacobian = ManyPoses(unscaled(model), blow.pose[None]).mass_and_jacobian()
+        per = jacobian[0] @ np.linalg.solve(mass[0], blow.direction @ jacobian[0])
+        told = [
+            float(peak @ per) / (blow.peak * float(per @ per))
+            for run in runs(made)
+            for _, peak in _jolts(run, kept.stream.threshold, operation)
+        ]
+        gains[key] = float(np.mean(told)) if len(told) == hits else 1.0
+    return replace(blow, force=blow.force / gains.get(key, 1.0))
 
 
 def _answers(

@@ -25,7 +25,8 @@ BLOCK = 1 << 16
 """Samples that are held at a time of a log that can be read in blocks."""
 _OWN_CLOCKS = ("mcap", "bag")  # a topic may have no message for a while
 _LATE = 8  # stretches without a blow's channel that are put off
-_STEPS = 5.0  # of the usual step: a longer one is a gap
+STEPS = 5.0
+"""Of the usual step: a longer one is a gap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +77,7 @@ class Samples:
     @property
     def gap(self) -> int:
         """ns: longer steps than this are gaps."""
-        return int(_STEPS * self.usual_step)
+        return int(STEPS * self.usual_step)
 
 
 def read_samples(path: Path, mapping: Mapping, robot: FlexibleRobot) -> Iterator[Samples]:

@@ -196,11 +196,14 @@ class Topic:
     def taken(
         self, log: bool, wanted: set[str] | None
     ) -> Iterator[tuple[_Layout, IndexArray, FloatArray]]:
-        """Layouts with the messages that have them: stamps ns (m,), their bytes (m, size).
+        """Take the messages apart by where their numbers stand.
 
         Args:
             log: the stamp is when it was logged, not the header's.
             wanted: series that are needed; None for all.
+
+        Returns:
+            layouts; of the messages that have them the stamps, (m,) ns, and the bytes (m, size).
         """
         sizes = np.array([len(d) for d in self.data])
         logged = np.array(self.logged, dtype=np.int64)
