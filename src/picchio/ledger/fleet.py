@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -14,15 +12,15 @@ import numpy as np
 
 from picchio.core.errors import InputError, PicchioError
 from picchio.core.html import sheet
-from picchio.core.processes import safe_start
 from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
+from picchio.core.spread import require_scheduler, spread
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.ledger.count import MAPPING, Count, count
-from picchio.ledger.exchange import Exchange, whose
+from picchio.ledger.count import MAPPING, count
+from picchio.ledger.result import Count
+from picchio.ledger.watch.exchange import Exchange, whose
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.default_task import task_of
-from picchio.studies.maps.run import require_scheduler
 from picchio.studies.tasks import Task
 
 ENDING = ".ledger"
@@ -161,24 +159,7 @@ def _spread(
         return
     if scheduler is not None:
         require_scheduler(scheduler)
-    from distributed import Client, LocalCluster, as_completed
-
-    with ExitStack() as opened:
-        opened.callback(logging.disable, logging.NOTSET)
-        cluster = None
-        if scheduler is None:
-            with safe_start():
-                cluster = LocalCluster(
-                    n_workers=workers, threads_per_worker=1, processes=True,
-                    dashboard_address=None, silence_logs=logging.CRITICAL,
-                )  # fmt: skip
-            opened.enter_context(cluster)
-        client = opened.enter_context(Client(cluster or scheduler))
-        opened.callback(logging.disable)
-        shared = client.scatter(job, broadcast=True)
-        futures = client.map(_row, [shared] * len(folders), list(folders), pure=False, retries=2)
-        for future in as_completed(futures):
-            yield future.result()
+    yield from spread(_row, job, folders, workers=workers, scheduler=scheduler)
 
 
 def _row(job: _Job, folder: Path) -> dict[str, Any]:

@@ -37,8 +37,8 @@ from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
-    from picchio.ledger.count import Count
     from picchio.ledger.fleet import Fleet
+    from picchio.ledger.result import Count
 
 
 @app.command(

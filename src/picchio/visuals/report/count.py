@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from picchio.fatigue.miner import format_count
-from picchio.ledger.count import Count
+from picchio.ledger.result import Count
 from picchio.visuals.plots.style import blank_figure, look, styled
 from picchio.visuals.report.page import Picture, Pictures, number, render
 

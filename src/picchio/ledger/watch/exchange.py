@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from picchio.core.arrays import FloatArray
-from picchio.ledger.changes import FIRST, Reading, date_of, scores
+from picchio.ledger.watch.changes import FIRST, Reading, date_of, scores
 
 _OF_THE_TOOL = ("force_drift", "pulse_width", "pulse_rate")
 # Of a robot's readings that must change together. One joint may happen to be alike in two robots.
