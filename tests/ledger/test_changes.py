@@ -184,6 +184,24 @@ def test_friction_and_lost_motion_are_read_of_a_moving_arm():
     assert drives(still, model) == []
 
 
+def test_friction_of_a_real_drive_is_what_was_published(measured_data):
+    """EMPS, by Janot, Gautier and Brunot (2019): 20.39 N and 203.5 N s/m, one slide."""
+    import picchio.datasets
+
+    for record, near in zip(
+        picchio.datasets.load("emps", measured_data), (0.01, 0.06), strict=True
+    ):
+        read = record.read()
+        stamps = shift.BEGIN + np.rint(read["time"] * 1e9).astype(np.int64)
+        slide = read["motor_position.slide"]
+        samples = Samples("trigger", stamps, np.zeros((stamps.size, 1)), stamps, slide[:, None],
+                          {"torque.slide": (stamps, read["torque.slide"])})  # fmt: skip
+        found = {n: v for n, _, v in drives(samples, Model.of(picchio.load_robot("emps")))}
+        speed = np.abs(np.gradient(slide, read["time"]))
+        usual = float(np.median(speed[speed > 0.2 * np.quantile(speed, 0.99)]))
+        assert found["friction.slide"] == pytest.approx(20.39 + 203.5 * usual, rel=near)
+
+
 def test_frequencies_of_a_decay_are_fitted():
     rng = np.random.default_rng(1)
     time = np.arange(1500) / 1000.0
