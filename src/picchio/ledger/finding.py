@@ -136,7 +136,8 @@ def blows_of(kept: Kept, model: Model, task: Task) -> list[Blow]:
         return measured(kept, along, rotation)
     found: list[Blow] = []
     shapes: dict[tuple[int, int], list[Shape]] = {}
-    gains: dict[tuple[Any, ...], float] = {}
+    gains: dict[tuple[Any, ...], FloatArray] = {}
+    hit, before = 0, 0  # of a rivet, and ns of the blow before
     for run in runs(kept):
         if not run.pose.size:
             raise InputError("no position was logged, so that nobody knows where the robot stood",
@@ -145,7 +146,9 @@ def blows_of(kept: Kept, model: Model, task: Task) -> list[Blow]:
             meant = _operations(task, settings.get("operation"), run.pose)
             for jolt, peak in _jolts(run, kept.stream.threshold, meant[0]):
                 blow = _felt(jolt, peak, settings, meant, task, model, shapes)
-                found.append(_corrected(blow, kept, meant[0], model, gains))
+                near = blow.onset - before < 2e9 * meant[0].excitation.period
+                hit, before = hit + 1 if near else 0, blow.onset
+                found.append(_corrected(blow, hit, kept, meant[0], model, gains))
             continue
         operation = _operation(task, settings.get("operation"), run.pose)
         period = operation.excitation.period
@@ -207,13 +210,15 @@ def _felt(
 
 
 def _corrected(
-    blow: Blow, kept: Kept, operation: Operation, model: Model, gains: dict[tuple[Any, ...], float]
-) -> Blow:
+    blow: Blow, hit: int, kept: Kept, operation: Operation, model: Model,
+    gains: dict[tuple[Any, ...], FloatArray],
+) -> Blow:  # fmt: skip
     """The blow, less what the springs' pull is taken for.
 
     They do move a little while a blow lasts, and the arm's ringing is not quite what was read
-    around it: how much too large that makes the task's own blows is computed, read as often as the
-    log was and kept as it is, and taken out.
+    around it: how much too large that makes each of the task's own blows is computed, read as often
+    as the log was and kept as it is, and taken out. The first blows of a rivet come out smaller
+    than the later ones, and count most.
     """
     if model.nonlinear:
         return blow
@@ -237,8 +242,9 @@ def _corrected(
             for run in runs(made)
             for _, peak in _jolts(run, kept.stream.threshold, operation)
         ]
-        gains[key] = float(np.mean(told)) if len(told) == hits else 1.0
-    return replace(blow, force=blow.force / gains.get(key, 1.0))
+        gains[key] = np.array(told) if len(told) == hits else np.ones(1)
+    known = gains.get(key, np.ones(1))
+    return replace(blow, force=blow.force / known[min(hit, len(known) - 1)])
 
 
 def _answers(

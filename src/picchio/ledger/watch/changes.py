@@ -328,11 +328,17 @@ def _stiffness(model: Model, table: dict[int, dict[str, float]]) -> list[Reading
     share = many.stiffness[:, :, None] * shapes**2 / squared[:, None, :]
     frequency = np.sqrt(squared) / (2.0 * np.pi)
     by_shift: dict[int, list[tuple[FloatArray, float, float, float]]] = {}
+    # Modes differ in damping, and a mode that hardly rings tells little of it.
+    usual = [
+        float(np.median(own)) if (own := [np.log(t[f"z{i}"]) for _, t in rows if f"z{i}" in t])
+        else 0.0 for i in range(n)
+    ]  # fmt: skip
     for k, (stamp, told) in enumerate(rows):
         for i in range(n):
             if f"f{i}" in told:
                 off = float(np.log(told[f"f{i}"] / frequency[k, i]))
-                entry = (0.5 * share[k, :, i], off, told[f"e{i}"], told[f"z{i}"])
+                damped = float(np.log(told[f"z{i}"])) - usual[i]
+                entry = (0.5 * share[k, :, i], off, told[f"e{i}"], damped)
                 by_shift.setdefault(stamp // SHIFT, []).append(entry)
     when: list[int] = []
     damping: list[float] = []
@@ -350,7 +356,7 @@ def _stiffness(model: Model, table: dict[int, dict[str, float]]) -> list[Reading
         when.append(shift * SHIFT + SHIFT // 2)
         stiffness.append(size)
         errors.append(np.sqrt(np.diag(np.linalg.inv(left.T @ left))))
-        damping.append(float(np.mean(np.log([e[3] for e in entries]))))
+        damping.append(float(np.average([e[3] for e in entries], weights=weight**2)))
     if not when:
         return []
     clock, nothing = np.array(when), np.empty((0, len(when)))

@@ -50,7 +50,7 @@ def drives(samples: Samples, model: Model) -> list[tuple[str, int, float]]:
     for name in sorted(torques.keys() | sides.keys()):
         j = names.index(name)
         own = speed[:, j]
-        usual = float(np.quantile(np.abs(own), 0.99))
+        usual = float(np.quantile(np.abs(own[sound]), 0.99)) if sound.any() else 0.0
         moving = np.flatnonzero(sound & (np.abs(own) > max(_SLOWEST, _SHARE * usual)))
         if min((own[moving] > 0.0).sum(), (own[moving] < 0.0).sum()) < _LEAST:
             continue
