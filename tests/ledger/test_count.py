@@ -180,6 +180,10 @@ def test_a_changed_model_recounts_and_a_changed_mapping_replaces(tmp_path, robot
     np.testing.assert_allclose(
         weak.counted.totals.damage, 2.0**shift.SLOPE * first.counted.totals.damage, rtol=1e-9
     )
+    steeper.write_text(shift.CURVE.replace(f"{shift.STRENGTH}", f"{0.02 * shift.STRENGTH}"))
+    gone = count(robot, None, tmp_path / "l", sn_curve=str(steeper))
+    assert any("joint_2 is whole in 0 % of the drawn worlds" in note for note in gone.notes)
+    assert not any("drawn worlds" in note for note in first.notes)
     scaled = tmp_path / "m.toml"
     scaled.write_text(shift.MAPPING.replace('to = "force.', 'scale = 0.5\nto = "force.'))
     half = count(robot, logs, tmp_path / "l", mapping=scaled, sn_curve=curve)

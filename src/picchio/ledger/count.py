@@ -28,7 +28,7 @@ from picchio.ledger.damage import (
     unscaled,
 )
 from picchio.ledger.finding import blows_of, standing, stream_of
-from picchio.ledger.forecast import worlds
+from picchio.ledger.forecast import UNLIKELY, Worlds, worlds
 from picchio.ledger.result import SECONDS_A_DAY, Count, Counted
 from picchio.ledger.samples import Samples, by_names, read_samples
 from picchio.ledger.store import Ledger
@@ -125,7 +125,7 @@ def count(
         drawn = worlds(unscaled(model), curves, sn_curve, counted.bursts, counted.totals, day,
                        samples, seed)  # fmt: skip
     inputs = [*bare.files, *work.files, *([rules_file] if rules_file else [])]
-    notes = (*names, *_notes(counted, rules, model))
+    notes = (*names, *_notes(counted, rules, model), *_surprises(drawn, model))
     return Count(
         model=model, ledger=Path(ledger), logs=logs, added=tuple(added), known=tuple(known),
         refused=tuple(refused), detected=detected, counted=counted, worlds=drawn,
@@ -134,6 +134,19 @@ def count(
         curves=curves, notes=notes,
         origin=provenance(inputs, seed=seed),
     )  # fmt: skip
+
+
+def _surprises(drawn: Worlds | None, model: Model) -> list[str]:
+    """Joints that should have failed by now; if one has, the ledger does not know it."""
+    if drawn is None:
+        return []
+    found = [(n, drawn.whole(j)) for j, n in enumerate(model.robot.flexible_names)]
+    return [
+        f"{name} is whole in {100 * share:.2g} % of the drawn worlds: if it has not failed, it is "
+        "stronger, or the blows are weaker, than is assumed, and what is left is told by few worlds"
+        for name, share in found
+        if share < UNLIKELY
+    ]
 
 
 def _notes(counted: Counted, rules: Mapping | None, model: Model) -> tuple[str, ...]:

@@ -21,6 +21,8 @@ from picchio.studies.tasks import Operation, Task
 from picchio.studies.uncertainty.inputs import DEFAULT_INPUTS
 from picchio.studies.uncertainty.sampler import Sampler
 
+UNLIKELY = 0.05
+"""Share of the worlds: where a joint is whole in fewer, something is not as it was taken to be."""
 # Bursts that stand for all; their damage is followed through every drawn world.
 _TYPICAL = 4
 _LONGEST = 4000  # pieces of the force: a longer burst is not typical
@@ -52,6 +54,14 @@ class Worlds:
         values = self.damage[joint]
         low, high = np.quantile(values, [0.5 - 0.5 * share, 0.5 + 0.5 * share])
         return float(low), float(high)
+
+    def whole(self, joint: int) -> float:
+        """In which share of the worlds a joint is whole by now; 1 of one without a curve.
+
+        Args:
+            joint: which.
+        """
+        return float((~(self.damage[joint] >= 1.0)).mean())
 
     def blows_left(self, joint: int, blows: int) -> FloatArray:
         """How many blows are left until the sum is one.
