@@ -125,6 +125,25 @@ def test_two_swapped_robots_are_told_and_whose_logs_they_are():
     assert words == {" like the logs of another robot, "}
 
 
+def test_a_fleet_says_in_both_rows_whose_logs_they_are():
+    from picchio.ledger.fleet import _told_apart
+
+    found = next(f for k in range(20) if (f := swapped(k)[0])[0] and f[1])
+    rows = [
+        {"name": "left", "another_robot": None, "_exchange": found[0],
+         "_signature": found[0].before},
+        {"name": "right", "another_robot": None, "_exchange": found[1],
+         "_signature": found[1].before},
+        {"name": "new", "another_robot": None, "_exchange": None, "_signature": {}},
+    ]  # fmt: skip
+    _told_apart(rows)
+    assert [r["another_robot"] and r["another_robot"]["like"] for r in rows] == [
+        "right", "left", None
+    ]  # fmt: skip
+    assert rows[0]["another_robot"]["words"].endswith("; they are like those of right")
+    assert not any(key.startswith("_") for row in rows for key in row)
+
+
 def no_swaps(seed):
     """Readings in which no robot is swapped: noise, one joint breaks, all wear, all are warm."""
     warmth, index = 20.0 + 5.0 * np.sin(np.arange(200) / 20.0), np.arange(200)
