@@ -1,6 +1,6 @@
 """How often a change is told, dated and sized, and how often one is told where there is none.
 
-    python benchmarks/changes.py [--histories 100]
+    python benchmarks/changes.py [--histories 100] [--logs 3]
 
 Histories of 200 shifts of five readings with 1 % noise a shift; in one of them something moves by
 3 % after shift 60: at once, over 60 shifts, or until the end. Without a change: another size of the
@@ -10,10 +10,23 @@ noise in each reading, one of which follows the temperature.
 from __future__ import annotations
 
 import argparse
+import sys
+import tempfile
+from pathlib import Path
 
 import numpy as np
+import pandas
 
-from picchio.ledger.changes import ALARMS, Reading, find
+import picchio
+from picchio.ledger.watch.changes import ALARMS, Reading, find
+from picchio.ledger.watch.exchange import exchange
+
+sys.path[:0] = [
+    str(Path(__file__).resolve().parents[1] / part) for part in ("tests", "tests/ledger")
+]
+
+import shift  # noqa: E402
+from test_changes import moves, no_swaps, ringing, swapped  # noqa: E402
 
 DAY = 86_400 * 10**9
 COUNT, BEGIN, SIZE, NOISE = 200, 60, -0.03, 0.01
@@ -33,10 +46,106 @@ def moved(kind):
     return SIZE * np.clip((index - BEGIN) / length, 0.0, 1.0)
 
 
+def swaps(count: int) -> None:
+    """Fleets of four, of which two robots are swapped; histories in which none is."""
+    told = right = dated = alarms = 0
+    for seed in range(1000, 1000 + count):
+        found, near, late = swapped(seed)
+        alarms += sum(found[n] is not None for n in (2, 3))
+        for a in (0, 1):
+            told += found[a] is not None
+            right += near[a] is not None and near[a][0] == 1 - a
+            dated += late[a] is not None and abs(late[a]) <= 2
+    print(f"{count} swaps of two robots in fleets of four: told of {told} of {2 * count} robots, "
+          f"whose logs they are of {right}, within two shifts of {dated}; told of {alarms} of "
+          f"{2 * count} others (set: {100 * ALARMS:g} %)")  # fmt: skip
+    tally: dict[str, int] = {}
+    for seed in range(1000, 1000 + count):
+        for kind, readings in no_swaps(seed).items():
+            tally[kind] = tally.get(kind, 0) + (exchange(readings) is not None)
+    words = ", ".join(f"{kind}: {number}" for kind, number in tally.items())
+    print(f"no swap, {count} histories each, told as one: {words}")
+
+
+LINKS = {"force": "force", "temp": "temperature.joint_1"} | {
+    f"{short}{k}": f"{long}.joint_{k}" for k in (1, 2, 3) for short, long in
+    (("m", "motor_position"), ("l", "position"), ("t", "torque"), ("d", "deflection"))
+}  # fmt: skip
+SHIFTS, MOVED = 60, 40
+
+
+def shift_log(path: Path, number: int, rng, softer, friction: float, gap: float, warm: float):
+    """A shift: the arm swings, then sets three rivets at three places and rings after each."""
+    parts = []
+    samples, _ = moves(rng, friction=friction, gap=gap, rate=500.0)
+    table = {"force": np.zeros(samples.stamps.size)}
+    for k in (1, 2, 3):
+        table |= {f"m{k}": samples.poses[:, k - 1], f"d{k}": np.zeros(samples.stamps.size),
+                  f"l{k}": samples.others[f"position.joint_{k}"][1],
+                  f"t{k}": samples.others[f"torque.joint_{k}"][1]}  # fmt: skip
+    parts.append(pandas.DataFrame(table))
+    for place in range(3):
+        time, joints = ringing(rng, shift.POSES[place], softer)
+        joints = 1e-4 * joints / joints.std() + 3e-6 * rng.standard_normal(joints.shape)
+        pose = shift.POSES[place][:, None] + 1e-5 * rng.standard_normal(joints.shape)
+        table = {"force": np.where(time < 0.005, 500.0, 0.0)}
+        for k in (1, 2, 3):
+            table |= {f"m{k}": pose[k - 1], f"l{k}": pose[k - 1], f"d{k}": joints[k - 1],
+                      f"t{k}": np.zeros(time.size)}  # fmt: skip
+        parts.append(pandas.DataFrame(table))
+    whole = pandas.concat(parts, ignore_index=True)
+    # A second between the parts, in which the arm moves and nothing is logged.
+    later = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    stamps = shift.BEGIN + number * DAY + 2_000_000 * np.arange(len(whole)) + 10**9 * later
+    whole.insert(0, "stamp", stamps)
+    whole["temp"] = warm
+    whole.to_parquet(path / f"{number:03d}.parquet")
+
+
+def from_logs(count: int) -> None:
+    """Histories as logs, through the whole of `count`; all follow the temperature."""
+    robot = picchio.load_robot("fanuc_like_3dof")
+    mapping = 'format = "picchio-mapping/1"\n' + "".join(
+        f'[[channel]]\nfrom = "{a}"\nto = "{b}"\n' for a, b in LINKS.items()
+    )
+    mapping += "[blows]\nthreshold = 100.0\ndirection = [1.0, 0.0, 0.0]\n"
+    for kind, target in (("nothing", None), ("joint_2 4 % softer", "stiffness of joint_2"),
+                         ("friction 20 % more", "friction of joint_"),
+                         ("lost motion doubled", "lost motion of joint_")):  # fmt: skip
+        right = dated = others = 0
+        for seed in range(count):
+            rng = np.random.default_rng([77, seed])
+            with tempfile.TemporaryDirectory() as place:
+                logs = Path(place) / "logs"
+                logs.mkdir()
+                (logs / "mapping.toml").write_text(mapping)
+                for number in range(SHIFTS):
+                    late = number >= MOVED
+                    warm = 20.0 + 5.0 * np.sin(number / 8.0) + rng.standard_normal()
+                    soft = np.full(3, 1.0 - 2e-3 * (warm - 20.0))
+                    soft[1] *= 0.96 if late and "softer" in kind else 1.0
+                    rub = (1.2 if late and "friction" in kind else 1.0) - 0.01 * (warm - 20.0)
+                    gap = 2e-4 if late and "lost" in kind else 1e-4
+                    shift_log(logs, number, rng, soft, rub, gap, warm)
+                found = picchio.count(robot, logs, Path(place) / "ledger")
+            mine = [c for c in found.changes if target and c["reading"].startswith(target)]
+            others += len(found.changes) - len(mine) + (found.exchange is not None and not target)
+            right += bool(mine)
+            day = str(np.datetime64(shift.BEGIN + MOVED * DAY, "ns"))[:10]
+            dated += any(c["since_low"] <= day <= c["since_high"] for c in mine)
+        print(f"{count} histories of {SHIFTS} logs, {kind} after {MOVED}: told of {right}, dated "
+              f"rightly {dated}, {others} other changes told", flush=True)  # fmt: skip
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--histories", type=int, default=100)
-    count = parser.parse_args().histories
+    parser.add_argument("--logs", type=int, default=0, help="histories of each kind, as logs")
+    asked = parser.parse_args()
+    count = asked.histories
+    if asked.logs:
+        from_logs(asked.logs)
+        return
     for kind in ("step", "ramp over 60 shifts", "ramp to the end"):
         found = dated = sized = others = 0
         for seed in range(count):
@@ -63,6 +172,7 @@ def main() -> None:
         values = -1e-3 * warmth + NOISE * rng.standard_normal(COUNT)
         readings.append(history(values, "warm", warmth[None]))
         alarms += bool(find(readings))
+    swaps(count)
     print(f"nothing changed: {alarms} of {count} told (set: {100 * ALARMS:g} %)")
 
 

@@ -1,20 +1,25 @@
 """How long it takes to count a day's log, and how much memory: 500 Hz, six joints, 43 million rows.
 
-    python benchmarks/counting.py [--hours 24] [--kind parquet|csv|mcap] [--folder FOLDER]
+    python benchmarks/counting.py [--hours 24] [--kind parquet|csv|mcap|bag|db3] [--days 1]
 
-MCAP: sensor_msgs/JointState, the trigger as one more joint; mcap-ros2-support reads it barely.
+MCAP and bags: sensor_msgs/JointState, the trigger as one more joint. mcap-ros2-support reads the
+one barely, rosbags the others; they decode one message after the other, so that `--bare` hours of
+it are enough: the ratio is that of the processor time a message.
 
 A robot that sets a rivet every 20 s; the log holds the trigger and six angles. The bare reading of
-the same file is timed beside it. Each is a process of its own, whose peak memory is told.
+the same file is timed beside it. Each is a process of its own; what reads a log for it counts, too.
+With `--days` there are so many logs, of as many days, in one folder.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import subprocess
 import sys
 import tempfile
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +40,12 @@ READ = {
     "n = sum(b.num_rows for b in f.iter_batches(131072))",
     "mcap": "from mcap_ros2.reader import read_ros2_messages\n"
     "n = sum(len(m.ros_msg.position) for m in read_ros2_messages(sys.argv[1]))",
+    "bag": (
+        BAGS := "from pathlib import Path\nfrom rosbags.highlevel import AnyReader\n"
+        "with AnyReader([Path(sys.argv[1])]) as r:\n"
+        "    n = sum(len(r.deserialize(d, c.msgtype).position) for c, _, d in r.messages())"
+    ),
+    "db3": BAGS,
     "csv": "import pandas\nn = sum(len(c) for c in pandas.read_csv(sys.argv[1], chunksize=131072))",
 }
 COUNT = """import warnings
@@ -43,35 +54,45 @@ import picchio
 robot = picchio.load_robot(sys.argv[4])
 found = picchio.count(robot, sys.argv[1], sys.argv[2], mapping=sys.argv[3])
 n = found.blows"""
-# Of the process itself: ru_maxrss would be that of the one that started it, too.
-TIMED = """import json, sys, time
-begin, cpu = time.perf_counter(), time.process_time()
+# The memory is that of the process itself, and that of the largest of those that read for it.
+TIMED = """import json, resource, sys, time
+def cpu():
+    return sum(sum(resource.getrusage(w)[:2]) for w in (0, -1))
+begin, before = time.perf_counter(), cpu()
 {code}
 peak = next(int(x.split()[1]) for x in open("/proc/self/status") if x[:5] == "VmHWM") / 1024
-print(json.dumps([n, time.perf_counter() - begin, time.process_time() - cpu, peak]))"""
+child = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+print(json.dumps([n, time.perf_counter() - begin, cpu() - before, peak, child]))"""
 
 
-def write(path: Path, hours: float, names: list[str], poses: np.ndarray) -> int:
+def pieces(hours: float, poses: np.ndarray, day: int):
+    """Stamps ns, the trigger, the angles, a million rows at a time."""
+    rows, rng = int(hours * 3600 * RATE), np.random.default_rng(day)
+    for first in range(0, rows, 1 << 20):
+        time = np.arange(first, min(first + (1 << 20), rows)) / RATE
+        rivet = (time // APART).astype(int)
+        on = ((time % APART) > 5.0) & ((time % APART) < 5.0 + ON)
+        angles = poses[rivet % len(poses)]
+        angles = angles + 1e-5 * rng.standard_normal(angles.shape)
+        begin = BEGIN + day * 86_400 * 10**9
+        yield begin + np.rint(time * 1e9).astype(np.int64), on.astype(float), angles
+
+
+def write(path: Path, hours: float, names: list[str], poses: np.ndarray, day: int = 0) -> int:
     import pyarrow
     import pyarrow.parquet
 
-    rows, rng = int(hours * 3600 * RATE), np.random.default_rng(0)
-    writer = None
-    if path.suffix == ".mcap":
-        return write_mcap(path, rows, rng, names, poses)
+    if path.suffix in (".mcap", ".bag", ".db3"):
+        return write_messages(path, names, pieces(hours, poses, day))
+    rows, writer = 0, None
     with open(path, "w", newline="") as text:
-        for first in range(0, rows, 1 << 20):
-            time = np.arange(first, min(first + (1 << 20), rows)) / RATE
-            rivet = (time // APART).astype(int)
-            on = ((time % APART) > 5.0) & ((time % APART) < 5.0 + ON)
-            angles = poses[rivet % len(poses)]
-            angles = angles + 1e-5 * rng.standard_normal(angles.shape)
-            stamp = BEGIN + np.rint(time * 1e9).astype(np.int64)
-            columns = {"stamp": stamp, "on": on.astype(float),
-                       **dict(zip(names, angles.T, strict=True))}  # fmt: skip
+        for stamp, on, angles in pieces(hours, poses, day):
+            columns = {"stamp": stamp, "on": on, **dict(zip(names, angles.T, strict=True))}
             table = pyarrow.table(columns)
+            rows += len(stamp)
             if path.suffix == ".csv":
-                table.to_pandas().to_csv(text, index=False, header=first == 0, float_format="%.6f")
+                first = rows == len(stamp)
+                table.to_pandas().to_csv(text, index=False, header=first, float_format="%.6f")
                 continue
             writer = writer or pyarrow.parquet.ParquetWriter(path, table.schema)
             writer.write_table(table, row_group_size=1 << 20)
@@ -80,28 +101,69 @@ def write(path: Path, hours: float, names: list[str], poses: np.ndarray) -> int:
     return rows
 
 
-def write_mcap(path: Path, rows: int, rng, names: list[str], poses: np.ndarray) -> int:
-    from mcap_ros2.writer import Writer
+def write_messages(path: Path, names: list[str], made) -> int:
+    """One message by rosbags; its stamp and numbers are exchanged in as many copies as are needed.
 
-    text = "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\n"
-    text += "float64[] effort\n" + "=" * 80 + "\nMSG: std_msgs/Header\n"
-    text += "builtin_interfaces/Time stamp\nstring frame_id\n" + "=" * 80
-    text += "\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
-    with open(path, "wb") as stream:
-        made = Writer(stream)
-        schema = made.register_msgdef("sensor_msgs/msg/JointState", text)
-        for i in range(rows):
-            time = i / RATE
-            on = 5.0 < time % APART < 5.0 + ON
-            angles = poses[int(time // APART) % len(poses)] + 1e-5 * rng.standard_normal(len(names))
-            ns = BEGIN + round(time * 1e9)
-            stamp = {"sec": ns // 10**9, "nanosec": ns % 10**9}
-            message = {"header": {"stamp": stamp, "frame_id": ""}, "name": [*names, "on"],
-                       "position": [*angles.tolist(), float(on)], "velocity": [],
-                       "effort": []}  # fmt: skip
-            made.write_message("/joint_states", schema, message, ns, ns)
-        made.finish()
+    rosbags and mcap write those, message by message: what they write is what others' logs hold.
+    """
+    from rosbags.typesys import Stores, get_typestore
+
+    one = path.suffix == ".bag"
+    store = get_typestore(Stores.ROS1_NOETIC if one else Stores.ROS2_HUMBLE)
+    t, kind = store.types, "sensor_msgs/msg/JointState"
+    stamp = t["builtin_interfaces/msg/Time"](sec=0, nanosec=0)
+    head = t["std_msgs/msg/Header"](stamp=stamp, frame_id="", **({"seq": 0} if one else {}))
+    marks = 1e300 + 1e290 * np.arange(len(names) + 1)
+    message = t[kind](head, [*names, "on"], marks, np.array([]), np.array([]))
+    raw = np.frombuffer(store.serialize_ros1(message, kind) if one
+                        else store.serialize_cdr(message, kind), np.uint8)  # fmt: skip
+    at, clock = raw.tobytes().index(marks.tobytes()), 4  # after the encapsulation, or seq
+    with writer_of(path, store, kind) as put:
+        rows = 0
+        for ns, on, angles in made:
+            for part in range(0, len(ns), 50_000):
+                own = slice(part, part + 50_000)
+                table = np.tile(raw, (len(ns[own]), 1))
+                whole = np.divmod(ns[own], 10**9)
+                table[:, clock : clock + 8] = np.column_stack(whole).astype("<u4").view(np.uint8)
+                numbers = np.column_stack([angles[own], on[own]])
+                table[:, at : at + 8 * numbers.shape[1]] = numbers.view(np.uint8)
+                for when, row in zip(ns[own].tolist(), table, strict=True):
+                    put(when, row.tobytes())
+            rows += len(ns)
     return rows
+
+
+@contextmanager
+def writer_of(path: Path, store, kind: str):
+    if path.suffix == ".mcap":
+        from mcap.writer import Writer
+
+        with open(path, "wb") as stream:
+            made = Writer(stream)
+            made.start()
+            text = store.generate_msgdef(kind, ros_version=2)[0].encode()
+            schema = made.register_schema(kind, "ros2msg", text)
+            link = made.register_channel("/joint_states", "cdr", schema)
+            yield lambda ns, data: made.add_message(link, ns, data, ns)
+            made.finish()
+        return
+    if path.suffix == ".bag":
+        from rosbags.rosbag1 import Writer as Bag
+
+        with Bag(path) as made:
+            link = made.add_connection("/joint_states", kind, typestore=store)
+            yield lambda ns, data: made.write(link, ns, data)
+        return
+    from rosbags.rosbag2 import StoragePlugin
+    from rosbags.rosbag2 import Writer as Bag
+
+    folder = path.with_suffix("")
+    with Bag(folder, version=9, storage_plugin=StoragePlugin.SQLITE3) as made:
+        link = made.add_connection("/joint_states", kind, typestore=store)
+        yield lambda ns, data: made.write(link, ns, data)
+    next(folder.glob("*.db3")).rename(path)
+    shutil.rmtree(folder)
 
 
 def timed(code: str, *arguments: object) -> list[float]:
@@ -116,36 +178,45 @@ def main() -> None:
 
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=24.0)
-    parser.add_argument("--kind", choices=("parquet", "csv", "mcap"), default="parquet")
+    parser.add_argument("--days", type=int, default=1, help="logs of so many hours each")
+    parser.add_argument("--bare", type=float, default=0.2, help="h of messages read barely")
+    parser.add_argument("--kind", choices=tuple(READ), default="parquet")
     parser.add_argument("--folder")
     asked = parser.parse_args()
     robot = picchio.load_robot(ROBOT)
     task = picchio.load_task(robot.task_path, robot)
-    names = list(robot.joint_names)
+    names, poses = list(robot.joint_names), task.operations[0].poses
     with tempfile.TemporaryDirectory(dir=asked.folder) as place:
-        folder = Path(place)
-        log, rules = folder / f"day.{asked.kind}", folder / "mapping.toml"
-        rows = write(log, asked.hours, names, task.operations[0].poses)
+        folder, kind = Path(place), asked.kind
+        logs, rules = folder / "logs", folder / "mapping.toml"
+        logs.mkdir()
+        days = [logs / f"day{k:02d}.{kind}" for k in range(asked.days)]
+        rows = sum(write(day, asked.hours, names, poses, k) for k, day in enumerate(days))
         text = MAPPING.format(operation=task.operations[0].name)
-        if asked.kind == "mcap":
+        messages = kind in ("mcap", "bag", "db3")
+        if messages:
             text = text.replace('"on"', '"/joint_states:position.on"')
             text = text.replace('to = "trigger"', 'to = "trigger"\nunit = "1"')
-        before = "/joint_states:position." if asked.kind == "mcap" else ""
+        before = "/joint_states:position." if messages else ""
         for name in names:
             text += f'[[channel]]\nfrom = "{before}{name}"\nto = "position.{name}"\n'
         rules.write_text(text)
-        print(
-            f"{rows} rows of {len(names)} joints, {log.stat().st_size / 1e6:.0f} MB, {asked.kind}"
-        )
+        size = sum(day.stat().st_size for day in days) / 1e6
+        print(f"{rows} rows of {len(names)} joints in {len(days)} logs, {size:.0f} MB, {kind}")
         # What is compiled once is not counted.
-        short = folder / f"short.{asked.kind}"
-        write(short, 0.02, names, task.operations[0].poses)
+        short = folder / f"short.{kind}"
+        few = write(short, asked.bare if messages else 0.02, names, poses)
         timed(COUNT, short, folder / "first", rules, ROBOT)
-        bare = timed(READ[asked.kind], log)
-        print(f"bare reading: {bare[1]:.1f} s ({bare[2]:.1f} s of CPU), {bare[3]:.0f} MB")
-        full = timed(COUNT, log, folder / "ledger", rules, ROBOT)
+        if not messages:
+            few = rows // len(days)
+        bare = timed(READ[kind], short if messages else days[0])
+        print(f"bare reading of {few} rows: {bare[1]:.1f} s ({bare[2]:.1f} s of CPU), "
+              f"{bare[3]:.0f} MB")  # fmt: skip
+        full = timed(COUNT, logs, folder / "ledger", rules, ROBOT)
+        ratio = full[2] / rows / (bare[2] / few)
         print(f"counting: {full[0]:.0f} blows, {full[1]:.1f} s ({full[2]:.1f} s of CPU), "
-              f"{full[3]:.0f} MB, {full[1] / bare[1]:.1f} times the bare reading")  # fmt: skip
+              f"{full[3]:.0f} MB and {full[4]:.0f} MB of the reader, {ratio:.2g} times the CPU of "
+              "the bare reading")  # fmt: skip
 
 
 if __name__ == "__main__":

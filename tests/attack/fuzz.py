@@ -24,7 +24,6 @@ import resource
 import shutil
 import signal
 import struct
-import subprocess
 import sys
 import tempfile
 import time
@@ -304,6 +303,11 @@ def write_uff(folder: Path) -> None:
         pyuff.UFF(str(folder / "raw.uff")).write_sets([told], mode="add")
 
 
+def write_bag(folder: Path) -> None:
+    logs = imported(Path(__file__).parents[1] / "campaign" / "test_logs_as_they_come.py")
+    logs.bag(folder / "raw.bag", np.ones(6), "bag")
+
+
 def write_mcap(folder: Path) -> None:
     """Without checksums, which would tell of every change at once."""
     import mcap_ros2.writer
@@ -437,6 +441,7 @@ READERS = {
     "csv": Reader(write_foreign, mapped, ("raw.csv",)),
     "uff": Reader(write_uff, raw("raw.uff")),
     "mcap": Reader(write_mcap, raw("raw.mcap")),
+    "bag": Reader(write_bag, raw("raw.bag")),
     "matlab": Reader(write_mat, raw("raw.mat")),
     "map-nc": Reader(map_to(".nc"), mapped_values),
     "map-zarr": Reader(map_to(".zarr"), mapped_values),
@@ -539,27 +544,36 @@ class Coverage:
         return self.trace
 
 
-def forked(
-    code: str, arguments: list[str], *, seconds: float, memory: int
-) -> subprocess.CompletedProcess[str]:
-    """As `run_python`, but forked: a thousand times a minute. Its limits are ours."""
-    with tempfile.TemporaryFile("w+") as out:
-        child = os.fork()
-        if child == 0:
+class Forked:
+    """As `start_python`, but forked: a thousand times a minute. Its limits are ours."""
+
+    def __init__(self, code: str, arguments: list[str], *, memory: int) -> None:
+        ours, theirs = os.pipe()
+        self.child = os.fork()
+        if self.child == 0:
             status = 70
             try:
                 sys.settrace(None)
-                sys.argv, sys.stdout = ["-c", *arguments], out
+                os.close(ours)
+                os.dup2(theirs, 1)
+                os.close(theirs)
+                sys.argv = ["-c", *arguments]
                 exec(code, {"sys": sys})
                 status = 0
             except SystemExit as ended:
                 status = int(ended.code or 0)
             finally:
-                out.flush()
                 os._exit(status)
-        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-        out.seek(0)
-        return subprocess.CompletedProcess(arguments, status, out.read(), "")
+        os.close(theirs)
+        self.stdout = os.fdopen(ours, "rb", buffering=0)
+
+    def kill(self) -> None:
+        """It may have ended."""
+        os.kill(self.child, signal.SIGKILL)
+
+    def wait(self) -> None:
+        """Until it has ended."""
+        os.waitpid(self.child, 0)
 
 
 @contextlib.contextmanager
@@ -601,10 +615,10 @@ def work(name: str, folder: Path, seconds: float, seed: int) -> None:
     reader, now = READERS[name], folder / "now"
     chance = random.Random(seed)
     warnings.simplefilter("ignore")
-    real = processes.run_python
+    real = processes.start_python
     for module in list(sys.modules.values()):
-        if getattr(module, "run_python", None) is real:
-            module.run_python = forked  # type: ignore[attr-defined]
+        if getattr(module, "start_python", None) is real:
+            module.start_python = Forked  # type: ignore[attr-defined]
     own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (own + MEMORY, own + MEMORY))
     files = sorted(path for path in now.rglob("*") if path.is_file())

@@ -16,9 +16,9 @@ from held import one_line
 
 from picchio.campaign.importing import isolated
 from picchio.campaign.importing.importer import read_raw
+from picchio.core import spread
 from picchio.core.errors import InputError
 from picchio.robot.urdf.shapes import load_parts
-from picchio.studies.maps import run
 from picchio.studies.maps.places import surface
 from picchio.studies.maps.result import WorkspaceMap
 from picchio.studies.maps.stored import open_map
@@ -174,7 +174,7 @@ def test_foreign_files_are_read_in_another_process(ending, tmp_path, monkeypatch
 
 
 def test_a_scheduler_that_does_not_answer(tmp_path, in_process, monkeypatch):
-    monkeypatch.setattr(run, "_PATIENCE", 0.5)
+    monkeypatch.setattr(spread, "_PATIENCE", 0.5)
     map_by = ("map", ARM, "--joint-grid", "3", "--out", "m.nc", "--scheduler")
     with socket.create_server(("127.0.0.1", 0)) as mute:
         address = f"tcp://127.0.0.1:{mute.getsockname()[1]}"

@@ -6,10 +6,12 @@ import shift
 from scipy.linalg import eigh
 
 import picchio
-from picchio.ledger.changes import FIRST, Reading, exchanged, find, readings_of
-from picchio.ledger.ringing import decaying, ring_downs
 from picchio.ledger.samples import Samples
 from picchio.ledger.store import Stream
+from picchio.ledger.watch.changes import FIRST, Reading, find, readings_of
+from picchio.ledger.watch.drives import drives
+from picchio.ledger.watch.exchange import exchange, signature, whose
+from picchio.ledger.watch.ringing import decaying, ring_downs
 from picchio.model.model import Model
 from worlds import bench, robots
 
@@ -70,15 +72,153 @@ def test_a_short_history_tells_nothing():
     assert find([history(np.zeros(100))]) == []
 
 
-def test_two_robots_in_one_ledger_are_told():
-    rng = np.random.default_rng(3)
-    readings = [
-        history(step_or_ramp(rng, "step", size), f"stiffness of {j}", j)
-        for j, size in (("joint_1", 0.08), ("joint_2", -0.06), ("joint_3", 0.1))
-    ]
-    (told,) = exchanged(find(readings))
-    assert "joint_1" in told and "joint_3" in told and "two robots" in told
-    assert exchanged(find(readings[:1])) == ()
+ROBOT_READINGS = {"stiffness of joint_1": (0.05, 0.01), "stiffness of joint_2": (0.05, 0.01),
+                  "stiffness of joint_3": (0.05, 0.01), "damping": (0.2, 0.03),
+                  "friction of joint_2": (0.15, 0.03)}  # fmt: skip
+"""By how much robots of a type differ, and a shift of one from the next, as a logarithm."""
+
+
+def of_robots(rng, robots, noise=None):
+    """What shifts show of robots of a type, the k-th shift that of the k-th number."""
+    noise = noise or rng
+    own = {name: rng.normal(0.0, size, 8) for name, (size, _) in ROBOT_READINGS.items()}
+    return {
+        name: own[name][robots] + size * noise.standard_normal(len(robots))
+        for name, (_, size) in ROBOT_READINGS.items()
+    }
+
+
+def as_readings(values):
+    return [history(v, name, name) for name, v in values.items()]
+
+
+def swapped(seed):
+    """Four robots, two of them swapped from some day on: what is told of each, whose logs, when."""
+    fleet, day = {}, 110 + seed % 40
+    for number in range(4):
+        rng = np.random.default_rng(seed)  # the same eight robots
+        robots = np.full(200, number)
+        if number < 2:
+            robots[day:] = 1 - number
+        fleet[number] = as_readings(of_robots(rng, robots, np.random.default_rng([seed, number])))
+    found = {number: exchange(readings) for number, readings in fleet.items()}
+    past = {n: f.before if f else signature(fleet[n]) for n, f in found.items()}
+    near = {n: whose(f, {k: s for k, s in past.items() if k != n}) if f else None
+            for n, f in found.items()}  # fmt: skip
+    late = {n: (f.since - shift.BEGIN) / DAY - day if f else None for n, f in found.items()}
+    return found, near, late
+
+
+def test_two_swapped_robots_are_told_and_whose_logs_they_are():
+    told, right, dated, alarms, words = 0, 0, 0, 0, set()
+    for seed in range(20):
+        found, near, late = swapped(seed)
+        alarms += sum(found[n] is not None for n in (2, 3))
+        for a in (0, 1):
+            told += found[a] is not None
+            right += near[a] is not None and near[a][0] == 1 - a
+            dated += late[a] is not None and abs(late[a]) <= 2
+            words |= {found[a].words.partition("look")[2][:33]} if found[a] else set()
+    assert told >= 33
+    assert min(right, dated) >= 0.9 * told
+    assert alarms <= 3  # 2 % of 40 are 0.8
+    assert words == {" like the logs of another robot, "}
+
+
+def test_a_fleet_says_in_both_rows_whose_logs_they_are():
+    from picchio.ledger.fleet import _told_apart
+
+    found = next(f for k in range(20) if (f := swapped(k)[0])[0] and f[1])
+    rows = [
+        {"name": "left", "another_robot": None, "_exchange": found[0],
+         "_signature": found[0].before},
+        {"name": "right", "another_robot": None, "_exchange": found[1],
+         "_signature": found[1].before},
+        {"name": "new", "another_robot": None, "_exchange": None, "_signature": {}},
+    ]  # fmt: skip
+    _told_apart(rows)
+    assert [r["another_robot"] and r["another_robot"]["like"] for r in rows] == [
+        "right", "left", None
+    ]  # fmt: skip
+    assert rows[0]["another_robot"]["words"].endswith("; they are like those of right")
+    assert not any(key.startswith("_") for row in rows for key in row)
+
+
+def no_swaps(seed):
+    """Readings in which no robot is swapped: noise, one joint breaks, all wear, all are warm."""
+    warmth, index = 20.0 + 5.0 * np.sin(np.arange(200) / 20.0), np.arange(200)
+    noise = of_robots(np.random.default_rng(900 + seed), np.zeros(200, int))
+    joint = "stiffness of joint_2"
+    broken = noise | {joint: noise[joint] - 0.1 * (index > 90)}
+    worn = {n: v - 0.05 * np.clip((index - 60) / 100, 0, 1) for n, v in noise.items()}
+    warm = {n: v - 2e-3 * warmth for n, v in noise.items()}
+    cases = {"noise": as_readings(noise), "a joint 10 % softer": as_readings(broken),
+             "all wear by 5 %": as_readings(worn)}  # fmt: skip
+    return cases | {"warm": [history(v, n, n, covariates=warmth[None]) for n, v in warm.items()]}
+
+
+def test_what_is_no_swap_is_not_told_as_one():
+    alarms = sum(exchange(case) is not None for k in range(15) for case in no_swaps(k).values())
+    assert alarms <= 4  # 2 % of 60 are 1.2
+
+
+def moves(rng, *, friction=1.0, gap=0.0, offset=0.0, seconds=8.0, rate=250.0):
+    """An arm that swings to and fro: torques by pinocchio, friction, both sides of each joint."""
+    import pinocchio as pin
+
+    robot = picchio.load_robot(NAME)
+    model = pin.buildModelFromUrdf(str(robot.files[0]))
+    time = np.arange(int(seconds * rate)) / rate
+    w = 2.0 * np.pi * np.array([0.31, 0.43, 0.55])[:, None]
+    q = np.array([0.2, 0.8, -0.7])[:, None] + 0.3 * np.sin(w * time)
+    v, a = 0.3 * w * np.cos(w * time), -0.3 * w**2 * np.sin(w * time)
+    data = model.createData()
+    torque = np.array(
+        [pin.rnea(model, data, *state) for state in zip(q.T, v.T, a.T, strict=True)]
+    ).T
+    rub = friction * np.array([60.0, 40.0, 20.0])[:, None]
+    torque = torque + rub * (np.sign(v) + 0.2 * v) + offset
+    torque = torque + 5.0 * rng.standard_normal(torque.shape)
+    motor = q + 0.5 * gap * np.sign(v) + 1e-5 * rng.standard_normal(q.shape)
+    stamps = shift.BEGIN + np.rint(time * 1e9).astype(np.int64)
+    others = {f"torque.joint_{j + 1}": (stamps, torque[j]) for j in range(3)}
+    others |= {f"position.joint_{j + 1}": (stamps, q[j]) for j in range(3)}
+    return Samples("trigger", stamps, np.zeros((time.size, 1)), stamps, motor.T, others), v
+
+
+def test_friction_and_lost_motion_are_read_of_a_moving_arm():
+    rng = np.random.default_rng(4)
+    model = Model.of(picchio.load_robot(NAME))
+    samples, v = moves(rng, friction=1.5, gap=4e-4)
+    found = {name: value for name, _, value in drives(samples, model)}
+    for j, dry in enumerate((60.0, 40.0, 20.0)):
+        fast = np.abs(v[j]) > max(0.02, 0.2 * np.quantile(np.abs(v[j]), 0.99))
+        usual = 1.5 * dry * (1.0 + 0.2 * np.median(np.abs(v[j][fast])))
+        assert found[f"friction.joint_{j + 1}"] == pytest.approx(usual, rel=0.05)
+        assert found[f"lost_motion.joint_{j + 1}"] == pytest.approx(4e-4, rel=0.03)
+        assert abs(found[f"offset.joint_{j + 1}"]) < 0.01
+    # An arm that stands still shows none of it.
+    rest = np.tile(samples.poses[0], (samples.stamps.size, 1))
+    still = Samples("trigger", samples.stamps, samples.values, samples.stamps, rest, samples.others)
+    assert drives(still, model) == []
+
+
+def test_friction_of_a_real_drive_is_what_was_published(measured_data):
+    """EMPS, by Janot, Gautier and Brunot (2019): 20.39 N and 203.5 N s/m, one slide."""
+    import picchio.datasets
+
+    for record, near in zip(
+        picchio.datasets.load("emps", measured_data), (0.01, 0.06), strict=True
+    ):
+        read = record.read()
+        stamps = shift.BEGIN + np.rint(read["time"] * 1e9).astype(np.int64)
+        slide = read["motor_position.slide"]
+        samples = Samples("trigger", stamps, np.zeros((stamps.size, 1)), stamps, slide[:, None],
+                          {"torque.slide": (stamps, read["torque.slide"])})  # fmt: skip
+        found = {n: v for n, _, v in drives(samples, Model.of(picchio.load_robot("emps")))}
+        speed = np.abs(np.gradient(slide, read["time"]))
+        usual = float(np.median(speed[speed > 0.2 * np.quantile(speed, 0.99)]))
+        assert found["friction.slide"] == pytest.approx(20.39 + 203.5 * usual, rel=near)
 
 
 def test_frequencies_of_a_decay_are_fitted():

@@ -38,34 +38,28 @@ def search_path() -> list[str]:
     return kept if _PACKAGES in kept else [*kept, _PACKAGES]
 
 
-def run_python(
-    code: str, arguments: Sequence[str], *, seconds: float, memory: int
-) -> subprocess.CompletedProcess[str]:
-    """Run some lines of Python in a process of their own, with bounded time and memory.
+def start_python(code: str, arguments: Sequence[str], *, memory: int) -> subprocess.Popen[bytes]:
+    """Run some lines of Python in a process of their own, with bounded memory.
 
     Args:
         code: the lines; `sys.argv[1:]` holds the arguments.
         arguments: of the process.
-        seconds: after which it is ended.
         memory: bytes of its address space, on Linux.
 
     Returns:
-        its exit status and what it printed.
-
-    Raises:
-        subprocess.TimeoutExpired: it took longer.
+        the process; `stdout` is an unbuffered pipe, what it says of errors goes nowhere.
     """
     begin = _BEGIN.format(sep=os.pathsep)
     if sys.platform == "linux":  # elsewhere the address space has no such limit
         begin += _LIMIT.format(memory=memory)
     begin += f"from picchio.core.processes import end_with; end_with({os.getpid()}); "
-    return subprocess.run(
+    return subprocess.Popen(
         # -I: neither the current folder nor the environment's folders are searched (implies -P)
         [sys.executable, "-I", "-c", begin + code, os.pathsep.join(search_path()), *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=seconds,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        bufsize=0,
         # Each thread of the linear algebra takes address space; a reader needs one.
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
     )

@@ -4,327 +4,47 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime, timedelta
 from itertools import chain
 from pathlib import Path
-from typing import Any, ClassVar
 
 import numpy as np
 
 from picchio.campaign.channels import AXES
 from picchio.campaign.importing.importer import ENDINGS
 from picchio.campaign.importing.mapping import Mapping, read_mapping
-from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError, warn_user
 from picchio.core.files import sha256
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
-from picchio.core.results import TableResult
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.ledger.blows import (
-    Blow,
-    Burst,
-    Run,
-    Shape,
-    assumed,
-    bursts,
-    covered,
-    measured,
-    runs,
-    within,
-)
-from picchio.ledger.changes import exchanged, find, readings_of
+from picchio.ledger.blows import Blow, bursts, covered, within
 from picchio.ledger.damage import (
     BurstDamage,
-    Totals,
     burst_damages_of,
     fingerprint,
     resting,
     together,
     unscaled,
 )
-from picchio.ledger.forecast import Worlds, quantiles, worlds
-from picchio.ledger.out import opc_ua
-from picchio.ledger.ringing import ring_downs, temperatures
+from picchio.ledger.finding import blows_of, standing, stream_of
+from picchio.ledger.forecast import UNLIKELY, Worlds, worlds
+from picchio.ledger.result import SECONDS_A_DAY, Count, Counted
 from picchio.ledger.samples import Samples, by_names, read_samples
-from picchio.ledger.store import Kept, Ledger, Stream
-from picchio.model.many_poses import ManyPoses
+from picchio.ledger.store import Ledger
+from picchio.ledger.watch.changes import find, readings_of
+from picchio.ledger.watch.drives import drives
+from picchio.ledger.watch.exchange import exchange, signature
+from picchio.ledger.watch.ringing import ring_downs, temperatures
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.loading.find import shipped_robot
 from picchio.studies.default_task import task_of
 from picchio.studies.rivet.life_rules import curves_of
-from picchio.studies.tasks import Operation, Task
-from picchio.vibration.closed_form.response import unit_vector
+from picchio.studies.tasks import Task
 
-_SHARE = 0.2  # of the task's force: what a blow exceeds where nobody says
-_FOOT = 0.1  # of the threshold
-_AT_REST = 12.0  # m/s^2: an accelerometer reads gravity, and its noise
-_NEAR = 0.02  # rad or m: a robot that stands so near to a pose of the task works there
-_SECONDS_A_DAY = 86_400
-_LATELY = 28  # days that today's pace is taken from
-_STATIONS = 12
 MAPPING = "mapping.toml"
-
-
-@dataclass(frozen=True, eq=False)
-class Counted:
-    """What a ledger holds, as blows and damage.
-
-    Attributes:
-        blows: by time.
-        bursts: by time.
-        damages: of each burst.
-        totals: of all.
-        spans: (s, 2) ns, the time that was logged.
-    """
-
-    blows: list[Blow]
-    bursts: list[Burst]
-    damages: list[BurstDamage]
-    totals: Totals
-    spans: IndexArray
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Count(TableResult):
-    """What the logs of a robot have done to it, and what is left.
-
-    Attributes:
-        model: the robot and its effects.
-        ledger: its file.
-        logs: how many it holds.
-        added: names of the logs that are new.
-        known: names of the logs that were counted before.
-        refused: (name, why) of logs that could not be read.
-        detected: what was found out about each new log.
-        counted: blows and damage.
-        worlds: what they may have done; None where nothing was counted.
-        changes: what is no longer as it was.
-        curves: of the flexible joints.
-        notes: what was taken for granted.
-        origin: provenance.
-    """
-
-    INDEX = "name"
-    PAGE: ClassVar[str] = "visuals.report.count:count_page"
-    UNITS: ClassVar[dict[str, str]] = {"damage": "1", "blows_left_p50": "1"}
-
-    model: Model
-    ledger: Path
-    logs: int
-    added: tuple[str, ...]
-    known: tuple[str, ...]
-    refused: tuple[tuple[str, str], ...]
-    detected: dict[str, tuple[str, ...]]
-    counted: Counted
-    worlds: Worlds | None
-    changes: tuple[dict[str, Any], ...]
-    curves: tuple[SNCurve | None, ...]
-    notes: tuple[str, ...]
-    origin: dict[str, Any]
-
-    @property
-    def blows(self) -> int:
-        """How many."""
-        return len(self.counted.blows)
-
-    @property
-    def seen_share(self) -> float:
-        """Of the blows whose size was logged; 1 where there is none."""
-        seen = sum(blow.seen for blow in self.counted.blows)
-        return seen / self.blows if self.blows else 1.0
-
-    @property
-    def hours(self) -> float:
-        """h, the time that was logged."""
-        spans = self.counted.spans
-        return float((spans[:, 1] - spans[:, 0]).sum() / 3.6e12) if len(spans) else 0.0
-
-    @property
-    def blows_a_day(self) -> float:
-        """Today's pace: over the last 28 days, or as many as there are; 0 of no blow."""
-        if not self.blows:
-            return 0.0
-        last, first = self.counted.blows[-1].onset, self.counted.blows[0].onset
-        span = _LATELY * _SECONDS_A_DAY * 1_000_000_000
-        days = min(max((last - first) / 1e9 / _SECONDS_A_DAY, 1.0), _LATELY)
-        return sum(blow.onset > last - span for blow in self.counted.blows) / days
-
-    def left(self, joint: int) -> dict[str, float] | None:
-        """P10, P50 and P90 of the blows until a joint's sum is one.
-
-        Args:
-            joint: which of the flexible ones.
-
-        Returns:
-            them by name; None without a curve, or where nothing was counted.
-        """
-        if self.worlds is None or self.curves[joint] is None:
-            return None
-        return quantiles(self.worlds.blows_left(joint, self.blows))
-
-    def dates(self, left: dict[str, float] | None) -> dict[str, str | None]:
-        """When so many blows will have come, at today's pace.
-
-        Args:
-            left: as `left` gives it.
-        """
-        found: dict[str, str | None] = {}
-        for name in ("p10", "p50", "p90"):
-            blows = math.inf if left is None else left[name]
-            days = blows / self.blows_a_day if self.blows_a_day else math.inf
-            found[name] = None
-            if days < 36500:
-                last = datetime.fromtimestamp(self.counted.blows[-1].onset / 1e9, UTC)
-                found[name] = (last + timedelta(days=days)).date().isoformat()
-        return found
-
-    def reached(self, left: dict[str, float] | None) -> str | None:
-        """The month in which the median of the blows left will have come, for people.
-
-        Args:
-            left: as `left` gives it.
-
-        Returns:
-            such as "2041-07"; None without end.
-        """
-        if left is None or not math.isfinite(left["p50"]):
-            return None
-        date = self.dates(left)["p50"]
-        return "> 100 y" if date is None else date.rpartition("-")[0]
-
-    @property
-    def first_to_fail(self) -> int | None:
-        """The joint that ends the life: the fewest blows left in the median; None of none."""
-        left = [self.left(j) for j in range(len(self.curves))]
-        finite = {j: x["p50"] for j, x in enumerate(left) if x and math.isfinite(x["p50"])}
-        return min(finite, key=finite.__getitem__) if finite else None
-
-    def if_force(self, factor: float) -> FloatArray:
-        """(n,) how many times as long the joints live with all blows so many times as hard.
-
-        Args:
-            factor: of the force.
-        """
-        now = self.counted.totals.at(np.array([1.0, factor]))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(np.where(now[:, 0] > 0.0, now[:, 0] / now[:, 1], np.nan))
-
-    def days(self) -> list[dict[str, Any]]:
-        """Of each day with blows: date, blows, and the damage of each joint."""
-        if not self.counted.bursts:
-            return []
-        day = np.array([burst.onset for burst in self.counted.bursts]) // (86_400 * 10**9)
-        blows = np.array([len(burst.blows) for burst in self.counted.bursts])
-        found = []
-        for which in np.unique(day):
-            rows = day == which
-            date = datetime.fromtimestamp(int(which) * _SECONDS_A_DAY, UTC).date().isoformat()
-            found.append({"date": date, "blows": int(blows[rows].sum()),
-                          "damage": self.counted.totals.shares[rows].sum(axis=0)})  # fmt: skip
-        return found
-
-    def stations(self) -> list[dict[str, Any]]:
-        """Where the damage comes from: pose, direction, blows, share of each joint's damage."""
-        if not self.counted.bursts:
-            return []
-        places: dict[tuple[float, ...], list[int]] = {}
-        for k, burst in enumerate(self.counted.bursts):
-            key = (*np.round(burst.pose / _NEAR).tolist(), *np.round(2 * burst.direction).tolist())
-            places.setdefault(key, []).append(k)
-        whole = np.maximum(np.nansum(self.counted.totals.shares, axis=0), 1e-300)
-        found = []
-        for rows in places.values():
-            first = self.counted.bursts[rows[0]]
-            found.append({
-                "pose": first.pose, "direction": first.direction,
-                "blows": sum(len(self.counted.bursts[k].blows) for k in rows),
-                "share": self.counted.totals.shares[rows].sum(axis=0) / whole,
-            })  # fmt: skip
-        found.sort(key=lambda s: (-float(np.max(s["share"])), -s["blows"]))
-        return found[:_STATIONS]
-
-    def _headline(self) -> str:
-        text = f"{self.blows} blows in {self.logs} log{'s' * (self.logs != 1)}"
-        j = int(np.nanargmax(self.counted.totals.damage)) if self._any_damage else None
-        if j is None:
-            return f"{text}, no damage"
-        names = self.model.robot.flexible_names
-        text += f", {names[j]} has used {100 * self.counted.totals.damage[j]:.3g} % of its life"
-        first = self.first_to_fail
-        left = None if first is None else self.left(first)
-        if first is None or left is None:
-            return text
-        low, middle, high = (float(f"{left[p]:.2g}") for p in ("p10", "p50", "p90"))
-        text += f"; {names[first]} lasts {middle:,.0f} blows more"
-        return f"{text} (P10 to P90: {low:,.0f} to {high:,.0f})"
-
-    @property
-    def _any_damage(self) -> bool:
-        return bool(np.nan_to_num(self.counted.totals.damage).any())
-
-    def _rows(self) -> list[dict[str, Any]]:
-        rows = []
-        for j, name in enumerate(self.model.robot.flexible_names):
-            left = self.left(j) or {"p50": math.nan}
-            rows.append({"name": name, "damage": float(self.counted.totals.damage[j]),
-                         "blows_left_p50": left["p50"]})  # fmt: skip
-        return rows
-
-    def joints(self) -> list[dict[str, Any]]:
-        """What is told of each joint."""
-        found = []
-        for j, name in enumerate(self.model.robot.flexible_names):
-            left = self.left(j)
-            known = self.worlds is not None and self.curves[j] is not None
-            found.append({
-                "name": name,
-                "damage": float(self.counted.totals.damage[j]),
-                "damage_interval": list(self.worlds.interval(j)) if known and self.worlds else None,
-                "damage_each_alone": float(self.counted.totals.alone[j]),
-                "blows_left": left,
-                "date": self.dates(left) if left else None,
-                "reason": None if self.curves[j] else "neither shaft nor drive with a curve",
-            })  # fmt: skip
-        return found
-
-    def _content(self) -> dict[str, Any]:
-        first = self.first_to_fail
-        return {
-            "format": "picchio-count/1",
-            "robot": self.model.robot.name,
-            "ledger": self.ledger,
-            "logs": self.logs,
-            "blows": self.blows,
-            "seen_share": self.seen_share,
-            "hours_logged": self.hours,
-            "from": _iso(self.counted.blows[0].onset) if self.blows else None,
-            "to": _iso(self.counted.blows[-1].onset) if self.blows else None,
-            "blows_a_day": self.blows_a_day,
-            "joints": self.joints(),
-            "ends": None if first is None else self.model.robot.flexible_names[first],
-            "force_10_percent_less": dict(
-                zip(self.model.robot.flexible_names, self.if_force(0.9), strict=True)
-            ),
-            "changes": list(self.changes),
-            "days": self.days(),
-            "stations": self.stations(),
-            "added": list(self.added),
-            "known": list(self.known),
-            "refused": [{"log": name, "why": why} for name, why in self.refused],
-            "detected": {name: list(lines) for name, lines in self.detected.items()},
-            "opc_ua": opc_ua(self),
-            "notes": list(self.notes),
-            "provenance": self.origin,
-        }
-
-
-def _iso(ns: int) -> str:
-    return datetime.fromtimestamp(ns / 1e9, UTC).isoformat(timespec="milliseconds")
+_READ = 2  # what is read of a log: where that becomes more, logs that are there are read anew
 
 
 @one_thread()
@@ -397,21 +117,36 @@ def count(
         except InputError as error:
             raise _to_map(error, files[0] if files else None, bare, names) from None
         logs = len(book.logs())
-        changes = find(readings_of(model, counted.blows, book.features()))
+        readings = readings_of(model, counted.blows, book.features())
+    changes, other = find(readings), exchange(readings)
     drawn = None
     if counted.bursts and any(curve is not None for curve in curves):
-        day = np.array([b.onset for b in counted.bursts]) // (_SECONDS_A_DAY * 10**9)
+        day = np.array([b.onset for b in counted.bursts]) // (SECONDS_A_DAY * 10**9)
         drawn = worlds(unscaled(model), curves, sn_curve, counted.bursts, counted.totals, day,
                        samples, seed)  # fmt: skip
     inputs = [*bare.files, *work.files, *([rules_file] if rules_file else [])]
-    notes = (*names, *_notes(counted, rules, model), *exchanged(changes))
+    notes = (*names, *_notes(counted, rules, model), *_surprises(drawn, model))
     return Count(
         model=model, ledger=Path(ledger), logs=logs, added=tuple(added), known=tuple(known),
         refused=tuple(refused), detected=detected, counted=counted, worlds=drawn,
         changes=tuple(change.to_dict() for change in changes),
+        exchange=other, signature=signature(readings) if other is None else other.before,
         curves=curves, notes=notes,
         origin=provenance(inputs, seed=seed),
     )  # fmt: skip
+
+
+def _surprises(drawn: Worlds | None, model: Model) -> list[str]:
+    """Joints that should have failed by now; if one has, the ledger does not know it."""
+    if drawn is None:
+        return []
+    found = [(n, drawn.whole(j)) for j, n in enumerate(model.robot.flexible_names)]
+    return [
+        f"{name} is whole in {100 * share:.2g} % of the drawn worlds: if it has not failed, it is "
+        "stronger, or the blows are weaker, than is assumed, and what is left is told by few worlds"
+        for name, share in found
+        if share < UNLIKELY
+    ]
 
 
 def _notes(counted: Counted, rules: Mapping | None, model: Model) -> tuple[str, ...]:
@@ -508,90 +243,6 @@ def _unjoined(files: list[Path], rules: Mapping) -> list[Path]:
     return [p for p in files if p.name not in joined]
 
 
-def stream_of(samples: Samples, rules: Mapping, task: Task, robot: FlexibleRobot) -> Stream:
-    """The stream that a log belongs to.
-
-    Args:
-        samples: its first stretch.
-        rules: its mapping.
-        task: whose force tells what a blow exceeds.
-        robot: whose masses tell which acceleration that is.
-
-    Raises:
-        InputError: a force along one direction that nobody states, a threshold that must be given.
-    """
-    asked = rules.blows
-    kind, columns = samples.kind, samples.values.shape[1]
-    threshold = asked.threshold if asked else None
-    if threshold is None and kind in ("trigger", "poses"):
-        threshold = 0.5
-    if threshold is None and kind == "force":
-        threshold = _SHARE * max(op.excitation.peak_force for op in task.operations)
-    told = asked.model_dump(mode="json") if asked else {}
-    settings = {k: told.get(k) for k in ("direction", "frame", "trigger", "operation")}
-    rest = 0.0
-    if kind == "acceleration":
-        settings["sensor"] = list(samples.names)
-        rest = _AT_REST * samples.names[0].startswith("accelerometer")
-        if threshold is None:
-            weakest = _felt_least(settings, task, robot)
-            if weakest < 2.5 * rest:
-                raise InputError(f"say what the reading exceeds in a blow: the task's blows are "
-                                 f"{weakest:.3g} m/s^2, which gravity hides",
-                                 key="blows.threshold", hint="such as 100.0, m/s^2")  # fmt: skip
-            threshold = float(f"{max(_SHARE * weakest, 1.25 * rest):.2g}")
-    assert threshold is not None
-    usual = min(max(_FOOT * threshold, rest), threshold)
-    foot = asked.foot if asked and asked.foot else usual
-    if kind in ("trigger", "poses"):
-        foot = threshold
-    if foot > threshold:
-        raise InputError("must not exceed the threshold", key="blows.foot", value=foot)
-    if kind == "force" and columns == 1 and settings["direction"] is None:
-        only = _operation(task, settings["operation"], None)
-        settings["direction"], settings["frame"] = only.direction.tolist(), "world"
-    return Stream(kind, samples.gap, columns, threshold, foot, settings)
-
-
-def _operations(task: Task, name: str | None, pose: FloatArray | None) -> list[Operation]:
-    """Those that may be meant: by name, by where the robot stands, or all."""
-    if name is not None:
-        for operation in task.operations:
-            if operation.name == name:
-                return [operation]
-        raise InputError("the task has no such operation", key="blows.operation", value=name,
-                         choices=[op.name for op in task.operations])  # fmt: skip
-    if len(task.operations) == 1 or pose is None:
-        return list(task.operations)
-    near = [op for op in task.operations if (np.abs(op.poses - pose).max(axis=1) < _NEAR).any()]
-    return near or list(task.operations)
-
-
-def _operation(task: Task, name: str | None, pose: FloatArray | None) -> Operation:
-    """The operation that is meant: by its name, by where the robot stands, or the only one."""
-    meant = _operations(task, name, pose)
-    if len(meant) == 1:
-        return meant[0]
-    raise InputError("several operations of the task may be meant: say which one",
-                     key="blows.operation", choices=[op.name for op in meant])  # fmt: skip
-
-
-def standing(samples: Samples, task: Task) -> Samples:
-    """Where the robot stands at a pose of the task, as a trigger; other samples as they are.
-
-    Args:
-        samples: of a log.
-        task: its poses.
-    """
-    if samples.kind != "poses":
-        return samples
-    near = np.zeros(len(samples.poses), dtype=bool)
-    for operation in task.operations:
-        for pose in operation.poses:
-            near |= np.abs(samples.poses - pose).max(axis=1) < _NEAR
-    return replace(samples, stamps=samples.pose_stamps, values=near[:, None].astype(float))
-
-
 def add_log(
     book: Ledger, file: Path, rules: Mapping, model: Model, task: Task
 ) -> tuple[str, ...] | None:
@@ -616,7 +267,7 @@ def add_log(
     plan = rules.model_dump(mode="json", exclude={"record", "campaign"}, by_alias=True)
     poses = [op.poses.tolist() for op in task.operations]
     forces = [op.excitation.peak_force for op in task.operations]
-    told = json.dumps([plan, robot.joint_names, forces, poses], sort_keys=True)
+    told = json.dumps([plan, robot.joint_names, forces, poses, _READ], sort_keys=True)
     how = hashlib.sha256(told.encode()).hexdigest()
     if book.holds(log, how):
         return None
@@ -633,6 +284,7 @@ def add_log(
                 spans.append(part.stamps.size)
                 features.extend(ring_downs(part, stream, model))
                 features.extend(temperatures(part))
+                features.extend(drives(part, model))
                 yield part
 
         book.add(log, how, file.name, stream, looked_at(), features)
@@ -682,125 +334,3 @@ def recount(book: Ledger, model: Model, curves: Sequence[SNCurve | None], task: 
         known |= fresh
     damages = [BurstDamage.unpacked(known[key], len(curves)) for key in keys]
     return Counted(blows, grouped, damages, together(damages, curves), over)
-
-
-def blows_of(kept: Kept, model: Model, task: Task) -> list[Blow]:
-    """The blows of a stream.
-
-    Args:
-        kept: what the ledger holds of it.
-        model: the robot, and the effects on blows that are assumed.
-        task: whose blows are assumed where none are seen.
-
-    Raises:
-        InputError: see `measured`; an operation that is not told.
-    """
-    settings, robot = kept.stream.settings, model.robot
-
-    def turn(pose: FloatArray) -> FloatArray:
-        return robot.frame_placement(pose, robot.tool_frame)[1]
-
-    rotation = turn if settings.get("frame") == "tool" else None
-    if kept.stream.kind == "force":
-        given = settings.get("direction")
-        along = None if given is None or kept.stream.columns == 3 else unit_vector(given)
-        return measured(kept, along, rotation)
-    found: list[Blow] = []
-    shapes: dict[tuple[int, int], list[Shape]] = {}
-    for run in runs(kept):
-        if not run.pose.size:
-            raise InputError("no position was logged, so that nobody knows where the robot stood",
-                             key="channel")  # fmt: skip
-        if kept.stream.kind == "acceleration":
-            meant = _operations(task, settings.get("operation"), run.pose)
-            for jolt, peak in _jolts(run, kept.stream.threshold, meant[0]):
-                found.append(_felt(jolt, peak, settings, meant, task, model, shapes))
-            continue
-        operation = _operation(task, settings.get("operation"), run.pose)
-        period = operation.excitation.period
-        length = (run.last - run.onset) * 1e-9
-        hits = 1 if settings.get("trigger") == "blow" else 1 + int(length / period)
-        if kept.stream.kind == "poses":
-            hits = (
-                operation.hits_per_rivet if length >= 0.5 * period * operation.hits_per_rivet else 0
-            )
-        found += assumed(run, operation, kept.stream.kind, hits, model, shapes)
-    return found
-
-
-def _jolts(run: Run, threshold: float, operation: Operation) -> list[tuple[Run, FloatArray]]:
-    """The blows of a run, each with the largest reading, (k,) m/s^2.
-
-    The arm's ringing and gravity hardly change while a blow lasts: they are the median of the
-    samples around, over four times as long as a blow.
-    """
-    from scipy.ndimage import median_filter
-
-    if run.stamps.size < 2:
-        return []
-    period = operation.excitation.period
-    length = min(4.0 * (operation.excitation.width or 0.1 * period), 0.8 * period)
-    around = max(1, round(0.5 * length * 1e9 / float(np.median(np.diff(run.stamps)))))
-    slow = median_filter(run.values, (2 * around + 1, 1), mode="nearest")
-    quick = run.values - slow
-    size = np.linalg.norm(quick, axis=1)
-    edge = np.diff((size > threshold).astype(np.int8), prepend=0, append=0)
-    found = []
-    for a, b in zip(np.flatnonzero(edge == 1), np.flatnonzero(edge == -1), strict=True):
-        own = replace(run, onset=int(run.stamps[a]), last=int(run.stamps[b - 1]))
-        found.append((own, quick[a + int(np.argmax(size[a:b]))]))
-    return found
-
-
-def _felt(
-    run: Run, peak: FloatArray, settings: dict[str, Any], meant: list[Operation], task: Task,
-    model: Model, shapes: dict[tuple[int, int], list[Shape]],
-) -> Blow:  # fmt: skip
-    """A blow of the task's shape, as large as the peak of the tool's acceleration tells.
-
-    While a blow lasts the springs have not moved: a = J M^-1 J^T n F. Of the operations that may be
-    meant that one is taken whose n fits the reading best.
-    """
-    if len(meant) > 1 and peak.size < 2:
-        meant = [_operation(task, settings.get("operation"), run.pose)]
-    best: tuple[float, float, Operation] | None = None
-    for operation in meant:
-        per = _answers(settings, operation, unscaled(model), run.pose[None])[0]
-        force = float(peak @ per) / float(per @ per)
-        left = float(np.linalg.norm(peak - force * per))
-        if best is None or left < best[0] * (1.0 - 1e-9):
-            best = left, abs(force), operation
-    assert best is not None
-    blow = assumed(run, best[2], "acceleration", 1, model, shapes)[0]
-    return replace(blow, force=blow.force * (best[1] / blow.peak))
-
-
-def _answers(
-    settings: dict[str, Any], operation: Operation, model: Model, poses: FloatArray
-) -> FloatArray:
-    """(p, k) what the sensor reads of a blow, m/s^2 a newton, in its own axes."""
-    robot, found = model.robot, []
-    mass, jacobian = ManyPoses(model, poses).mass_and_jacobian()
-    sensor = settings.get("sensor") or ["acceleration"]
-    kind, _, rest = sensor[0].partition(".")
-    for k, pose in enumerate(poses):
-        frame = robot.frame_placement(pose, robot.tool_frame)[1]
-        along = model.force_directions(frame) @ operation.direction
-        moved = jacobian[k] @ np.linalg.solve(mass[k], along @ jacobian[k])
-        if not rest:  # its axis is not told: that of the blow
-            found.append(np.array([along @ moved]))
-            continue
-        if kind == "accelerometer":
-            moved = robot.frame_placement(pose, rest.rpartition(".")[0])[1].T @ moved
-        found.append(moved[[AXES.index(name[-1]) for name in sensor]])
-    return np.array(found)
-
-
-def _felt_least(settings: dict[str, Any], task: Task, robot: FlexibleRobot) -> float:
-    """m/s^2, what the sensor reads of the task's weakest blow."""
-    model = Model.of(robot)
-    return min(
-        float(np.linalg.norm(_answers(settings, op, model, op.poses), axis=1).min())
-        * op.excitation.peak_force
-        for op in _operations(task, settings.get("operation"), None)
-    )

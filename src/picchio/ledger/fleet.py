@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -14,14 +12,15 @@ import numpy as np
 
 from picchio.core.errors import InputError, PicchioError
 from picchio.core.html import sheet
-from picchio.core.processes import safe_start
 from picchio.core.provenance import provenance
 from picchio.core.results import TableResult
+from picchio.core.spread import require_scheduler, spread
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.ledger.count import MAPPING, Count, count
+from picchio.ledger.count import MAPPING, count
+from picchio.ledger.result import Count
+from picchio.ledger.watch.exchange import Exchange, whose
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.default_task import task_of
-from picchio.studies.maps.run import require_scheduler
 from picchio.studies.tasks import Task
 
 ENDING = ".ledger"
@@ -78,7 +77,8 @@ class Fleet(TableResult):
             rows.append((
                 row["name"], row["logs"], row["blows"], row["joint"], used, left.get("p10"),
                 left.get("p50"), left.get("p90"), date.get("p50"),
-                "; ".join(c["words"] for c in row["changes"]), row["error"],
+                "; ".join(c["words"] for c in (*row["changes"], row["another_robot"])
+                          if c), row["error"],
             ))  # fmt: skip
         return sheet(f"A fleet of {self.robot}", None, heads, rows, head=self._headline())
 
@@ -144,6 +144,7 @@ def count_fleet(
         found.append(row)
         if progress is not None:
             progress(len(found), len(names))
+    _told_apart(found)
     found.sort(key=lambda row: (-(row["damage"] or 0.0), row["name"]))
     inputs = [*robot.files, *work.files, *([shared] if shared else [])]
     return Fleet(robot.name, tuple(found), provenance(inputs, seed=seed))
@@ -158,24 +159,7 @@ def _spread(
         return
     if scheduler is not None:
         require_scheduler(scheduler)
-    from distributed import Client, LocalCluster, as_completed
-
-    with ExitStack() as opened:
-        opened.callback(logging.disable, logging.NOTSET)
-        cluster = None
-        if scheduler is None:
-            with safe_start():
-                cluster = LocalCluster(
-                    n_workers=workers, threads_per_worker=1, processes=True,
-                    dashboard_address=None, silence_logs=logging.CRITICAL,
-                )  # fmt: skip
-            opened.enter_context(cluster)
-        client = opened.enter_context(Client(cluster or scheduler))
-        opened.callback(logging.disable)
-        shared = client.scatter(job, broadcast=True)
-        futures = client.map(_row, [shared] * len(folders), list(folders), pure=False, retries=2)
-        for future in as_completed(futures):
-            yield future.result()
+    yield from spread(_row, job, folders, workers=workers, scheduler=scheduler)
 
 
 def _row(job: _Job, folder: Path) -> dict[str, Any]:
@@ -186,7 +170,8 @@ def _row(job: _Job, folder: Path) -> dict[str, Any]:
         ("logs", "blows", "seen_share", "joint", "damage", "damage_interval", "blows_left", "date",
          "error")
     )  # fmt: skip
-    row |= {"name": folder.name, "changes": [], "refused": []}
+    row |= {"name": folder.name, "changes": [], "refused": [], "another_robot": None,
+            "_exchange": None, "_signature": {}}  # fmt: skip
     try:
         found = count(job.robot, folder, job.ledgers / f"{folder.name}{ENDING}", mapping=mapping,
                       task=job.task, sn_curve=job.sn_curve, seed=job.seed)  # fmt: skip
@@ -195,10 +180,24 @@ def _row(job: _Job, folder: Path) -> dict[str, Any]:
     return row | _summary(found)
 
 
+def _told_apart(rows: list[dict[str, Any]]) -> None:
+    """Say of each exchange which robot of the fleet it looks like."""
+    kept = {row["name"]: (row.pop("_exchange"), row.pop("_signature")) for row in rows}
+    for row in rows:
+        found: Exchange | None = kept[row["name"]][0]
+        if found is None:
+            continue
+        others = {name: told for name, (_, told) in kept.items() if name != row["name"]}
+        near = whose(found, others)
+        told = found.to_dict() | {"like": near[0] if near else None}
+        told["words"] += f"; they are like those of {near[0]}" if near else ""
+        row["another_robot"] = told
+
+
 def _summary(found: Count) -> dict[str, Any]:
     row: dict[str, Any] = {
         "logs": found.logs, "blows": found.blows, "seen_share": found.seen_share,
-        "changes": list(found.changes),
+        "changes": list(found.changes), "_exchange": found.exchange, "_signature": found.signature,
         "refused": [{"log": name, "why": why} for name, why in found.refused],
     }  # fmt: skip
     damage = found.counted.totals.damage

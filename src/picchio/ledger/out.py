@@ -11,7 +11,7 @@ from picchio.core.errors import InputError
 from picchio.core.files import atomic_write, write_text
 
 if TYPE_CHECKING:
-    from picchio.ledger.count import Count
+    from picchio.ledger.result import Count
 
 _HELP = {
     "picchio_blows_total": ("counter", "Blows in the ledger."),

@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from picchio.campaign.channels import AXES, LOG_KINDS, Channel, kinds, parse_channel
-from picchio.campaign.importing.importer import combined, joined, kind_of, read_raw
-from picchio.campaign.importing.mapping import Mapping
+from picchio.campaign.importing.importer import combined, joined, read_blocks
+from picchio.campaign.importing.mapping import Mapping, TimeTable
 from picchio.campaign.importing.named import named
 from picchio.campaign.importing.raw import RawFile
-from picchio.campaign.importing.readers import read_csv, read_parquet
 from picchio.campaign.importing.resample import clocked, taken_samples
 from picchio.campaign.units import Conversion
 from picchio.core.arrays import FloatArray, IndexArray
@@ -24,7 +23,10 @@ KINDS = ("force", "acceleration", "trigger", "poses")
 """What blows are told by, the surest first."""
 BLOCK = 1 << 16
 """Samples that are held at a time of a log that can be read in blocks."""
-_STEPS = 5.0  # of the usual step: a longer one is a gap
+_OWN_CLOCKS = ("mcap", "bag")  # a topic may have no message for a while
+_LATE = 8  # stretches without a blow's channel that are put off
+STEPS = 5.0
+"""Of the usual step: a longer one is a gap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +77,11 @@ class Samples:
     @property
     def gap(self) -> int:
         """ns: longer steps than this are gaps."""
-        return int(_STEPS * self.usual_step)
+        return int(STEPS * self.usual_step)
 
 
 def read_samples(path: Path, mapping: Mapping, robot: FlexibleRobot) -> Iterator[Samples]:
-    """A log in stretches, in bounded memory where its kind of file allows (CSV, Parquet).
+    """A log in stretches, in bounded memory where its kind of file allows: see `read_blocks`.
 
     Args:
         path: the file.
@@ -92,14 +94,24 @@ def read_samples(path: Path, mapping: Mapping, robot: FlexibleRobot) -> Iterator
     """
     plan = _Plan(mapping, robot)
     fixed = mapping
-    for raw in _blocks(path, mapping):
+    held: list[Samples] | None = []
+    for raw in read_blocks(path, mapping, plan.needed, BLOCK):
         if mapping.join:
             found = joined(raw, fixed)
         else:
             found = clocked(raw, fixed.time, None, plan.series & set(raw.channels))
         if fixed is mapping and mapping.time.series is None and mapping.time.rate is None:
             fixed = _fixed(raw, mapping)
-        yield plan.samples(found)
+        made = plan.samples(found)
+        # The first stretch says what the log's step is; a topic may begin later than others.
+        if held is not None and made.stamps.size < 2 and plan.kind != "poses" and len(held) < _LATE:
+            held.append(made)
+            continue
+        yield made
+        yield from held or ()
+        held = None
+    plan.require_all(path)
+    yield from held or ()
 
 
 def by_names(path: Path, robot: FlexibleRobot) -> tuple[Mapping | None, tuple[str, ...]]:
@@ -116,7 +128,7 @@ def by_names(path: Path, robot: FlexibleRobot) -> tuple[Mapping | None, tuple[st
     Raises:
         InputError: the file can't be read.
     """
-    raw = next(_blocks(path, None), None)
+    raw = next(read_blocks(path, None, None, BLOCK), None)
     if raw is None:
         raise InputError("is empty", file=path)
     found = named(raw, robot.joint_names, [*robot.tree.links, *robot.tree.joints])
@@ -128,16 +140,6 @@ def by_names(path: Path, robot: FlexibleRobot) -> tuple[Mapping | None, tuple[st
     if not any(one.to.startswith("position.") for one in taken):
         return None, tuple(lines)
     return Mapping(channel=[one.entry for one in taken]), tuple(lines)
-
-
-def _blocks(path: Path, mapping: Mapping | None) -> Iterator[RawFile]:
-    kind = kind_of(path, mapping)
-    if (mapping and (mapping.join or mapping.filter)) or kind not in ("csv", "parquet"):
-        yield read_raw(path, mapping)
-    elif kind == "csv":
-        yield from read_csv.blocks(path, mapping, BLOCK)
-    else:
-        yield from read_parquet.blocks(path, None, BLOCK)
 
 
 def _fixed(raw: RawFile, mapping: Mapping) -> Mapping:
@@ -158,6 +160,10 @@ class _Plan:
         self.mapping, self.robot = mapping, robot
         self.series = {s for _, _, parts, _ in mapping.entries for s in parts}
         self.series |= {entry.series for entry in mapping.filter}
+        self.needed = self.series | ({mapping.time.series} if mapping.time.series else set())
+        self.zero: int | None = None
+        self.met: set[str] = set()
+        self.last: dict[str, tuple[IndexArray, FloatArray]] = {}
         self.poses: dict[str, int] = {}
         self.seen: dict[str, list[str]] = {}
         names = robot.joint_names
@@ -207,49 +213,71 @@ class _Plan:
                 hint="give [time] start in the mapping, or stamps with a date",
             )  # fmt: skip
         values: dict[str, tuple[IndexArray, FloatArray]] = {}
+        asked = self._window(raw.epoch)
         for key, to, parts, entry in self.mapping.entries:
+            if raw.kind in _OWN_CLOCKS and not parts.keys() <= raw.channels.keys():
+                continue  # no message of this topic in this stretch
+            self.met |= parts.keys()
             series = {s: raw.channel(s, key=key) for s in parts}
             first = next(iter(series.values()))
             assert first.time is not None
             channel, convert = _channel(to, entry.unit or first.unit)
             stored = combined({s: c.values for s, c in series.items()}, parts)
             stored = entry.sign * (entry.scale * stored.astype(np.float64) + entry.offset)
-            take = taken_samples(raw, first, self.mapping.time, self.mapping.filter, None)
+            take = taken_samples(raw, first, asked, self.mapping.filter, None)
             stamps = raw.epoch + np.rint(first.time * 1e9).astype(np.int64)
             values[channel.name] = (stamps[take], convert(stored)[take])
-        nothing = (np.empty(0, np.int64), np.empty((0, 1)))
         names = tuple(self.seen.get(self.kind, ()))
-        stamps, table = _together([values[n] for n in names], *nothing)
+        stamps, table = self._together(names, values)
         if self.kind == "force" and "force" not in names:  # an axis that is not logged has none
             whole = np.zeros((len(table), len(AXES)))
             whole[:, [AXES.index(n[-1]) for n in names]] = table
             table = whole
-        at, rows = _together([values[n] for n in self.poses], nothing[0], np.empty((0, 0)))
+        at, rows = self._together(tuple(self.poses), values)
+        self.last |= {n: (s[-1:], v[-1:]) for n, (s, v) in values.items() if s.size}
         poses = np.zeros((at.size, len(self.robot.joint_names)))
-        poses[:, list(self.poses.values())] = rows.reshape(at.size, len(self.poses))
+        poses[:, list(self.poses.values())] = rows
         used = {*names, *self.poses}
         others = {n: v for n, v in values.items() if n not in used}
         return Samples(self.kind, stamps, table, at, poses, others, raw.detected, names)
 
+    def _window(self, epoch: int) -> TimeTable:
+        """`[time]` with begin and end in s of this stretch, not of the file."""
+        self.zero = epoch if self.zero is None else self.zero
+        asked, late = self.mapping.time, (epoch - self.zero) * 1e-9
+        moved = {k: v - late for k in ("begin", "end") if isinstance(v := getattr(asked, k), float)}
+        return asked.model_copy(update=moved)
+
+    def _together(
+        self, names: tuple[str, ...], values: dict[str, tuple[IndexArray, FloatArray]]
+    ) -> tuple[IndexArray, FloatArray]:
+        """Channels on the stamps of the first; others hold their last sample until the next."""
+        nothing = np.empty(0, np.int64), np.empty((0, max(len(names), 1)))
+        if not names or names[0] not in values:
+            return nothing
+        clock, columns = values[names[0]][0], []
+        for name in names:
+            own, column = values.get(name, (clock[:0], np.empty(0)))
+            if own.size != clock.size or (own != clock).any():
+                if name in self.last:  # from the stretch before
+                    before = self.last[name]
+                    own = np.concatenate([before[0], own])
+                    column = np.concatenate([before[1], column])
+                if not own.size:
+                    return nothing
+                at = np.maximum(np.searchsorted(own, clock, side="right") - 1, 0)
+                column = column[at]
+            columns.append(column)
+        return clock, np.column_stack(columns)
+
+    def require_all(self, path: Path) -> None:
+        """Raise where a series that the mapping names was nowhere in the file."""
+        for key, _, parts, _ in self.mapping.entries:
+            for series in sorted(parts.keys() - self.met):
+                first = next(read_blocks(path, self.mapping, None, BLOCK), None)
+                raise InputError(f"{path.name} has no such series", key=key, value=series,
+                                 choices=first.channels if first else ())  # fmt: skip
+
 
 def _channel(name: str, unit: str | None) -> tuple[Channel, Conversion]:
     return parse_channel(name, unit, (*LOG_KINDS, *kinds()))
-
-
-def _together(
-    series: list[tuple[IndexArray, FloatArray]], stamps: IndexArray, table: FloatArray
-) -> tuple[IndexArray, FloatArray]:
-    """Series on the stamps of the first; others hold their last sample until the next."""
-    if not series:
-        return stamps, table
-    clock = series[0][0]
-    columns = []
-    for own, values in series:
-        if own.size == clock.size and (own == clock).all():
-            columns.append(values)
-        elif own.size:
-            at = np.maximum(np.searchsorted(own, clock, side="right") - 1, 0)
-            columns.append(values[at])
-        else:
-            return stamps, table
-    return clock, np.column_stack(columns)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,10 +13,10 @@ import numpy as np
 from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.channels import TIME, parse_channel
 from picchio.campaign.importing.detect import implausible, told
-from picchio.campaign.importing.isolated import read_isolated
+from picchio.campaign.importing.isolated import blocks_isolated, read_isolated
 from picchio.campaign.importing.mapping import ChannelTable, Mapping, TimeTable, read_mapping
 from picchio.campaign.importing.raw import RawChannel, RawFile
-from picchio.campaign.importing.readers import read_csv
+from picchio.campaign.importing.readers import read_csv, read_parquet
 from picchio.campaign.importing.resample import clocked, common_clock
 from picchio.campaign.record import Record
 from picchio.core.arrays import FloatArray
@@ -30,6 +31,7 @@ _ISOLATED = {
     "parquet": "read_parquet", "npz": "read_npz", "json-lines": "read_json_lines",
     "lvm": "read_lvm",
 }  # fmt: skip
+_IN_BLOCKS = ("csv", "parquet", "mcap", "bag")
 ENDINGS = {".csv": "csv", ".txt": "csv", ".tsv": "csv", ".dat": "csv", ".uff": "uff",
             ".unv": "uff", ".mcap": "mcap", ".mat": "matlab", ".parquet": "parquet",
             ".bag": "bag", ".db3": "bag", ".lvm": "lvm", ".npz": "npz", ".jsonl": "json-lines",
@@ -79,6 +81,34 @@ def read_raw(path: str | Path, mapping: Mapping | None = None) -> RawFile:
         clock = mapping.time.model_dump(mode="json") if mapping else {}
         raw = read_isolated(f"{_ROOM}.{_ISOLATED[kind]}", source, clock)
     return _rows(raw, mapping) if mapping and mapping.filter else raw
+
+
+def read_blocks(
+    path: Path, mapping: Mapping | None, names: set[str] | None, size: int
+) -> Iterator[RawFile]:
+    """The series of a log in blocks, so that memory does not grow with it, where its kind allows.
+
+    CSV, Parquet, MCAP, ROS bags; others, and what a mapping joins or filters, come as one block.
+
+    Args:
+        path: the file.
+        mapping: how it is written, and which time to take.
+        names: of the series that are needed, all where None; others may be there, too.
+        size: samples of a table.
+
+    Raises:
+        InputError: as `read_raw`.
+    """
+    kind = kind_of(path, mapping)
+    if (mapping and (mapping.join or mapping.filter)) or kind not in _IN_BLOCKS:
+        yield read_raw(path, mapping)
+    elif kind == "csv":
+        yield from read_csv.blocks(path, mapping, size)
+    elif kind == "parquet":
+        yield from read_parquet.blocks(path, None, size)
+    else:
+        clock = mapping.time.model_dump(mode="json") if mapping else {}
+        yield from blocks_isolated(f"{_ROOM}.{_ISOLATED[kind]}", path, clock, names)
 
 
 def _rows(raw: RawFile, mapping: Mapping) -> RawFile:

@@ -1,22 +1,24 @@
 """Readers of foreign files work in a process of their own, with bounded time and memory.
 
 Some are compiled and die of a damaged file; some files are small and unpack to more than there is
-memory. What is imported here and in the readers is what such a process waits for.
+memory. What is imported here and in the readers is what such a process waits for. It hands over
+what it reads by a pipe, which it waits at: it is never further ahead than a block.
 """
 
 from __future__ import annotations
 
 import importlib
 import json
+import os
+import select
 import sys
-import tempfile
+import time
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from subprocess import TimeoutExpired
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -24,9 +26,8 @@ from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError, PicchioWarning, warn_user
 from picchio.core.files import regular_file
-from picchio.core.processes import run_python
+from picchio.core.processes import start_python
 
-_REFUSED = 3
 _CHILD = "from picchio.campaign.importing.isolated import child; child(*sys.argv[1:])"
 
 
@@ -35,7 +36,7 @@ class Limits:
     """What a reader may take; files are compressed, or text, to a degree of their kind.
 
     Attributes:
-        seconds: for any file, and `seconds_a_byte` more.
+        seconds: that are waited for any file, and `seconds_a_byte` more.
         memory: bytes of address space for any file, and `memory_a_byte` more.
     """
 
@@ -59,89 +60,176 @@ def read_isolated(module: str, path: Path, clock: Mapping[str, Any]) -> RawFile:
     Raises:
         InputError: as the reader; or it crashed, or took more time or memory than it may.
     """
+    (found,) = _received(module, path, clock, "whole")
+    return found
+
+
+def blocks_isolated(
+    module: str, path: Path, clock: Mapping[str, Any], names: set[str] | None
+) -> Iterator[RawFile]:
+    """What `module.blocks(path, clock, names)` gives, a block at a time.
+
+    Args:
+        module: dotted name; it has `blocks` and its `LIMITS`.
+        path: the file.
+        clock: the mapping's `[time]`; empty without one.
+        names: of the series that are needed; all where None.
+
+    Raises:
+        InputError: as `read_isolated`.
+    """
+    return _received(module, path, clock, None if names is None else sorted(names))
+
+
+def _received(module: str, path: Path, clock: Mapping[str, Any], names: Any) -> Iterator[RawFile]:
     limits: Limits = importlib.import_module(module).LIMITS
     size = regular_file(path).stat().st_size
     seconds = limits.seconds + size * limits.seconds_a_byte
     memory = int(limits.memory + size * limits.memory_a_byte)
-    with tempfile.TemporaryDirectory() as folder:
-        out = Path(folder) / "series.npz"
-        arguments = [module, str(path), str(out), json.dumps(dict(clock))]
-        try:
-            done = run_python(_CHILD, arguments, seconds=seconds, memory=memory)
-        except TimeoutExpired:
-            raise InputError(f"could not be read within {seconds:.0f} s", file=path) from None
-        if done.returncode == _REFUSED:
-            told = json.loads(done.stdout)
-            _warn(told["warnings"])
-            raise InputError(**told["error"])
-        if done.returncode != 0:
-            raise InputError("is damaged: its reader crashed", file=path)
-        return _unpacked(path, out)
+    arguments = [module, str(path), json.dumps(dict(clock)), json.dumps(names)]
+    process = start_python(_CHILD, arguments, memory=memory)
+    assert process.stdout is not None
+    pipe = _Pipe(process.stdout, seconds)
+    try:
+        while True:
+            told = pipe.told()
+            for message in told["warnings"]:
+                warn_user(message)
+            if "error" in told:
+                raise InputError(**told["error"])
+            if "series" not in told:
+                return
+            yield _block(path, told, pipe)
+    except TimeoutError:
+        raise InputError(f"could not be read within {seconds:.0f} s", file=path) from None
+    except EOFError:
+        raise InputError("is damaged: its reader crashed", file=path) from None
+    finally:
+        process.kill()
+        process.stdout.close()
+        process.wait()
 
 
-def child(module: str, path: str, out: str, clock: str) -> None:
-    """Read the file and leave its series as .npz; the other process runs this.
+class _Pipe:
+    """What the other process writes; waiting for it takes no longer, all in all, than it may."""
+
+    def __init__(self, stream: IO[bytes], seconds: float) -> None:
+        self.stream, self.left = stream, seconds
+
+    def fill(self, target: memoryview) -> None:
+        at = 0
+        while at < len(target):
+            begin = time.monotonic()
+            if not select.select([self.stream], [], [], max(self.left, 0.0))[0]:
+                raise TimeoutError
+            self.left -= time.monotonic() - begin
+            got = self.stream.readinto(target[at:])  # type: ignore[attr-defined]
+            if not got:
+                raise EOFError
+            at += got
+
+    def told(self) -> dict[str, Any]:
+        """What goes before the numbers: its length, then JSON."""
+        length = np.zeros(1, np.int64)
+        self.fill(length.data.cast("B"))
+        text = bytearray(int(length[0]))
+        self.fill(memoryview(text))
+        found: dict[str, Any] = json.loads(text)
+        return found
+
+
+def _block(path: Path, told: dict[str, Any], pipe: _Pipe) -> RawFile:
+    arrays: list[FloatArray] = []
+    for kind, size in told["arrays"]:
+        arrays.append(np.empty(size, kind))
+        if size:
+            pipe.fill(arrays[-1].data.cast("B"))
+    channels = {}
+    for entry in told["series"]:
+        at, when = entry.pop("values"), entry.pop("time")
+        time_of = None if when is None else arrays[when]
+        channels[entry["name"]] = RawChannel(values=arrays[at], time=time_of, **entry)
+    taken = told["taken"] and datetime.fromisoformat(told["taken"])
+    return RawFile(path, told["kind"], channels, taken, told["epoch"], tuple(told["detected"]))
+
+
+def child(module: str, path: str, clock: str, names: str) -> None:
+    """Read the file and write its series to the pipe; the other process runs this.
 
     Args:
         module: dotted name of the reader.
         path: the file.
-        out: where the series go.
         clock: `[time]`, as JSON.
+        names: JSON: of the series that are needed, null for all, "whole" for one block.
     """
+    out = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a library prints is none of it
+    wanted = json.loads(names)
     with warnings.catch_warnings(record=True) as met:
         warnings.simplefilter("always")
+        refused = None
         try:
-            found: RawFile = importlib.import_module(module).read(Path(path), json.loads(clock))
-            refused = None
+            reader = importlib.import_module(module)
+            how = Path(path), json.loads(clock)
+            found: Iterable[RawFile] = (
+                [reader.read(*how)] if wanted == "whole"
+                else reader.blocks(*how, None if wanted is None else set(wanted))
+            )  # fmt: skip
+            for raw in found:
+                _send(out, raw, _said(met))
         except MemoryError:
             refused = InputError("needs more memory than its size allows for", file=path)
         except InputError as error:
             refused = error
+        last: dict[str, Any] = {"warnings": _said(met)}
+    _write(out, last if refused is None else {**last, "error": _told(refused)})
+    out.close()
+    sys.exit(0)
+
+
+def _said(met: list[warnings.WarningMessage]) -> Sequence[str]:
+    """What was warned of since the last time."""
     said = [str(w.message) for w in met if issubclass(w.category, PicchioWarning)]
-    if refused is not None:
-        print(json.dumps({"error": _told(refused), "warnings": said}))
-        sys.exit(_REFUSED)
-    arrays: dict[str, FloatArray] = {}
+    met.clear()
+    return said
+
+
+def _write(out: IO[bytes], told: dict[str, Any]) -> None:
+    text = json.dumps(told).encode()
+    out.write(np.array([len(text)], np.int64).tobytes() + text)
+    out.flush()
+
+
+def _send(out: IO[bytes], raw: RawFile, said: Sequence[str]) -> None:
+    arrays: list[FloatArray] = []
     series: list[dict[str, Any]] = []
-    clock, stamps = "", None
-    for channel in found.channels.values():
-        arrays[key := f"values {len(series)}"] = channel.values
+    clock: int | None = None
+    for channel in raw.channels.values():
+        arrays.append(channel.values)
+        at = len(arrays) - 1
         if channel.time is None:
-            clock, stamps = "", None
-        elif stamps is None or not np.array_equal(stamps, channel.time):  # a topic's share them
-            arrays[clock := f"time {len(series)}"] = stamps = channel.time
+            clock = None
+        elif clock is None or not np.array_equal(arrays[clock], channel.time):
+            clock = len(arrays)  # a topic's series share their stamps
+            arrays.append(channel.time)
         about = {name: getattr(channel, name) for name in ("name", "unit", "suggestion", "note")}
-        series.append(about | {"values": key, "time": clock})
-    told = {
-        "kind": found.kind,
-        "taken": found.taken and found.taken.isoformat(),
-        "epoch": found.epoch,
-        "detected": found.detected,
+        series.append(about | {"values": at, "time": clock})
+    _write(out, {
+        "kind": raw.kind,
+        "taken": raw.taken and raw.taken.isoformat(),
+        "epoch": raw.epoch,
+        "detected": raw.detected,
         "series": series,
+        "arrays": [(a.dtype.str, a.size) for a in arrays],
         "warnings": said,
-    }
-    np.savez(out, allow_pickle=False, told=np.array(json.dumps(told)), **arrays)
+    })  # fmt: skip
+    for array in arrays:
+        if array.size:
+            out.write(np.ascontiguousarray(array).data.cast("B"))
+    out.flush()
 
 
 def _told(error: InputError) -> dict[str, Any]:
     """What makes the same error again."""
     keys = ("problem", "file", "key", "value", "choices", "hint")
     return {key: getattr(error, key) for key in keys if getattr(error, key) is not None}
-
-
-def _unpacked(path: Path, stored: Path) -> RawFile:
-    with np.load(stored) as found:
-        told = json.loads(str(found["told"]))
-        arrays = {name: found[name] for name in found.files if name != "told"}
-    _warn(told["warnings"])
-    channels = {}
-    for entry in told["series"]:
-        both = {name: arrays.get(entry[name]) for name in ("values", "time")}
-        channels[entry["name"]] = RawChannel(**entry | both)
-    taken = told["taken"] and datetime.fromisoformat(told["taken"])
-    return RawFile(path, told["kind"], channels, taken, told["epoch"], tuple(told["detected"]))
-
-
-def _warn(messages: Sequence[str]) -> None:
-    for message in messages:
-        warn_user(message)

@@ -37,8 +37,8 @@ from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.studies.assessment.result import format_count
 
 if TYPE_CHECKING:
-    from picchio.ledger.count import Count
     from picchio.ledger.fleet import Fleet
+    from picchio.ledger.result import Count
 
 
 @app.command(
@@ -169,6 +169,8 @@ def _show_fleet(found: Fleet) -> None:
     for row in found.robots:
         if row["error"]:
             out.print(styled(f"not counted: {row['name']}", f": {row['error']}"))
+        if row["another_robot"]:
+            out.print(styled(f"another robot? {row['name']}", f": {row['another_robot']['words']}"))
         for change in row["changes"]:
             out.print(styled(f"changed: {row['name']}", f": {change['words']}"))
 
@@ -229,6 +231,8 @@ def _show(found: Count) -> None:
         out.print(f"Where it comes from: {shares}.")
     for change in found.changes:
         out.print(styled("changed: ", change["words"], style="bold yellow"))
+    if found.exchange is not None:
+        out.print(styled("another robot? ", found.exchange.words, style="bold yellow"))
     for note in found.notes:
         out.print(f"  - {note}")
 

@@ -7,13 +7,10 @@ The chunks are then joined, one at a time, to one netCDF file or Zarr store.
 
 from __future__ import annotations
 
-import asyncio
 import hashlib
 import json
-import logging
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +18,9 @@ import numpy as np
 
 from picchio.core.errors import InputError
 from picchio.core.files import atomic_write, locked, write_text
-from picchio.core.processes import one_thread, safe_start
+from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
+from picchio.core.spread import require_scheduler, spread
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import check_hits
 from picchio.model.model import Model
@@ -44,8 +42,6 @@ ENDINGS = (".nc", ".zarr")
 # Fewer places than this are not worth starting workers for.
 _WORTH_WORKERS = 50_000
 MOST_WORKERS = 1024
-# s that a scheduler has to answer.
-_PATIENCE = 5.0
 
 
 @one_thread()
@@ -200,8 +196,9 @@ def _read(path: Path) -> Columns:
         return {name: stored[name] for name in stored.files}
 
 
-def compute_chunk(job: MapJob, folder: Path, span: tuple[int, int]) -> tuple[int, int]:
-    """Compute one chunk and write its file; what a worker does."""
+def compute_chunk(work: tuple[MapJob, Path], span: tuple[int, int]) -> tuple[int, int]:
+    """Compute one chunk and write its file, into a folder; what a worker does."""
+    job, folder = work
     columns = job.compute(*span)
     with atomic_write(_file(folder, span), "wb") as stream:
         np.savez(stream, **columns)  # type: ignore[arg-type]
@@ -219,55 +216,9 @@ def _run(
     alone = places < _WORTH_WORKERS if workers is None else workers <= 1
     if not missing or (scheduler is None and alone):
         for span in missing:
-            yield compute_chunk(job, folder, span)
+            yield compute_chunk((job, folder), span)
         return
-    from distributed import Client, LocalCluster, as_completed
-
-    with ExitStack() as open_things:
-        open_things.callback(logging.disable, logging.NOTSET)
-        cluster = None
-        if scheduler is None:
-            with safe_start():
-                cluster = LocalCluster(
-                    n_workers=workers, threads_per_worker=1, processes=True,
-                    dashboard_address=None, silence_logs=logging.CRITICAL,
-                )  # fmt: skip
-            open_things.enter_context(cluster)
-        client = open_things.enter_context(Client(cluster or scheduler))
-        # First of all at the end: what its tasks say of being stopped is of no use to anybody.
-        open_things.callback(logging.disable)
-        shared = client.scatter(job, broadcast=True)
-        futures = client.map(
-            compute_chunk, [shared] * len(missing), [folder] * len(missing), missing,
-            pure=False, retries=3,
-        )  # fmt: skip
-        for future in as_completed(futures):
-            yield future.result()
-
-
-def require_scheduler(address: str) -> None:
-    """Raise where no dask scheduler answers, which a client would wait long for.
-
-    Args:
-        address: such as "tcp://host:8786".
-
-    Raises:
-        InputError: none does.
-    """
-    from distributed.comm.core import connect
-    from distributed.security import Security
-
-    async def greet() -> None:
-        arguments = Security().get_connection_args("client")
-        comm = await asyncio.wait_for(connect(address, timeout=_PATIENCE, **arguments), _PATIENCE)
-        comm.abort()
-
-    try:
-        asyncio.run(greet())
-    except (OSError, ValueError, TypeError) as error:  # what dask makes of an address
-        reason = "" if isinstance(error, OSError) else f": {error}"
-        raise InputError(f"no dask scheduler answers there within {_PATIENCE:g} s{reason}",
-                         key="scheduler", value=address) from None  # fmt: skip
+    yield from spread(compute_chunk, (job, folder), missing, workers=workers, scheduler=scheduler)
 
 
 def _attributes(job: MapJob) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from picchio.fatigue.miner import format_count
-from picchio.ledger.count import Count
+from picchio.ledger.result import Count
 from picchio.visuals.plots.style import blank_figure, look, styled
 from picchio.visuals.report.page import Picture, Pictures, number, render
 
@@ -69,7 +69,8 @@ def count_page(found: Count, *, command: str | None = None, warnings: Sequence[s
         facts=facts, rows=rows, pictures=_pictures(found), places=places,
         place_heads=["Pose|rad", "Force along", "Blows",
                      *(f"{name}|% of its damage" for name in names)],
-        changes=[change["words"] for change in found.changes],
+        changes=[*([found.exchange.words] if found.exchange else []),
+                 *(change["words"] for change in found.changes)],
         refused=[list(pair) for pair in found.refused], notes=found.notes, command=command,
         warnings=list(warnings), provenance=found.origin,
     )  # fmt: skip

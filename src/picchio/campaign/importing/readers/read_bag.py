@@ -1,20 +1,26 @@
-"""Bags of ROS 1 (.bag) and ROS 2 (.db3), read by rosbags."""
+"""Bags of ROS 1 (.bag) and ROS 2 (.db3) (needs rosbags), whole or in blocks."""
 
 from __future__ import annotations
 
+import bz2
 import sqlite3
+import struct
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from picchio.campaign.importing.isolated import Limits
-from picchio.campaign.importing.raw import RawFile, reason
-from picchio.campaign.importing.readers.ros_messages import Series, stamp_of
-from picchio.core.errors import InputError, warn_user
+from picchio.campaign.importing.raw import RawFile
+from picchio.campaign.importing.readers.ros_messages import Series, Topic, collected, definitions
+from picchio.core.errors import InputError
 
 LIMITS = Limits(seconds_a_byte=1e-5, memory_a_byte=32.0)
+_WORDS = "ROS bag"
 _SQLITE = b"SQLite format 3\0"
+_BAG = b"#ROSBAG V2.0\n"
+_MESSAGE, _BEGIN, _CHUNK, _CONNECTION = 2, 3, 5, 7  # kinds of record
+_LARGEST = 1 << 31  # bytes of a record; damage asks for more
+_SOME = 1000  # messages
 
 
 def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
@@ -30,66 +36,155 @@ def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
     Raises:
         InputError: rosbags is missing, the file is no bag or cut short, or holds no number.
     """
+    return next(collected(Series(path, "bag", clock), _fill, _WORDS, whole=True))
+
+
+def blocks(path: Path, clock: Mapping[str, Any], names: set[str] | None) -> Iterator[RawFile]:
+    """The same in blocks: memory does not grow with the file.
+
+    Args:
+        path: the file.
+        clock: the mapping's `[time]`.
+        names: of the series that are needed; all where None.
+
+    Raises:
+        InputError: as `read`.
+    """
+    return collected(Series(path, "bag", clock, names), _fill, _WORDS, whole=False)
+
+
+def _fill(series: Series) -> Iterator[None]:
     try:
-        import rosbags.rosbag1  # noqa: F401
+        import rosbags.typesys  # noqa: F401
     except ImportError:
-        raise InputError("ROS bags need rosbags", file=path,
+        raise InputError("ROS bags need rosbags", file=series.path,
                          hint="pip install 'picchio[import]'") from None  # fmt: skip
-    log = clock.get("stamp") == "log"
-    with open(path, "rb") as stream:
-        messages = _ros2 if stream.read(len(_SQLITE)) == _SQLITE else _ros1
-    series = Series()
-    try:
-        for topic, kind, logged, message in messages(path):
-            when = logged if log else stamp_of(message, logged)
-            series.add(topic, kind.rpartition("/")[2], when, message)
-    except MemoryError:
-        raise
-    except Exception as error:  # rosbags', sqlite's and the decoder's own kinds
-        raise InputError(f"is not a readable ROS bag: {reason(error)}", file=path) from None
-    return series.file(path, "bag")
+    with open(series.path, "rb") as file:
+        if file.read(len(_SQLITE)) != _SQLITE:
+            file.seek(0)
+            yield from _ros1(file, series)
+            return
+    yield from _ros2(series)
 
 
-def _ros1(path: Path) -> Iterator[tuple[str, str, int, Any]]:
-    from rosbags.highlevel import AnyReader
+def _ros1(file: BinaryIO, series: Series) -> Iterator[None]:
+    """A chunk at a time, in the order of the file, without its index, which may be large.
 
-    with AnyReader([path]) as reader:
-        for connection, logged, data in reader.messages():
-            yield (
-                connection.topic, connection.msgtype, logged,
-                reader.deserialize(data, connection.msgtype),
-            )  # fmt: skip
+    Source: the ROS wiki, "Bags/Format/2.0".
+    """
+    if file.read(len(_BAG)) != _BAG:
+        raise ValueError("it does not begin as a bag of version 2.0")
+    topics: dict[int, Topic | None] = {}
+    claimed, chunks = -1, 0
+    while (record := _record(file)) is not None:
+        head, data = record
+        kind = head["op"][0]
+        if kind == _BEGIN:
+            claimed = _whole(head["chunk_count"])
+            if not _whole(head["index_pos"]):
+                raise ValueError("it was not closed; reindex it first")
+        elif kind == _CONNECTION:
+            _connect(head, data, topics, series)
+        elif kind == _CHUNK:
+            chunks += 1
+            _inside(_unpacked(head["compression"], data), topics, series)
+            yield
+    if chunks != claimed:
+        raise ValueError(f"it holds {chunks} of {claimed} chunks")
 
 
-def _ros2(path: Path) -> Iterator[tuple[str, str, int, Any]]:
-    from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+def _unpacked(how: bytes, data: bytes) -> bytes:
+    if how == b"bz2":
+        return bz2.decompress(data)
+    if how == b"lz4":
+        import lz4.frame  # type: ignore[import-untyped]
 
-    store = get_typestore(Stores.LATEST)
-    database = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
+        return bytes(lz4.frame.decompress(data))
+    if how != b"none":
+        raise ValueError(f"its compression {how!r} is not known")
+    return data
+
+
+def _inside(data: bytes, topics: dict[int, Topic | None], series: Series) -> None:
+    at = 0
+    while at < len(data):
+        (size,) = struct.unpack_from("<I", data, at)
+        head = _fields(data[at + 4 : at + 4 + size])
+        (length,) = struct.unpack_from("<I", data, at + 4 + size)
+        begin = at + 8 + size
+        at = begin + length
+        if at > len(data):
+            raise ValueError("a record goes beyond its chunk")
+        if head["op"][0] == _CONNECTION:
+            _connect(head, data[begin:at], topics, series)
+        elif head["op"][0] == _MESSAGE:
+            topic = topics[_whole(head["conn"])]
+            if topic is not None:
+                seconds, rest = struct.unpack("<II", head["time"])
+                topic.data.append(data[begin:at])
+                topic.logged.append(seconds * 1_000_000_000 + rest)
+
+
+def _connect(
+    head: dict[str, bytes], data: bytes, topics: dict[int, Topic | None], series: Series
+) -> None:
+    number = _whole(head["conn"])
+    if number not in topics:
+        about = _fields(data)
+        kind = about["type"].decode().replace("/", "/msg/")
+        fields = definitions(about["message_definition"].decode(), kind, ros1=True)
+        topics[number] = series.topic(head["topic"].decode(), kind, fields, ros1=True)
+
+
+def _record(file: BinaryIO) -> tuple[dict[str, bytes], bytes] | None:
+    parts: list[bytes] = []
+    for _ in range(2):
+        length = file.read(4)
+        if not length and not parts:
+            return None
+        (size,) = struct.unpack("<I", length)
+        parts.append(file.read(size) if size < _LARGEST else b"")
+        if len(parts[-1]) < size:
+            raise ValueError("it is cut short")
+    return _fields(parts[0]), parts[1]
+
+
+def _fields(data: bytes) -> dict[str, bytes]:
+    found, at = {}, 0
+    while at < len(data):
+        (size,) = struct.unpack_from("<I", data, at)
+        name, _, value = data[at + 4 : at + 4 + size].partition(b"=")
+        found[name.decode()] = value
+        at += 4 + size
+    return found
+
+
+def _whole(value: bytes) -> int:
+    return int.from_bytes(value, "little")
+
+
+def _ros2(series: Series) -> Iterator[None]:
+    database = sqlite3.connect(f"{series.path.resolve().as_uri()}?mode=ro", uri=True)
     try:
         tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master")}
+        texts = {}
         if "message_definitions" in tables:
-            rows = database.execute(
+            texts = dict(database.execute(
                 "SELECT topic_type, encoded_message_definition FROM message_definitions "
                 "WHERE encoding = 'ros2msg'"
-            )
-            for kind, text in rows:
-                if kind not in store.types and text:
-                    # One that can't be parsed is told below, with those that are not there.
-                    with suppress(TypesysError):
-                        store.register(get_types_from_msg(text, kind))
+            ))  # fmt: skip
         topics = {
-            key: (name, kind)
+            key: series.topic(name, kind, definitions(texts.get(kind) or "", kind))
             for key, name, kind in database.execute("SELECT id, name, type FROM topics")
         }
-        unknown = {kind for _, kind in topics.values() if kind not in store.types}
-        for kind in sorted(unknown):
-            warn_user(f"{path}: messages of the kind {kind} are defined nowhere and left out")
-        for key, logged, data in database.execute(
-            "SELECT topic_id, timestamp, data FROM messages ORDER BY timestamp, id"
-        ):
-            topic, kind = topics[key]
-            if kind not in unknown:
-                yield topic, kind, logged, store.deserialize_cdr(data, kind)
+        rows = database.execute("SELECT topic_id, timestamp, data FROM messages "
+                                "ORDER BY timestamp, id")  # fmt: skip
+        for count, (key, logged, data) in enumerate(rows):
+            topic = topics[key]
+            if topic is not None:
+                topic.data.append(data)
+                topic.logged.append(logged)
+            if count % _SOME == 0:
+                yield
     finally:
         database.close()

@@ -1,48 +1,106 @@
-"""MCAP logs of ROS 2 (needs mcap-ros2-support)."""
+"""MCAP logs of ROS 2, or of ROS 1 (needs mcap and rosbags), whole or in blocks."""
 
 from __future__ import annotations
 
-import contextlib
 import io
-from collections.abc import Mapping
+import struct
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from picchio.campaign.importing.isolated import Limits
-from picchio.campaign.importing.raw import RawFile, reason
-from picchio.campaign.importing.readers.ros_messages import Series, stamp_of
-from picchio.core.errors import InputError
+from picchio.campaign.importing.raw import RawFile
+from picchio.campaign.importing.readers.ros_messages import Series, Topic, collected, definitions
+from picchio.core.errors import InputError, warn_user
 
-# Decoded message by message, and often compressed.
-LIMITS = Limits(seconds_a_byte=1e-5, memory_a_byte=32.0)
+LIMITS = Limits(seconds_a_byte=1e-5, memory_a_byte=32.0)  # often compressed
+_WORDS = "MCAP file"
+_SCHEMA, _CHANNEL, _MESSAGE = 3, 4, 5
+_HEAD = struct.Struct("<BQ")  # kind and length of a record
+_ABOUT = struct.Struct("<HIQQ")  # of a message: channel, number, when logged, when published
+_WRITTEN = {("ros2msg", "cdr"), ("ros2idl", "cdr"), ("ros1msg", "ros1")}
 
 
 def read(path: Path, clock: Mapping[str, Any]) -> RawFile:
     """Every number of the messages, named "<topic>:<field>"; see `Series`.
 
+    Args:
+        path: the file.
+        clock: the mapping's `[time]`.
+
     Raises:
         InputError: mcap is missing, the file is no MCAP or cut short, or holds no number.
     """
+    return next(collected(Series(path, "mcap", clock), _fill, _WORDS, whole=True))
+
+
+def blocks(path: Path, clock: Mapping[str, Any], names: set[str] | None) -> Iterator[RawFile]:
+    """The same in blocks: memory does not grow with the file.
+
+    Args:
+        path: the file.
+        clock: the mapping's `[time]`.
+        names: of the series that are needed; all where None.
+
+    Raises:
+        InputError: as `read`.
+    """
+    return collected(Series(path, "mcap", clock, names), _fill, _WORDS, whole=False)
+
+
+def _fill(series: Series) -> Iterator[None]:
+    """A chunk at a time."""
     try:
-        from mcap.reader import make_reader
-        from mcap_ros2.decoder import DecoderFactory
+        import rosbags.typesys  # noqa: F401
+        from mcap.records import Channel, Chunk, Message, Schema
+        from mcap.stream_reader import ReadDataStream, StreamReader, get_chunk_data_stream
     except ImportError:
-        raise InputError("MCAP files need mcap and mcap-ros2-support",
+        raise InputError("MCAP files need mcap and rosbags", file=series.path,
                          hint="pip install 'picchio[import]'") from None  # fmt: skip
-    stamp = clock.get("stamp", "header")
-    series = Series()
-    try:
-        # The decoder prints what it does not like about a message's definition.
-        with open(path, "rb") as stream, contextlib.redirect_stdout(io.StringIO()):
-            reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
-            for schema, channel, message, ros in reader.iter_decoded_messages(
-                log_time_order=stamp == "log"
-            ):
-                kind = schema.name.rpartition("/")[2] if schema is not None else ""
-                when = message.log_time if stamp == "log" else stamp_of(ros, message.log_time)
-                series.add(channel.topic, kind, when, ros)
-    except MemoryError:
-        raise
-    except Exception as error:  # mcap's, zstandard's, lz4's and the decoder's own kinds
-        raise InputError(f"is not a readable MCAP file: {reason(error)}", file=path) from None
-    return series.file(path, "mcap")
+    schemas: dict[int, Any] = {}
+    topics: dict[int, Topic | None] = {}
+
+    def about(record: Any) -> None:
+        if isinstance(record, Schema):
+            schemas[record.id] = record
+        elif isinstance(record, Channel) and record.id not in topics:
+            schema, topics[record.id] = schemas.get(record.schema_id), None
+            if schema is None or (schema.encoding, record.message_encoding) not in _WRITTEN:
+                warn_user(f"{series.path}: messages of {record.topic} are not ROS's and left out")
+                return
+            ros1, idl = schema.encoding == "ros1msg", schema.encoding == "ros2idl"
+            kind = schema.name if schema.name.count("/") > 1 else schema.name.replace("/", "/msg/")
+            fields = definitions(schema.data.decode(), kind, ros1, idl)
+            topics[record.id] = series.topic(record.topic, kind, fields, ros1)
+
+    def inside(data: bytes) -> None:
+        """The records of a chunk; its messages, of which there are very many, by hand."""
+        at, end = 0, len(data)
+        while at < end:
+            kind, length = _HEAD.unpack_from(data, at)
+            at += _HEAD.size
+            if at + length > end:
+                raise ValueError("a record goes beyond its chunk")
+            if kind == _MESSAGE:
+                channel, _, logged, _ = _ABOUT.unpack_from(data, at)
+                topic = topics[channel]
+                if topic is not None:
+                    topic.data.append(data[at + _ABOUT.size : at + length])
+                    topic.logged.append(logged)
+            elif kind in (_CHANNEL, _SCHEMA):
+                stream = ReadDataStream(io.BytesIO(data[at : at + length]))
+                about((Channel if kind == _CHANNEL else Schema).read(stream))
+            at += length
+
+    with open(series.path, "rb") as file:
+        for record in StreamReader(file, emit_chunks=True, validate_crcs=True).records:
+            if isinstance(record, Chunk):
+                stream, length = get_chunk_data_stream(record, validate_crc=True)
+                inside(stream.read(length))
+            elif isinstance(record, Message):
+                if (topic := topics[record.channel_id]) is not None:
+                    topic.data.append(record.data)
+                    topic.logged.append(record.log_time)
+            else:
+                about(record)
+            yield

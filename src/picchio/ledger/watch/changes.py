@@ -32,6 +32,9 @@ _DIM = 2.0  # times the usual standard error
 SMALLEST = 2e-3
 """Relative: smaller changes are not told, nor are those that may be: no life depends on them."""
 _LENGTHS = (1, 4, 8, 16, 32, 64, 128)  # shifts that a change may take
+_DRIVEN = {"friction": ("friction of", "coulomb_friction"),
+           "offset": ("torque offset, of gravity's torque, of", "torque_offset"),
+           "lost_motion": ("lost motion of", "backlash")}  # fmt: skip
 _LEAST = 5  # shifts after the first ones before anything can be told
 
 
@@ -83,7 +86,7 @@ class Change:
     def to_dict(self) -> dict[str, Any]:
         """As the JSON of a count has it."""
         when = self.reading.when
-        dates = [_date(int(when[k])) for k in (self.onset, self.onset_low, self.onset_high)]
+        dates = [date_of(int(when[k])) for k in (self.onset, self.onset_low, self.onset_high)]
         days = (when[-1] - when[self.onset]) / 8.64e13
         moved = "rose" if self.value > 0.0 else "fell"
         words = (
@@ -98,7 +101,12 @@ class Change:
         }  # fmt: skip
 
 
-def _date(ns: int) -> str:
+def date_of(ns: int) -> str:
+    """The day, UTC, as text.
+
+    Args:
+        ns: from 1970.
+    """
     return datetime.fromtimestamp(ns / 1e9, UTC).date().isoformat()
 
 
@@ -160,8 +168,7 @@ def find(readings: Sequence[Reading], alarms: float = ALARMS) -> list[Change]:
     told = [r for r in readings if r.values.size >= FIRST + _LEAST]
     found = []
     for reading in told:
-        table = np.vstack([np.ones(reading.values.size), reading.covariates]).T
-        table = table[:, _useful(table[:FIRST])]
+        table = _covariates(reading)
         level = alarms / len(told)
         limit = threshold(level)
         if table.shape[1] > 1:
@@ -173,24 +180,19 @@ def find(readings: Sequence[Reading], alarms: float = ALARMS) -> list[Change]:
     return sorted(found, key=lambda c: -abs(c.value) / max(c.high - c.low, 1e-12))
 
 
-def exchanged(changes: Sequence[Change]) -> tuple[str, ...]:
-    """What it looks like where several joints change at the same time, in a sentence.
+def scores(reading: Reading) -> FloatArray:
+    """(t,) a reading less what its covariates explain, by the mean and spread of the first shifts.
 
     Args:
-        changes: of one robot.
-
-    Returns:
-        none, or one.
+        reading: of more than `FIRST` shifts.
     """
-    sudden = [c for c in changes if c.reading.effect == "stiffness_drift" and not c.ramp]
-    first = [c for c in sudden if any(
-        o is not c and o.onset_low <= c.onset_high and c.onset_low <= o.onset_high for o in sudden
-    )]  # fmt: skip
-    if len(first) < 2:
-        return ()
-    names = " and ".join(c.reading.target for c in first)
-    return (f"{names} changed at once: was the robot or its tool exchanged, or are these the logs "
-            "of two robots?",)  # fmt: skip
+    return _scores(reading.values[None], _covariates(reading))[0]
+
+
+def _covariates(reading: Reading) -> FloatArray:
+    """(t, c) a constant, and the covariates that vary."""
+    table = np.vstack([np.ones(reading.values.size), reading.covariates]).T
+    return np.asarray(table[:, _useful(table[:FIRST])])
 
 
 def _useful(table: FloatArray) -> IndexArray:
@@ -239,12 +241,13 @@ def _told(reading: Reading, table: FloatArray) -> Change:
 def readings_of(
     model: Model, blows: Sequence[Blow], features: Sequence[tuple[str, int, float]]
 ) -> list[Reading]:
-    """What each shift shows: the blows' force, width and rate, the joints' stiffness, the damping.
+    """What each shift shows: force, width and rate of the blows, the joints' stiffness and drives.
 
     Args:
         model: the robot and its effects: where frequencies are compared with.
         blows: by time.
-        features: what the ledger holds of ring-downs and temperatures, see `ring_downs`.
+        features: what the ledger holds of ring-downs, temperatures and drives: see `ring_downs` and
+            `drives`.
     """
     found = []
     seen = [blow for blow in blows if blow.kind == "force" and not blow.cut]
@@ -262,12 +265,21 @@ def readings_of(
                                  np.log(gap[near])))  # fmt: skip
     table: dict[int, dict[str, float]] = {}
     warmth: list[tuple[int, float]] = []
+    driven: dict[str, list[tuple[int, float]]] = {}
     for name, stamp, value in features:
         if name == "temperature":
             warmth.append((stamp, value))
+        elif "." in name:
+            driven.setdefault(name, []).append((stamp, value))
         else:
             table.setdefault(stamp, {})[name] = value
     found += _stiffness(model, table)
+    for name, told in sorted(driven.items()):
+        kind, _, joint = name.partition(".")
+        words, effect = _DRIVEN[kind]
+        when, size = np.array([t for t, _ in told]), np.array([x for _, x in told])
+        values = size if kind == "offset" else np.log(size)
+        found.append(_shifts(f"{words} {joint}", effect, joint, when, values))
     return [_warmed(reading, warmth) for reading in found]
 
 
@@ -316,11 +328,17 @@ def _stiffness(model: Model, table: dict[int, dict[str, float]]) -> list[Reading
     share = many.stiffness[:, :, None] * shapes**2 / squared[:, None, :]
     frequency = np.sqrt(squared) / (2.0 * np.pi)
     by_shift: dict[int, list[tuple[FloatArray, float, float, float]]] = {}
+    # Modes differ in damping, and a mode that hardly rings tells little of it.
+    usual = [
+        float(np.median(own)) if (own := [np.log(t[f"z{i}"]) for _, t in rows if f"z{i}" in t])
+        else 0.0 for i in range(n)
+    ]  # fmt: skip
     for k, (stamp, told) in enumerate(rows):
         for i in range(n):
             if f"f{i}" in told:
                 off = float(np.log(told[f"f{i}"] / frequency[k, i]))
-                entry = (0.5 * share[k, :, i], off, told[f"e{i}"], told[f"z{i}"])
+                damped = float(np.log(told[f"z{i}"])) - usual[i]
+                entry = (0.5 * share[k, :, i], off, told[f"e{i}"], damped)
                 by_shift.setdefault(stamp // SHIFT, []).append(entry)
     when: list[int] = []
     damping: list[float] = []
@@ -338,7 +356,7 @@ def _stiffness(model: Model, table: dict[int, dict[str, float]]) -> list[Reading
         when.append(shift * SHIFT + SHIFT // 2)
         stiffness.append(size)
         errors.append(np.sqrt(np.diag(np.linalg.inv(left.T @ left))))
-        damping.append(float(np.mean(np.log([e[3] for e in entries]))))
+        damping.append(float(np.average([e[3] for e in entries], weights=weight**2)))
     if not when:
         return []
     clock, nothing = np.array(when), np.empty((0, len(when)))

@@ -1,0 +1,289 @@
+"""What a count found: blows, damage, what is left, what changed, as it is told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from picchio.core.arrays import FloatArray, IndexArray
+from picchio.core.results import TableResult
+from picchio.fatigue.sn.curve import SNCurve
+from picchio.ledger.blows import Blow, Burst
+from picchio.ledger.damage import BurstDamage, Totals
+from picchio.ledger.finding import NEAR
+from picchio.ledger.forecast import Worlds, quantiles
+from picchio.ledger.out import opc_ua
+from picchio.ledger.watch.exchange import Exchange
+from picchio.model.model import Model
+
+SECONDS_A_DAY = 86_400
+_LATELY = 28  # days that today's pace is taken from
+_STATIONS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Counted:
+    """What a ledger holds, as blows and damage.
+
+    Attributes:
+        blows: by time.
+        bursts: by time.
+        damages: of each burst.
+        totals: of all.
+        spans: (s, 2) ns, the time that was logged.
+    """
+
+    blows: list[Blow]
+    bursts: list[Burst]
+    damages: list[BurstDamage]
+    totals: Totals
+    spans: IndexArray
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Count(TableResult):
+    """What the logs of a robot have done to it, and what is left.
+
+    Attributes:
+        model: the robot and its effects.
+        ledger: its file.
+        logs: how many it holds.
+        added: names of the logs that are new.
+        known: names of the logs that were counted before.
+        refused: (name, why) of logs that could not be read.
+        detected: what was found out about each new log.
+        counted: blows and damage.
+        worlds: what they may have done; None where nothing was counted.
+        changes: what is no longer as it was.
+        exchange: since when these look like another robot's logs; None where they do not.
+        signature: what the robot's own readings are like, see `picchio.ledger.watch.exchange`.
+        curves: of the flexible joints.
+        notes: what was taken for granted.
+        origin: provenance.
+    """
+
+    INDEX = "name"
+    PAGE: ClassVar[str] = "visuals.report.count:count_page"
+    UNITS: ClassVar[dict[str, str]] = {"damage": "1", "blows_left_p50": "1"}
+
+    model: Model
+    ledger: Path
+    logs: int
+    added: tuple[str, ...]
+    known: tuple[str, ...]
+    refused: tuple[tuple[str, str], ...]
+    detected: dict[str, tuple[str, ...]]
+    counted: Counted
+    worlds: Worlds | None
+    changes: tuple[dict[str, Any], ...]
+    exchange: Exchange | None
+    signature: Mapping[str, tuple[float, float]]
+    curves: tuple[SNCurve | None, ...]
+    notes: tuple[str, ...]
+    origin: dict[str, Any]
+
+    @property
+    def blows(self) -> int:
+        """How many."""
+        return len(self.counted.blows)
+
+    @property
+    def seen_share(self) -> float:
+        """Of the blows whose size was logged; 1 where there is none."""
+        seen = sum(blow.seen for blow in self.counted.blows)
+        return seen / self.blows if self.blows else 1.0
+
+    @property
+    def hours(self) -> float:
+        """h, the time that was logged."""
+        spans = self.counted.spans
+        return float((spans[:, 1] - spans[:, 0]).sum() / 3.6e12) if len(spans) else 0.0
+
+    @property
+    def blows_a_day(self) -> float:
+        """Today's pace: over the last 28 days, or as many as there are; 0 of no blow."""
+        if not self.blows:
+            return 0.0
+        last, first = self.counted.blows[-1].onset, self.counted.blows[0].onset
+        span = _LATELY * SECONDS_A_DAY * 1_000_000_000
+        days = min(max((last - first) / 1e9 / SECONDS_A_DAY, 1.0), _LATELY)
+        return sum(blow.onset > last - span for blow in self.counted.blows) / days
+
+    def left(self, joint: int) -> dict[str, float] | None:
+        """P10, P50 and P90 of the blows until a joint's sum is one.
+
+        Args:
+            joint: which of the flexible ones.
+
+        Returns:
+            them by name; None without a curve, or where nothing was counted.
+        """
+        if self.worlds is None or self.curves[joint] is None:
+            return None
+        return quantiles(self.worlds.blows_left(joint, self.blows))
+
+    def dates(self, left: dict[str, float] | None) -> dict[str, str | None]:
+        """When so many blows will have come, at today's pace.
+
+        Args:
+            left: as `left` gives it.
+        """
+        found: dict[str, str | None] = {}
+        for name in ("p10", "p50", "p90"):
+            blows = math.inf if left is None else left[name]
+            days = blows / self.blows_a_day if self.blows_a_day else math.inf
+            found[name] = None
+            if days < 36500:
+                last = datetime.fromtimestamp(self.counted.blows[-1].onset / 1e9, UTC)
+                found[name] = (last + timedelta(days=days)).date().isoformat()
+        return found
+
+    def reached(self, left: dict[str, float] | None) -> str | None:
+        """The month in which the median of the blows left will have come, for people.
+
+        Args:
+            left: as `left` gives it.
+
+        Returns:
+            such as "2041-07"; None without end.
+        """
+        if left is None or not math.isfinite(left["p50"]):
+            return None
+        date = self.dates(left)["p50"]
+        return "> 100 y" if date is None else date.rpartition("-")[0]
+
+    @property
+    def first_to_fail(self) -> int | None:
+        """The joint that ends the life: the fewest blows left in the median; None of none."""
+        left = [self.left(j) for j in range(len(self.curves))]
+        finite = {j: x["p50"] for j, x in enumerate(left) if x and math.isfinite(x["p50"])}
+        return min(finite, key=finite.__getitem__) if finite else None
+
+    def if_force(self, factor: float) -> FloatArray:
+        """(n,) how many times as long the joints live with all blows so many times as hard.
+
+        Args:
+            factor: of the force.
+        """
+        now = self.counted.totals.at(np.array([1.0, factor]))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.where(now[:, 0] > 0.0, now[:, 0] / now[:, 1], np.nan))
+
+    def days(self) -> list[dict[str, Any]]:
+        """Of each day with blows: date, blows, and the damage of each joint."""
+        if not self.counted.bursts:
+            return []
+        day = np.array([burst.onset for burst in self.counted.bursts]) // (86_400 * 10**9)
+        blows = np.array([len(burst.blows) for burst in self.counted.bursts])
+        found = []
+        for which in np.unique(day):
+            rows = day == which
+            date = datetime.fromtimestamp(int(which) * SECONDS_A_DAY, UTC).date().isoformat()
+            found.append({"date": date, "blows": int(blows[rows].sum()),
+                          "damage": self.counted.totals.shares[rows].sum(axis=0)})  # fmt: skip
+        return found
+
+    def stations(self) -> list[dict[str, Any]]:
+        """Where the damage comes from: pose, direction, blows, share of each joint's damage."""
+        if not self.counted.bursts:
+            return []
+        places: dict[tuple[float, ...], list[int]] = {}
+        for k, burst in enumerate(self.counted.bursts):
+            key = (*np.round(burst.pose / NEAR).tolist(), *np.round(2 * burst.direction).tolist())
+            places.setdefault(key, []).append(k)
+        whole = np.maximum(np.nansum(self.counted.totals.shares, axis=0), 1e-300)
+        found = []
+        for rows in places.values():
+            first = self.counted.bursts[rows[0]]
+            found.append({
+                "pose": first.pose, "direction": first.direction,
+                "blows": sum(len(self.counted.bursts[k].blows) for k in rows),
+                "share": self.counted.totals.shares[rows].sum(axis=0) / whole,
+            })  # fmt: skip
+        found.sort(key=lambda s: (-float(np.max(s["share"])), -s["blows"]))
+        return found[:_STATIONS]
+
+    def _headline(self) -> str:
+        text = f"{self.blows} blows in {self.logs} log{'s' * (self.logs != 1)}"
+        j = int(np.nanargmax(self.counted.totals.damage)) if self._any_damage else None
+        if j is None:
+            return f"{text}, no damage"
+        names = self.model.robot.flexible_names
+        text += f", {names[j]} has used {100 * self.counted.totals.damage[j]:.3g} % of its life"
+        first = self.first_to_fail
+        left = None if first is None else self.left(first)
+        if first is None or left is None:
+            return text
+        low, middle, high = (float(f"{left[p]:.2g}") for p in ("p10", "p50", "p90"))
+        text += f"; {names[first]} lasts {middle:,.0f} blows more"
+        return f"{text} (P10 to P90: {low:,.0f} to {high:,.0f})"
+
+    @property
+    def _any_damage(self) -> bool:
+        return bool(np.nan_to_num(self.counted.totals.damage).any())
+
+    def _rows(self) -> list[dict[str, Any]]:
+        rows = []
+        for j, name in enumerate(self.model.robot.flexible_names):
+            left = self.left(j) or {"p50": math.nan}
+            rows.append({"name": name, "damage": float(self.counted.totals.damage[j]),
+                         "blows_left_p50": left["p50"]})  # fmt: skip
+        return rows
+
+    def joints(self) -> list[dict[str, Any]]:
+        """What is told of each joint."""
+        found = []
+        for j, name in enumerate(self.model.robot.flexible_names):
+            left = self.left(j)
+            known = self.worlds is not None and self.curves[j] is not None
+            found.append({
+                "name": name,
+                "damage": float(self.counted.totals.damage[j]),
+                "damage_interval": list(self.worlds.interval(j)) if known and self.worlds else None,
+                "damage_each_alone": float(self.counted.totals.alone[j]),
+                "blows_left": left,
+                "date": self.dates(left) if left else None,
+                "reason": None if self.curves[j] else "neither shaft nor drive with a curve",
+            })  # fmt: skip
+        return found
+
+    def _content(self) -> dict[str, Any]:
+        first = self.first_to_fail
+        return {
+            "format": "picchio-count/1",
+            "robot": self.model.robot.name,
+            "ledger": self.ledger,
+            "logs": self.logs,
+            "blows": self.blows,
+            "seen_share": self.seen_share,
+            "hours_logged": self.hours,
+            "from": _iso(self.counted.blows[0].onset) if self.blows else None,
+            "to": _iso(self.counted.blows[-1].onset) if self.blows else None,
+            "blows_a_day": self.blows_a_day,
+            "joints": self.joints(),
+            "ends": None if first is None else self.model.robot.flexible_names[first],
+            "force_10_percent_less": dict(
+                zip(self.model.robot.flexible_names, self.if_force(0.9), strict=True)
+            ),
+            "changes": list(self.changes),
+            "another_robot": self.exchange.to_dict() if self.exchange else None,
+            "days": self.days(),
+            "stations": self.stations(),
+            "added": list(self.added),
+            "known": list(self.known),
+            "refused": [{"log": name, "why": why} for name, why in self.refused],
+            "detected": {name: list(lines) for name, lines in self.detected.items()},
+            "opc_ua": opc_ua(self),
+            "notes": list(self.notes),
+            "provenance": self.origin,
+        }
+
+
+def _iso(ns: int) -> str:
+    return datetime.fromtimestamp(ns / 1e9, UTC).isoformat(timespec="milliseconds")
