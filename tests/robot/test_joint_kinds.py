@@ -88,11 +88,40 @@ def test_many_poses_at_once(arm, write, which, sidecar_text):
         gun = "[gun]\nmass = 1.0\nrecoil_stiffness = 1e4\n" if which == "gun" else ""
         robot = load_robot(arm, flex=write("f.toml", sidecar_text + gun))
     poses = np.random.default_rng(0).uniform(-1, 1, (7, len(robot.joint_names)))
-    mass, jacobian = robot.mass_and_jacobian(poses)
-    for i, pose in enumerate(poses):
-        state = robot.state(pose)
-        np.testing.assert_array_equal(mass[i], state.mass_matrix)
-        np.testing.assert_array_equal(jacobian[i], state.jacobian)
+    point, index = robot.rigid.frame(robot.tool_point), robot.flexible_index
+    heavier = robot.rigid.with_masses([(3.0, list(robot.tree.links)[-1], (0.1, -0.4, 0.2))])
+    for rigid in (robot.rigid, heavier):
+        mass, jacobian = rigid.mass_and_jacobian(poses, point, index)
+        for i, pose in enumerate(poses):
+            pinocchio = rigid.mass_matrix(pose)[np.ix_(index, index)]
+            size = np.sqrt(np.diag(pinocchio))
+            error = np.abs(mass[i] - pinocchio) / size / size[:, None]
+            assert error.max() < 1e-13
+            expected = rigid.jacobian(pose, point)[:3, index]
+            np.testing.assert_allclose(jacobian[i], expected, rtol=0, atol=1e-14)
+    assert np.abs(mass - robot.mass_and_jacobian(poses)[0]).max() > 0.1
+
+
+def test_a_mimic_joint_moves_with_the_one_that_it_follows(write):
+    text = f"""<robot name="g"><link name="w"/><link name="x">{BODY}</link>
+    <link name="y">{BODY}</link><link name="z">{BODY}</link>
+    <joint name="one" type="continuous"><parent link="w"/><child link="x"/><axis xyz="0 1 0"/>
+    </joint>
+    <joint name="two" type="prismatic"><parent link="x"/><child link="y"/><axis xyz="1 0 1"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="one" multiplier="-0.5"/>
+    <origin xyz="0.2 0 1"/></joint>
+    <joint name="side" type="revolute"><parent link="x"/><child link="z"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/><origin xyz="0 1 0"/></joint></robot>"""
+    values = {"one": {"stiffness": 1e5}, "side": {"stiffness": 1e5}}
+    robot = load_robot(write("g.urdf", text), values=values, tool="y")
+    # More poses than one thread takes at a time.
+    poses = np.random.default_rng(0).uniform(-1, 1, (600, 2))
+    point = robot.rigid.frame(robot.tool_point)
+    mass, jacobian = robot.rigid.mass_and_jacobian(poses, point)
+    for i in (0, 255, 256, 599):
+        np.testing.assert_allclose(mass[i], robot.rigid.mass_matrix(poses[i]), rtol=1e-12)
+        expected = robot.rigid.jacobian(poses[i], point)[:3]
+        np.testing.assert_allclose(jacobian[i], expected, rtol=0, atol=1e-14)
 
 
 def test_every_tool_frame_that_is_guessed_says_why(arm_text, write):

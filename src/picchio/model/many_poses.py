@@ -79,7 +79,7 @@ class ManyPoses:
             ]
             # J^T F with F = turn @ programmed.
             jacobian = np.einsum("pde,pdn->pen", np.array(turns).reshape(-1, 3, 3), jacobian)
-        return np.ascontiguousarray(mass), np.ascontiguousarray(jacobian)
+        return mass, np.ascontiguousarray(jacobian)
 
     def gravity_torque(self) -> FloatArray:
         """(p, n) N m (N), that the springs carry at rest, added masses included."""

@@ -194,8 +194,7 @@ class FlexibleRobot:
         """
         index = self.flexible_index
         point = self.rigid.frame(self.tool_point)
-        mass, jacobian = self.rigid.mass_and_jacobian(poses, point, index)
-        return np.ascontiguousarray(mass), np.ascontiguousarray(jacobian)
+        return self.rigid.mass_and_jacobian(poses, point, index)
 
     def tool_position(self, pose: Array) -> Array:
         """Only the point (3,) in m, world, where the force acts.

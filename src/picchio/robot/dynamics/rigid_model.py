@@ -60,6 +60,8 @@ class RigidModel:
             if frame.type == pin.FrameType.BODY
         }
         self._local = threading.local()
+        self._joints: tuple[NDArray[Any], ...] | None = None
+        self._bodies: Array | None = None
 
     def with_masses(self, masses: Sequence[Mass]) -> RigidModel:
         """The same robot with masses added to its links; not picklable, unlike the original.
@@ -72,9 +74,11 @@ class RigidModel:
         """
         if not masses:
             return self
+        self._tables()  # where the joints are stays as it is
         changed = object.__new__(RigidModel)
         changed.__dict__.update(self.__dict__)
         changed._model, changed._local = self._model.copy(), threading.local()
+        changed._bodies = None
         for weight, link, point in masses:
             own = unit_inertia(self._tree, link, point)
             frame = self._model.frames[self.frame(link)]
@@ -98,6 +102,21 @@ class RigidModel:
         if data is None:
             data = self._local.data = self._model.createData()
         return data
+
+    def _tables(self) -> tuple[NDArray[Any], ...]:
+        """Rotations (k + 1, 3, 3) that lead the z axis to a joint's; what compiled code takes."""
+        if self._joints is None:
+            self._joints = _joint_tables(self._model)
+        turns = self._joints[0]
+        if self._bodies is None:
+            rows = []
+            for turn, body in zip(turns, self._model.inertias, strict=True):
+                lever, mass = turn.T @ body.lever, body.mass
+                about = turn.T @ body.inertia @ turn
+                about += mass * (lever @ lever * np.eye(3) - np.outer(lever, lever))
+                rows.append([mass, *(mass * lever), *about[np.tril_indices(3)]])
+            self._bodies = np.array(rows)
+        return (*self._joints, self._bodies)
 
     def _q(self, pose: Array) -> Array:
         if pose.shape != (self.nv,):
@@ -165,7 +184,7 @@ class RigidModel:
     ) -> tuple[Array, Array]:
         """The mass matrices (p, n, n) and a frame's linear Jacobians (p, 3, n) at many poses.
 
-        Two Pinocchio calls a pose and nothing else: the floor under the cost of a map.
+        Compiled code, from Pinocchio's model: two calls a pose from Python take four times as long.
 
         Args:
             poses: (p, nv).
@@ -175,29 +194,32 @@ class RigidModel:
         Raises:
             InputError: poses of another shape, or no such frame.
         """
+        from picchio.robot.dynamics.rigid_kernel import BLOCK, mass_and_jacobian, some
+
         self._check_frame(frame)
         if poses.ndim != 2 or poses.shape[1] != self.nv:
             raise InputError("the poses have the wrong shape", key="poses", value=poses.shape,
                              choices=[f"(p, {self.nv})"])  # fmt: skip
-        model, data, size = self._model, self._data(), self._all
-        crba, frame_jacobian, world = pin.crba, pin.computeFrameJacobian, pin.LOCAL_WORLD_ALIGNED
-        # The bindings flatten matrices of one row or column.
-        flat = size == 1
-        mass = np.empty((len(poses), size * size) if flat else (len(poses), size, size))
-        jacobian = np.empty((len(poses), 6) if flat else (len(poses), 6, size))
-        every = poses if self._plain else poses @ self._follow.T + self._offset
-        for k, q in enumerate(np.ascontiguousarray(every)):
-            mass[k] = crba(model, data, q)
-            jacobian[k] = frame_jacobian(model, data, q, frame, world)
-        mass = mass.reshape(len(poses), size, size)
-        jacobian = jacobian.reshape(len(poses), 6, size)[:, :3]
         follow = self._follow if index is None else self._follow[:, index]
-        if self._plain and follow.shape[1] == size and (follow == np.eye(size)).all():
-            return mass, jacobian
-        if ((follow != 0.0).sum(axis=0) == 1).all() and (follow.max(axis=0) == 1.0).all():
-            rows = follow.argmax(axis=0)  # picking is many times faster than multiplying
-            return mass[:, rows[:, None], rows], jacobian[:, :, rows]
-        return follow.T @ mass @ follow, jacobian @ follow
+        # Where a coordinate is one joint's, this joint's row is all that is wanted.
+        picks = ((follow != 0.0).sum(axis=0) == 1).all() and (follow.max(axis=0) == 1.0).all()
+        rows = np.full(self._all + 1, -1)
+        where = follow.argmax(axis=0) if picks else np.arange(self._all)
+        rows[where + 1] = np.arange(len(where))
+        n = len(where)
+        mass, jacobian = np.zeros((len(poses), n, n)), np.zeros((len(poses), 3, n))
+        every = poses if self._plain else poses @ self._follow.T + self._offset
+        turns, *tables = self._tables()
+        tip = self._model.frames[frame]
+        point = turns[tip.parentJoint].T @ tip.placement.translation
+        arguments = (*tables, rows, tip.parentJoint, point, np.require(every, float, ("C", "W")),
+                     mass, jacobian)  # fmt: skip
+        # Starting the threads takes longer than a few poses.
+        if len(poses) <= BLOCK:
+            some(0, len(poses), *arguments)
+        else:
+            mass_and_jacobian(*arguments)
+        return (mass, jacobian) if picks else (follow.T @ mass @ follow, jacobian @ follow)
 
     def gravity_torque(self, pose: Array) -> Array:
         """Torque (nv,) that holds the arm against gravity, N m (N).
@@ -276,6 +298,27 @@ def unit_inertia(tree: UrdfTree, link: str, point: tuple[float, ...] | None) -> 
         )
     turn = pin.rpy.rpyToMatrix(*own.rpy)
     return pin.Inertia(own.mass, np.array(own.xyz), turn @ symmetric(own.inertia) @ turn.T)
+
+
+def _joint_tables(model: pin.Model) -> tuple[NDArray[Any], ...]:
+    """Turns, parents, rotations, offsets, slides: see `rigid_kernel.mass_and_jacobian`."""
+    count, data = model.njoints, model.createData()
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    turns, rotation = np.tile(np.eye(3), (count, 1, 1)), np.tile(np.eye(3), (count, 1, 1))
+    parent, offset = np.array(list(model.parents), dtype=np.int64), np.zeros((count, 3))
+    slides = np.zeros(count, dtype=np.int64)
+    for j in range(1, count):
+        # The bindings flatten matrices of one column.
+        own = np.array(pin.getJointJacobian(model, data, j, pin.LOCAL)).reshape(6, -1)[:, j - 1]
+        slides[j] = not own[3:].any()
+        axis = own[:3] if slides[j] else own[3:]
+        across = np.cross(np.eye(3)[np.abs(axis).argmin()], axis)
+        across /= np.linalg.norm(across)
+        turns[j] = np.stack([across, np.cross(axis, across), axis], axis=1)
+        before, here = turns[parent[j]], model.jointPlacements[j]
+        rotation[j] = before.T @ here.rotation @ turns[j]
+        offset[j] = before.T @ here.translation
+    return turns, parent, rotation, offset, slides
 
 
 def _mimic_matrix(tree: UrdfTree, every: list[str], free: list[str]) -> tuple[Array, Array]:

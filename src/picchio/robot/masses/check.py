@@ -107,7 +107,8 @@ def _check_mass_matrix(robot: FlexibleRobot) -> None:
     if not robot.flexible_joints:
         return
     pose = general_pose(robot)
-    mass = robot.mass_and_jacobian(pose[None])[0][0]
+    index = robot.flexible_index
+    mass = robot.rigid.mass_matrix(pose)[np.ix_(index, index)]
     names = robot.flexible_names
     if not np.isfinite(mass).all():
         raise InputError("the mass matrix overflows: masses or lengths are absurdly large",

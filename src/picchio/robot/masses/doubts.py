@@ -151,7 +151,8 @@ def _frequencies(robot: FlexibleRobot) -> Iterator[str]:
     rows = [k for k, name in enumerate(robot.flexible_names) if name in robot.tree.joints]
     if not rows:
         return
-    mass = robot.mass_and_jacobian(general_pose(robot)[None])[0][0][np.ix_(rows, rows)]
+    index = robot.flexible_index[rows]
+    mass = robot.rigid.mass_matrix(general_pose(robot))[np.ix_(index, index)]
     root_stiffness = np.sqrt(robot.stiffness[rows])
     # Of the flexibility, whose largest eigenvalues are exact where frequencies lie far apart.
     inverse, shapes = np.linalg.eigh(mass / np.outer(root_stiffness, root_stiffness))

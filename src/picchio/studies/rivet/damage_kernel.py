@@ -7,7 +7,7 @@ from numba import njit, prange
 
 from picchio.core.arrays import FloatArray
 from picchio.fatigue.counting.kernel import finish, push
-from picchio.vibration.batch.modal_kernel import modes_of
+from picchio.vibration.batch.modal_kernel import decompose, modes_of
 from picchio.vibration.batch.turning_kernel import FINE, turns_from_rest
 
 _BLOCK = 16
@@ -86,12 +86,11 @@ def swing(  # type: ignore[no-untyped-def]
         underdamped.
     """
     n = stiffness.shape[0]
-    work, vectors, shapes = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-    omega, ratio, weights = np.empty(n), np.empty(n), np.empty((n, n))
+    values, vectors = np.empty((n, n, 1)), np.empty((n, n, 1))
+    omega, shapes, weights = np.empty(n), np.empty((n, n)), np.empty((n, n))
     poles = np.empty(n, dtype=np.complex128)
-    if not modes_of(
-        mass, stiffness, joint_ratio, work, vectors, omega, ratio, shapes, frequency, poles
-    ):
+    decompose(mass.reshape((1, n, n)), stiffness.reshape((1, n)), values, vectors)
+    if not modes_of(0, values, vectors, stiffness, joint_ratio, omega, shapes, frequency, poles):
         return np.empty((0, 0)), np.empty(0, dtype=np.int64)
     for i in range(n):
         moved = 0.0

@@ -9,6 +9,7 @@ eta = Im(z) / Im(pole). On a piece of the force z is one row of coefficients:
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -16,120 +17,151 @@ from numba import njit
 from picchio.core.arrays import ComplexArray, FloatArray
 
 _SWEEPS = 30
+KERNEL: dict[str, Any] = {
+    "cache": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False
+}  # fmt: skip
+"""How innermost functions are compiled. Products are added without rounding between them, which
+loses nothing. References to arrays are not counted there, so that none can be made: a count each
+way takes longer than the arithmetic."""
 # Off-diagonal terms, squared, over the product of their diagonal ones: no rotation below the
 # first, no further sweep below the second.
 _NOTHING = 1e-30
 _SMALL = 1e-17
 
 
-@njit(cache=True, error_model="numpy")
-def jacobi_eigh(a: FloatArray, vectors: FloatArray) -> None:
-    """Eigenvalues onto the diagonal of `a` (n, n), eigenvectors into the rows of `vectors`.
+@njit(**KERNEL)
+def _angles(  # type: ignore[no-untyped-def]
+    app, aqq, apq, cosine, sine
+):
+    """Of each matrix, the rotation that makes `apq` zero; how many are not diagonal there yet."""
+    far = 0
+    for k in range(app.shape[0]):
+        x, y, off = app[k], aqq[k], apq[k]
+        scale, square, half = abs(x * y), off * off, 0.5 * (y - x)
+        turns = square > _NOTHING * scale
+        size = abs(half) + np.sqrt(half * half + square)
+        t = off / (size if half >= 0.0 else -size) if turns else 0.0
+        c = 1.0 / np.sqrt(t * t + 1.0)
+        cosine[k], sine[k] = c, t * c
+        app[k], aqq[k], apq[k] = x - t * off, y + t * off, 0.0 if turns else off
+        far += 1 if square > _SMALL * scale else 0
+    return far
 
-    Cyclic Jacobi rotations (Golub and Van Loan, Matrix Computations, section 8.5): for n <= 7
-    faster than LAPACK's overhead, and relatively accurate for positive definite matrices. Only
-    the upper triangle of `a` is read, and destroyed.
+
+@njit(**KERNEL)
+def _turn(first, second, cosine, sine):  # type: ignore[no-untyped-def]
+    """Rotate two rows (l,) into each other, each lane by its own angle."""
+    for k in range(first.shape[0]):
+        x, y = first[k], second[k]
+        first[k], second[k] = cosine[k] * x - sine[k] * y, sine[k] * x + cosine[k] * y
+
+
+@njit(cache=True, error_model="numpy")
+def _jacobi_eigh(a: FloatArray, vectors: FloatArray) -> None:
+    """Eigenvalues of l matrices onto the diagonals of `a` (n, n, l); vectors into rows (n, n, l).
+
+    Cyclic Jacobi rotations (Golub and Van Loan, Matrix Computations, section 8.5), of all
+    matrices side by side on vector units, until the last one is diagonal. They are relatively
+    accurate for positive definite matrices. Only the upper triangles are read, and destroyed.
     """
-    n = a.shape[0]
+    n, _, lanes = a.shape
+    cosine, sine = np.empty(lanes), np.empty(lanes)
+    vectors[:] = 0.0
     for i in range(n):
-        for j in range(n):
-            vectors[i, j] = 0.0
         vectors[i, i] = 1.0
     for _ in range(_SWEEPS):
-        worst = 0.0
+        far = 0
         for p in range(n - 1):
             for q in range(p + 1, n):
-                off, app, aqq = a[p, q], a[p, p], a[q, q]
-                scale = abs(app * aqq)
-                if off * off <= _NOTHING * scale:
-                    continue
-                worst = max(worst, off * off / scale if scale > 0.0 else 1.0)
-                theta = 0.5 * (aqq - app) / off
-                t = 1.0 / (abs(theta) + np.sqrt(theta * theta + 1.0))
-                if theta < 0.0:
-                    t = -t
-                c = 1.0 / np.sqrt(t * t + 1.0)
-                s = t * c
-                a[p, p], a[q, q], a[p, q] = app - t * off, aqq + t * off, 0.0
-                for k in range(p):
-                    x, y = a[k, p], a[k, q]
-                    a[k, p], a[k, q] = c * x - s * y, s * x + c * y
-                for k in range(p + 1, q):
-                    x, y = a[p, k], a[k, q]
-                    a[p, k], a[k, q] = c * x - s * y, s * x + c * y
-                for k in range(q + 1, n):
-                    x, y = a[p, k], a[q, k]
-                    a[p, k], a[q, k] = c * x - s * y, s * x + c * y
+                far += _angles(a[p, p], a[q, q], a[p, q], cosine, sine)
                 for k in range(n):
-                    x, y = vectors[p, k], vectors[q, k]
-                    vectors[p, k], vectors[q, k] = c * x - s * y, s * x + c * y
+                    if k < p:
+                        _turn(a[k, p], a[k, q], cosine, sine)
+                    elif p < k < q:
+                        _turn(a[p, k], a[k, q], cosine, sine)
+                    elif k > q:
+                        _turn(a[p, k], a[q, k], cosine, sine)
+                    _turn(vectors[p, k], vectors[q, k], cosine, sine)
         # What is left after a sweep is the square of what was there before it.
-        if worst <= _SMALL:
+        if far == 0:
             break
 
 
 @njit(cache=True, error_model="numpy")
+def decompose(
+    mass: FloatArray, stiffness: FloatArray, values: FloatArray, vectors: FloatArray
+) -> None:
+    """B = K^-1/2 M K^-1/2 of l systems, decomposed: B V = V diag(values).
+
+    Args:
+        mass: (l, n, n) kg m^2.
+        stiffness: (l, n) N m/rad.
+        values: (n, n, l) out, on the diagonals; the rest is scratch.
+        vectors: (n, n, l) out, in rows.
+    """
+    lanes, n = stiffness.shape
+    for s in range(lanes):
+        for i in range(n):
+            for j in range(i, n):
+                both = 0.5 * (mass[s, i, j] + mass[s, j, i])
+                values[i, j, s] = both / np.sqrt(stiffness[s, i] * stiffness[s, j])
+    _jacobi_eigh(values, vectors)
+
+
+@njit(**KERNEL)
 def modes_of(
-    mass: FloatArray,
+    s: int,
+    values: FloatArray,
+    vectors: FloatArray,
     stiffness: FloatArray,
     joint_ratio: FloatArray,
-    work: FloatArray,
-    vectors: FloatArray,
     omega: FloatArray,
-    ratio: FloatArray,
     shapes: FloatArray,
     frequency: FloatArray,
     poles: ComplexArray,
 ) -> bool:
     """Undamped modes of M x'' + diag(k) x = 0, ascending, with S^T M S = I; Hz, and their poles.
 
-    From B = K^-1/2 M K^-1/2 with B V = V diag(1 / omega^2): S = K^-1/2 V diag(omega). A mode's
-    damping ratio is the joints' weighted by strain energy, which is V squared.
+    From what `decompose` made of system s: values are 1 / omega^2, and S = K^-1/2 V diag(omega).
+    A mode's damping ratio is the joints' weighted by strain energy, which is V squared.
 
     Returns:
         whether the mass matrix is positive definite, and every mode underdamped.
     """
-    n = mass.shape[0]
-    for i in range(n):
-        ratio[i] = 1.0 / np.sqrt(stiffness[i])
-    for i in range(n):
-        for j in range(i, n):
-            work[i, j] = 0.5 * (mass[i, j] + mass[j, i]) * (ratio[i] * ratio[j])
-    jacobi_eigh(work, vectors)
+    n = stiffness.shape[0]
+    under = True
     for k in range(n):
         # The k-th lowest frequency has the k-th largest eigenvalue.
         best = k
         for i in range(k + 1, n):
-            if not work[i, i] <= work[best, best]:
+            if not values[i, i, s] <= values[best, best, s]:
                 best = i
-        largest = work[best, best]
+        largest = values[best, best, s]
         if not largest > 0.0:
             return False
-        work[best, best] = work[k, k]
+        values[best, best, s] = values[k, k, s]
         omega[k] = 1.0 / np.sqrt(largest)
+        ratio = 0.0
         for i in range(n):
-            vectors[k, i], vectors[best, i] = vectors[best, i], vectors[k, i]
-            shapes[i, k] = vectors[k, i] * omega[k] * ratio[i]
-    for k in range(n):
-        ratio[k] = 0.0
-        for i in range(n):
-            ratio[k] += joint_ratio[i] * vectors[k, i] ** 2
-    under = True
+            part = vectors[best, i, s]
+            vectors[best, i, s] = vectors[k, i, s]
+            shapes[i, k] = part * omega[k] / np.sqrt(stiffness[i])
+            ratio += joint_ratio[i] * part * part
+        under = under and 0.0 < ratio < 1.0 - 1e-6
+        poles[k] = complex(-ratio * omega[k], omega[k] * np.sqrt(1.0 - ratio * ratio))
     for k in range(n):
         frequency[k] = omega[k] / (2.0 * np.pi)
-        under = under and 0.0 < ratio[k] < 1.0 - 1e-6
-        poles[k] = complex(-ratio[k] * omega[k], omega[k] * np.sqrt(1.0 - ratio[k] ** 2))
     return under
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(**KERNEL)
 def exponential(pole: complex, u: float) -> complex:
     """exp(pole u); the library's complex exponential takes twice as long over special cases."""
     size, angle = math.exp(pole.real * u), pole.imag * u
     return complex(size * math.cos(angle), size * math.sin(angle))
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(**KERNEL)
 def coefficients(
     poles: ComplexArray,
     duration: FloatArray,

@@ -6,17 +6,24 @@ import numpy as np
 from numba import njit, prange
 
 from picchio.core.arrays import ComplexArray, FloatArray
-from picchio.vibration.batch.modal_kernel import coefficients, exponential, modes_of
+from picchio.vibration.batch.modal_kernel import (
+    coefficients,
+    decompose,
+    exponential,
+    modes_of,
+)
 from picchio.vibration.batch.top_kernel import (
     TERMS,
     highest,
     joint_norms,
+    power_series,
     room_for,
     sample,
     steps_of,
 )
 
-_BLOCK = 128
+# So many matrices are decomposed side by side; more would not stay near the processor.
+_BLOCK = 64
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -30,15 +37,14 @@ def _block_peaks(  # type: ignore[no-untyped-def]
     """
     n = stiffness.shape[1]
     dims = 3 if along.shape[0] == 0 else 1
-    work = np.empty((n, n))
-    vectors = np.empty((n, n))
+    values, vectors = np.empty((n, n, last - first)), np.empty((n, n, last - first))
+    decompose(mass[first:last], stiffness[first:last], values, vectors)
     omega = np.empty(n)
-    ratio = np.empty(n)
     shapes = np.empty((n, n))
-    pull = np.empty((n, n, 3))  # of a joint, by a mode, for an axis of the force
+    pull = np.empty((n, n, 4))  # of a joint, by a mode, for an axis of the force; and its length
     found = np.empty((n, 3))
     g = np.empty(3)
-    terms = np.empty((TERMS, 3))
+    terms, free, powers = np.empty((TERMS, 3)), np.empty((n, 2)), np.empty((TERMS, n, 2))
     room = room_for(n, 256)
     poles = np.empty(n, dtype=np.complex128)
     rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
@@ -48,20 +54,25 @@ def _block_peaks(  # type: ignore[no-untyped-def]
         peak[s, :] = np.nan
         direction[s, :, :] = np.nan
         if not modes_of(
-            mass[s], stiffness[s], joint_ratio, work, vectors, omega, ratio, shapes, frequency[s],
+            s - first, values, vectors, stiffness[s], joint_ratio, omega, shapes, frequency[s],
             poles,
         ):  # fmt: skip
             continue
-        pull[:] = 0.0
         for i in range(n):
-            push = 0.0
-            for d in range(3):
-                moved = 0.0
-                for j in range(n):
-                    moved += jacobian[s, d, j] * shapes[j, i]
-                push = moved if dims == 3 else push + moved * along[s, d]
-                for j in range(n):
-                    pull[j, i, d if dims == 3 else 0] = shapes[j, i] * push
+            x, y, z = 0.0, 0.0, 0.0
+            for j in range(n):
+                shape = shapes[j, i]
+                x += jacobian[s, 0, j] * shape
+                y += jacobian[s, 1, j] * shape
+                z += jacobian[s, 2, j] * shape
+            if dims == 1:
+                x, y, z = x * along[s, 0] + y * along[s, 1] + z * along[s, 2], 0.0, 0.0
+            size = np.sqrt(x * x + y * y + z * z)
+            for j in range(n):
+                shape = shapes[j, i]
+                pull[j, i, 0], pull[j, i, 1], pull[j, i, 2] = shape * x, shape * y, shape * z
+                pull[j, i, 3] = abs(shape) * size
+        power_series(poles, powers)
         coefficients(poles, duration, constant, slope, amplitude, wave, periodic, rows)
         if endless:
             length[-1] = 2.0 * np.pi / omega[0]
@@ -72,30 +83,29 @@ def _block_peaks(  # type: ignore[no-untyped-def]
                 total += length[p]
             if count > room.time.shape[0]:
                 room = room_for(n, 2 * count)
-            sample(poles, rows, length, wave, omega[n - 1], room.eta, room.rate, room.time)
+            sample(poles, rows, length, wave, omega[n - 1], room)
             done = True
             for j in range(n):
-                peak[s, j] = joint_norms(j, count, room.eta, pull[j], dims, room.g, room.norm)
+                peak[s, j] = joint_norms(j, count, pull[j], room)
                 if endless and done:
                     # Nothing after the samples can be larger than what is left of the modes.
                     left = 0.0
                     for d in range(dims):
                         most = 0.0
                         for i in range(n):
-                            z = rows[i, -1, 0] * exponential(poles[i], length[-1])
-                            most += abs(pull[j, i, d]) * abs(z) / poles[i].imag
+                            state = rows[i, -1, 0] * exponential(poles[i], length[-1])
+                            most += abs(pull[j, i, d]) * abs(state) / poles[i].imag
                         left += most * most
                     done = left <= peak[s, j]
-            if done or length[-1] > 1e3 * np.pi / (ratio[0] * omega[0]):
+            if done or length[-1] > -1e3 * np.pi / poles[0].real:
                 break
             length[-1] *= 2.0
         for j in range(n):
             found[j, 0], found[j, 1], found[j, 2] = 0.0, 0.0, 1.0
             if peak[s, j] > 0.0:
                 peak[s, j] = highest(
-                    j, count, periodic, total, peak[s, j], room.time, room.norm, room.eta,
-                    room.rate, start, poles, rows, constant, slope, amplitude, wave, pull[j], g,
-                    terms, found,
+                    j, count, periodic, total, peak[s, j], room, start, poles, rows, constant,
+                    slope, amplitude, wave, powers, pull[j], g, free, terms, found,
                 )  # fmt: skip
         for j in range(n):
             for d in range(3):

@@ -14,12 +14,13 @@ import numpy as np
 from numba import njit
 
 from picchio.core.arrays import ComplexArray, FloatArray
-from picchio.vibration.batch.modal_kernel import exponential
+from picchio.vibration.batch.modal_kernel import KERNEL, exponential
 
 # Samples a cycle of the fastest mode. |g|^2 swings twice as fast: a top between two samples is
 # at most 10 % above both, unless modes nearly cancel (see `_MISSED`).
 _PER_CYCLE = 10.0
-_FAST = {"contract", "reassoc", "nsz", "arcp"}
+# Samples whose largest |g|^2 is kept: what lies below the search is passed over at once.
+TILE = 8
 # Of the largest |g|^2 on the samples: no top beside a sample below this is the largest.
 _CANDIDATE = 0.5
 # How much higher than a cubic through values and slopes a top can be: of |g|, the modes'
@@ -49,142 +50,153 @@ class Samples(NamedTuple):
         eta: (n, k) deflections of the modes.
         rate: (n, k) real parts of their states.
         norm: (n, k) |g|^2 of every joint.
-        g: (3, k) of one joint.
+        tiles: (n, k / 8, 8) the same.
+        tops: (n, k / 8) the largest of each eight.
+        scratch: (3, k).
     """
 
     time: FloatArray
     eta: FloatArray
     rate: FloatArray
     norm: FloatArray
-    g: FloatArray
+    tiles: FloatArray
+    tops: FloatArray
+    scratch: FloatArray
 
 
 @njit(cache=True)
 def room_for(n: int, count: int) -> Samples:
     """Room for `count` samples of n modes and joints."""
+    tiles = (count + TILE - 1) // TILE
+    count = tiles * TILE
+    norm = np.empty((n, count))
     return Samples(
-        np.empty(count), np.empty((n, count)), np.empty((n, count)), np.empty((n, count)),
-        np.empty((3, count)),
+        np.empty(count), np.empty((n, count)), np.empty((n, count)), norm,
+        norm.reshape((n, tiles, TILE)), np.empty((n, tiles)), np.empty((3, count)),
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def steps_of(duration: float, rate: float) -> int:
     """How many samples a piece of `duration` s takes at `rate` rad/s."""
     return max(1, int(np.ceil(duration * rate * (_PER_CYCLE / (2.0 * np.pi)))))
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def _add_decay(
-    state: complex,
-    factor: complex,
-    scale: float,
-    i: int,
-    first: int,
-    last: int,
-    eta: FloatArray,
-    rate: FloatArray,
-) -> None:
-    """Add Im(state factor^k) scale and Re(state factor^k) to samples first to last - 1 of row i.
-
-    In two chains, so that none waits for itself.
-    """
-    second = factor * factor
-    c, d = second.real, second.imag
-    odd = state * factor
-    a0, b0, a1, b1 = state.real, state.imag, odd.real, odd.imag
-    k = first
-    while k + 2 <= last:
-        rate[i, k] += a0
-        eta[i, k] += b0 * scale
-        rate[i, k + 1] += a1
-        eta[i, k + 1] += b1 * scale
-        a0, b0 = a0 * c - b0 * d, a0 * d + b0 * c
-        a1, b1 = a1 * c - b1 * d, a1 * d + b1 * c
-        k += 2
-    if k < last:
-        rate[i, k] += a0
-        eta[i, k] += b0 * scale
+@njit(**KERNEL)
+def _double(factor, real, imag, next_real, next_imag):  # type: ignore[no-untyped-def]
+    """The next states of a decay, from as many before them."""
+    c, d = factor.real, factor.imag
+    for k in range(next_real.shape[0]):
+        next_real[k] = real[k] * c - imag[k] * d
+        next_imag[k] = real[k] * d + imag[k] * c
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(**KERNEL)
+def _decay(state: complex, factor: complex, real: FloatArray, imag: FloatArray) -> None:
+    """State factor^k, for all k: each pass doubles what is there, side by side."""
+    real[0], imag[0] = state.real, state.imag
+    done = 1
+    while done < real.shape[0]:
+        _double(factor, real, imag, real[done : 2 * done], imag[done : 2 * done])
+        factor *= factor
+        done *= 2
+
+
+@njit(**KERNEL)
+def _add(  # type: ignore[no-untyped-def]
+    first, level, rise, scale, real, imag, eta, rate
+):
+    """A decay and a line in time: the first of a mode, or more of it."""
+    for k in range(real.shape[0]):
+        x = (imag[k] + (level.imag + rise.imag * k)) * scale
+        v = real[k] + (level.real + rise.real * k)
+        eta[k] = x if first else eta[k] + x
+        rate[k] = v if first else rate[k] + v
+
+
+@njit(**KERNEL)
 def sample(
     poles: ComplexArray,
     rows: ComplexArray,
     duration: FloatArray,
     wave: FloatArray,
     fastest: float,
-    eta: FloatArray,
-    rate: FloatArray,
-    time: FloatArray,
+    room: Samples,
 ) -> None:
-    """Oscillators' deflections (n, k) at times (k,) over all pieces, by recurrence.
+    """Oscillators' deflections at the samples of all pieces, and their `rate`, into `room`.
 
-    `rate` (n, k) has the real parts of their states: rates less Re(pole) times deflections.
+    A rate is the real part of a state: the speed less Re(pole) times the deflection.
     """
     count, began = 0, 0.0
     for p in range(duration.shape[0]):
         steps = steps_of(duration[p], max(fastest, wave[p]))
         h = duration[p] / steps
+        last = count + steps
+        real, imag = room.scratch[0, :steps], room.scratch[1, :steps]
         for i in range(poles.shape[0]):
             scale = 1.0 / poles[i].imag
-            level, rise = rows[i, p, 1], rows[i, p, 2] * h
-            for k in range(steps):
-                eta[i, count + k] = (level.imag + rise.imag * k) * scale
-                rate[i, count + k] = level.real + rise.real * k
-            last = count + steps
-            _add_decay(rows[i, p, 0], exponential(poles[i], h), scale, i, count, last, eta, rate)
+            eta, rate = room.eta[i, count:last], room.rate[i, count:last]
+            _decay(rows[i, p, 0], exponential(poles[i], h), real, imag)
+            _add(True, rows[i, p, 1], rows[i, p, 2] * h, scale, real, imag, eta, rate)
             if wave[p] != 0.0:
                 spin = exponential(complex(0.0, wave[p]), h)
-                _add_decay(rows[i, p, 3], spin, scale, i, count, last, eta, rate)
-                _add_decay(rows[i, p, 4], spin.conjugate(), scale, i, count, last, eta, rate)
+                _decay(rows[i, p, 3], spin, real, imag)
+                _add(False, 0.0j, 0.0j, scale, real, imag, eta, rate)
+                _decay(rows[i, p, 4], spin.conjugate(), real, imag)
+                _add(False, 0.0j, 0.0j, scale, real, imag, eta, rate)
         for k in range(steps):
-            time[count + k] = began + h * k
+            room.time[count + k] = began + h * k
         began += duration[p]
-        count += steps
+        count = last
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
-def joint_norms(
-    joint: int,
-    count: int,
-    eta: FloatArray,
-    pull: FloatArray,
-    dims: int,
-    g: FloatArray,
-    norm: FloatArray,
-) -> float:
-    """|g|^2 of a joint on the samples, into its row (joint, k), and its largest; g is scratch.
-
-    `dims` is 1 where only the first column of `pull` (n, 3) is not zero.
-    """
+@njit(**KERNEL)
+def _project(count, eta, pull, first, g, norm):  # type: ignore[no-untyped-def]
+    """Add three modes' shares to the axes of a joint's g: the fewer ways to memory, the faster."""
     n = pull.shape[0]
-    for d in range(dims):
-        weight = pull[0, d]
-        for k in range(count):
-            g[d, k] = weight * eta[0, k]
-        i = 1
-        while i + 1 < n:  # two modes at a time: half as many ways to memory and back
-            first, second = pull[i, d], pull[i + 1, d]
-            for k in range(count):
-                g[d, k] += first * eta[i, k] + second * eta[i + 1, k]
-            i += 2
-        if i < n:
-            weight = pull[i, d]
-            for k in range(count):
-                g[d, k] += weight * eta[i, k]
+    second, third = min(first + 1, n - 1), min(first + 2, n - 1)
+    one, two = 1.0 if first + 1 < n else 0.0, 1.0 if first + 2 < n else 0.0
+    a0, a1, a2 = pull[first, 0], one * pull[second, 0], two * pull[third, 0]
+    b0, b1, b2 = pull[first, 1], one * pull[second, 1], two * pull[third, 1]
+    c0, c1, c2 = pull[first, 2], one * pull[second, 2], two * pull[third, 2]
+    for k in range(count):
+        x, y, z = eta[first, k], eta[second, k], eta[third, k]
+        a = a0 * x + a1 * y + a2 * z
+        b = b0 * x + b1 * y + b2 * z
+        c = c0 * x + c1 * y + c2 * z
+        if first > 0:
+            a, b, c = a + g[0, k], b + g[1, k], c + g[2, k]
+        g[0, k], g[1, k], g[2, k] = a, b, c
+        norm[k] = a * a + b * b + c * c
+
+
+@njit(**KERNEL)
+def joint_norms(joint: int, count: int, pull: FloatArray, room: Samples) -> float:
+    """|g|^2 of a joint on the samples, into its row of `norm`, with `tops`; and its largest.
+
+    Args:
+        joint: which row.
+        count: of the samples.
+        pull: (n, 4), its deflection by each mode's, for each axis of the force; and their length.
+        room: the samples.
+    """
+    g, norm = room.scratch, room.norm[joint]
+    for first in range(0, pull.shape[0], 3):
+        _project(count, room.eta, pull, first, g, norm)
     largest = 0.0
-    for k in range(count):
-        size = g[0, k] * g[0, k]
-        if dims == 3:
-            size += g[1, k] * g[1, k] + g[2, k] * g[2, k]
-        norm[joint, k] = size
-    for k in range(count):
-        largest = max(largest, norm[joint, k])
+    tiles = (count + TILE - 1) // TILE
+    for k in range(count, tiles * TILE):
+        norm[k] = 0.0
+    for tile in range(tiles):
+        top = 0.0
+        for k in range(TILE):
+            top = max(top, room.tiles[joint, tile, k])
+        room.tops[joint, tile] = top
+        largest = max(largest, top)
     return largest
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(**KERNEL)
 def piece_at(time: float, start: FloatArray) -> int:
     """The last piece of the force that has begun at a time, s."""
     p = 0
@@ -193,7 +205,7 @@ def piece_at(time: float, start: FloatArray) -> int:
     return p
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**KERNEL)
 def refine(
     a: float,
     t: float,
@@ -277,18 +289,30 @@ def refine(
     return norm
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(**KERNEL)
+def power_series(poles: ComplexArray, powers: FloatArray) -> None:
+    """Taylor coefficients of exp(pole t) Im(pole)^-1: real and imaginary parts, (TERMS, n, 2)."""
+    for i in range(poles.shape[0]):
+        term = complex(1.0 / poles[i].imag, 0.0)
+        for m in range(TERMS):
+            powers[m, i, 0], powers[m, i, 1] = term.real, term.imag
+            term *= poles[i] * (1.0 / (m + 1.0))
+
+
+@njit(**KERNEL)
 def series_top(
     k: int,
     hint: float,
     low: float,
     high: float,
-    force: float,
-    tilt: float,
+    p: int,
     poles: ComplexArray,
+    rows: ComplexArray,
+    powers: FloatArray,
     eta: FloatArray,
     rate: FloatArray,
     pull: FloatArray,
+    free: FloatArray,
     terms: FloatArray,
     g: FloatArray,
 ) -> float:
@@ -301,37 +325,34 @@ def series_top(
         hint: s, from the sample to where the top is thought to be.
         low: s, how far back the sample's piece of the force goes.
         high: s, how far ahead.
-        force: N, at the sample.
-        tilt: N/s, its slope.
+        p: that piece, which has no wave.
         poles: (n,) ascending, 1/s.
+        rows: see `coefficients`.
+        powers: see `power_series`.
         eta: (n, samples) deflections of the modes.
         rate: (n, samples) real parts of their states.
-        pull: (n, 3) of the joint: its deflection by each mode's, for each axis of the force.
-        terms: (TERMS, 3) scratch: derivatives of g, then its series.
+        pull: (n, 4) of the joint: its deflection by each mode's, for each axis of the force.
+        free: (n, 2) scratch: what of a state decays.
+        terms: (TERMS, 3) scratch: Taylor series of g.
         g: (3,) out.
     """
     n = poles.shape[0]
     most = _NEAR / poles[n - 1].imag
-    for m in range(TERMS):
-        terms[m, 0], terms[m, 1], terms[m, 2] = 0.0, 0.0, 0.0
+    u0, u1, u2, r0, r1, r2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(n):
-        fall, spin = poles[i].real, poles[i].imag
-        twice, square = 2.0 * fall, fall * fall + spin * spin
-        q0, q1, q2 = pull[i, 0], pull[i, 1], pull[i, 2]
-        before = eta[i, k]
-        here = rate[i, k] + fall * before
-        drive, next_drive = force, tilt
-        for m in range(TERMS):
-            terms[m, 0] += q0 * before
-            terms[m, 1] += q1 * before
-            terms[m, 2] += q2 * before
-            before, here = here, drive + twice * here - square * before
-            drive, next_drive = next_drive, 0.0
-    factor = 1.0
-    for m in range(2, TERMS):
-        factor /= m
-        for d in range(3):
-            terms[m, d] *= factor
+        level, rise = rows[i, p, 1] - rows[i, p, 2] * low, rows[i, p, 2]
+        free[i, 0] = rate[i, k] - level.real
+        free[i, 1] = eta[i, k] * poles[i].imag - level.imag
+        still, drift = level.imag / poles[i].imag, rise.imag / poles[i].imag
+        u0, u1, u2 = u0 + pull[i, 0] * still, u1 + pull[i, 1] * still, u2 + pull[i, 2] * still
+        r0, r1, r2 = r0 + pull[i, 0] * drift, r1 + pull[i, 1] * drift, r2 + pull[i, 2] * drift
+    for m in range(TERMS):
+        for i in range(n):
+            x = powers[m, i, 0] * free[i, 1] + powers[m, i, 1] * free[i, 0]
+            u0, u1, u2 = u0 + pull[i, 0] * x, u1 + pull[i, 1] * x, u2 + pull[i, 2] * x
+        terms[m, 0], terms[m, 1], terms[m, 2] = u0, u1, u2
+        u0, u1, u2 = r0, r1, r2
+        r0, r1, r2 = 0.0, 0.0, 0.0
     s = min(max(hint, low), high)
     for _ in range(_SERIES_STEPS):
         # The axes side by side: each chain of products waits for itself alone.
@@ -358,7 +379,7 @@ def series_top(
     return -1.0
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(**KERNEL)
 def _moving(
     k: int,
     force: float,
@@ -377,11 +398,11 @@ def _moving(
         q0, q1, q2 = pull[i, 0], pull[i, 1], pull[i, 2]
         x0, x1, x2 = x0 + q0 * x, x1 + q1 * x, x2 + q2 * x
         v0, v1, v2 = v0 + q0 * v, v1 + q1 * v, v2 + q2 * v
-        bound += np.sqrt(q0 * q0 + q1 * q1 + q2 * q2) * abs(change)
+        bound += pull[i, 3] * abs(change)
     return x0 * v0 + x1 * v1 + x2 * v2, bound
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(**KERNEL)
 def _cubic_top(
     first: float, last: float, rise: float, fall: float, length: float
 ) -> tuple[float, float]:
@@ -405,7 +426,7 @@ def _cubic_top(
     return at, top
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(**KERNEL)
 def _force(
     p: int,
     u: float,
@@ -422,17 +443,14 @@ def _force(
     return float(force)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(**KERNEL)
 def highest(
     joint: int,
     count: int,
     periodic: bool,
     total: float,
     largest: float,
-    time: FloatArray,
-    norm: FloatArray,
-    eta: FloatArray,
-    rate: FloatArray,
+    room: Samples,
     start: FloatArray,
     poles: ComplexArray,
     rows: ComplexArray,
@@ -440,54 +458,60 @@ def highest(
     slope: FloatArray,
     amplitude: ComplexArray,
     wave: FloatArray,
+    powers: FloatArray,
     pull: FloatArray,
     g: FloatArray,
+    free: FloatArray,
     terms: FloatArray,
     direction: FloatArray,
 ) -> float:
     """The largest |g| of a joint, from that of |g|^2 on the samples; its way into `direction`."""
     best, floor = -1.0, _CANDIDATE * largest
-    for k in range(count):
-        before = k - 1 if k > 0 else (count - 1 if periodic else 0)
-        after = k + 1 if k + 1 < count else (0 if periodic else count - 1)
-        here = norm[joint, k]
-        if here < floor or here < norm[joint, before] or here < norm[joint, after]:
+    time, norm, eta, rate = room.time, room.norm[joint], room.eta, room.rate
+    for tile in range((count + TILE - 1) // TILE):
+        if room.tops[joint, tile] < floor:
             continue
-        a, t, b = time[before], time[k], time[after]
-        if a > t:
-            a -= total
-        if b < t:
-            b += total
-        p = piece_at(t, start)
-        force = _force(p, t - start[p], constant, slope, amplitude, wave)
-        climb, bound = _moving(k, force, poles, eta, rate, pull)
-        beside, length = (after, b - t) if climb >= 0.0 else (before, t - a)
-        guess, top = t, here
-        if length > 0.0:
-            # Where a piece ends the force may jump, but no slope does: any piece's will do.
-            descent = _moving(beside, 0.0, poles, eta, rate, pull)[0]
-            sign = 1.0 if climb >= 0.0 else -1.0
-            move, top = _cubic_top(
-                here, norm[joint, beside], 2.0 * sign * climb, 2.0 * sign * descent, length
-            )
-            guess = t + sign * move
-        if top + _MISSED * np.sqrt(here) * bound * length * length < best:
-            continue
-        value = -1.0
-        if wave[p] == 0.0:
-            u = t - start[p]
-            stop = start[p + 1] if p + 1 < start.shape[0] else total
-            value = series_top(
-                k, guess - t, -u, stop - t, force, slope[p], poles, eta, rate, pull, terms, g
-            )
-        if value < 0.0:  # the top is in another piece, or not near
-            value = refine(
-                a, guess, b, total if periodic else np.inf, start, poles, rows, constant,
-                slope, amplitude, wave, pull, g,
-            )  # fmt: skip
-        if value > best:
-            best = value
-            size = np.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
-            for d in range(3):
-                direction[joint, d] = g[d] / size
-    return np.sqrt(best)
+        for k in range(tile * TILE, min(count, tile * TILE + TILE)):
+            before = k - 1 if k > 0 else (count - 1 if periodic else 0)
+            after = k + 1 if k + 1 < count else (0 if periodic else count - 1)
+            here = norm[k]
+            if here < floor or here < norm[before] or here < norm[after]:
+                continue
+            a, t, b = time[before], time[k], time[after]
+            if a > t:
+                a -= total
+            if b < t:
+                b += total
+            p = piece_at(t, start)
+            force = _force(p, t - start[p], constant, slope, amplitude, wave)
+            climb, bound = _moving(k, force, poles, eta, rate, pull)
+            beside, length = (after, b - t) if climb >= 0.0 else (before, t - a)
+            guess, top = t, here
+            if length > 0.0:
+                # Where a piece ends the force may jump, but no slope does: any piece's will do.
+                descent = _moving(beside, 0.0, poles, eta, rate, pull)[0]
+                sign = 1.0 if climb >= 0.0 else -1.0
+                move, top = _cubic_top(
+                    here, norm[beside], 2.0 * sign * climb, 2.0 * sign * descent, length
+                )
+                guess = t + sign * move
+            if top + _MISSED * np.sqrt(here) * bound * length * length < best:
+                continue
+            value = -1.0
+            if wave[p] == 0.0:
+                stop = start[p + 1] if p + 1 < start.shape[0] else total
+                value = series_top(
+                    k, guess - t, start[p] - t, stop - t, p, poles, rows, powers, eta, rate, pull,
+                    free, terms, g,
+                )  # fmt: skip
+            if value < 0.0:  # the top is in another piece, or not near
+                value = refine(
+                    a, guess, b, total if periodic else np.inf, start, poles, rows, constant,
+                    slope, amplitude, wave, pull, g,
+                )  # fmt: skip
+            if value > best:
+                best = value
+                size = np.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+                for d in range(3):
+                    direction[joint, d] = g[d] / size
+    return float(np.sqrt(best))
