@@ -163,7 +163,7 @@ class Identification(TableResult):
         return []
 
     def modes(self) -> list[ModeSeen]:
-        """Peaks that were measured, each with its mode, where the method fits functions."""
+        """Every measured peak that a mode explains, where the method fits functions."""
         return []
 
     def by_pose(self) -> list[PoseLeft]:

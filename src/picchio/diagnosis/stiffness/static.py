@@ -379,7 +379,11 @@ def _moved(information: FloatArray, lines: tuple[str, ...]) -> str:
     first = np.argsort(-information, kind="stable")[:_LINES]
     half = int(np.searchsorted(np.cumsum(np.sort(information)[::-1]), 0.5 * total)) + 1
     named = [lines[k] for k in first if information[k] > 0.02 * total]
-    if not all(name.rsplit(" ", 1)[1].isdigit() for name in named):
+    numbered = [name.rsplit(" ", 1)[1].isdigit() for name in named]
+    if not any(numbered):
+        motors = (name.rsplit(" ", 1) for name in named)
+        return "told most by the torque of " + ", ".join(f"{of} in {file}" for file, of in motors)
+    if not all(numbered):
         return f"{half} of {len(lines)} rows tell half of it, most of all {', '.join(named)}"
     file = named[0].split(" ")[0]
     if all(name.startswith(f"{file} ") for name in named):
