@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,7 +22,7 @@ _LONGEST = 600
 _FINER = 4
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, slots=True)
 class Blow:
     """One blow.
 
@@ -336,14 +336,24 @@ def bursts(blows: Sequence[Blow], rest: Callable[[FloatArray], FloatArray]) -> l
     places, which = np.unique(poses[:-1], axis=0, return_inverse=True)
     near = silence < (rest(places)[which.ravel()] if len(places) else silence)
     found: list[Burst] = []
+    shapes: dict[bytes, Burst] = {}
     part = [blows[0]]
     for k, blow in enumerate(blows[1:]):
         if moved[k] or not near[k] or len(part) >= _LONGEST:
-            found.append(burst(part))
+            found.append(_shared(burst(part), shapes))
             part = []
         part.append(blow)
-    found.append(burst(part))
+    found.append(_shared(burst(part), shapes))
     return found
+
+
+def _shared(made: Burst, shapes: dict[bytes, Burst]) -> Burst:
+    """The burst, its force held once where another's is the same: those assumed mostly are."""
+    told = b"".join(part.tobytes() for part in (made.start, made.constant, made.slope))
+    one = shapes.setdefault(hashlib.blake2b(told, digest_size=20).digest(), made)
+    if one is made:
+        return made
+    return replace(made, start=one.start, constant=one.constant, slope=one.slope)
 
 
 def burst(blows: Sequence[Blow]) -> Burst:

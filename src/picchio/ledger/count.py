@@ -329,8 +329,9 @@ def recount(book: Ledger, model: Model, curves: Sequence[SNCurve | None], task: 
     new = {key: burst for key, burst in zip(keys, grouped, strict=True) if key not in known}
     if new:
         made = burst_damages_of(model, curves, list(new.values()))
-        fresh = {key: each.packed() for key, each in zip(new, made, strict=True)}
+        fresh = {key: one.packed() for key, one in zip(new, made, strict=True)}
         book.remember(name, fresh)
         known |= fresh
-    damages = [BurstDamage.unpacked(known[key], len(curves)) for key in keys]
+    each = {key: BurstDamage.unpacked(known[key], len(curves)) for key in dict.fromkeys(keys)}
+    damages = [each[key] for key in keys]
     return Counted(blows, grouped, damages, together(damages, curves), over)
