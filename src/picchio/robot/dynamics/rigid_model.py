@@ -202,7 +202,7 @@ class RigidModel:
         return (mass, jacobian) if picks else (follow.T @ mass @ follow, jacobian @ follow)
 
     def origins(self, poses: Array, frame: int) -> Array:
-        """World positions (p, 3) in m of a frame at many poses; errors as of `mass_and_jacobian`.
+        """The positions (p, 3) in m, world, of a frame at many poses.
 
         Args:
             poses: (p, nv).
