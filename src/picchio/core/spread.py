@@ -48,6 +48,7 @@ def spread(
                 cluster = LocalCluster(
                     n_workers=workers, threads_per_worker=1, processes=True,
                     dashboard_address=None, silence_logs=logging.CRITICAL,
+                    env={"NUMBA_NUM_THREADS": "1"},  # each core has a process already
                 )  # fmt: skip
             opened.enter_context(cluster)
         client = opened.enter_context(Client(cluster or scheduler))

@@ -196,6 +196,14 @@ class FlexibleRobot:
         point = self.rigid.frame(self.tool_point)
         return self.rigid.mass_and_jacobian(poses, point, index)
 
+    def tool_positions(self, poses: Array) -> Array:
+        """Only the points (p, 3) in m, world, where the force acts at many poses.
+
+        Args:
+            poses: (p, nv) rad or m, not checked.
+        """
+        return self.rigid.origins(poses, self.rigid.frame(self.tool_point))
+
     def tool_position(self, pose: Array) -> Array:
         """Only the point (3,) in m, world, where the force acts.
 

@@ -13,8 +13,7 @@ from numba import njit, prange
 
 from picchio.core.arrays import FloatArray, IndexArray
 
-BLOCK = 256
-"""Poses that one thread takes at a time."""
+_BLOCK = 256  # poses that a thread takes at a time
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -91,10 +90,11 @@ def _add(part, step, whole):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def some(  # type: ignore[no-untyped-def]
-    first, last, parent, rotation, offset, slides, bodies, rows, tip, point, poses, mass, jacobian
-):
-    """`mass_and_jacobian` of the poses from `first` to `last` - 1."""
+def _some(  # type: ignore[no-untyped-def]
+    first, last, parent, rotation, offset, slides, bodies, rows, tip, point, poses, mass, jacobian,
+    origin,
+):  # fmt: skip
+    """Of `mass_and_jacobian`, the poses from `first` to `last` - 1."""
     count = len(parent)
     turned, place, step = np.empty((count, 3, 3)), np.zeros((count, 3)), np.empty((count, 3))
     whole = np.empty((count, 10))
@@ -146,6 +146,7 @@ def some(  # type: ignore[no-untyped-def]
             + turned[tip, 2, 1] * point[1]
             + turned[tip, 2, 2] * point[2]
         )
+        origin[s, 0], origin[s, 1], origin[s, 2] = x, y, z
         i = tip
         while i > 0:
             if rows[i] >= 0:
@@ -157,7 +158,18 @@ def some(  # type: ignore[no-untyped-def]
             i = parent[i]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy")
+def _on_all_cores(  # type: ignore[no-untyped-def]
+    parent, rotation, offset, slides, bodies, rows, tip, point, poses, mass, jacobian, origin
+):
+    count = poses.shape[0]
+    for block in prange((count + _BLOCK - 1) // _BLOCK):
+        _some(
+            block * _BLOCK, min(count, (block + 1) * _BLOCK), parent, rotation, offset, slides,
+            bodies, rows, tip, point, poses, mass, jacobian, origin,
+        )  # fmt: skip
+
+
 def mass_and_jacobian(
     parent: IndexArray,
     rotation: FloatArray,
@@ -170,6 +182,7 @@ def mass_and_jacobian(
     poses: FloatArray,
     mass: FloatArray,
     jacobian: FloatArray,
+    origin: FloatArray,
 ) -> None:
     """Mass matrices and a point's linear Jacobians at many poses, into arrays of zeros.
 
@@ -187,10 +200,11 @@ def mass_and_jacobian(
         poses: (p, k) rad or m, of all joints.
         mass: (p, n, n) kg m^2, kg m, kg, out; zeros where two joints are not above each other.
         jacobian: (p, 3, n) m or 1, out.
+        origin: (p, 3) m, out: where the point is, world.
     """
-    count = poses.shape[0]
-    for block in prange((count + BLOCK - 1) // BLOCK):
-        some(
-            block * BLOCK, min(count, (block + 1) * BLOCK), parent, rotation, offset, slides,
-            bodies, rows, tip, point, poses, mass, jacobian,
-        )  # fmt: skip
+    tables = parent, rotation, offset, slides, bodies, rows, tip, point, poses
+    # To start the threads takes longer than a few poses.
+    if len(poses) <= _BLOCK:
+        _some(0, len(poses), *tables, mass, jacobian, origin)
+    else:
+        _on_all_cores(*tables, mass, jacobian, origin)

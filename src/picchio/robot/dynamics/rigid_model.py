@@ -194,32 +194,45 @@ class RigidModel:
         Raises:
             InputError: poses of another shape, or no such frame.
         """
-        from picchio.robot.dynamics.rigid_kernel import BLOCK, mass_and_jacobian, some
+        follow = self._follow if index is None else self._follow[:, index]
+        # Where a coordinate is one joint's, this joint's row is all that is wanted.
+        picks = ((follow != 0.0).sum(axis=0) == 1).all() and (follow.max(axis=0) == 1.0).all()
+        where = follow.argmax(axis=0) if picks else np.arange(self._all)
+        mass, jacobian, _ = self._compiled(poses, frame, where)
+        return (mass, jacobian) if picks else (follow.T @ mass @ follow, jacobian @ follow)
+
+    def origins(self, poses: Array, frame: int) -> Array:
+        """The positions (p, 3) in m, world, of a frame at many poses.
+
+        Args:
+            poses: (p, nv).
+            frame: of `frame`.
+        """
+        return self._compiled(poses, frame, np.arange(0))[2]
+
+    def _compiled(
+        self, poses: Array, frame: int, where: NDArray[np.intp]
+    ) -> tuple[Array, Array, Array]:
+        """Mass matrices and Jacobians of n of Pinocchio's coordinates, and a frame's origins."""
+        from picchio.robot.dynamics.rigid_kernel import mass_and_jacobian
 
         self._check_frame(frame)
         if poses.ndim != 2 or poses.shape[1] != self.nv:
             raise InputError("the poses have the wrong shape", key="poses", value=poses.shape,
                              choices=[f"(p, {self.nv})"])  # fmt: skip
-        follow = self._follow if index is None else self._follow[:, index]
-        # Where a coordinate is one joint's, this joint's row is all that is wanted.
-        picks = ((follow != 0.0).sum(axis=0) == 1).all() and (follow.max(axis=0) == 1.0).all()
         rows = np.full(self._all + 1, -1)
-        where = follow.argmax(axis=0) if picks else np.arange(self._all)
         rows[where + 1] = np.arange(len(where))
-        n = len(where)
+        n, origin = len(where), np.empty((len(poses), 3))
         mass, jacobian = np.zeros((len(poses), n, n)), np.zeros((len(poses), 3, n))
         every = poses if self._plain else poses @ self._follow.T + self._offset
-        turns, *tables = self._tables()
+        turns, parent, rotation, offset, slides, bodies = self._tables()
         tip = self._model.frames[frame]
-        point = turns[tip.parentJoint].T @ tip.placement.translation
-        arguments = (*tables, rows, tip.parentJoint, point, np.require(every, float, ("C", "W")),
-                     mass, jacobian)  # fmt: skip
-        # Starting the threads takes longer than a few poses.
-        if len(poses) <= BLOCK:
-            some(0, len(poses), *arguments)
-        else:
-            mass_and_jacobian(*arguments)
-        return (mass, jacobian) if picks else (follow.T @ mass @ follow, jacobian @ follow)
+        mass_and_jacobian(
+            parent, rotation, offset, slides, bodies, rows, tip.parentJoint,
+            turns[tip.parentJoint].T @ tip.placement.translation,
+            np.require(every, float, ("C", "W")), mass, jacobian, origin,
+        )  # fmt: skip
+        return mass, jacobian, origin
 
     def gravity_torque(self, pose: Array) -> Array:
         """Torque (nv,) that holds the arm against gravity, N m (N).

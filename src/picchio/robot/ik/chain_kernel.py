@@ -74,16 +74,6 @@ def forward(tables, q, residual, jacobian, target, axis, weight):  # type: ignor
 
 
 @njit(cache=True)
-def places_of(tables, q, found):  # type: ignore[no-untyped-def]
-    """Where the tool is: fill found (p, 3) in m for coordinates (p, k); tables as of `forward`."""
-    nothing = np.zeros(3)
-    residual, jacobian = np.empty(6), np.empty((6, q.shape[1]))
-    for s in range(q.shape[0]):
-        forward(tables, q[s], residual, jacobian, nothing, nothing, 0.0)
-        copy(residual[:3], found[s])
-
-
-@njit(cache=True)
 def normal_equations(jacobian, residual, normal, gradient):  # type: ignore[no-untyped-def]
     """Fill J^T J (k, k) and J^T r (k,); return the largest diagonal entry, at least 1e-12."""
     rows, k = jacobian.shape

@@ -13,7 +13,6 @@ from picchio.core.errors import InputError
 from picchio.excitation.excitation import Excitation
 from picchio.fatigue.shaft_stress import shaft_stress_per_torque, stress_per_torque
 from picchio.model.model import Model
-from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.varied import cases_of
 from picchio.studies.maps.places import Listed, Places
 from picchio.studies.rivet.life_rules import curves_of
@@ -126,6 +125,12 @@ class MapJob:
     hits: int | None
     damage: int | None = None
 
+    @property
+    def fast(self) -> bool:
+        """Whether a place takes microseconds: given poses, steady state, nothing integrated."""
+        slow = self.model.nonlinear or self.hits is not None or self.damage is not None
+        return self.places.kind == "pose" and not slow and not self.cases
+
     @cached_property
     def cases(self) -> tuple[Model, ...]:
         """Drawn robots, where a spring is an estimate and no place is integrated in time."""
@@ -146,7 +151,7 @@ class MapJob:
         found, stiffness = peaks_at(
             self.model, poses, self.excitation, hits=self.hits, direction=direction
         )
-        position = tool_places(robot, poses)
+        position = robot.tool_positions(poses)
         torque = stiffness * found.peak_deflection
         stress = torque * shaft_stress_per_torque(robot.flexible_joints)
         # Of drives, what stands for the stress is the share of what they bear.
@@ -213,17 +218,3 @@ class MapJob:
             chosen.append(pose)
             place.append(k + first)
         return np.array(chosen).reshape(-1, solved.poses.shape[1]), np.array(place, dtype=int)
-
-
-def tool_places(robot: FlexibleRobot, poses: FloatArray) -> FloatArray:
-    """(p, 3) m, world: where the tool's force acts at poses (p, nv)."""
-    from picchio.robot.ik.chain import tool_chain
-    from picchio.robot.ik.chain_kernel import places_of
-    from picchio.robot.joint import RECOIL_JOINT
-
-    if RECOIL_JOINT in robot.joint_names:  # the chain ends before it
-        return np.array([robot.tool_position(pose) for pose in poses]).reshape(-1, 3)
-    chain = tool_chain(robot)
-    found = np.empty((len(poses), 3))
-    places_of(chain.tables, np.ascontiguousarray(poses[:, chain.index]), found)
-    return found

@@ -10,7 +10,10 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -39,9 +42,12 @@ CHUNK, SMALL_CHUNK = 4096, 64
 _HITS = 200_000
 MOST_PLACES = 10**10
 ENDINGS = (".nc", ".zarr")
-# Fewer places than this are not worth starting workers for.
-_WORTH_WORKERS = 50_000
+# Fewer places than this are not worth starting workers for; and where compiled code takes some
+# microseconds a place: to start two workers takes as long as two million places.
+_WORTH_WORKERS, _WORTH_WORKERS_FAST = 50_000, 4_000_000
 MOST_WORKERS = 1024
+# Chunks that are computed while others are written.
+_AHEAD = 16
 
 
 @one_thread()
@@ -146,13 +152,22 @@ def workspace_map(
         folder = _open_folder(target, job, chunk)
         spans = [(k, min(k + chunk, len(places))) for k in range(0, len(places), chunk)]
         missing = [span for span in spans if not _file(folder, span).exists()]
-        done = len(places) - sum(last - first for first, last in missing)
         tell = progress or (lambda done, total: None)
-        tell(done, len(places))
-        for span in _run(job, folder, missing, workers, scheduler):
-            done += span[1] - span[0]
-            tell(done, len(places))
-        join_chunks(target, (_read(_file(folder, span)) for span in spans), _attributes(job))
+        tell(done := len(places) - sum(last - first for first, last in missing), len(places))
+
+        def finished() -> Iterator[Columns]:
+            """The chunks in order; they are joined while workers compute those that follow."""
+            nonlocal done
+            running = _run(job, folder, missing, workers, scheduler)
+            with closing(running):
+                for span in spans:
+                    while not _file(folder, span).exists():
+                        first, last = next(running)
+                        done += last - first
+                        tell(done, len(places))
+                    yield _read(_file(folder, span))
+
+        join_chunks(target, finished(), _attributes(job))
         shutil.rmtree(folder)
     return WorkspaceMap(open_map(target), target)
 
@@ -205,18 +220,40 @@ def compute_chunk(work: tuple[MapJob, Path], span: tuple[int, int]) -> tuple[int
     return span
 
 
+def _here(job: MapJob, folder: Path, missing: list[tuple[int, int]]) -> Generator[tuple[int, int]]:
+    """Compute in this process; the next chunks of a fast map while those before are written."""
+    if not job.fast:
+        for span in missing:
+            yield compute_chunk((job, folder), span)
+        return
+    from numba import set_num_threads
+
+    waiting: deque[Future[tuple[int, int]]] = deque()
+    # Threads within a chunk wait for each other: on a busy machine that doubled processor time.
+    pool = ThreadPoolExecutor(1, initializer=set_num_threads, initargs=(1,))
+    try:
+        for span in missing:
+            waiting.append(pool.submit(compute_chunk, (job, folder), span))
+            if len(waiting) > _AHEAD:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
 def _run(
     job: MapJob,
     folder: Path,
     missing: list[tuple[int, int]],
     workers: int | None,
     scheduler: str | None,
-) -> Iterator[tuple[int, int]]:
+) -> Generator[tuple[int, int]]:
     places = sum(last - first for first, last in missing)
-    alone = places < _WORTH_WORKERS if workers is None else workers <= 1
+    worth = _WORTH_WORKERS_FAST if job.fast else _WORTH_WORKERS
+    alone = places < worth if workers is None else workers <= 1
     if not missing or (scheduler is None and alone):
-        for span in missing:
-            yield compute_chunk((job, folder), span)
+        yield from _here(job, folder, missing)
         return
     yield from spread(compute_chunk, (job, folder), missing, workers=workers, scheduler=scheduler)
 

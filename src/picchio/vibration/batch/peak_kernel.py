@@ -7,6 +7,7 @@ from numba import njit, prange
 
 from picchio.core.arrays import ComplexArray, FloatArray
 from picchio.vibration.batch.modal_kernel import (
+    KERNEL,
     coefficients,
     decompose,
     exponential,
@@ -26,6 +27,73 @@ from picchio.vibration.batch.top_kernel import (
 _BLOCK = 64
 
 
+@njit(**KERNEL)
+def _pulls(jacobian, along, shapes, pull):  # type: ignore[no-untyped-def]
+    """Fill (n, n, 4): of a joint, by a mode, for each axis of the force; and the length of that.
+
+    With a fixed direction, `along` (3,), all is on the first axis.
+    """
+    n = shapes.shape[0]
+    for i in range(n):
+        x, y, z = 0.0, 0.0, 0.0
+        for j in range(n):
+            shape = shapes[j, i]
+            x += jacobian[0, j] * shape
+            y += jacobian[1, j] * shape
+            z += jacobian[2, j] * shape
+        if along.shape[0] > 0:
+            x, y, z = x * along[0] + y * along[1] + z * along[2], 0.0, 0.0
+        size = np.sqrt(x * x + y * y + z * z)
+        for j in range(n):
+            shape = shapes[j, i]
+            pull[j, i, 0], pull[j, i, 1], pull[j, i, 2] = shape * x, shape * y, shape * z
+            pull[j, i, 3] = abs(shape) * size
+
+
+@njit(**KERNEL)
+def _pose_peaks(  # type: ignore[no-untyped-def]
+    periodic, start, length, constant, slope, amplitude, wave, endless, omega, poles, rows, powers,
+    pull, g, free, terms, room, peak, direction,
+):  # fmt: skip
+    """Peaks (n,) and their directions (n, 3) at a pose; or how many samples need room first."""
+    n = poles.shape[0]
+    count, total = 0, 0.0
+    while True:
+        count, total = 0, 0.0
+        for p in range(length.shape[0]):
+            count += steps_of(length[p], max(omega[n - 1], wave[p]))
+            total += length[p]
+        if count > room.time.shape[0]:
+            break
+        sample(poles, rows, length, wave, omega[n - 1], room)
+        done = True
+        for j in range(n):
+            peak[j] = joint_norms(j, count, pull[j], room)
+            if endless and done:
+                # Nothing after the samples can be larger than what is left of the modes.
+                left = 0.0
+                for d in range(3):
+                    most = 0.0
+                    for i in range(n):
+                        state = rows[i, -1, 0] * exponential(poles[i], length[-1])
+                        most += abs(pull[j, i, d]) * abs(state) / poles[i].imag
+                    left += most * most
+                done = left <= peak[j]
+        if done or length[-1] > -1e3 * np.pi / poles[0].real:
+            break
+        length[-1] *= 2.0
+    if count > room.time.shape[0]:
+        return count
+    for j in range(n):
+        direction[j, 0], direction[j, 1], direction[j, 2] = 0.0, 0.0, 1.0
+        if peak[j] > 0.0:
+            peak[j] = highest(
+                j, count, periodic, total, peak[j], room, start, poles, rows, constant, slope,
+                amplitude, wave, powers, pull[j], g, free, terms, direction,
+            )  # fmt: skip
+    return 0
+
+
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _block_peaks(  # type: ignore[no-untyped-def]
     first, last, periodic, start, duration, constant, slope, amplitude, wave, mass, jacobian,
@@ -36,19 +104,20 @@ def _block_peaks(  # type: ignore[no-untyped-def]
     A function of its own, so that the compiler's slow passes for parallel loops never see it.
     """
     n = stiffness.shape[1]
-    dims = 3 if along.shape[0] == 0 else 1
+    fixed = along.shape[0] > 0
     values, vectors = np.empty((n, n, last - first)), np.empty((n, n, last - first))
     decompose(mass[first:last], stiffness[first:last], values, vectors)
-    omega = np.empty(n)
-    shapes = np.empty((n, n))
-    pull = np.empty((n, n, 4))  # of a joint, by a mode, for an axis of the force; and its length
-    found = np.empty((n, 3))
-    g = np.empty(3)
-    terms, free, powers = np.empty((TERMS, 3)), np.empty((n, 2)), np.empty((TERMS, n, 2))
+    omega, shapes, pull = np.empty(n), np.empty((n, n)), np.empty((n, n, 4))
+    g, terms, free, powers = (
+        np.empty(3),
+        np.empty((TERMS, 3)),
+        np.empty((n, 2)),
+        np.empty((TERMS, n, 2)),
+    )
     room = room_for(n, 256)
     poles = np.empty(n, dtype=np.complex128)
     rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
-    endless, length = np.isinf(duration[-1]), duration.copy()
+    endless, length, nothing = np.isinf(duration[-1]), duration.copy(), np.empty(0)
     for s in range(first, last):
         frequency[s, :] = np.nan
         peak[s, :] = np.nan
@@ -58,61 +127,26 @@ def _block_peaks(  # type: ignore[no-untyped-def]
             poles,
         ):  # fmt: skip
             continue
-        for i in range(n):
-            x, y, z = 0.0, 0.0, 0.0
-            for j in range(n):
-                shape = shapes[j, i]
-                x += jacobian[s, 0, j] * shape
-                y += jacobian[s, 1, j] * shape
-                z += jacobian[s, 2, j] * shape
-            if dims == 1:
-                x, y, z = x * along[s, 0] + y * along[s, 1] + z * along[s, 2], 0.0, 0.0
-            size = np.sqrt(x * x + y * y + z * z)
-            for j in range(n):
-                shape = shapes[j, i]
-                pull[j, i, 0], pull[j, i, 1], pull[j, i, 2] = shape * x, shape * y, shape * z
-                pull[j, i, 3] = abs(shape) * size
+        _pulls(jacobian[s], along[s] if fixed else nothing, shapes, pull)
         power_series(poles, powers)
         coefficients(poles, duration, constant, slope, amplitude, wave, periodic, rows)
         if endless:
             length[-1] = 2.0 * np.pi / omega[0]
         while True:
-            count, total = 0, 0.0
-            for p in range(length.shape[0]):
-                count += steps_of(length[p], max(omega[n - 1], wave[p]))
-                total += length[p]
-            if count > room.time.shape[0]:
-                room = room_for(n, 2 * count)
-            sample(poles, rows, length, wave, omega[n - 1], room)
-            done = True
-            for j in range(n):
-                peak[s, j] = joint_norms(j, count, pull[j], room)
-                if endless and done:
-                    # Nothing after the samples can be larger than what is left of the modes.
-                    left = 0.0
-                    for d in range(dims):
-                        most = 0.0
-                        for i in range(n):
-                            state = rows[i, -1, 0] * exponential(poles[i], length[-1])
-                            most += abs(pull[j, i, d]) * abs(state) / poles[i].imag
-                        left += most * most
-                    done = left <= peak[s, j]
-            if done or length[-1] > -1e3 * np.pi / poles[0].real:
+            more = _pose_peaks(
+                periodic, start, length, constant, slope, amplitude, wave, endless, omega, poles,
+                rows, powers, pull, g, free, terms, room, peak[s], direction[s],
+            )  # fmt: skip
+            if more == 0:
                 break
-            length[-1] *= 2.0
-        for j in range(n):
-            found[j, 0], found[j, 1], found[j, 2] = 0.0, 0.0, 1.0
-            if peak[s, j] > 0.0:
-                peak[s, j] = highest(
-                    j, count, periodic, total, peak[s, j], room, start, poles, rows, constant,
-                    slope, amplitude, wave, powers, pull[j], g, free, terms, found,
-                )  # fmt: skip
-        for j in range(n):
-            for d in range(3):
-                direction[s, j, d] = found[j, d] if dims == 3 else along[s, d]
+            room = room_for(n, 2 * more)
+        if fixed:
+            for j in range(n):
+                for d in range(3):
+                    direction[s, j, d] = along[s, d]
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy")
 def peaks(
     periodic: bool,
     start: FloatArray,

@@ -28,8 +28,8 @@ _CANDIDATE = 0.5
 # (omega h)^2, which is 0.4 of the fastest mode; modes that nearly cancel have larger accelerations
 # than |g| itself.
 _MISSED = 0.025
-# Derivatives of g in the series, and how far from the sample, in rad of the fastest mode, it
-# serves: 0.35^12 / 12! = 7e-15 of that mode's share is left out.
+# Of the series of g, and how far from the sample, in rad of the fastest mode, it serves:
+# 0.35^12 / 12! = 7e-15 of that mode's share is left out.
 TERMS = 12
 _NEAR = 0.35
 _SERIES_STEPS = 6
@@ -66,7 +66,12 @@ class Samples(NamedTuple):
 
 @njit(cache=True)
 def room_for(n: int, count: int) -> Samples:
-    """Room for `count` samples of n modes and joints."""
+    """Room for `count` samples of n modes and joints.
+
+    Args:
+        n: how many modes there are, and joints.
+        count: of the samples.
+    """
     tiles = (count + TILE - 1) // TILE
     count = tiles * TILE
     norm = np.empty((n, count))
@@ -78,7 +83,12 @@ def room_for(n: int, count: int) -> Samples:
 
 @njit(**KERNEL)
 def steps_of(duration: float, rate: float) -> int:
-    """How many samples a piece of `duration` s takes at `rate` rad/s."""
+    """How many samples a piece takes.
+
+    Args:
+        duration: s, of the piece.
+        rate: rad/s, of the fastest mode or wave.
+    """
     return max(1, int(np.ceil(duration * rate * (_PER_CYCLE / (2.0 * np.pi)))))
 
 
@@ -172,7 +182,7 @@ def _project(count, eta, pull, first, g, norm):  # type: ignore[no-untyped-def]
 
 @njit(**KERNEL)
 def joint_norms(joint: int, count: int, pull: FloatArray, room: Samples) -> float:
-    """|g|^2 of a joint on the samples, into its row of `norm`, with `tops`; and its largest.
+    """The largest |g|^2 of a joint on the samples; all into its row of `norm`, with `tops`.
 
     Args:
         joint: which row.
@@ -198,7 +208,12 @@ def joint_norms(joint: int, count: int, pull: FloatArray, room: Samples) -> floa
 
 @njit(**KERNEL)
 def piece_at(time: float, start: FloatArray) -> int:
-    """The last piece of the force that has begun at a time, s."""
+    """The last piece of the force that has begun at a time.
+
+    Args:
+        time: s.
+        start: (m,) s, of the pieces.
+    """
     p = 0
     while p + 1 < start.shape[0] and start[p + 1] <= time:
         p += 1
@@ -291,7 +306,12 @@ def refine(
 
 @njit(**KERNEL)
 def power_series(poles: ComplexArray, powers: FloatArray) -> None:
-    """Taylor coefficients of exp(pole t) Im(pole)^-1: real and imaginary parts, (TERMS, n, 2)."""
+    """Taylor coefficients of exp(pole t) / Im(pole).
+
+    Args:
+        poles: (n,) 1/s.
+        powers: (TERMS, n, 2) out, real and imaginary parts.
+    """
     for i in range(poles.shape[0]):
         term = complex(1.0 / poles[i].imag, 0.0)
         for m in range(TERMS):
