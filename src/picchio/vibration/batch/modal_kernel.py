@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numba.core.cpu import CPUTargetOptions
 
 from picchio.core.arrays import ComplexArray, FloatArray
 
 _SWEEPS = 30
-KERNEL: dict[str, Any] = {
-    "cache": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False
-}  # fmt: skip
+KERNEL: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}}
+if hasattr(CPUTargetOptions, "_nrt"):  # a switch of Numba's own, that need not stay
+    KERNEL["_nrt"] = False
 """How innermost functions are compiled. Products are added without rounding between them, which
 loses nothing. References to arrays are not counted there, so that none can be made: a count each
 way takes longer than the arithmetic."""
