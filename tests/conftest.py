@@ -28,6 +28,11 @@ NO_DATA = "no measured data here: "
 _skipped: list[str] = []
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with what takes minutes."""
+    items.sort(key=lambda item: item.get_closest_marker("minutes") is None)
+
+
 @pytest.fixture(scope="session")
 def repository() -> Path:
     """The checkout's root."""

@@ -12,6 +12,7 @@ sys.path.pop(0)
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 @pytest.mark.parametrize(
     ("draw", "causes"),
     [
