@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from .pinocchio_chain import Chain, with_wrong_masses
 from .robots import load as shipped
 
 ROBOTS = {3: "fanuc_like_3dof", 6: "fanuc_r2000ic", 7: "kinova_gen3"}
@@ -81,12 +82,7 @@ def draw(joints: int, seed: int, *, exact: bool = False, loadings: int | None = 
     rng = np.random.default_rng((seed, joints))
     own = shipped(robot or ROBOTS[joints])
     off = 0.0 if exact else 1.0
-    model = own.model.copy()
-    for k in range(1, model.njoints):
-        factor = 1.0 + 0.01 * off * rng.standard_normal()
-        model.inertias[k] = pin.Inertia.FromDynamicParameters(
-            factor * model.inertias[k].toDynamicParameters()
-        )
+    model = with_wrong_masses(own.model, rng, 0.01 * off)
     nominal = np.array([curve[0] for curve in own.curves])
     truth = nominal * np.exp(rng.uniform(-1.0, 1.0, len(nominal)) * math.log(FACTOR))
     zero = 3.5e-4 * off * rng.standard_normal(len(nominal))  # rad, 0.02 degrees
@@ -118,7 +114,7 @@ def draw(joints: int, seed: int, *, exact: bool = False, loadings: int | None = 
         stands = pose + zero + 1e-4 * off * rng.standard_normal(len(pose))
         moved = arm.moved(stands, pulled, hook)
         if base > 0.0:
-            place = arm.place(stands)[0]
+            place = arm.place(stands).translation
             moved = moved + np.cross([np.cross(place, pulled)[0] / base, 0.0, 0.0], place)
         slipped[row] = rng.random() < slips
         for name, value in zip(own.joints, pose, strict=True):
@@ -138,39 +134,17 @@ def draw(joints: int, seed: int, *, exact: bool = False, loadings: int | None = 
     return Loads(own.name, own.joints, nominal, truth, columns, noise, slipped)
 
 
-class _Arm:
-    """A chain with springs in some of its joints; the others stand at zero."""
+class _Arm(Chain):
+    """A chain with springs in its joints."""
 
     def __init__(self, model, tool, joints, springs) -> None:
-        self.model, self.data = model, model.createData()
-        self.frame = model.getFrameId(tool)
-        self.at = [model.joints[model.getJointId(name)] for name in joints]
-        self.columns = [joint.idx_v for joint in self.at]
+        super().__init__(model, tool, joints)
         self.springs = springs
-
-    def _q(self, pose):
-        step = np.zeros(self.model.nv)
-        step[self.columns] = pose
-        return pin.integrate(self.model, pin.neutral(self.model), step)
-
-    def gravity(self, pose):
-        whole = pin.computeGeneralizedGravity(self.model, self.data, self._q(pose))
-        return np.array(whole)[self.columns]
-
-    def place(self, pose):
-        pin.framesForwardKinematics(self.model, self.data, self._q(pose))
-        at = self.data.oMf[self.frame]
-        return np.array(at.translation), np.array(at.rotation)
 
     def load(self, pose, force, hook):
         """Torques (n,) of a force (3,) at a point (3,) of the tool frame."""
-        pin.computeJointJacobians(self.model, self.data, self._q(pose))
-        full = pin.computeFrameJacobian(
-            self.model, self.data, self._q(pose), self.frame, pin.LOCAL_WORLD_ALIGNED
-        )
-        lever = self.place(pose)[1] @ hook
-        linear = full[:3] + np.cross(full[3:], lever, axis=0)
-        return (linear.T @ force)[self.columns]
+        full, lever = self.jacobian(pose), self.place(pose).rotation @ hook
+        return (full[:3] + np.cross(full[3:], lever, axis=0)).T @ force
 
     def moved(self, pose, force, hook):
         """(3,) m, how far the tool's origin moves when the force comes on."""
@@ -192,7 +166,7 @@ class _Arm:
             turn = turn - np.linalg.solve(slope, error)
         else:
             raise RuntimeError("the equilibrium was not found")
-        return self.place(pose + turn)[0] - self.place(pose)[0]
+        return self.place(pose + turn).translation - self.place(pose).translation
 
 
 def _turned(way, by):

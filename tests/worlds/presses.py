@@ -18,6 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 from .loads import FACTOR, ROBOTS
+from .pinocchio_chain import Chain, with_wrong_masses
 from .robots import load as shipped
 
 RATE, WAY = 20.0, 1.5  # Hz; s, from one end of a press to the other
@@ -58,12 +59,7 @@ def draw(joints: int, seed: int, *, exact: bool = False, poses: int = 2, one_way
     rng = np.random.default_rng((seed, joints, 23))
     own = shipped(ROBOTS[joints])
     off = 0.0 if exact else 1.0
-    model = own.model.copy()
-    for k in range(1, model.njoints):
-        factor = 1.0 + 0.01 * off * rng.standard_normal()
-        model.inertias[k] = pin.Inertia.FromDynamicParameters(
-            factor * model.inertias[k].toDynamicParameters()
-        )
+    model = with_wrong_masses(own.model, rng, 0.01 * off)
     n = len(own.joints)
     nominal = np.array([curve[0] for curve in own.curves])
     drawn = np.exp(rng.uniform(-1.0, 1.0, n) * math.log(FACTOR))
@@ -76,8 +72,7 @@ def draw(joints: int, seed: int, *, exact: bool = False, poses: int = 2, one_way
     before = rng.uniform(0.02, 0.12, n)  # of a press's turn, until friction has turned over
     ripple, waves = off * level * rng.uniform(0.0, 0.012, n), rng.uniform(1.0, 8.0, n)
     low, high = np.maximum(own.lower, -2.0), np.minimum(own.upper, 2.0)
-    columns = [model.joints[model.getJointId(name)].idx_v for name in own.joints]
-    frame, data = model.getFrameId(own.tool), model.createData()
+    arm = _Arm(model, own.tool, own.joints)
     # What the fixture is like: six springs in axes of its own, off the tool's origin.
     axes = pin.exp3(off * rng.standard_normal(3))
     hook = 0.05 * off * rng.standard_normal(3)
@@ -85,7 +80,6 @@ def draw(joints: int, seed: int, *, exact: bool = False, poses: int = 2, one_way
     records = []
     for _ in range(poses):
         pose = rng.uniform(0.85 * low + 0.15 * high, 0.15 * low + 0.85 * high)
-        arm = _Arm(model, data, frame, columns)
         stand = pose + zero
         place = arm.place(stand)
         reach = max(np.linalg.norm(place.translation), 0.2)
@@ -166,34 +160,8 @@ def _presses(n: int, one_way: bool) -> tuple[np.ndarray, np.ndarray]:
     return np.arange(len(found)) / RATE, found
 
 
-class _Arm:
-    """Gravity and the tool's place of a chain; joints without springs stand at zero."""
-
-    def __init__(self, model, data, frame, columns) -> None:
-        self.model, self.data, self.frame, self.columns = model, data, frame, columns
-
-    def _q(self, pose):
-        step = np.zeros(self.model.nv)
-        step[self.columns] = pose
-        return pin.integrate(self.model, pin.neutral(self.model), step)
-
-    def gravity(self, pose):
-        whole = pin.computeGeneralizedGravity(self.model, self.data, self._q(pose))
-        return np.array(whole)[self.columns]
-
-    def pull(self, pose):
-        whole = pin.computeGeneralizedGravityDerivatives(self.model, self.data, self._q(pose))
-        return np.array(whole)[np.ix_(self.columns, self.columns)]
-
-    def place(self, pose):
-        pin.framesForwardKinematics(self.model, self.data, self._q(pose))
-        return pin.SE3(self.data.oMf[self.frame])
-
-    def jacobian(self, pose):
-        pin.computeJointJacobians(self.model, self.data, self._q(pose))
-        return pin.computeFrameJacobian(
-            self.model, self.data, self._q(pose), self.frame, pin.LOCAL_WORLD_ALIGNED
-        )[:, self.columns]
+class _Arm(Chain):
+    """A chain whose tool is held."""
 
     def off(self, pose, place):
         """(6,) how far the tool is from where it was fixed: m, then rad, world axes."""

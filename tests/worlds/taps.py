@@ -17,6 +17,7 @@ from scipy.signal import StateSpace, lsim
 
 from .frfs import Frfs
 from .loads import FACTOR, ROBOTS
+from .pinocchio_chain import with_wrong_masses
 from .robots import load as shipped
 
 FINE = 8  # steps of the integration for one sample
@@ -44,12 +45,7 @@ def draw(joints: int, seed: int, *, known: bool = True, rate: float = 2000.0, le
     onsets = np.random.default_rng((seed, joints, 12))
     own = shipped(ROBOTS[joints])
     off = 0.0 if exact else 1.0
-    model = own.model.copy()
-    for k in range(1, model.njoints):
-        scale = 1.0 + 0.01 * off * rng.standard_normal()
-        model.inertias[k] = pin.Inertia.FromDynamicParameters(
-            scale * model.inertias[k].toDynamicParameters()
-        )
+    model = with_wrong_masses(own.model, rng, 0.01 * off)
     n = len(own.joints)
     nominal = np.array([curve[0] for curve in own.curves])
     drawn = np.exp(rng.uniform(-1.0, 1.0, n) * math.log(FACTOR))
