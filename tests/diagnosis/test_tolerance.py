@@ -22,12 +22,20 @@ from picchio.diagnosis.percussion.criteria.remainder import (
 )
 from picchio.diagnosis.percussion.data.problem import Problem, residual_under
 from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
-from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing
+from picchio.diagnosis.percussion.fit.least_squares import (
+    Fit,
+    central_jacobian,
+    fit,
+    fit_growing,
+)
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.tolerance.linearise import linearise, recentre, settled
 from picchio.diagnosis.percussion.tolerance.marginal import Marginal
 from picchio.diagnosis.percussion.tolerance.nudges import Inexact, inexact, nudged, principal
 from picchio.diagnosis.percussion.tolerance.slopes import Slopes, all_slopes
+from picchio.model.effects.nonlinear.coulomb_friction import CoulombFriction
+from picchio.model.effects.nonlinear.hysteresis import Hysteresis
+from picchio.model.effects.sensors.sensor_gain import SensorGain
 from picchio.model.geometry import Geometry
 from picchio.model.model import Model
 from worlds import campaign as worlds
@@ -167,6 +175,42 @@ def test_the_mass_of_all_is_told_by_no_record(wrong_everywhere):
     for label in ("joint_stiffness:joint_1", "joint_stiffness:joint_3", "force_amplitude:tool"):
         assert taken[label] == pytest.approx(-0.01, rel=1e-3)
     assert taken["modal_damping:robot"] == pytest.approx(0.0, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "forces"),
+    [
+        (CoulombFriction, {"torque": 2.4, "smoothing": 0.0}, ["torque"]),
+        (Hysteresis, {"torque": 2.4, "deflection": 5e-5}, ["torque", "deflection"]),
+    ],
+)
+def test_slopes_of_joints_that_stick_leave_the_scale_of_all_open(
+    wrong_everywhere, effect, values, forces
+):
+    """Blows and friction larger by one factor make all that is read larger by it, exactly."""
+    robot, campaign = wrong_everywhere
+    problem = Problem(robot, campaign)
+    here = Hypothesis.baseline(robot, campaign.tolerance).plus(effect("joint_3", **values))
+    records = problem.records[:3]
+    names = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
+    rate = {("force_amplitude:tool", "scale"): 1.0}
+    for force in forces:
+        k = names.index((f"{effect.name}:joint_3", force))
+        own = here.unknowns()[k]
+        rate[names[k]] = 1.0 if own.logarithmic else float(here.vector()[k])
+
+    def louder(by):
+        gains = [SensorGain(group, gain=1.0 + by) for group in problem.groups]
+        return problem.unmarginalised((*here.effects, *gains), records)
+
+    with problem.pinned(here.effects), one_thread():
+        at = problem.unmarginalised(here.effects, records)
+        slopes = np.concatenate(central_jacobian(problem, here, records, None, at))
+        gain = np.concatenate([
+            ((a - b) / 2e-3).ravel() for a, b in zip(louder(1e-3), louder(-1e-3), strict=True)
+        ])  # fmt: skip
+    along = sum(factor * slopes[:, names.index(name)] for name, factor in rate.items())
+    assert np.linalg.norm(gain - along) < 3e-3 * np.linalg.norm(gain)
 
 
 def test_slopes_about_moved_numbers_are_what_differences_are(wrong_everywhere):

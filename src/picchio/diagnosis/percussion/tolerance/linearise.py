@@ -14,9 +14,9 @@ from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Moved, Problem
 from picchio.diagnosis.percussion.fit.least_squares import (
     Fit,
+    central_jacobian,
     fit,
     is_nonsmooth,
-    jacobian,
     prior_cost,
 )
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
@@ -73,7 +73,7 @@ def linearise(
     _move(problem, problem.sizes, shifted=False)
     problem.marginal = None
     raw = problem.unmarginalised(effects, None, end)
-    jacobians = jacobian(problem, here, problem.records, end, raw, both=True)
+    jacobians = central_jacobian(problem, here, problem.records, end, raw)
     shared, absorbed = _without(problem, slopes, jacobians, {r.name for r in fitted})
     unknowns = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
     problem.marginal = Marginal(shared, dict(zip(unknowns, absorbed, strict=True)))
@@ -98,7 +98,7 @@ def beside(problem: Problem, record: MeasuredRecord, here: Hypothesis) -> Moved 
     slopes = slopes_of(problem, record, here.effects, some.what[some.own :])
     problem.marginal = None
     (raw,) = problem.unmarginalised(here.effects, [record])
-    (jacobian_of,) = jacobian(problem, here, [record], None, [raw], both=True)
+    (jacobian_of,) = central_jacobian(problem, here, [record], None, [raw])
     taken = np.zeros((jacobian_of.shape[1], len(some.what) - some.own))
     for k, u in enumerate(here.unknowns()):
         taken[k] = marginal.absorbed.get((here.effects[u.effect].label, u.name), 0.0)
