@@ -204,7 +204,7 @@ def main() -> None:
         )
     if given.json is not None:
         with atomic_write(given.json) as stream:
-            json.dump(found, stream, indent=1)
+            json.dump(found, stream, indent=1, default=lambda number: number.item())  # numpy
 
 
 if __name__ == "__main__":

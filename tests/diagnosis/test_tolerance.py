@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -178,39 +179,47 @@ def test_the_mass_of_all_is_told_by_no_record(wrong_everywhere):
 
 
 @pytest.mark.parametrize(
-    ("effect", "values", "forces"),
+    ("effect", "values"),
     [
-        (CoulombFriction, {"torque": 2.4, "smoothing": 0.0}, ["torque"]),
-        (Hysteresis, {"torque": 2.4, "deflection": 5e-5}, ["torque", "deflection"]),
+        (CoulombFriction, {"torque": 2.4, "smoothing": 0.0}),
+        (Hysteresis, {"torque": 2.4, "deflection": 5e-5}),
     ],
 )
-def test_slopes_of_joints_that_stick_leave_the_scale_of_all_open(
-    wrong_everywhere, effect, values, forces
-):
-    """Blows and friction larger by one factor make all that is read larger by it, exactly."""
+def test_where_joints_stick_slopes_leave_the_scale_of_all_open(wrong_everywhere, effect, values):
+    """Masses, springs, blows and friction larger by one factor move the arm just as before.
+
+    And with blows and friction alone larger all that is read is larger by that.
+    """
     robot, campaign = wrong_everywhere
-    problem = Problem(robot, campaign)
+    problem = Problem(robot, replace(campaign, records=campaign.records[:5]))
     here = Hypothesis.baseline(robot, campaign.tolerance).plus(effect("joint_3", **values))
-    records = problem.records[:3]
-    names = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
-    rate = {("force_amplitude:tool", "scale"): 1.0}
-    for force in forces:
-        k = names.index((f"{effect.name}:joint_3", force))
-        own = here.unknowns()[k]
-        rate[names[k]] = 1.0 if own.logarithmic else float(here.vector()[k])
 
     def louder(by):
         gains = [SensorGain(group, gain=1.0 + by) for group in problem.groups]
-        return problem.unmarginalised((*here.effects, *gains), records)
+        return problem.unmarginalised((*here.effects, *gains))
+
+    def flat(parts):
+        return np.concatenate([part.ravel() for part in parts])
 
     with problem.pinned(here.effects), one_thread():
-        at = problem.unmarginalised(here.effects, records)
-        slopes = np.concatenate(central_jacobian(problem, here, records, None, at))
-        gain = np.concatenate([
-            ((a - b) / 2e-3).ravel() for a, b in zip(louder(1e-3), louder(-1e-3), strict=True)
-        ])  # fmt: skip
-    along = sum(factor * slopes[:, names.index(name)] for name, factor in rate.items())
-    assert np.linalg.norm(gain - along) < 3e-3 * np.linalg.norm(gain)
+        at = problem.unmarginalised(here.effects)
+        columns = np.concatenate(central_jacobian(problem, here, problem.records, None, at)).T
+        slopes = all_slopes(problem, here.effects, both=True)
+        gain = (flat(louder(1e-3)) - flat(louder(-1e-3))) / 2e-3
+    along = {}  # by what share of itself
+    for unknown, value, column in zip(here.unknowns(), here.vector(), columns, strict=True):
+        label = f"{here.effects[unknown.effect].name}.{unknown.name}"
+        own = column if unknown.logarithmic else value * column
+        along[label] = along.get(label, 0.0) + own
+    force, torque = along["force_amplitude.scale"], along[f"{effect.name}.torque"]
+    yields = along.get(f"{effect.name}.deflection", 0.0)
+    assert np.linalg.norm(gain - force - torque - yields) < 3e-3 * np.linalg.norm(gain)
+    masses = sum(
+        flat(s.columns[:, :, [one.name == name for one in s.what]] for s in slopes.values())
+        for name in ("link_mass.link_1", "link_mass.link_2", "link_mass.link_3")
+    ) / campaign.tolerance.link_mass  # fmt: skip
+    rest = masses + along["joint_stiffness.scale"] + force + torque
+    assert np.linalg.norm(rest) < 1e-3 * np.linalg.norm(masses)
 
 
 def test_slopes_about_moved_numbers_are_what_differences_are(wrong_everywhere):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import zip_longest
@@ -27,6 +28,10 @@ from picchio.model.model import Model
 _STEP = 0.1
 _STRUCTURE = 0.05
 _TURN = 5e-6
+# Where the motion has kinks, by what changes a record's residuals by so many deviations, all in
+# all; and by so many standard deviations at least.
+_SEEN = 0.1
+_FINEST = 1e-6
 # What may change the motion without a change of its steps.
 _BY_MODES = ("structure", "blows")
 # What moves all records together by less than this, in units of the noise, need not be looked at.
@@ -295,10 +300,17 @@ def _columns(
     if one.where == POSE:
         step = _TURN / one.change[1]
 
-    def change(blow: int) -> FloatArray:
+    rough = any(effect.where == "nonlinear" for effect in effects) and one.where != POSE
+
+    def change(blow: int, step: float = step) -> FloatArray:
         there = _moved_on(here, one, blow, step)
         moved = attempt(one.name, lambda: _moved_residual(problem, record, effects, there, end))
-        return np.zeros_like(base) if moved is None else (moved - base) / step
+        found = np.zeros_like(base) if moved is None else (moved - base) / step
+        fine = _SEEN / max(float(np.linalg.norm(found)), 1e-300)
+        if not rough or fine > 0.5 * abs(step) or abs(step) <= _FINEST:
+            return found
+        # Where a joint sticks once more within the step, the slope is none of either side.
+        return change(blow, math.copysign(max(fine, _FINEST), step))
 
     # Each blow by itself: the first one's change, moved to the others, falls between samples, and
     # the little that is then wrong of all of them alike passes for a force that drifts.
