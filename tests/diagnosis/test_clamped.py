@@ -124,3 +124,14 @@ def test_a_record_needs_torque_and_pose():
     table = record.table.model_copy(update={"pose": None})
     with pytest.raises(InputError, match="needs this key"):
         Campaign.from_records([replace(record, table=table)])
+
+
+def test_one_record_is_told_to_leave_nothing_out_and_a_wrong_pose_is_placed(tmp_path):
+    campaign = press(**{"torque.joint_1": 200.0 * np.sin(np.arange(400) / 50.0)})
+    (said, *_) = picchio.identify("fanuc_like_3dof", campaign).remarks
+    assert said.startswith("1 motor that presses in 1 record. Nothing could be left out")
+    campaign.save(tmp_path)
+    file = tmp_path / "campaign.toml"
+    file.write_text(file.read_text().replace("joint_1 = 0.0", "joint_7 = 0.0"))
+    with pytest.raises(InputError, match=r"campaign\.toml: record\[0\]\.pose.*joint_7"):
+        picchio.identify("fanuc_like_3dof", picchio.load_campaign(tmp_path))

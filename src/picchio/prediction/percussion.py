@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -406,7 +407,7 @@ def percussion_setups(robot: FlexibleRobot, campaign: Campaign) -> list[Percussi
     warm = [r.temperature for r in chosen if r.temperature is not None]
     setups, in_common = [], InCommon()
     for record in chosen:
-        pose = _pose(robot, campaign, record)
+        pose = pose_of(robot, record)
         geometry = geometries.setdefault(pose.tobytes(), Geometry(chain, pose))
         days = (
             (record.taken - min(taken)).total_seconds() / _SECONDS_A_DAY if record.taken else None
@@ -432,14 +433,23 @@ def percussion_setups(robot: FlexibleRobot, campaign: Campaign) -> list[Percussi
     return setups
 
 
-def _pose(robot: FlexibleRobot, campaign: Campaign, record: Record) -> FloatArray:
+def pose_of(robot: FlexibleRobot, record: Record) -> FloatArray:
+    """The pose (nv,) in which a record was taken, rad or m; joints that it does not name are at 0.
+
+    Args:
+        robot: the robot.
+        record: of a campaign.
+
+    Raises:
+        InputError: as `FlexibleRobot.pose`, with the campaign's file and the record's number.
+    """
     try:
-        return robot.pose(record.pose)  # type: ignore[arg-type]
+        return robot.pose({} if record.pose is None else record.pose)
     except InputError as error:
-        number = next((i for i, r in enumerate(campaign.records) if r is record), None)
-        place = "record" if number is None else f"record[{number}]"
-        file = None if campaign.folder is None else campaign.folder / CAMPAIGN_FILE
-        raise error.placed(file=file, key=f"{place}.pose") from None
+        path = record.source.path
+        if path is not None:
+            path = path.parents[len(Path(record.file).parts) - 1] / CAMPAIGN_FILE
+        raise error.placed(file=path, key=f"{record.source.key}.pose") from None
 
 
 def _warn_of_blows_beyond(record: Record) -> None:

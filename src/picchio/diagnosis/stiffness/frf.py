@@ -29,6 +29,7 @@ from picchio.diagnosis.stiffness.modes import paired, starts
 from picchio.diagnosis.stiffness.prior import prior_of
 from picchio.diagnosis.stiffness.responses import Damping, FrfProblem, make_problem
 from picchio.diagnosis.stiffness.written import sidecar
+from picchio.prediction.percussion import pose_of
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import is_drive
 
@@ -134,7 +135,7 @@ class FrfIdentification(Identification):
         n = problem.joints
         held = problem.bare(self.fit.mean, problem.convention)
         parts = iter(held.predict(self.fit.mean[: 2 * n]))
-        poses = dict.fromkeys(tuple(self.robot.pose(r.pose or {}).tolist()) for r in self.campaign)
+        poses = dict.fromkeys(tuple(pose_of(self.robot, r).tolist()) for r in self.campaign)
         springs, found = np.exp(self.fit.mean[:n]), []
         for stand, (standing, pose) in enumerate(zip(held.standings, poses, strict=True), start=1):
             fitted = [

@@ -33,6 +33,7 @@ from picchio.diagnosis.stiffness.prior import LOOSE, REMAINDER, SIDEWAYS, Spring
 from picchio.diagnosis.stiffness.statics import Stand, Yield
 from picchio.model.expansion import WideChain
 from picchio.prediction.motion.log import read_log
+from picchio.prediction.percussion import pose_of
 from picchio.robot.dynamics.statics import stiffness_at_torque
 from picchio.robot.flexible_robot import FlexibleRobot
 
@@ -212,7 +213,7 @@ def make_press(
         turns = wide[:, moves] / reach[moves]
         found, own, friction[:, k] = log.split(k, turns, float(largest[k]), bool(moves[at]))
         values[k, moves], spread[k][inside] = found, own
-    pose = robot.pose(record.pose or {})
+    pose = pose_of(robot, record)
     stand = Stand(robot, chain, pose, True)
     jacobian = stand.at_tool(None, np.zeros(3))
     axes = stand.place(stand.tool)[2].T

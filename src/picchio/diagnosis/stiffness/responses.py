@@ -25,6 +25,7 @@ from picchio.diagnosis.stiffness.fit import Predicted
 from picchio.diagnosis.stiffness.prior import Prior, damping_std, remainder_of
 from picchio.diagnosis.stiffness.statics import moved
 from picchio.diagnosis.stiffness.taps import SAMPLING, UNKNOWN_BLOW, Seen, spectra
+from picchio.prediction.percussion import pose_of
 from picchio.robot.flexible_robot import FlexibleRobot
 
 Damping = Literal["modal", "joint"]
@@ -448,7 +449,7 @@ def make_problem(
     index = {name: k for k, name in enumerate(steps)}
     poses: dict[tuple[float, ...], list[Record]] = {}
     for record in records:
-        pose = robot.pose(record.pose or {})
+        pose = pose_of(robot, record)
         poses.setdefault(tuple(pose.tolist()), []).append(record)
     standings = []
     for key, own in poses.items():

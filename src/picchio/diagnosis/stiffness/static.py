@@ -115,23 +115,12 @@ class StaticIdentification(Identification):
     @property
     def remarks(self) -> tuple[str, ...]:
         """What is left on loadings left out, what else yields, and which rows are outliers."""
-        left, alone = self.answer.left_out, self.answer.alone
         noise = ", ".join(
             f"{scale * size:.2g} {told} ({group})"
             for group, size in self.answer.fit.noise.items()
             for _, scale, told in (_READ.get(group, _METRES),)
         )
-        said = [
-            f"{self.read}. On what was left out, {100 * alone.before:.3g} % of the signal is left "
-            f"with the stated stiffness, {100 * alone.nrmse:.3g} % with joint springs fitted to "
-            "the others"
-            + (
-                f", {100 * left.nrmse:.3g} % with what else is most probable."
-                if self.named
-                else "."
-            ),
-            f"Noise, as the fit finds it: {noise}.",
-        ]
+        said = [f"{self.read}. {self._judged}.", f"Noise, as the fit finds it: {noise}."]
         for cause, one in zip(self.causes, self.named, strict=True):
             values = ", ".join(
                 f"{name} {v.value:.3g} +- {v.std:.2g} {v.unit}"
@@ -151,15 +140,31 @@ class StaticIdentification(Identification):
         return tuple(said)
 
     @property
+    def _judged(self) -> str:
+        """How much is left of what was left out."""
+        left, alone = self.answer.left_out, self.answer.alone
+        if math.isnan(alone.nrmse):
+            return "Nothing could be left out to judge the fit by: one more record would do"
+        said = (
+            f"On what was left out, {100 * alone.before:.3g} % of the signal is left "
+            f"with the stated stiffness, {100 * alone.nrmse:.3g} % with joint springs fitted to "
+            "the others"
+        )
+        if self.named:
+            said += f", {100 * left.nrmse:.3g} % with what else is most probable"
+        return said
+
+    @property
     def read(self) -> str:
         """How many readings there are, in words."""
         tables = self.answer.fit.problem.tables
         pressed = [table for table in tables if isinstance(table, Press)]
         loads = len(self.lines) - sum(map(len, pressed))
-        said = [f"{loads} loadings"] if loads else []
+        said = [_counted(loads, "loading")] if loads else []
         if pressed:
             motors = len({k for table in pressed for k in np.flatnonzero(table.moves).tolist()})
-            said.append(f"{motors} motors that press in {len(pressed)} records")
+            press = "motor that presses" if motors == 1 else "motors that press"
+            said.append(f"{motors} {press} in {_counted(len(pressed), 'record')}")
         return " and ".join(said)
 
     def compared(self) -> list[Compared]:
@@ -231,7 +236,9 @@ class StaticIdentification(Identification):
             "also": [cause.to_dict() for cause in self.causes],
             "residual": {
                 "before": alone.before, "after": left.nrmse, "joints_alone": alone.nrmse,
-                "held_out": [record.file for record in self.campaign],
+                "held_out": [
+                    record.file for record in self.campaign if not math.isnan(alone.nrmse)
+                ],
             },
             "sets": [
                 {"probability": weight,
@@ -337,6 +344,10 @@ def identify_static(
     )  # fmt: skip
     source = "memory" if campaign.folder is None else campaign.folder.resolve().name
     return StaticIdentification(robot, source, joints, campaign, answer, told.half, lines)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def _rms(shares: Sequence[float]) -> float:
