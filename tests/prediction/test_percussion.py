@@ -99,7 +99,7 @@ def test_a_pose_the_robot_cannot_have_is_told_with_its_file_and_record(tmp_path)
     campaign = _campaign({"joint_1": 0.1, "joint_9": 0.2})
     campaign.save(tmp_path / "measured")
     for given, place in (
-        (campaign, "record[0].pose"),
+        (campaign, "r01.csv.pose"),
         (load_campaign(tmp_path / "measured"), "campaign.toml: record[0].pose"),
     ):
         with pytest.raises(InputError, match="joint_9") as caught:
