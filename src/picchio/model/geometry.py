@@ -38,6 +38,7 @@ class Geometry:
         self._stacks: Recent[dict[str, FloatArray]] = Recent(_KEPT_STACKS)
         # Records of one pose share theirs.
         self.plants: Recent[Plant] = Recent(_KEPT_PLANTS)
+        self.begun: Recent[Plant] = Recent(_KEPT_BESIDE)
         self._beside: Recent[Geometry] = Recent(_KEPT_BESIDE)
         self._bent: Recent[Geometry] = Recent(_KEPT_BESIDE)
         state = chain.robot.state(pose)

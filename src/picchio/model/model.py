@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -153,11 +153,23 @@ class Model:
         Raises:
             InputError: an effect whose target the robot does not have.
         """
+        changing = [effect for effect in self.ordered if effect.where in _STRUCTURAL]
+        return self._changed(geometry, conditions or Conditions(), changing)
+
+    def _changed(
+        self, geometry: Geometry, conditions: Conditions, effects: Sequence[Effect]
+    ) -> Plant:
+        """A plant with effects: of many that differ in the last one, the rest is made once."""
         from picchio.model.plant import Plant
 
-        plant = Plant(geometry, self.gravity_stiffness, conditions or Conditions())
-        for effect in self.ordered:
-            effect.structure(plant)
+        if not effects:
+            return Plant(geometry, self.gravity_stiffness, conditions)
+        *known, newest = effects
+        when = conditions if any(effect.where == "over-time" for effect in known) else None
+        key = (tuple(effect.key for effect in known), self.gravity_stiffness, when)
+        begun = geometry.begun.get(key, lambda: self._changed(geometry, conditions, known))
+        plant = begun.copy(conditions)
+        newest.structure(plant)
         return plant
 
     def blows(self, blows: Blows, conditions: Conditions | None = None) -> Blows:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -267,6 +268,20 @@ class Plant(Changes):
         super().__init__(geometry.robot, springs, conditions or Conditions(), angles)
         self.geometry = geometry
         self.gravity_stiffness = gravity_stiffness
+
+    def copy(self, conditions: Conditions) -> Plant:
+        """A plant that can be changed further by itself.
+
+        Args:
+            conditions: its own.
+        """
+        twin = copy.copy(self)
+        twin.__dict__.pop("_unloaded", None)
+        twin.conditions = conditions
+        for name, own in vars(self).items():
+            if isinstance(own, list | dict):
+                setattr(twin, name, own.copy())
+        return twin
 
     @property
     def gravity_torque(self) -> dict[str, float]:

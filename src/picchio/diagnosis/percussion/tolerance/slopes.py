@@ -18,7 +18,7 @@ from picchio.diagnosis.percussion.data.problem import (
     residual_under,
 )
 from picchio.diagnosis.percussion.fit.parallel import worker_pool
-from picchio.diagnosis.percussion.tolerance.nudges import POSE, Inexact, inexact, nudged
+from picchio.diagnosis.percussion.tolerance.nudges import POSE, Inexact, Nudge, inexact, nudged
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 
@@ -251,11 +251,15 @@ def _by_modes(
     numbers = [one for one in every if one.where in _BY_MODES and not one.each_blow]
     model = problem.model.with_effects(effects)
 
-    def moved(one: Inexact, step: float) -> Model:
-        return _under(model, nudged(record, _moved_on(here, one, 0, step))[1])
-
     def found() -> FloatArray | None:
         there, more = nudged(record, list(here.values()))
+
+        def moved(one: Inexact, step: float) -> Model:
+            if one.where == "structure":
+                # By itself, after the others: these are put into a plant once.
+                return _under(model, (*more, Nudge([(one, np.array([step]))], "structure")))
+            return _under(model, nudged(record, _moved_on(here, one, 0, step))[1])
+
         pairs = [(moved(one, -_STRUCTURE), moved(one, _STRUCTURE)) for one in numbers]
         return residual_changes(record, model, there, _under(model, more), pairs, end)
 
