@@ -94,6 +94,37 @@ def _campaign(pose, **blows):
     return Campaign.from_records([record], robot="fanuc_like_3dof", excitation=excitation)
 
 
+@pytest.mark.parametrize("filtered", [(), (("sensor_lowpass", {"frequency": 180.0}),)])
+@pytest.mark.parametrize(
+    ("name", "before", "after"),
+    [
+        ("force_amplitude", {"scale": 0.99}, {"scale": 1.01}),
+        ("pulse_rate", {"scale": 0.9999}, {"scale": 1.0001}),
+        ("pulse_width", {"scale": 0.999}, {"scale": 1.001}),
+    ],
+)
+def test_changes_of_the_blows_are_those_between_two_predictions(
+    small, name, before, after, filtered
+):
+    campaign, _, _ = small
+    robot = load_robot("fanuc_like_3dof")
+    setup = percussion_setups(robot, campaign)[1]
+    base = [effect_class(kind)("accelerometer.tool", **values) for kind, values in filtered]
+    models = [
+        Model(robot, True).with_effects([*base, effect_class(name)("tool", **values)])
+        for values in (before, after)
+    ]
+    found = setup.changes(Model(robot, True).with_effects(base), [tuple(models)], each_blow=True)
+    one, other = (setup.predict(model) for model in models)
+    for channel in setup.channels:
+        expected = other[channel.name] - one[channel.name]
+        error = np.abs(found[channel.name][0] - expected).max()
+        assert error <= 5e-3 * np.abs(expected).max(), channel.name
+    if name != "force_amplitude":  # a change of single blows is told only where it is asked for
+        (told,) = setup.changes(models[0], [tuple(models)])["deflection.joint_1"]
+        assert np.isnan(told).all()
+
+
 def test_a_pose_the_robot_cannot_have_is_told_with_its_file_and_record(tmp_path):
     arm = picchio.load_robot("fanuc_like_3dof")
     campaign = _campaign({"joint_1": 0.1, "joint_9": 0.2})

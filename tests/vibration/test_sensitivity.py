@@ -7,12 +7,17 @@ import pytest
 from scipy.signal import StateSpace, lsim
 
 import picchio
-from picchio.excitation.pulse_train import HalfSineTrain
+from picchio.excitation.piecewise import superposed
+from picchio.excitation.pulse_train import HalfSineTrain, PulseTrain
 from picchio.model.expansion import WideChain
 from picchio.model.geometry import Geometry
 from picchio.model.model import Model
-from picchio.vibration.integration.integrate import Samples, make_plan
-from picchio.vibration.integration.sensitivity import motion_changes
+from picchio.vibration.integration.integrate import Samples, follow, make_plan
+from picchio.vibration.integration.sensitivity import (
+    Strike,
+    blow_changes,
+    motion_changes,
+)
 
 FINE = 20  # scipy's steps to one sample: it takes the force as straight between its steps
 
@@ -85,6 +90,30 @@ def test_a_change_is_what_two_simulations_of_scipy_differ_by(plant_of, change):
         assert np.abs(halves - 0.5 * expected).max() < 2e-2 * np.abs(expected).max()
 
 
+@pytest.mark.parametrize("at_jumps", ["after", "mean", "moments"])
+@pytest.mark.parametrize("train", [PulseTrain, HalfSineTrain])
+@pytest.mark.parametrize("start", [-0.003, 0.0, 0.0214])
+def test_single_blows_add_up_to_the_motion_that_steps_give(plant_of, start, train, at_jumps):
+    samples = Samples(-0.01, 1e-3, 300)
+    shape = train(force=1.0, period=0.05, width=0.008).unit_blows[0]
+    system = plant_of().build(np.array([0.6, 0.0, 0.8]))
+    nothing = (np.zeros_like(system.mass_gradient), np.zeros_like(system.force_gradient))
+    linear = replace(system, mass_gradient=nothing[0], gravity_curvature=nothing[0],
+                     force_gradient=nothing[1])  # fmt: skip
+    force = superposed(np.array([start, 0.11]), [(np.array([300.0, -200.0]), shape)])
+    stepped = follow(linear, make_plan(force, samples, 1e-4, at_jumps=at_jumps), samples.count)
+    strikes = [Strike(shape, start, 300.0), Strike(shape, 0.11, -200.0)]
+    found = blow_changes(linear, samples, at_jumps, [[], strikes])
+    for weights, expected in zip(
+        (found.position, found.velocity, found.acceleration),
+        (stepped.position, stepped.velocity, stepped.acceleration),
+        strict=True,
+    ):
+        nothing, both = weights @ found.series
+        assert not nothing.any()
+        assert np.abs(both.T - expected).max() < 1e-6 * np.abs(expected).max()
+
+
 def test_where_a_joint_has_slack_there_is_no_such_change(plant_of):
     from picchio.model.system import Element, ElementKind
 
@@ -95,3 +124,4 @@ def test_where_a_joint_has_slack_there_is_no_such_change(plant_of):
     force = HalfSineTrain(force=300.0, period=0.05, width=0.008).burst(1)
     plan = make_plan(force, Samples(0.0, 1e-3, 50), 1e-3)
     assert motion_changes(slack, plan, 50, [(system, system)]) is None
+    assert blow_changes(slack, Samples(0.0, 1e-3, 50), "after", []) is None

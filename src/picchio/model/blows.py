@@ -97,23 +97,31 @@ class Blows:
         """
         return replace(self, **changes)  # type: ignore[arg-type]
 
-    def force(self) -> PiecewiseForce:
-        """The force over time: of a burst from t = 0 on, endless; or one period of a steady train.
+    @property
+    def parts(self) -> list[tuple[FloatArray, PiecewiseForce]]:
+        """What every blow consists of: (h,) N, and what it is times, from the blow's start on.
 
         Raises:
             InputError: a stretch that is not positive.
         """
         if self.stretch <= 0.0:
             raise InputError("must be positive", key="width", value=self.stretch)
-        start, height = self.start, self.height
-        shape = self.shape.stretched(self.stretch)
-        if self.period is not None:
-            # What sticks out of the period at either end comes in at the other.
-            before = max(int(np.ceil(shape.end / self.period)), 1)
-            shifts = self.period * np.arange(-before, 2)
-            start = (shifts[:, None] + start).ravel()
-            height = np.tile(height, shifts.size)
-        parts = [((1.0 - self.blend) * height, shape)]
+        parts = [((1.0 - self.blend) * self.height, self.shape.stretched(self.stretch))]
         if self.blend and self.other is not None:
-            parts.append((self.blend * height, self.other.stretched(self.stretch)))
-        return superposed(start, parts, np.inf if self.period is None else self.period)
+            parts.append((self.blend * self.height, self.other.stretched(self.stretch)))
+        return parts
+
+    def force(self) -> PiecewiseForce:
+        """The force over time: of a burst from t = 0 on, endless; or one period of a steady train.
+
+        Raises:
+            InputError: a stretch that is not positive.
+        """
+        if self.period is None:
+            return superposed(self.start, self.parts)
+        # What sticks out of the period at either end comes in at the other.
+        before = max(int(np.ceil(self.parts[0][1].end / self.period)), 1)
+        shifts = self.period * np.arange(-before, 2)
+        start = (shifts[:, None] + self.start).ravel()
+        parts = [(np.tile(height, shifts.size), shape) for height, shape in self.parts]
+        return superposed(start, parts, self.period)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -37,7 +37,12 @@ from picchio.vibration.integration.integrate import (
     integrate,
     make_plan,
 )
-from picchio.vibration.integration.sensitivity import MotionChanges, motion_changes
+from picchio.vibration.integration.sensitivity import (
+    MotionChanges,
+    Strike,
+    blow_changes,
+    motion_changes,
+)
 
 # Filters need the motion this finely, s.
 _FILTER_STEP = 1e-4
@@ -48,6 +53,7 @@ _KEPT_IN_COMMON = 48
 _SLIGHTLY = 1e-6
 # Relative difference of rounding.
 _SAME = 1e-12
+_SILENCE = PiecewiseForce(np.zeros(1), np.inf, *np.zeros((4, 1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,13 +77,19 @@ class Struck:
 
     Attributes:
         blows: as they come.
-        unit: the force they make, divided by `peak`: the same in many records.
         peak: N.
+        forces: those that are known, of blows of which the highest is 1 N.
     """
 
     blows: Blows
-    unit: PiecewiseForce
     peak: float
+    forces: Recent[PiecewiseForce] = field(repr=False)
+
+    @cached_property
+    def unit(self) -> PiecewiseForce:
+        """The force they make, divided by `peak`: the same in many records."""
+        unit = self.blows.change(height=self.blows.height / self.peak)
+        return self.forces.get(unit.key, unit.force)
 
     @property
     def force(self) -> PiecewiseForce:
@@ -90,12 +102,12 @@ class Struck:
         Args:
             other: blows that may be harder, or along another direction.
         """
-        if self.unit is other.unit:
-            return True
-        names = [f.name for f in fields(self.unit)]
-        pairs = [(getattr(self.unit, name), getattr(other.unit, name)) for name in names]
-        return all(
-            np.shape(a) == np.shape(b) and np.allclose(a, b, rtol=_SAME, atol=0.0) for a, b in pairs
+        one, two = self.blows, other.blows
+        return (
+            one.start.shape == two.start.shape
+            and one.key[2:] == two.key[2:]
+            and bool((np.abs(one.start - two.start) <= _SAME * np.abs(two.start)).all())
+            and bool((np.abs(one.height / self.peak - two.height / other.peak) <= _SAME).all())
         )
 
 
@@ -241,19 +253,22 @@ class PercussionSetup:
         return {c.name: values[..., 0, :] for c in members}
 
     def changes(
-        self, model: Model, pairs: Sequence[tuple[Model, Model]]
+        self, model: Model, pairs: Sequence[tuple[Model, Model]], each_blow: bool = False
     ) -> dict[str, FloatArray] | None:
         """By how much every channel changes between models that differ little.
 
         To first order, without integrating anew (`motion_changes`): models may differ in their
-        structure, in the direction of the blows and in how hard all of them are.
+        structure, in the direction of the blows and in how hard all of them are; with `each_blow`,
+        instead, in when and how hard each of them is.
 
         Args:
             model: about which; the sensors are those of all.
             pairs: (before, after) of each change.
+            each_blow: whether blows that differ one by one are known as well: the change is that
+                between the two, however far apart they are.
 
         Returns:
-            (pairs, count) of each channel, SI, not a number where the blows differ in another way;
+            (pairs, count) of each channel, SI, not a number where the models differ in another way;
             None where the motion is not linear, is steady, or a sensor is at its limit.
         """
         sensors = model.sensors(self.conditions)
@@ -262,41 +277,46 @@ class PercussionSetup:
             return None
         struck = self.struck(model)
         system = self._system(model, struck.blows)
-        blows = [[self.struck(m) for m in pair] for pair in pairs]
-        around = [
-            (self._system(one, ours.blows), self._system(other, theirs.blows))
-            for (one, other), (ours, theirs) in zip(pairs, blows, strict=True)
-        ]
+        blows = [(self.struck(one), self.struck(other)) for one, other in pairs]
+        alone = [k for k, pair in enumerate(blows) if each_blow and not pair[0].alike(pair[1])]
+        together = [k for k in range(len(pairs)) if k not in alone]
+        systems = [
+            self._system(m, s.blows)
+            for k in together for m, s in zip(pairs[k], blows[k], strict=True)
+        ]  # fmt: skip
+        around = list(zip(systems[::2], systems[1::2], strict=True))
         louder = np.array([
             (after.peak - before.peak) / struck.peak
             if before.alike(struck) and after.alike(struck) else np.nan
-            for before, after in blows
+            for before, after in (blows[k] for k in together)
         ])  # fmt: skip
-        made: dict[tuple[Samples, AtJumps], MotionChanges] = {}
+        made: dict[tuple[Samples, AtJumps], tuple[MotionChanges, MotionChanges]] = {}
         out: dict[str, FloatArray] = {}
         for group, members in self._members.items():
             chain, taken = chains[group], self._taken(members[0], chains[group])
             key = taken.samples, taken.at_jumps
             if key not in made:
-                found = motion_changes(
-                    system,
-                    self._plan(struck, system, *key),
-                    taken.samples.count,
-                    around,
-                    louder,
-                )
-                if found is None:
+                plan, count = self._plan(struck, system, *key), taken.samples.count
+                found = motion_changes(system, plan, count, around, louder)
+                apart = blow_changes(system, *key, [_differing(*blows[k]) for k in alone])
+                if found is None or apart is None:
                     return None
-                made[key] = found
-            by_position, by_velocity, by_acceleration = _slopes_of(
-                members[0], chain, system, struck.force
-            )
-            weights = (
-                by_position @ made[key].position
-                + by_velocity @ made[key].velocity
-                + by_acceleration @ made[key].acceleration
-            )
-            out |= self._behind(taken, members, weights @ made[key].series)
+                made[key] = found, apart
+            slopes = _slopes_of(members[0], chain, system)
+            if not any(by.any() for by in slopes):  # reads the force alone
+                read = [[self._group(m, chain, members) for m in pair] for pair in pairs]
+                out |= {
+                    c.name: np.array([after[c.name] - before[c.name] for before, after in read])
+                    for c in members
+                }
+                continue
+            rows = np.empty((len(pairs), len(slopes[0]), taken.samples.count))
+            by_position, by_velocity, by_acceleration = slopes
+            for which, each in zip((together, alone), made[key], strict=True):
+                weights = by_position @ each.position + by_velocity @ each.velocity
+                weights = weights + by_acceleration @ each.acceleration
+                rows[which] = weights @ each.series
+            out |= self._behind(taken, members, rows)
         return out
 
     def struck(self, model: Model) -> Struck:
@@ -308,9 +328,7 @@ class PercussionSetup:
 
         def make() -> Struck:
             blows = model.blows(self.blows, self.conditions)
-            peak = blows.peak
-            unit = blows.change(height=blows.height / peak)
-            return Struck(blows, self.in_common.forces.get(unit.key, unit.force), peak)
+            return Struck(blows, blows.peak, self.in_common.forces)
 
         return self._struck.get(model.key("blows"), make)
 
@@ -362,8 +380,23 @@ class PercussionSetup:
         return plan.scaled(struck.peak)
 
 
+def _differing(one: Struck, other: Struck) -> list[Strike]:
+    """The blows that come from one to the other, and those that go."""
+    before, after = one.blows, other.blows
+    own = np.ones(before.start.shape, bool), np.ones(after.start.shape, bool)
+    if before.start.shape == after.start.shape and before.key[2:] == after.key[2:]:
+        apart = (before.start != after.start) | (before.height != after.height)
+        own = apart, apart
+    return [
+        Strike(shape, float(blows.start[k]), sign * float(height[k]))
+        for blows, chosen, sign in ((before, own[0], -1.0), (after, own[1], 1.0))
+        for height, shape in blows.parts
+        for k in np.flatnonzero(chosen)
+    ]
+
+
 def _slopes_of(
-    channel: Channel, chain: SensorChain, system: VibratingSystem, force: PiecewiseForce
+    channel: Channel, chain: SensorChain, system: VibratingSystem
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(rows, N) each: what a reader makes of position, velocity and acceleration, at rest."""
     n = len(system.coordinates)
@@ -376,7 +409,7 @@ def _slopes_of(
         Reading(
             channel.subject,
             Samples(0.0, 1.0, 3 * n + 1),
-            lambda: force,
+            lambda: _SILENCE,
             lambda: (system, motion),
             chain.place if chain.place.any() else None,
         )

@@ -191,6 +191,39 @@ def make_plan(
     return Plan(fine, lengths, regular, same, force0, force1, sample, force_after=after)
 
 
+def force_at(
+    shape: PiecewiseForce, start: float, samples: Samples, at_jumps: AtJumps
+) -> FloatArray:
+    """(count,) N, what one blow pushes at the samples, as the steps of `make_plan` have it.
+
+    Args:
+        shape: the blow.
+        start: s, when it begins; before t = 0 nothing is felt.
+        samples: when.
+        at_jumps: as in `integrate`.
+    """
+    out = np.zeros(samples.count)
+    ends = np.array([max(start, 0.0), start + shape.end])
+    ends = np.floor((ends - samples.start) / samples.step).astype(int)
+    low, high = np.clip(ends + np.array([-2, 4]), 0, samples.count)
+    times = samples.times[low:high]
+
+    def pushed(time: FloatArray) -> FloatArray:
+        return np.where(time >= 0.0, shape(time - start), 0.0)
+
+    after = pushed(times + 2 * _EDGE)
+    if at_jumps != "after":
+        after = 0.5 * (pushed(times - 2 * _EDGE) + after)
+    first = int(np.searchsorted(times, -_EDGE))
+    if at_jumps == "moments":
+        edges = np.unique(np.maximum([*(start + shape.start), start + shape.end], 0.0))
+        jumps = pushed(edges + 2 * _EDGE) - pushed(edges - 2 * _EDGE)
+        begin = samples.start + low * samples.step
+        after = after + jump_corrections(begin, samples.step, times.size, first, edges, jumps)
+    out[low + first : high] = after[first:]
+    return out
+
+
 def jump_corrections(
     start: float, step: float, count: int, first: int, times: FloatArray, heights: FloatArray
 ) -> FloatArray:

@@ -503,6 +503,7 @@ def residual_changes(
     about: Model,
     pairs: Sequence[tuple[Model, Model]],
     end: float | None = None,
+    each_blow: bool = False,
 ) -> FloatArray | None:
     """By how much a record's whitened residual changes between models that differ a little.
 
@@ -513,6 +514,7 @@ def residual_changes(
         about: the model with its changes: about which the residual is linear.
         pairs: the models before and after each change.
         end: s, up to when.
+        each_blow: as of `PercussionSetup.changes`.
 
     Returns:
         (pairs, channels, m), to first order; not a number, or None for all, where that is not
@@ -523,7 +525,7 @@ def residual_changes(
     setup = there.until(end)
     if any(e.latent and e.latent.linear and setup.name not in e.hidden for e in model.effects):
         return None
-    found = setup.changes(about, pairs)
+    found = setup.changes(about, pairs, each_blow)
     if found is None:
         return None
     masked = _kept_edges(record, record.until(end), model)

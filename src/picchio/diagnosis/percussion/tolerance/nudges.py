@@ -48,6 +48,8 @@ class Inexact:
             "pose" the joint's index, or None.
         means: effect and target that stand for it where it is a cause.
         each_blow: whether every blow has its own number.
+        one_way: whether it is moved upwards alone to see what it does: no blow begins before its
+            record does.
     """
 
     name: str
@@ -57,6 +59,7 @@ class Inexact:
     change: Any
     means: str = ""
     each_blow: bool = False
+    one_way: bool = False
 
 
 class Nudge(Effect):
@@ -271,7 +274,8 @@ def _blows(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterat
 
     if blows.period is None and blows.start.size > 1:
         yield Inexact("blow_force", "blow_force", False, "blows", harder, each_blow=True)
-        yield Inexact("blow_time", "blow_time", False, "blows", later, "pulse_jitter:tool", True)
+        yield Inexact("blow_time", "blow_time", False, "blows", later, "pulse_jitter:tool",
+                      each_blow=True, one_way=True)  # fmt: skip
 
     def ramped(blows: Blows, size: float) -> Blows:
         # Half of its rise later, but for (angular frequency x rise)^2 / 24: a ramp that is shorter
@@ -279,7 +283,7 @@ def _blows(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterat
         return blows.change(start=blows.start + 0.5 * size * sigma.rise_time)
 
     if _is_flat(blows.shape):
-        yield Inexact("rise_time", "rise_time", True, "blows", ramped)
+        yield Inexact("rise_time", "rise_time", True, "blows", ramped, one_way=True)
 
 
 def _is_flat(shape: PiecewiseForce) -> bool:

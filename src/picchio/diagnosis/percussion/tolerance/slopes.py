@@ -214,7 +214,7 @@ def _number_by_number(
     quickly = _by_modes(problem, record, effects, every, here, end)
     for one in every:
         if one.name in quickly:
-            yield [quickly[one.name]]
+            yield quickly[one.name]
             continue
         if one.where == POSE:  # its zero and its repeatability turn a joint alike
             index, sigma = one.change
@@ -243,34 +243,43 @@ def _by_modes(
     every: Sequence[Inexact],
     here: Mapping[str, tuple[Inexact, FloatArray]],
     end: float | None,
-) -> dict[str, FloatArray]:
+) -> dict[str, list[FloatArray]]:
     """Columns (channels, m) of the numbers of which they are known without integrating anew.
 
-    Both ways: what they do to the matrices is exact to the second order.
+    Both ways where that can be: what they do to the matrices is exact to the second order.
     """
-    numbers = [one for one in every if one.where in _BY_MODES and not one.each_blow]
+    blows = len(_starts(record))
+    numbers = [
+        (one, blow)
+        for one in every
+        if one.where in _BY_MODES
+        for blow in range(blows if one.each_blow else 1)
+    ]
     model = problem.model.with_effects(effects)
 
     def found() -> FloatArray | None:
         there, more = nudged(record, list(here.values()))
 
-        def moved(one: Inexact, step: float) -> Model:
+        def moved(one: Inexact, blow: int, step: float) -> Model:
             if one.where == "structure":
                 # By itself, after the others: these are put into a plant once.
                 return _under(model, (*more, Nudge([(one, np.array([step]))], "structure")))
-            return _under(model, nudged(record, _moved_on(here, one, 0, step))[1])
+            return _under(model, nudged(record, _moved_on(here, one, blow, step))[1])
 
-        pairs = [(moved(one, -_STRUCTURE), moved(one, _STRUCTURE)) for one in numbers]
-        return residual_changes(record, model, there, _under(model, more), pairs, end)
+        pairs = []
+        for one, blow in numbers:
+            ends = (0.0, 2.0 * _STRUCTURE) if one.one_way else (-_STRUCTURE, _STRUCTURE)
+            pairs.append((moved(one, blow, ends[0]), moved(one, blow, ends[1])))
+        return residual_changes(
+            record, model, there, _under(model, more), pairs, end, each_blow=True
+        )
 
     changes = attempt("slopes", found)
-    if changes is None:
-        return {}
-    return {
-        one.name: change / (2.0 * _STRUCTURE)
-        for one, change in zip(numbers, changes, strict=True)
-        if np.isfinite(change.sum())
-    }
+    columns: dict[str, list[FloatArray]] = {}
+    for (one, _), change in zip(numbers, () if changes is None else changes, strict=False):
+        columns.setdefault(one.name, []).append(change / (2.0 * _STRUCTURE))
+    known = {name: np.isfinite([own.sum() for own in each]).all() for name, each in columns.items()}
+    return {name: each for name, each in columns.items() if known[name]}
 
 
 def _moved_on(
