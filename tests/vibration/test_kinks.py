@@ -1,7 +1,10 @@
 """The straight line that stands for a force with a kink, against plain quadrature."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import picchio
 from picchio.model.blows import Blows
@@ -65,3 +68,45 @@ def test_play_is_followed_at_the_step_that_is_used():
     fine = integrate(system, force, samples, longest_step=1e-5).position
     found = integrate(system, force, samples).position
     assert np.abs(found - fine).max() <= 1e-5 * fine.std()
+
+
+@pytest.mark.parametrize(
+    ("torque", "smoothing", "least"), [(5.0, 5e-4, 1e-4), (50.0, 1e-4, 5e-4), (300.0, 5e-5, 1e-4)]
+)
+def test_friction_that_fades_is_followed_at_the_step_that_is_used(torque, smoothing, least):
+    """Against scipy's Radau method, from edge to edge of the force."""
+    robot = picchio.load_robot("fanuc_like_3dof")
+    values = {"torque": torque, "smoothing": smoothing}
+    model = picchio.Model(robot).with_effects(
+        [effect_class("coulomb_friction")("joint_3", **values)]
+    )
+    direction = np.array([0.0, 1.0, 0.0])
+    system = model.plant(Geometry.of(robot, [0.3, 0.5, -0.8])).build(direction)
+    nothing = np.zeros_like(system.mass_gradient)
+    system = replace(
+        system, mass_gradient=nothing, gravity_curvature=nothing,
+        force_gradient=np.zeros_like(system.force_gradient),
+    )  # fmt: skip
+    inverse, row, n = np.linalg.inv(system.mass), system.rows[0], len(system.coordinates)
+    train = picchio.PulseTrain(3000.0, 0.04, 0.004)
+    samples = Samples(0.0, 1e-3, 400)
+
+    def slope(_, y, push):
+        held = system.stiffness @ y[:n] + system.damping @ y[n:]
+        held = held + torque * np.tanh(row @ y[n:] / smoothing) * row
+        return np.concatenate([y[n:], inverse @ (system.force * push - held)])
+
+    edges = [*np.sort(np.concatenate([0.04 * np.arange(10), 0.04 * np.arange(10) + 0.004])), 0.4]
+    right, y = np.zeros((samples.count, n)), np.zeros(2 * n)
+    for k, (begin, end) in enumerate(zip(edges, edges[1:], strict=False)):
+        inside = (samples.times > begin - 1e-9) & (samples.times < end + 1e-9)
+        push = 3000.0 if k % 2 == 0 else 0.0
+        times = np.clip(samples.times[inside], begin, end)
+        ran = solve_ivp(
+            slope, (begin, end), y, "Radau", args=(push,), rtol=1e-9, atol=1e-12,
+            dense_output=True,
+        )  # fmt: skip
+        right[inside], y = ran.sol(times)[:n].T, ran.y[:, -1]
+    force = Blows.of(train, 10, direction).force()
+    found = integrate(system, force, samples).position
+    assert np.abs(found - right).max() <= least * right.std()

@@ -8,29 +8,57 @@ from numba import njit
 
 COULOMB = 3
 _FRICTION_SWEEPS = 4
+_LOOKS = 80
+_APART = 1e-8
 _IDEAL = 2e-5  # rad/s, below which friction is taken as ideal
 
 
 @njit(cache=True, nogil=True)
-def _smooth_friction(free, gain, limit, smooth):
-    """The f with f = limit tanh((free - gain f) / smooth), by bisection and Newton."""
-    low, high = -limit, limit
-    f = min(max(free / (gain + smooth / max(limit, 1e-300)), low), high)
-    for _ in range(60):
-        t = np.tanh((free - gain * f) / smooth)
-        wrong = f - limit * t
-        if wrong > 0.0:
-            high = f
+def _way(x, push, brake):
+    """A primitive: over push^2 - brake^2 the time it takes x, where x' = push - brake tanh x."""
+    near = push - brake if x > 0.0 else push + brake
+    other = push + brake if x > 0.0 else push - brake
+    return push * x + brake * (abs(x) + np.log(abs(near + other * np.exp(-2.0 * abs(x)))))
+
+
+@njit(cache=True, nogil=True)
+def _smooth_friction(before, free, gain, limit, smooth):
+    """The mean over a step of limit tanh(rate / smooth), everything else pushing evenly.
+
+    x = rate / smooth then follows x' = push - brake tanh x, whose time from one x to another is
+    known; where it is after one step is found by Newton's method between two bounds.
+    """
+    change, brake = free - before, gain * limit
+    if not brake > 0.0:
+        return 0.0
+    push = change
+    if abs(abs(push) - brake) < _APART * brake:  # there the closed form is 0 / 0
+        push *= 1.0 + 2.0 * _APART
+    near = before / smooth
+    rate = push - brake * np.tanh(near)
+    x = near + rate / smooth
+    if abs(push) < brake:
+        far = np.arctanh(push / brake)  # where it would stay
+        if abs(x - near) > 0.5 * abs(far - near):
+            x = 0.5 * (near + far)
+    else:
+        far = near + (push + (brake if push > 0.0 else -brake)) / smooth
+    start, across = _way(near, push, brake), push * push - brake * brake
+    for _ in range(_LOOKS):
+        late = (_way(x, push, brake) - start) / across - 1.0 / smooth
+        if late > 0.0:
+            far = x
         else:
-            low = f
-        step = wrong / (1.0 + limit * (1.0 - t * t) * gain / smooth)
-        new = f - step
-        if not low < new < high:
-            new = 0.5 * (low + high)
-        if abs(new - f) <= 1e-9 * limit:
-            return new
-        f = new
-    return f
+            near = x
+        new = x - late * (push - brake * np.tanh(x))
+        if not min(near, far) < new < max(near, far):
+            new = 0.5 * (near + far)
+        moved = abs(new - x)
+        x = new
+        if moved <= 1e-11 * (1.0 + abs(x)):
+            break
+    mean = (change - (x * smooth - before)) / gain
+    return min(max(mean, -limit), limit)
 
 
 @njit(cache=True, nogil=True)
@@ -84,8 +112,8 @@ def stick(old, new, kinds, parameters, rows, kick, friction, last):
             if smooth <= _IDEAL:
                 wanted, last[e] = _ideal_friction(before, free, gain, limit)
             else:
-                wanted = _smooth_friction(free, gain, limit, smooth)
-                last[e] = wanted
+                wanted = _smooth_friction(before, free, gain, limit, smooth)
+                last[e] = limit * np.tanh((free - gain * wanted) / smooth)
             change = wanted - friction[e]
             friction[e] = wanted
             for i in range(2 * n):
