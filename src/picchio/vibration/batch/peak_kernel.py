@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
-from picchio.core.arrays import ComplexArray, FloatArray
 from picchio.vibration.batch.modal_kernel import (
     KERNEL,
     coefficients,
@@ -15,16 +14,18 @@ from picchio.vibration.batch.modal_kernel import (
 )
 from picchio.vibration.batch.top_kernel import (
     TERMS,
+    TILE,
     highest,
     joint_norms,
     power_series,
     room_for,
     sample,
-    steps_of,
+    samples_of,
 )
 
 # So many matrices are decomposed side by side; more would not stay near the processor.
 _BLOCK = 64
+SPAN = 8 * _BLOCK  # poses that a thread takes at a time
 
 
 @njit(**KERNEL)
@@ -57,12 +58,8 @@ def _pose_peaks(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Peaks (n,) and their directions (n, 3) at a pose; or how many samples need room first."""
     n = poles.shape[0]
-    count, total = 0, 0.0
     while True:
-        count, total = 0, 0.0
-        for p in range(length.shape[0]):
-            count += steps_of(length[p], max(omega[n - 1], wave[p]))
-            total += length[p]
+        count, total = samples_of(length, wave, omega[n - 1])
         if count > room.time.shape[0]:
             break
         sample(poles, rows, length, wave, omega[n - 1], room)
@@ -94,79 +91,16 @@ def _pose_peaks(  # type: ignore[no-untyped-def]
     return 0
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _block_peaks(  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def peaks(  # type: ignore[no-untyped-def]
     first, last, periodic, start, duration, constant, slope, amplitude, wave, mass, jacobian,
     stiffness, joint_ratio, along, frequency, peak, direction,
 ):  # fmt: skip
-    """`peaks` of the poses from `first` to `last` - 1.
-
-    A function of its own, so that the compiler's slow passes for parallel loops never see it.
-    """
-    n = stiffness.shape[1]
-    fixed = along.shape[0] > 0
-    values, vectors = np.empty((n, n, last - first)), np.empty((n, n, last - first))
-    decompose(mass[first:last], stiffness[first:last], values, vectors)
-    omega, shapes, pull = np.empty(n), np.empty((n, n)), np.empty((n, n, 4))
-    g, terms, free, powers = (
-        np.empty(3),
-        np.empty((TERMS, 3)),
-        np.empty((n, 2)),
-        np.empty((TERMS, n, 2)),
-    )
-    room = room_for(n, 256)
-    poles = np.empty(n, dtype=np.complex128)
-    rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
-    endless, length, nothing = np.isinf(duration[-1]), duration.copy(), np.empty(0)
-    for s in range(first, last):
-        frequency[s, :] = np.nan
-        peak[s, :] = np.nan
-        direction[s, :, :] = np.nan
-        if not modes_of(
-            s - first, values, vectors, stiffness[s], joint_ratio, omega, shapes, frequency[s],
-            poles,
-        ):  # fmt: skip
-            continue
-        _pulls(jacobian[s], along[s] if fixed else nothing, shapes, pull)
-        power_series(poles, powers)
-        coefficients(poles, duration, constant, slope, amplitude, wave, periodic, rows)
-        if endless:
-            length[-1] = 2.0 * np.pi / omega[0]
-        while True:
-            more = _pose_peaks(
-                periodic, start, length, constant, slope, amplitude, wave, endless, omega, poles,
-                rows, powers, pull, g, free, terms, room, peak[s], direction[s],
-            )  # fmt: skip
-            if more == 0:
-                break
-            room = room_for(n, 2 * more)
-        if fixed:
-            for j in range(n):
-                for d in range(3):
-                    direction[s, j, d] = along[s, d]
-
-
-@njit(cache=True, parallel=True, nogil=True, error_model="numpy")
-def peaks(
-    periodic: bool,
-    start: FloatArray,
-    duration: FloatArray,
-    constant: FloatArray,
-    slope: FloatArray,
-    amplitude: ComplexArray,
-    wave: FloatArray,
-    mass: FloatArray,
-    jacobian: FloatArray,
-    stiffness: FloatArray,
-    joint_ratio: FloatArray,
-    along: FloatArray,
-    frequency: FloatArray,
-    peak: FloatArray,
-    direction: FloatArray,
-) -> None:
     """Natural frequencies and peak deflections at many poses.
 
     Args:
+        first: of the poses; a multiple of how many are decomposed side by side.
+        last: the one after the last.
         periodic: steady state, or from rest with an endless last piece.
         start: (m,) s, of the pieces of the force; see `PiecewiseForce` for these.
         duration: (m,) s.
@@ -179,14 +113,48 @@ def peaks(
         stiffness: (p, n) N m/rad.
         joint_ratio: (n,) damping ratios.
         along: (p, 3) force directions, or (0, 3) for the worst of all directions.
-        frequency: (p, n) Hz, out; NaN where the pose's mass matrix is not positive definite.
-        peak: (p, n) rad, out; NaN where a mode is not underdamped: take the exact path there.
+        frequency: (p, n) Hz, NaN, out; left so where the mass matrix is not positive definite.
+        peak: (p, n) rad, NaN, out; left so where a mode is not underdamped: take the exact
+            path there.
         direction: (p, n, 3) out; of a fixed direction, itself.
     """
-    poses = stiffness.shape[0]
-    for block in prange((poses + _BLOCK - 1) // _BLOCK):
-        _block_peaks(
-            block * _BLOCK, min(poses, (block + 1) * _BLOCK), periodic, start, duration, constant,
-            slope, amplitude, wave, mass, jacobian, stiffness, joint_ratio, along, frequency, peak,
-            direction,
-        )  # fmt: skip
+    n = stiffness.shape[1]
+    fixed = along.shape[0] > 0
+    omega, shapes, pull = np.empty(n), np.empty((n, n)), np.empty((n, n, 4))
+    g, terms, free, powers = (
+        np.empty(3),
+        np.empty((TERMS, 3)),
+        np.empty((n, 2)),
+        np.empty((TERMS, n, 2)),
+    )
+    room = room_for(n, 32 * TILE)
+    poles = np.empty(n, dtype=np.complex128)
+    rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
+    endless, length, nothing = np.isinf(duration[-1]), duration.copy(), np.empty(0)
+    for begin in range(first, last, _BLOCK):
+        end = min(last, begin + _BLOCK)
+        values, vectors = np.empty((n, n, end - begin)), np.empty((n, n, end - begin))
+        decompose(mass[begin:end], stiffness[begin:end], values, vectors)
+        for s in range(begin, end):
+            if not modes_of(
+                s - begin, values, vectors, stiffness[s], joint_ratio, omega, shapes, frequency[s],
+                poles,
+            ):  # fmt: skip
+                continue
+            _pulls(jacobian[s], along[s] if fixed else nothing, shapes, pull)
+            power_series(poles, powers)
+            coefficients(poles, duration, constant, slope, amplitude, wave, periodic, rows)
+            if endless:
+                length[-1] = 2.0 * np.pi / omega[0]
+            while True:
+                more = _pose_peaks(
+                    periodic, start, length, constant, slope, amplitude, wave, endless, omega,
+                    poles, rows, powers, pull, g, free, terms, room, peak[s], direction[s],
+                )  # fmt: skip
+                if more == 0:
+                    break
+                room = room_for(n, 2 * more)
+            if fixed:
+                for j in range(n):
+                    for d in range(3):
+                        direction[s, j, d] = along[s, d]

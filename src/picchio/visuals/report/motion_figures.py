@@ -95,7 +95,11 @@ class View:
         return replace(parse_channel(name, unit)[0], name=short)
 
     def motion(self, name: str) -> FloatArray:
-        """(m,) a series of the nominal motion: angle, velocity, acceleration, body."""
+        """(m,) a series of the nominal motion, SI.
+
+        Args:
+            name: angle, velocity, acceleration, or body: the torque that the gear carries.
+        """
         nominal = self.system.predictors[self.segment.record].nominal
         return getattr(nominal, name)[self.group[1]][self.segment.samples]
 
