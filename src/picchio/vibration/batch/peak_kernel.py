@@ -91,6 +91,55 @@ def _pose_peaks(  # type: ignore[no-untyped-def]
     return 0
 
 
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _block_peaks(  # type: ignore[no-untyped-def]
+    first, last, periodic, start, duration, constant, slope, amplitude, wave, mass, jacobian,
+    stiffness, joint_ratio, along, frequency, peak, direction,
+):  # fmt: skip
+    """`peaks` of one block.
+
+    A function of its own: as one loop over the blocks it takes 15 % longer.
+    """
+    n = stiffness.shape[1]
+    fixed = along.shape[0] > 0
+    omega, shapes, pull = np.empty(n), np.empty((n, n)), np.empty((n, n, 4))
+    g, terms, free, powers = (
+        np.empty(3),
+        np.empty((TERMS, 3)),
+        np.empty((n, 2)),
+        np.empty((TERMS, n, 2)),
+    )
+    room = room_for(n, 32 * TILE)
+    poles = np.empty(n, dtype=np.complex128)
+    rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
+    endless, length, nothing = np.isinf(duration[-1]), duration.copy(), np.empty(0)
+    values, vectors = np.empty((n, n, last - first)), np.empty((n, n, last - first))
+    decompose(mass[first:last], stiffness[first:last], values, vectors)
+    for s in range(first, last):
+        if not modes_of(
+            s - first, values, vectors, stiffness[s], joint_ratio, omega, shapes, frequency[s],
+            poles,
+        ):  # fmt: skip
+            continue
+        _pulls(jacobian[s], along[s] if fixed else nothing, shapes, pull)
+        power_series(poles, powers)
+        coefficients(poles, duration, constant, slope, amplitude, wave, periodic, rows)
+        if endless:
+            length[-1] = 2.0 * np.pi / omega[0]
+        while True:
+            more = _pose_peaks(
+                periodic, start, length, constant, slope, amplitude, wave, endless, omega,
+                poles, rows, powers, pull, g, free, terms, room, peak[s], direction[s],
+            )  # fmt: skip
+            if more == 0:
+                break
+            room = room_for(n, 2 * more)
+        if fixed:
+            for j in range(n):
+                for d in range(3):
+                    direction[s, j, d] = along[s, d]
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def peaks(  # type: ignore[no-untyped-def]
     first, last, periodic, start, duration, constant, slope, amplitude, wave, mass, jacobian,
@@ -118,43 +167,9 @@ def peaks(  # type: ignore[no-untyped-def]
             path there.
         direction: (p, n, 3) out; of a fixed direction, itself.
     """
-    n = stiffness.shape[1]
-    fixed = along.shape[0] > 0
-    omega, shapes, pull = np.empty(n), np.empty((n, n)), np.empty((n, n, 4))
-    g, terms, free, powers = (
-        np.empty(3),
-        np.empty((TERMS, 3)),
-        np.empty((n, 2)),
-        np.empty((TERMS, n, 2)),
-    )
-    room = room_for(n, 32 * TILE)
-    poles = np.empty(n, dtype=np.complex128)
-    rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
-    endless, length, nothing = np.isinf(duration[-1]), duration.copy(), np.empty(0)
     for begin in range(first, last, _BLOCK):
-        end = min(last, begin + _BLOCK)
-        values, vectors = np.empty((n, n, end - begin)), np.empty((n, n, end - begin))
-        decompose(mass[begin:end], stiffness[begin:end], values, vectors)
-        for s in range(begin, end):
-            if not modes_of(
-                s - begin, values, vectors, stiffness[s], joint_ratio, omega, shapes, frequency[s],
-                poles,
-            ):  # fmt: skip
-                continue
-            _pulls(jacobian[s], along[s] if fixed else nothing, shapes, pull)
-            power_series(poles, powers)
-            coefficients(poles, duration, constant, slope, amplitude, wave, periodic, rows)
-            if endless:
-                length[-1] = 2.0 * np.pi / omega[0]
-            while True:
-                more = _pose_peaks(
-                    periodic, start, length, constant, slope, amplitude, wave, endless, omega,
-                    poles, rows, powers, pull, g, free, terms, room, peak[s], direction[s],
-                )  # fmt: skip
-                if more == 0:
-                    break
-                room = room_for(n, 2 * more)
-            if fixed:
-                for j in range(n):
-                    for d in range(3):
-                        direction[s, j, d] = along[s, d]
+        _block_peaks(
+            begin, min(last, begin + _BLOCK), periodic, start, duration, constant, slope,
+            amplitude, wave, mass, jacobian, stiffness, joint_ratio, along, frequency, peak,
+            direction,
+        )  # fmt: skip
