@@ -17,6 +17,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import os
 import resource
 import tempfile
 import time
@@ -29,9 +30,11 @@ from typing import Any
 import numba
 import numpy as np
 import pinocchio as pin
+from numba import njit
 
 import picchio
 from picchio.core.files import atomic_write
+from picchio.core.processes import on_threads
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.model.linear_system import LinearSystem
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -221,20 +224,59 @@ def compare_dofs() -> tuple[dict[str, float], dict[str, float], dict[int, float]
     return ratios, counted, costs
 
 
+@njit(nogil=True)
+def spin(first: int, last: int, out: np.ndarray) -> None:
+    """Nothing but arithmetic, for a tenth of a second or so each: what the cores can give."""
+    for k in range(first, last):
+        x = 0.3
+        for _ in range(60_000_000):
+            x = 3.7 * x * (1.0 - x)
+        out[k] = x
+
+
+def on_cores(count: int, work: Callable[[], object]) -> float:
+    """The wall's time of some work, s, while every thread of this process has so many cores."""
+    cores = sorted(os.sched_getaffinity(0))
+    numba.set_num_threads(count)
+    try:
+        for thread in os.listdir("/proc/self/task"):
+            os.sched_setaffinity(int(thread), cores[:count])
+        return clock(work, time.perf_counter)
+    finally:
+        for thread in os.listdir("/proc/self/task"):
+            os.sched_setaffinity(int(thread), cores)
+        numba.set_num_threads(1)
+
+
 def go_cores() -> None:
-    """The kernel's wall time a pose on one core and on more, in turns, three times (3 DoF)."""
-    block = random_poses(picchio.load_robot(ROBOTS[3]), 4096)
+    """One core against all, in turns, the best of five of each (3 DoF)."""
     robot = picchio.load_robot(ROBOTS[3])
+    block = random_poses(robot, 100_000)
+    cores = numba.config.NUMBA_NUM_THREADS
+    out = np.empty(cores)
+    print(f"\n                                1 core, s   {cores} cores, s    gain    load")
+    with tempfile.TemporaryDirectory() as folder:
 
-    def run() -> None:
-        for _ in range(25):
-            ours(robot, block)
+        def draw(ending: str, side: int = 100) -> None:
+            path = Path(folder) / f"map{ending}"
+            workspace_map(
+                robot, places.joint_grid(robot, side), BLOWS, path, workers=1, restart=True
+            ).close()
 
-    print("\ncores   us a pose, by the wall's clock")
-    for cores in (1, numba.config.NUMBA_NUM_THREADS) * 3:
-        numba.set_num_threads(cores)
-        print(f"{cores:5d}   {clock(run, time.perf_counter) / (25 * 4096) * 1e6:9.2f}", flush=True)
-    numba.set_num_threads(1)
+        for name, work in {
+            "arithmetic alone": lambda: on_threads(spin, cores, 1, out),
+            "kernels, 1e5 poses": lambda: ours(robot, block),
+            "a map of 1e6 poses, Zarr": lambda: draw(".zarr"),
+            "a map of 1e6 poses, netCDF": lambda: draw(".nc"),
+        }.items():
+            work()
+            both = [(on_cores(1, work), on_cores(cores, work)) for _ in range(5)]
+            alone, together = (min(times) for times in zip(*both, strict=True))
+            print(
+                f"{name:28s}   {alone:10.2f}   {together:11.2f}   {alone / together:5.2f}   "
+                f"{os.getloadavg()[0]:5.2f}",
+                flush=True,
+            )
 
 
 def go_long() -> list[dict[str, Any]]:
@@ -280,7 +322,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", metavar="FILE")
     parser.add_argument("--long", action="store_true")
-    parser.add_argument("--cores", action="store_true", help="only one core against all")
+    parser.add_argument("--cores", action="store_true", help="one core against all, no more")
     options = parser.parse_args()
     numba.set_num_threads(1)
     arm = picchio.load_robot(ROBOTS[3])

@@ -31,6 +31,7 @@ from picchio.studies.rivet.damage_kernel import history_damage, swing
 from picchio.studies.tasks import Task, task_from_dict
 from picchio.studies.uncertainty.inputs import DEFAULT_INPUTS
 from picchio.studies.uncertainty.result import UncertainLife
+from picchio.vibration.batch.turning_kernel import FINE
 
 CACHE = Path(__file__).parents[1] / "tests" / "studies" / "plain_monte_carlo.json"
 DRAWS = 100_000
@@ -88,7 +89,7 @@ def plain(name: str, draws: int = DRAWS, seed: int = 2026) -> dict[str, Any]:
         turns, count = swing(
             state.mass_matrix, state.jacobian, stiffness, damping, operation.direction, whole,
             force.duration, force.constant, force.slope, force.amplitude,
-            force.angular_frequency, frequency,
+            force.angular_frequency, frequency, FINE,
         )  # fmt: skip
         scratch = np.empty((3, turns.shape[1]))
         spent = [

@@ -77,7 +77,7 @@ def test_a_cause_that_worsens_its_own_channel_is_withdrawn(robot, rubbing):
     every = {(c.effect, c.target) for c in found.causes} | set(found.leads)
     assert ("coulomb_friction", "joint_1") in every
     assert ("coulomb_friction", "joint_2") not in {(c.effect, c.target) for c in found.causes}
-    dropped = {(d["effect"], d["target"]) for d in found.details["dropped"]}
+    dropped = {(d["effect"], d["target"]) for d in found.extra["dropped"]}
     assert ("coulomb_friction", "joint_2") in dropped
     row = next(r for r in found.extra["channels"] if r["channel"] == "torque.joint_2")
     assert row["after"] <= 1.01 * row["before"]

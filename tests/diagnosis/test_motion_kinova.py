@@ -57,7 +57,7 @@ def test_the_ripples_orders(diagnosis):
 
 
 def test_what_joint_6_has_at_two_cycles_is_seen_and_not_claimed(diagnosis):
-    dropped = [(d["target"], round(d["order"])) for d in diagnosis.details["dropped"]
+    dropped = [(d["target"], round(d["order"])) for d in diagnosis.extra["dropped"]
                if d["effect"] == "torque_ripple"]  # fmt: skip
     assert ("joint_6", 2) in dropped
 

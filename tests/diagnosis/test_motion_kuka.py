@@ -61,11 +61,11 @@ def test_stiffness_only_where_b_and_c_gain(robot, kuka, diagnosis):
                 assert a < 0.8 * b
     # How far from the documented one, and what the lag would do to that.
     for joint in joints:
-        told = diagnosis.details["stiffness"][joint]
+        told = diagnosis.extra["stiffness"][joint]
         assert told["found"] / told["documented"] == pytest.approx(told["ratio"])
     assert joints == {"joint_a3"}
-    assert diagnosis.details["stiffness"]["joint_a3"]["ratio"] == pytest.approx(1.0, abs=0.25)
-    assert diagnosis.details["stiffness"]["joint_a3"]["ratio_without_delay"] > 1.5
+    assert diagnosis.extra["stiffness"]["joint_a3"]["ratio"] == pytest.approx(1.0, abs=0.25)
+    assert diagnosis.extra["stiffness"]["joint_a3"]["ratio_without_delay"] > 1.5
 
 
 def test_the_payload_that_the_robot_does_not_have(diagnosis):

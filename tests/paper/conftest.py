@@ -10,15 +10,7 @@ import pytest
 import picchio.paper as package
 from picchio.paper import printed as printed_module
 from picchio.paper.assumptions import Assumptions
-from picchio.paper.run import compiled_on_one_thread
 from picchio.paper.study import Study
-
-
-@pytest.fixture(scope="package", autouse=True)
-def single_thread():
-    """As a reproduction runs: small batches on one thread."""
-    with compiled_on_one_thread():
-        yield
 
 
 @pytest.fixture(scope="session")

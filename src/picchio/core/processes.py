@@ -1,4 +1,4 @@
-"""Processes of our own: what they import, how long they live, how many threads they use."""
+"""Processes and threads of our own: what they import, how long they live, how many there are."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 _PACKAGES = str(Path(__file__).resolve().parents[2])
@@ -95,6 +97,31 @@ def safe_start() -> Iterator[None]:
         sys.path[:] = path
         os.environ.clear()
         os.environ.update(before)
+
+
+def on_threads(kernel: Callable[..., None], count: int, span: int, *arguments: Any) -> None:
+    """A compiled kernel on rows of arrays, over the cores; it must let other threads run.
+
+    Numba's own threads wait for each other at full speed, and a loop for them takes ten seconds to
+    compile. Rows are parted alike however many threads there are, so that results are, too.
+
+    Args:
+        kernel: called with the first row, the one after the last, and the arguments, by several
+            threads at once.
+        count: how many rows there are.
+        span: rows that a thread takes at a time; up to so many are done by this one.
+        *arguments: the same for all, what it writes to among them.
+    """
+    from numba import get_num_threads
+
+    parts = [(first, min(first + span, count)) for first in range(0, count, span)]
+    threads = min(len(parts), get_num_threads()) if len(parts) > 1 else 1
+    if threads == 1:
+        kernel(0, count, *arguments)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        for done in [pool.submit(kernel, *part, *arguments) for part in parts]:
+            done.result()
 
 
 @contextmanager

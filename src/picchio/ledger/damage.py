@@ -12,6 +12,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.processes import on_threads
 from picchio.excitation.measured import MeasuredForce
 from picchio.fatigue.counting.counter import RainflowCounter, rainflow
 from picchio.fatigue.miner import damage
@@ -157,8 +158,8 @@ def _batch(
         constant = np.concatenate([burst.constant for burst in bursts])
         slope = np.concatenate([burst.slope for burst in bursts])
         _, knots, lines, known = curve_tables(curves)
-        burst_damages(
-            begin, duration, constant, slope, mass, jacobian, many.stiffness,
+        on_threads(
+            burst_damages, b, 1, begin, duration, constant, slope, mass, jacobian, many.stiffness,
             np.asarray(many.damping_ratio, float), along, factor, knots, lines, known, SCALES,
             closed, alone, residue, kept, peak,
         )  # fmt: skip

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from picchio.core.arrays import FloatArray
 from picchio.fatigue.counting.kernel import finish, push
 from picchio.studies.rivet.damage_kernel import cost_of, swing
+from picchio.vibration.batch.turning_kernel import FINE
 
 MOST = 96
 """Turning points of a residue that are kept."""
@@ -84,14 +85,16 @@ def trimmed(residue, depth):  # type: ignore[no-untyped-def]
         cut *= 1.5
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def burst_damages(  # type: ignore[no-untyped-def]
-    begin, duration, constant, slope, mass, jacobian, stiffness, ratio, along, factor, knots, lines,
-    known, scales, closed, alone, residue, kept, peak,
+    first, last, begin, duration, constant, slope, mass, jacobian, stiffness, ratio, along, factor,
+    knots, lines, known, scales, closed, alone, residue, kept, peak,
 ):  # fmt: skip
     """Damage of b bursts from rest, ring-down included.
 
     Args:
+        first: of the bursts.
+        last: the one after the last.
         begin: (b + 1,) where each burst's pieces begin in the next three.
         duration: (m,) s; the last of a burst endless.
         constant: (m,) N.
@@ -109,21 +112,20 @@ def burst_damages(  # type: ignore[no-untyped-def]
         closed: (b, n, s) out: damage of the closed cycles, and of the residue's small ends.
         alone: (b, n, s) out: of the burst by itself, its residue as half cycles.
         residue: (b, n, MOST) out: turning points of stress.
-        kept: (b, n) out: how many; -1 where the exact path must be taken.
+        kept: (b, n) -1, out: how many; left so where the exact path must be taken.
         peak: (b, n) out: rad, largest deflection.
     """
     n = stiffness.shape[1]
-    for b in prange(begin.size - 1):
+    for b in range(first, last):
         part = slice(begin[b], begin[b + 1])
         pieces = begin[b + 1] - begin[b]
         nothing, still = np.zeros(pieces, np.complex128), np.zeros(pieces)
         turns, count = swing(
             mass[b], jacobian[b], stiffness[b], ratio, along[b], np.full(n, -1.0), duration[part],
-            constant[part], slope[part], nothing, still, np.empty(n),
+            constant[part], slope[part], nothing, still, np.empty(n), FINE,
         )  # fmt: skip
         size = turns.shape[1]
         if size == 0:
-            kept[b, :] = -1
             continue
         stack, ranges, means = np.empty(size), np.empty(size), np.empty(size)
         for j in range(n):
@@ -144,19 +146,19 @@ def burst_damages(  # type: ignore[no-untyped-def]
                     closed[b, j, s] = total if part_of == 0 else closed[b, j, s] + total
                 if part_of == 0:
                     depth, cycles = finish(stack, depth, ranges, means)
-            first, end = trimmed(stack, depth)
+            low, end = trimmed(stack, depth)
             for s in range(scales.size):
                 outer, inner = 0.0, 0.0
                 for c in range(depth - 1):
                     half = 0.5 * cost_of(
                         top * scales[s] * abs(stack[c + 1] - stack[c]), own_knots, own_lines
                     )
-                    if first <= c < end - 1:
+                    if low <= c < end - 1:
                         inner += half
                     else:
                         outer += half
                 closed[b, j, s] += outer
                 alone[b, j, s] = closed[b, j, s] + inner
-            for c in range(first, end):
-                residue[b, j, c - first] = stress * stack[c]
-            kept[b, j] = end - first
+            for c in range(low, end):
+                residue[b, j, c - low] = stress * stack[c]
+            kept[b, j] = end - low

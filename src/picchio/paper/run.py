@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -111,19 +110,6 @@ class Reproduction(TableResult):
         }
 
 
-@contextmanager
-def compiled_on_one_thread() -> Iterator[None]:
-    """Compiled code on one thread: the batches are small, and threads would wait for each other."""
-    import numba
-
-    before = numba.get_num_threads()
-    numba.set_num_threads(1)
-    try:
-        yield
-    finally:
-        numba.set_num_threads(before)
-
-
 @one_thread()
 def reproduce(
     assume: Assumptions | Mapping[str, float | str] | None = None,
@@ -151,19 +137,18 @@ def reproduce(
     if not isinstance(assume, Assumptions):
         assume = parse_assumptions(f"{name}={value}" for name, value in (assume or {}).items())
     study = Study(assume, worlds, seed, progress)
-    with compiled_on_one_thread():
-        _ = study.base.rivet_poses, study.base.path_poses  # what is out of reach is said at once
-        steps = waterfall(study.base)
-        claims = try_claims(study)
-        figures = {figure.name: figure for figure in all_figures(study, steps)}
-        return Reproduction(
-            study=study,
-            claims=claims,
-            conflicts=tuple(conflicts(study, figures)),
-            equations=equations(study),
-            figures=figures,
-            steps=steps,
-            influences=influences(study),
-            answer=answer(study),
-            origin=provenance([paper_file()], seed=seed),
-        )
+    _ = study.base.rivet_poses, study.base.path_poses  # what is out of reach is said at once
+    steps = waterfall(study.base)
+    claims = try_claims(study)
+    figures = {figure.name: figure for figure in all_figures(study, steps)}
+    return Reproduction(
+        study=study,
+        claims=claims,
+        conflicts=tuple(conflicts(study, figures)),
+        equations=equations(study),
+        figures=figures,
+        steps=steps,
+        influences=influences(study),
+        answer=answer(study),
+        origin=provenance([paper_file()], seed=seed),
+    )

@@ -188,11 +188,21 @@ def _conclude(search: _Search, found: Fit) -> Diagnosis:
         gain=gain,
         next_measurement=next_measurement(system, found, noise, rivals)
         if verdict not in ("nothing-wrong", "named") else None,
-        scores=tuple(row for step in search.steps for row in step.scores),
+        scores=tuple(
+            {"step": number, "accepted": (row["effect"], row["target"]) in step.accepted, **row}
+            for number, step in enumerate(search.steps, 1) for row in step.scores
+        ),
         note=note,
         correlation=correlation(found),
-        extra={"channels": told if judge_on is not system else []},
-        details=_details(search, found, outer, causes),
+        extra={
+            "channels": told if judge_on is not system else [],
+            "stiffness": _stiffness(system, found, causes),
+            "dropped": [
+                {"effect": e.name, "target": e.target, "order": e.values.get("order"), "gain": gain}
+                for e, gain in search.dropped
+            ],
+        },
+        details=_details(search, found, outer),
     )  # fmt: skip
 
 
@@ -241,19 +251,13 @@ def _alternatives(state: State, alike: Mapping[int, Sequence[Pair]]) -> tuple[
     )  # fmt: skip
 
 
-def _details(search: _Search, found: Fit, noise: Mapping[Group, float],
-             causes: tuple[Cause, ...]) -> dict[str, Any]:  # fmt: skip
+def _details(search: _Search, found: Fit, noise: Mapping[Group, float]) -> dict[str, Any]:
     system, judge_on, before = search.system, search.judge_on, search.before
     inner = {**noise, **{g: noise.get(g, 1.0) for g in system.groups}}
     return {
         "steps": [vars(step) for step in search.steps],
         "train": table(system, before.state, found.state, inner),
         "held_out": table(judge_on, before.state, found.state, noise),
-        "dropped": [
-            {"effect": e.name, "target": e.target, "order": e.values.get("order"), "gain": dict(g)}
-            for e, g in search.dropped
-        ],
-        "stiffness": _stiffness(system, found, causes),
         "instruments": instrument_shifts(system, found),
         "systems": {"train": system, "held_out": judge_on},
         "search": search,

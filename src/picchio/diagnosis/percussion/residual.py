@@ -144,6 +144,9 @@ def percussion_residual(
         campaign: its percussion records; others are passed over.
         gravity_stiffness: whether gravity's change with the deflection counts.
 
+    Returns:
+        the fit, and what it leaves: by channel, frequency and pose.
+
     Raises:
         InputError: no record that can be predicted for this robot.
     """

@@ -9,11 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
-from picchio.core.arrays import FloatArray, IndexArray
-
-_BLOCK = 256  # poses that a thread takes at a time
+SPAN = 1024  # poses that a thread takes at a time
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -89,16 +87,37 @@ def _add(part, step, whole):  # type: ignore[no-untyped-def]
     whole[9] += part[9] + 2.0 * (p * d + q * e)
 
 
-@njit(cache=True, error_model="numpy")
-def _some(  # type: ignore[no-untyped-def]
+@njit(cache=True, nogil=True, error_model="numpy")
+def mass_and_jacobian(  # type: ignore[no-untyped-def]
     first, last, parent, rotation, offset, slides, bodies, rows, tip, point, poses, mass, jacobian,
     origin,
 ):  # fmt: skip
-    """Of `mass_and_jacobian`, the poses from `first` to `last` - 1."""
+    """Mass matrices and a point's linear Jacobians at many poses, into arrays of zeros.
+
+    Args:
+        first: of the poses.
+        last: the one after the last.
+        parent: (k + 1,) of the world (which comes first and has none) and of k joints, each after
+            its parent.
+        rotation: (k + 1, 3, 3) of each joint's frame in its parent's, at position zero.
+        offset: (k + 1, 3) m, likewise.
+        slides: (k + 1,) one of prismatic joints.
+        bodies: (k + 1, 10) kg, kg m, kg m^2: mass, first moment, and xx, xy, yy, xz, yz, zz of the
+            inertia about the joint's origin, in its frame.
+        rows: (k + 1,) where a joint stands in the result; negative: nowhere.
+        tip: the joint that carries the point.
+        point: (3,) m in that joint's frame.
+        poses: (p, k) rad or m, of all joints.
+        mass: (p, n, n) kg m^2, kg m, kg, out; zeros where two joints are not above each other.
+        jacobian: (p, 3, n) m or 1, out.
+        origin: (p, 3) m, out: where the point is, world.
+    """
     count = len(parent)
     turned, place, step = np.empty((count, 3, 3)), np.zeros((count, 3)), np.empty((count, 3))
     whole = np.empty((count, 10))
-    turned[0] = np.eye(3)
+    for r in range(3):
+        for c in range(3):
+            turned[0, r, c] = 1.0 if r == c else 0.0
     for s in range(first, last):
         for j in range(1, count):
             _place(j, parent, rotation, offset, slides, poses[s, j - 1], turned, place, step)
@@ -156,55 +175,3 @@ def _some(  # type: ignore[no-untyped-def]
                     a, b, c = b * f - c * e, c * d - a * f, a * e - b * d
                 jacobian[s, 0, rows[i]], jacobian[s, 1, rows[i]], jacobian[s, 2, rows[i]] = a, b, c
             i = parent[i]
-
-
-@njit(cache=True, parallel=True, nogil=True, error_model="numpy")
-def _on_all_cores(  # type: ignore[no-untyped-def]
-    parent, rotation, offset, slides, bodies, rows, tip, point, poses, mass, jacobian, origin
-):
-    count = poses.shape[0]
-    for block in prange((count + _BLOCK - 1) // _BLOCK):
-        _some(
-            block * _BLOCK, min(count, (block + 1) * _BLOCK), parent, rotation, offset, slides,
-            bodies, rows, tip, point, poses, mass, jacobian, origin,
-        )  # fmt: skip
-
-
-def mass_and_jacobian(
-    parent: IndexArray,
-    rotation: FloatArray,
-    offset: FloatArray,
-    slides: IndexArray,
-    bodies: FloatArray,
-    rows: IndexArray,
-    tip: int,
-    point: FloatArray,
-    poses: FloatArray,
-    mass: FloatArray,
-    jacobian: FloatArray,
-    origin: FloatArray,
-) -> None:
-    """Mass matrices and a point's linear Jacobians at many poses, into arrays of zeros.
-
-    Args:
-        parent: (k + 1,) of the world (which comes first and has none) and of k joints, each after
-            its parent.
-        rotation: (k + 1, 3, 3) of each joint's frame in its parent's, at position zero.
-        offset: (k + 1, 3) m, likewise.
-        slides: (k + 1,) one of prismatic joints.
-        bodies: (k + 1, 10) kg, kg m, kg m^2: mass, first moment, and xx, xy, yy, xz, yz, zz of the
-            inertia about the joint's origin, in its frame.
-        rows: (k + 1,) where a joint stands in the result; negative: nowhere.
-        tip: the joint that carries the point.
-        point: (3,) m in that joint's frame.
-        poses: (p, k) rad or m, of all joints.
-        mass: (p, n, n) kg m^2, kg m, kg, out; zeros where two joints are not above each other.
-        jacobian: (p, 3, n) m or 1, out.
-        origin: (p, 3) m, out: where the point is, world.
-    """
-    tables = parent, rotation, offset, slides, bodies, rows, tip, point, poses
-    # To start the threads takes longer than a few poses.
-    if len(poses) <= _BLOCK:
-        _some(0, len(poses), *tables, mass, jacobian, origin)
-    else:
-        _on_all_cores(*tables, mass, jacobian, origin)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from picchio.core.arrays import Vector, symmetric
 from picchio.core.errors import InputError
+from picchio.core.processes import on_threads
 from picchio.robot.urdf.tree import UrdfTree
 
 Array = NDArray[np.float64]
@@ -214,7 +215,7 @@ class RigidModel:
         self, poses: Array, frame: int, where: NDArray[np.intp]
     ) -> tuple[Array, Array, Array]:
         """Mass matrices and Jacobians of n of Pinocchio's coordinates, and a frame's origins."""
-        from picchio.robot.dynamics.rigid_kernel import mass_and_jacobian
+        from picchio.robot.dynamics.rigid_kernel import SPAN, mass_and_jacobian
 
         self._check_frame(frame)
         if poses.ndim != 2 or poses.shape[1] != self.nv:
@@ -227,7 +228,8 @@ class RigidModel:
         every = poses if self._plain else poses @ self._follow.T + self._offset
         turns, parent, rotation, offset, slides, bodies = self._tables()
         tip = self._model.frames[frame]
-        mass_and_jacobian(
+        on_threads(
+            mass_and_jacobian, len(every), SPAN,
             parent, rotation, offset, slides, bodies, rows, tip.parentJoint,
             turns[tip.parentJoint].T @ tip.placement.translation,
             np.require(every, float, ("C", "W")), mass, jacobian, origin,

@@ -25,7 +25,8 @@ def forward(tables, q, residual, jacobian, target, axis, weight):  # type: ignor
     """
     rotation, offset, axes, slides, follow, shift, tool_axis = tables
     m, k = follow.shape
-    turned, other, spin = np.eye(3), np.empty((3, 3)), np.empty((3, 3))
+    turned, other, spin = np.zeros((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    turned[0, 0] = turned[1, 1] = turned[2, 2] = 1.0
     place, arm, linear, angular = np.zeros(3), np.empty(3), np.empty(3), np.empty(3)
     spins, origins = np.empty((m, 3)), np.empty((m, 3))
     for i in range(m):

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from picchio.core.errors import InputError
 from picchio.robot.ik.chain import Chain, tool_chain
-from picchio.robot.ik.kernel import solve_points
+from picchio.robot.ik.kernel import STEPS, solve_points
 
 if TYPE_CHECKING:
     from picchio.robot.flexible_robot import FlexibleRobot
@@ -119,7 +119,7 @@ def solve_many(
     errors = np.empty((len(targets), len(guesses)))
     solve_points(
         chain.tables, guesses, centre, chain.wraps, chain.lower, chain.upper, targets,
-        wanted, weight, redundant and not scattered, found, errors,
+        wanted, weight, redundant and not scattered, STEPS, found, errors,
     )  # fmt: skip
     return _collect(robot, chain, centre, found, errors, 1e-2 if redundant else 1e-5)
 

@@ -19,6 +19,9 @@ from picchio.robot.ik.chain_kernel import (
     square,
 )
 
+STEPS = 100
+"""More than any descent took that ended at its point."""
+
 
 @njit(cache=True)
 def descend(tables, q, lower, upper, target, axis, weight, steps):  # type: ignore[no-untyped-def]
@@ -136,7 +139,7 @@ def relax(tables, q, centre, lower, upper, target, axis, weight, steps):  # type
         for _shorter in range(8):
             for j in range(k):
                 trial[j] = min(max(q[j] + share * step[j], lower[j]), upper[j])
-            error = descend(tables, trial, lower, upper, target, axis, weight, 20)
+            error = descend(tables, trial, lower, upper, target, axis, weight, steps // 5)
             nearer = error < 1e-8 and gap(centre, trial) < before
             if nearer:
                 break
@@ -159,7 +162,19 @@ def unwind(q, centre, wraps, lower, upper):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def solve_points(  # type: ignore[no-untyped-def]
-    tables, starts, centre, wraps, lower, upper, targets, axes, weight, redundant, found, errors
+    tables,
+    starts,
+    centre,
+    wraps,
+    lower,
+    upper,
+    targets,
+    axes,
+    weight,
+    redundant,
+    steps,
+    found,
+    errors,
 ):
     """Every start at every point.
 
@@ -174,6 +189,8 @@ def solve_points(  # type: ignore[no-untyped-def]
         axes: (p, 3) unit.
         weight: m; zero leaves the axis free.
         redundant: move solutions along their self-motion towards the centre.
+        steps: of a descent, and along a self-motion: `STEPS`. (A number that stands in compiled
+            text is a type of its own to Numba: it would compile the descent for each.)
         found: (p, s, k) out: where each start ended.
         errors: (p, s) out: distance left, m.
     """
@@ -181,9 +198,9 @@ def solve_points(  # type: ignore[no-untyped-def]
     for p in range(targets.shape[0]):
         for s in range(starts.shape[0]):
             copy(starts[s], q)
-            error = descend(tables, q, lower, upper, targets[p], axes[p], weight, 100)
+            error = descend(tables, q, lower, upper, targets[p], axes[p], weight, steps)
             unwind(q, centre, wraps, lower, upper)
             if redundant and error < 1e-8:
-                relax(tables, q, centre, lower, upper, targets[p], axes[p], weight, 100)
+                relax(tables, q, centre, lower, upper, targets[p], axes[p], weight, steps)
             copy(q, found[p, s])
             errors[p, s] = error

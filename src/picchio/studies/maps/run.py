@@ -226,11 +226,11 @@ def _here(job: MapJob, folder: Path, missing: list[tuple[int, int]]) -> Generato
         for span in missing:
             yield compute_chunk((job, folder), span)
         return
-    from numba import set_num_threads
+    from numba import get_num_threads, set_num_threads
 
     waiting: deque[Future[tuple[int, int]]] = deque()
-    # Threads within a chunk wait for each other: on a busy machine that doubled processor time.
-    pool = ThreadPoolExecutor(1, initializer=set_num_threads, initargs=(1,))
+    # A thread a core, each with chunks of its own; this one joins what they have done.
+    pool = ThreadPoolExecutor(get_num_threads(), initializer=set_num_threads, initargs=(1,))
     try:
         for span in missing:
             waiting.append(pool.submit(compute_chunk, (job, folder), span))

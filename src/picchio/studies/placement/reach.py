@@ -11,7 +11,7 @@ from picchio.core.arrays import FloatArray, IndexArray
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.ik.chain import Chain, tool_chain
 from picchio.robot.ik.inverse_kinematics import TOLERANCE, spread_evenly, start_ranges
-from picchio.robot.ik.kernel import solve_points
+from picchio.robot.ik.kernel import STEPS, solve_points
 from picchio.studies.placement.work import Work
 
 # Poses that reach the work where it stands: candidates by inverse kinematics, many at once.
@@ -123,7 +123,7 @@ class Reach:
         error = np.empty(q.shape[:2])
         solve_points(
             chain.tables, guesses, self._middle, chain.wraps, chain.lower, chain.upper,
-            targets, axes, weight, False, q, error,
+            targets, axes, weight, False, STEPS, q, error,
         )  # fmt: skip
         q[error >= TOLERANCE] = np.nan
         _drop_twins(q)

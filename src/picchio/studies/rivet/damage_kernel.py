@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from picchio.core.arrays import FloatArray
 from picchio.fatigue.counting.kernel import finish, push
 from picchio.vibration.batch.modal_kernel import decompose, modes_of
-from picchio.vibration.batch.turning_kernel import FINE, turns_from_rest
+from picchio.vibration.batch.turning_kernel import turns_from_rest
 
-_BLOCK = 16
+SPAN = 16  # rivets that a thread takes at a time
 
 
 @njit(cache=True, error_model="numpy")
@@ -62,7 +62,7 @@ def history_damage(turns, factor, knots, lines, stack, ranges, means):  # type: 
 @njit(cache=True, error_model="numpy")
 def swing(  # type: ignore[no-untyped-def]
     mass, jacobian, stiffness, joint_ratio, along, limit, duration, constant, slope, amplitude,
-    wave, frequency, per_cycle=FINE,
+    wave, frequency, per_cycle,
 ):  # fmt: skip
     """Every joint's turning points from rest, ring-down included.
 
@@ -104,15 +104,17 @@ def swing(  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, parallel=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def damages(  # type: ignore[no-untyped-def]
-    duration, constant, slope, amplitude, wave, mass, jacobian, blows, place, stiffness,
-    joint_ratio, along, factor, enough, knots, lines, known, frequency, lowest, highest, damage,
-    per_cycle=FINE,
+    first, last, duration, constant, slope, amplitude, wave, mass, jacobian, blows, place,
+    stiffness, joint_ratio, along, factor, enough, knots, lines, known, frequency, lowest, highest,
+    damage, per_cycle,
 ):  # fmt: skip
     """Extremes and damage of p rivets: at many poses, or one varied many times.
 
     Args:
+        first: of the rivets.
+        last: the one after the last.
         duration: (b, m) s, of the pieces of b bursts, the last endless; see `PiecewiseForce`.
         constant: (b, m) N.
         slope: (b, m) N/s.
@@ -130,38 +132,35 @@ def damages(  # type: ignore[no-untyped-def]
         knots: (n, k) Pa, of the S-N curves; see `cost_of`.
         lines: (n, k + 1, 3).
         known: (n,) how many of the k knots a curve has; below zero for a joint without one.
-        frequency: (p, n) Hz, out; NaN where the mass matrix is not positive definite.
-        lowest: (p, n) rad, out; NaN where a mode is not underdamped, or rings for too long:
-            take the exact path there.
+        frequency: (p, n) Hz, NaN, out; left so where the mass matrix is not positive definite.
+        lowest: (p, n) rad, NaN, out; left so where a mode is not underdamped, or rings for too
+            long: take the exact path there.
         highest: (p, n) rad, out.
         damage: (p, n) out; zero for a joint without a curve.
         per_cycle: see `turns_from_rest`.
     """
-    poses, n = stiffness.shape
-    for block in prange((poses + _BLOCK - 1) // _BLOCK):
-        limit = np.empty(n)
-        for s in range(block * _BLOCK, min(poses, (block + 1) * _BLOCK)):
-            frequency[s, :] = np.nan
-            lowest[s, :] = np.nan
-            for j in range(n):
-                stress = factor[s, j] * stiffness[s, j]
-                limit[j] = 2.0 * enough[j] / stress if stress > 0.0 else np.inf
-            q, b = place[s], blows[s]
-            turns, count = swing(
-                mass[q], jacobian[q], stiffness[s], joint_ratio[s], along[q], limit,
-                duration[b], constant[b], slope[b], amplitude[b], wave[b], frequency[s],
-                per_cycle,
-            )  # fmt: skip
-            size = turns.shape[1]
-            if size == 0:
-                continue
-            stack, ranges, means = np.empty(size), np.empty(size), np.empty(size)
-            for j in range(n):
-                own = turns[j, : count[j]]
-                lowest[s, j], highest[s, j] = own.min(), own.max()
-                damage[s, j] = 0.0
-                if known[j] >= 0 and highest[s, j] - lowest[s, j] >= limit[j]:
-                    damage[s, j] = history_damage(
-                        own, factor[s, j] * stiffness[s, j], knots[j, : known[j]],
-                        lines[j, : known[j] + 1], stack, ranges, means,
-                    )  # fmt: skip
+    n = stiffness.shape[1]
+    limit = np.empty(n)
+    for s in range(first, last):
+        for j in range(n):
+            stress = factor[s, j] * stiffness[s, j]
+            limit[j] = 2.0 * enough[j] / stress if stress > 0.0 else np.inf
+        q, b = place[s], blows[s]
+        turns, count = swing(
+            mass[q], jacobian[q], stiffness[s], joint_ratio[s], along[q], limit,
+            duration[b], constant[b], slope[b], amplitude[b], wave[b], frequency[s],
+            per_cycle,
+        )  # fmt: skip
+        size = turns.shape[1]
+        if size == 0:
+            continue
+        stack, ranges, means = np.empty(size), np.empty(size), np.empty(size)
+        for j in range(n):
+            own = turns[j, : count[j]]
+            lowest[s, j], highest[s, j] = own.min(), own.max()
+            damage[s, j] = 0.0
+            if known[j] >= 0 and highest[s, j] - lowest[s, j] >= limit[j]:
+                damage[s, j] = history_damage(
+                    own, factor[s, j] * stiffness[s, j], knots[j, : known[j]],
+                    lines[j, : known[j] + 1], stack, ranges, means,
+                )  # fmt: skip

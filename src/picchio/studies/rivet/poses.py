@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
+from picchio.core.processes import on_threads
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
 from picchio.fatigue.shaft_stress import stress_per_torque
@@ -85,7 +86,8 @@ def damage_at(
     )  # fmt: skip
     left = np.ones(len(poses), dtype=bool)
     if compiled and many.compiled:
-        from picchio.studies.rivet.damage_kernel import damages
+        from picchio.studies.rivet.damage_kernel import SPAN, damages
+        from picchio.vibration.batch.turning_kernel import FINE
 
         factor = stress_per_torque(model.robot.flexible_joints, 0.0)
         mass, jacobian = many.mass_and_jacobian()
@@ -94,11 +96,12 @@ def damage_at(
             steady = factor * many.static_torque(excitation.preload, along)
             factors = factors * raised(curves, steady)
         here = np.arange(len(poses))
-        damages(
+        on_threads(
+            damages, len(poses), SPAN,
             *stacked([force]), mass, jacobian, np.zeros_like(here), here, many.stiffness,
             np.tile(many.damping_ratio, (len(poses), 1)), along, factors,
             *curve_tables(curves), found.natural_frequencies, found.lowest, found.highest,
-            found.damage,
+            found.damage, FINE,
         )  # fmt: skip
         left = np.isnan(found.lowest[:, 0]) & ~np.isnan(found.natural_frequencies[:, 0])
     for s in np.flatnonzero(left):

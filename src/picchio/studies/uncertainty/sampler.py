@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from picchio.core.arrays import FloatArray, IndexArray
+from picchio.core.processes import on_threads
 from picchio.fatigue.counting.counter import rainflow
 from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.miner import damage, utilisation
@@ -197,7 +198,7 @@ class Sampler:
         self, draw: _Draw, op: Operation, nominal: ManyPoses
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Damage and utilisation (k, m, p), peak torque and the torque at rest (n, m, p)."""
-        from picchio.studies.rivet.damage_kernel import damages
+        from picchio.studies.rivet.damage_kernel import SPAN, damages
         from picchio.vibration.batch.turning_kernel import COARSE, FINE
 
         m, p = draw.count, len(op.poses)
@@ -226,9 +227,10 @@ class Sampler:
         if not self._shafts_only:
             steady = static[place][:, columns] * (per * draw.thinner)[d]
             factor[:, columns] *= raised(self.stress.curves, steady)
-        frequency, low, high, damaged = np.empty((4, m * p, springs.shape[1]))
+        frequency, low, high, damaged = np.full((4, m * p, springs.shape[1]), np.nan)
         stiffness = springs[place] * draw.stiffness[d]
-        damages(
+        on_threads(
+            damages, m * p, SPAN,
             *stacked(forces), mass, jacobian, d if len(forces) > 1 else np.zeros_like(d), place,
             stiffness, ratio[world] * draw.damping[d], np.tile(op.direction, (len(mass), 1)),
             factor, *curve_tables(curves), frequency, low, high, damaged,
@@ -424,6 +426,7 @@ class _Draw:
         which = next(k for k, each in enumerate(sampler.task.operations) if each is op)
         if sampler._modal and not self.others:
             from picchio.studies.rivet.damage_kernel import swing
+            from picchio.vibration.batch.turning_kernel import FINE
 
             many = sampler._places[which]
             mass, jacobian = many.mass_and_jacobian()
@@ -433,7 +436,7 @@ class _Draw:
             turns, count = swing(
                 mass[i], jacobian[i], stiffness, many.damping_ratio * self.damping[d],
                 op.direction, np.full(len(stiffness), -1.0), burst[0], burst[1], burst[2],
-                burst[3], burst[4], np.empty(len(stiffness)),
+                burst[3], burst[4], np.empty(len(stiffness)), FINE,
             )  # fmt: skip
             if len(count):
                 static = sampler.static_torque[which][i]

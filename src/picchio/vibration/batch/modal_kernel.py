@@ -67,9 +67,10 @@ def _jacobi_eigh(a: FloatArray, vectors: FloatArray) -> None:
     """
     n, _, lanes = a.shape
     cosine, sine = np.empty(lanes), np.empty(lanes)
-    vectors[:] = 0.0
     for i in range(n):
-        vectors[i, i] = 1.0
+        for j in range(n):
+            for k in range(lanes):
+                vectors[i, j, k] = 1.0 if i == j else 0.0
     for _ in range(_SWEEPS):
         far = 0
         for p in range(n - 1):

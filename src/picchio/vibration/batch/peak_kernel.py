@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
-from picchio.core.arrays import ComplexArray, FloatArray
 from picchio.vibration.batch.modal_kernel import (
     KERNEL,
     coefficients,
@@ -15,16 +14,18 @@ from picchio.vibration.batch.modal_kernel import (
 )
 from picchio.vibration.batch.top_kernel import (
     TERMS,
+    TILE,
     highest,
     joint_norms,
     power_series,
     room_for,
     sample,
-    steps_of,
+    samples_of,
 )
 
 # So many matrices are decomposed side by side; more would not stay near the processor.
 _BLOCK = 64
+SPAN = 8 * _BLOCK  # poses that a thread takes at a time
 
 
 @njit(**KERNEL)
@@ -57,12 +58,8 @@ def _pose_peaks(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Peaks (n,) and their directions (n, 3) at a pose; or how many samples need room first."""
     n = poles.shape[0]
-    count, total = 0, 0.0
     while True:
-        count, total = 0, 0.0
-        for p in range(length.shape[0]):
-            count += steps_of(length[p], max(omega[n - 1], wave[p]))
-            total += length[p]
+        count, total = samples_of(length, wave, omega[n - 1])
         if count > room.time.shape[0]:
             break
         sample(poles, rows, length, wave, omega[n - 1], room)
@@ -99,14 +96,12 @@ def _block_peaks(  # type: ignore[no-untyped-def]
     first, last, periodic, start, duration, constant, slope, amplitude, wave, mass, jacobian,
     stiffness, joint_ratio, along, frequency, peak, direction,
 ):  # fmt: skip
-    """`peaks` of the poses from `first` to `last` - 1.
+    """`peaks` of one block.
 
-    A function of its own, so that the compiler's slow passes for parallel loops never see it.
+    A function of its own: as one loop over the blocks it takes 15 % longer.
     """
     n = stiffness.shape[1]
     fixed = along.shape[0] > 0
-    values, vectors = np.empty((n, n, last - first)), np.empty((n, n, last - first))
-    decompose(mass[first:last], stiffness[first:last], values, vectors)
     omega, shapes, pull = np.empty(n), np.empty((n, n)), np.empty((n, n, 4))
     g, terms, free, powers = (
         np.empty(3),
@@ -114,14 +109,13 @@ def _block_peaks(  # type: ignore[no-untyped-def]
         np.empty((n, 2)),
         np.empty((TERMS, n, 2)),
     )
-    room = room_for(n, 256)
+    room = room_for(n, 32 * TILE)
     poles = np.empty(n, dtype=np.complex128)
     rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
     endless, length, nothing = np.isinf(duration[-1]), duration.copy(), np.empty(0)
+    values, vectors = np.empty((n, n, last - first)), np.empty((n, n, last - first))
+    decompose(mass[first:last], stiffness[first:last], values, vectors)
     for s in range(first, last):
-        frequency[s, :] = np.nan
-        peak[s, :] = np.nan
-        direction[s, :, :] = np.nan
         if not modes_of(
             s - first, values, vectors, stiffness[s], joint_ratio, omega, shapes, frequency[s],
             poles,
@@ -134,8 +128,8 @@ def _block_peaks(  # type: ignore[no-untyped-def]
             length[-1] = 2.0 * np.pi / omega[0]
         while True:
             more = _pose_peaks(
-                periodic, start, length, constant, slope, amplitude, wave, endless, omega, poles,
-                rows, powers, pull, g, free, terms, room, peak[s], direction[s],
+                periodic, start, length, constant, slope, amplitude, wave, endless, omega,
+                poles, rows, powers, pull, g, free, terms, room, peak[s], direction[s],
             )  # fmt: skip
             if more == 0:
                 break
@@ -146,27 +140,16 @@ def _block_peaks(  # type: ignore[no-untyped-def]
                     direction[s, j, d] = along[s, d]
 
 
-@njit(cache=True, parallel=True, nogil=True, error_model="numpy")
-def peaks(
-    periodic: bool,
-    start: FloatArray,
-    duration: FloatArray,
-    constant: FloatArray,
-    slope: FloatArray,
-    amplitude: ComplexArray,
-    wave: FloatArray,
-    mass: FloatArray,
-    jacobian: FloatArray,
-    stiffness: FloatArray,
-    joint_ratio: FloatArray,
-    along: FloatArray,
-    frequency: FloatArray,
-    peak: FloatArray,
-    direction: FloatArray,
-) -> None:
+@njit(cache=True, nogil=True, error_model="numpy")
+def peaks(  # type: ignore[no-untyped-def]
+    first, last, periodic, start, duration, constant, slope, amplitude, wave, mass, jacobian,
+    stiffness, joint_ratio, along, frequency, peak, direction,
+):  # fmt: skip
     """Natural frequencies and peak deflections at many poses.
 
     Args:
+        first: of the poses; a multiple of how many are decomposed side by side.
+        last: the one after the last.
         periodic: steady state, or from rest with an endless last piece.
         start: (m,) s, of the pieces of the force; see `PiecewiseForce` for these.
         duration: (m,) s.
@@ -179,14 +162,14 @@ def peaks(
         stiffness: (p, n) N m/rad.
         joint_ratio: (n,) damping ratios.
         along: (p, 3) force directions, or (0, 3) for the worst of all directions.
-        frequency: (p, n) Hz, out; NaN where the pose's mass matrix is not positive definite.
-        peak: (p, n) rad, out; NaN where a mode is not underdamped: take the exact path there.
+        frequency: (p, n) Hz, NaN, out; left so where the mass matrix is not positive definite.
+        peak: (p, n) rad, NaN, out; left so where a mode is not underdamped: take the exact
+            path there.
         direction: (p, n, 3) out; of a fixed direction, itself.
     """
-    poses = stiffness.shape[0]
-    for block in prange((poses + _BLOCK - 1) // _BLOCK):
+    for begin in range(first, last, _BLOCK):
         _block_peaks(
-            block * _BLOCK, min(poses, (block + 1) * _BLOCK), periodic, start, duration, constant,
-            slope, amplitude, wave, mass, jacobian, stiffness, joint_ratio, along, frequency, peak,
+            begin, min(last, begin + _BLOCK), periodic, start, duration, constant, slope,
+            amplitude, wave, mass, jacobian, stiffness, joint_ratio, along, frequency, peak,
             direction,
         )  # fmt: skip

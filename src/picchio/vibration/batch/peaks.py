@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.processes import on_threads
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
 from picchio.model.linear_system import LinearSystem, modal_damping_matrix
@@ -75,9 +76,10 @@ def batch_peaks(
         np.full((poses, n), np.nan), np.full((poses, n), np.nan), np.full((poses, n, 3), np.nan)
     )
     if compiled:
-        from picchio.vibration.batch.peak_kernel import peaks
+        from picchio.vibration.batch.peak_kernel import SPAN, peaks
 
-        peaks(
+        on_threads(
+            peaks, poses, SPAN,
             periodic, force.start, force.duration, force.constant, force.slope,
             force.amplitude, force.angular_frequency, _plain(mass_matrix), _plain(jacobian),
             springs, ratios, along,

@@ -93,6 +93,25 @@ def steps_of(duration: float, rate: float) -> int:
 
 
 @njit(**KERNEL)
+def samples_of(length: FloatArray, wave: FloatArray, fastest: float) -> tuple[int, float]:
+    """How many samples all pieces take, and how long they are, s.
+
+    A function of its own: what begins as a number in the text is a type of its own to Numba, which
+    then compiles all that it is handed to once more.
+
+    Args:
+        length: (m,) s, of the pieces.
+        wave: (m,) rad/s.
+        fastest: rad/s, of the modes.
+    """
+    count, total = 0, 0.0
+    for p in range(length.shape[0]):
+        count += steps_of(length[p], max(fastest, wave[p]))
+        total += length[p]
+    return count, total
+
+
+@njit(**KERNEL)
 def _double(factor, real, imag, next_real, next_imag):  # type: ignore[no-untyped-def]
     """The next states of a decay, from as many before them."""
     c, d = factor.real, factor.imag

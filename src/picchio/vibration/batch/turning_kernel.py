@@ -96,7 +96,7 @@ def turns_from_rest(
     slope: FloatArray,
     amplitude: ComplexArray,
     wave: FloatArray,
-    per_cycle: float = FINE,
+    per_cycle: float,
 ) -> tuple[FloatArray, IndexArray]:
     """Every joint's deflection at rest, at its turns and at the end of the ring-down.
 

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from html import escape
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
-from picchio.core.provenance import package_version
 from picchio.robot.annotations.flexibility import estimate_notice
 from picchio.studies.envelopes import icosphere
 from picchio.visuals.kinematics import frames, world
 from picchio.visuals.live.session import COARSE, FINE, Session
 from picchio.visuals.scene.overlay import Scale, ring_radius
-from picchio.visuals.scene.page import Packer, _matrix, _viewer, script_json
+from picchio.visuals.scene.page import Packer, _matrix, page_html
 from picchio.visuals.scene.robot.body import build_body
 from picchio.visuals.scene.robot.mesh import ring, turned_to
 
-_SCRIPTS = ("1-stage.js", "2-talk.js", "3-hands.js", "4-panel.js", "5-keep.js")
+_SCRIPTS = ("1-parts.js", "2-talk.js", "3-hands.js", "4-panel.js", "5-keep.js")
 
 
 def live_html(session: Session) -> str:
@@ -32,21 +30,14 @@ def live_html(session: Session) -> str:
     """
     packer = Packer()
     data = _data(session, packer)
-    here = files("picchio.visuals.live") / "page_files"
-    shared = files("picchio.visuals.scene") / "page_files"
-    scripts = [shared / "0-data.js", *(here / name for name in _SCRIPTS)]
-    parts = {
-        "title": escape(session.robot.name),
-        "notice": escape(data["notice"]),
-        "version": escape(package_version()),
-        "style": (here / "page.css").read_text("utf-8"),
-        "viewer": _viewer(),
-        "data": script_json(data),
-        "arrays": packer.text(),
-        "script": "\n".join(each.read_text("utf-8") for each in scripts),
-    }
-    pieces = (here / "page.html").read_text("utf-8").split("@@")
-    return "".join(parts[p] if k % 2 else p for k, p in enumerate(pieces))
+    return page_html(
+        "picchio.visuals.live", _SCRIPTS, packer,
+        kind="explore",
+        told=escape(f"3-D robot {session.robot.name}: drag the tool or the arrow"),
+        data=data,
+        policy="",  # the server's, which names its own socket
+        notice=escape(data["notice"]),
+    )  # fmt: skip
 
 
 def _data(session: Session, packer: Packer) -> dict[str, Any]:
@@ -89,13 +80,16 @@ def _data(session: Session, packer: Packer) -> dict[str, Any]:
     lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
     upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
     points = np.array([place[:3, 3] for place in places.values()])
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    view = np.array([0.55, -1.0, 0.5])
+    eye = middle + 2.1 * body.reach * view / np.linalg.norm(view)
     return {
-        "robot": robot.name,
+        "title": robot.name,
         "notice": estimate_notice(robot.name, robot.origins),
         "frames": nodes, "meshes": meshes, "items": items, "rings": rings, "spheres": spheres,
         "reach": body.reach,
-        "middle": (0.5 * (points.min(axis=0) + points.max(axis=0))).tolist(),
-        "floor": float(points[0][2]),
+        "camera": [eye.tolist(), middle.tolist()],
+        "floor": {"cell": 0.1 * body.reach, "squares": 24, "at": [0.0, 0.0, float(points[0][2])]},
         "joints": [{"name": name, "lower": float(low), "upper": float(high),
                     "unit": "m" if _slides(robot, name) else "rad"}
                    for name, low, high in zip(robot.joint_names, lower, upper, strict=True)],

@@ -21,6 +21,7 @@ from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from picchio.core.errors import PicchioError
 from picchio.visuals.live.session import COARSE, FINE, Session
+from picchio.visuals.scene.page import POLICY
 
 _STILL = 0.35  # s without a gesture: the hand rests
 _LONGEST = 100_000  # bytes of a message
@@ -215,11 +216,7 @@ class _Page(RequestHandler):
         if not self._server.own(self.request.host):
             raise HTTPError(403)
         where = self.request.host
-        self.set_header(
-            "Content-Security-Policy",
-            "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
-            f"img-src data: blob:; connect-src ws://{where}",
-        )
+        self.set_header("Content-Security-Policy", f"{POLICY}; connect-src ws://{where}")
         self.set_header("Cache-Control", "no-store")
         self.set_header("Referrer-Policy", "no-referrer")
         self.finish(self._server._page)

@@ -95,7 +95,11 @@ class View:
         return replace(parse_channel(name, unit)[0], name=short)
 
     def motion(self, name: str) -> FloatArray:
-        """(m,) a series of the nominal motion: angle, velocity, acceleration, body."""
+        """(m,) a series of the nominal motion, SI.
+
+        Args:
+            name: angle, velocity, acceleration, or body: the torque that the gear carries.
+        """
         nominal = self.system.predictors[self.segment.record].nominal
         return getattr(nominal, name)[self.group[1]][self.segment.samples]
 
@@ -121,9 +125,14 @@ def _telling(found: Sequence[View], view: View) -> tuple[str, FloatArray, list[V
     return best, series[best], same
 
 
-def _views(diagnosis: Diagnosis, which: str) -> list[View]:
-    """All torques in the band and twists of the records "train" or "held_out"."""
-    details = diagnosis.details
+def views(diagnosis: Diagnosis, which: str) -> list[View]:
+    """What is left of every torque and twist of motion records, before and after.
+
+    Args:
+        diagnosis: of a campaign that has such records.
+        which: the records "train", which were fitted to, or those "held_out".
+    """
+    details = diagnosis.details.get("motion", diagnosis).details
     system: System = details["systems"][which]
     before, after = (residual_of(system, details[key]) for key in ("baseline", "extended"))
     noise = {(row["record"], row["channel"]): row["noise"] for row in details[which]}
@@ -168,7 +177,7 @@ class MotionFigures(Pictures):
     def __init__(self, diagnosis: Diagnosis) -> None:
         self.diagnosis = diagnosis
         self.changed = bool(diagnosis.details["extended"].effects)
-        self.train = _views(diagnosis, "train")
+        self.train = views(diagnosis, "train")
 
     def _worst(self, found: Sequence[View]) -> list[View]:
         """The torque and the twist, if measured, that the baseline leaves most of over its noise.
@@ -218,7 +227,7 @@ class MotionFigures(Pictures):
 
     def traces(self) -> list[Trace]:
         """Every torque and twist of every record, the one that is missed most first."""
-        held = _views(self.diagnosis, "held_out") if "held_out" in self.diagnosis.details else []
+        held = views(self.diagnosis, "held_out") if "held_out" in self.diagnosis.details else []
         made: dict[tuple[str, str], Trace] = {}
         every = [(v, "") for v in self.train] + [(v, ", held out") for v in held]
         for view, told in sorted(every, key=lambda each: -rms(each[0].before) / each[0].noise):
@@ -293,7 +302,7 @@ class MotionFigures(Pictures):
         if gain is None or not self.changed or not gain.held_out_records:
             return []
         made = []
-        for view in self._worst(_views(self.diagnosis, "held_out")):
+        for view in self._worst(views(self.diagnosis, "held_out")):
             simulated = {"before": view.measured - view.before, "after": view.measured - view.after}
             was, now = (rms(x) / rms(view.measured) for x in (view.before, view.after))
             caption = (

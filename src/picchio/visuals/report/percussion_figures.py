@@ -89,7 +89,11 @@ class View:
         return np.asarray(start[start <= self.time[-1]])
 
     def aligned(self, predictions: dict[str, FloatArray]) -> FloatArray:
-        """(m,) SI, the channel as predicted, a free offset as the measurement's."""
+        """(m,) SI, the channel as predicted, a free offset as the measurement's.
+
+        Args:
+            predictions: channel -> (m,) SI, of the record.
+        """
         predicted = predictions[self.channel.name]
         if self.record.setup.steady or self.channel.kind.free_offset:
             predicted = predicted + float(np.mean(self.measured - predicted))

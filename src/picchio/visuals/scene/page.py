@@ -6,6 +6,7 @@ import base64
 import hashlib
 import json
 import zlib
+from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 from importlib.util import find_spec
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from picchio.core.provenance import package_version
 from picchio.visuals.kinematics import Frame
 from picchio.visuals.scene.robot.mesh import Mesh
 
@@ -73,40 +75,63 @@ def script_json(value: Any) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-# One scope, in this order.
-_SCRIPTS = (
-    "0-data.js",
-    "1-robot.js",
-    "2-overlay.js",
-    "3-controls.js",
-    "4-answers.js",
-    "5-stage.js",
+POLICY = (
+    "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:"
 )
+"""What a page may load: what is in it."""
+# One scope, in this order.
+_SCRIPTS = ("1-robot.js", "2-overlay.js", "3-controls.js", "4-answers.js", "5-items.js")
+
+
+def page_html(package: str, scripts: Sequence[str], packer: Packer, **parts: Any) -> str:
+    """A page of a robot in 3-D: the common frame, and what one kind of page has of its own.
+
+    Args:
+        package: whose folder `page_files` has `body.html`, `page.css` and the scripts.
+        scripts: names of files, in order; they share one scope with `common/*.js`.
+        packer: the arrays.
+        **parts: "kind" (of the page, a word), "told" (of the picture, to who cannot see it),
+            "data" (what the scripts read, "title" among it), "policy" (HTML of the head), and what
+            the body names. Escaped where a name may be in it.
+
+    Returns:
+        HTML that loads nothing.
+    """
+    own = files(package) / "page_files"
+    common = files("picchio.visuals.scene") / "page_files" / "common"
+    code = [common / "data.js", common / "stage.js", *(own / name for name in scripts)]
+    parts |= {
+        "title": escape(parts["data"]["title"]),
+        "version": escape(package_version()),
+        "style": "".join((folder / "page.css").read_text("utf-8") for folder in (common, own)),
+        "viewer": _viewer(),
+        "data": script_json(parts["data"]),
+        "arrays": packer.text(),
+        "script": "\n".join(each.read_text("utf-8") for each in code),
+    }
+    for page in (own / "body.html", common / "page.html"):
+        # Split at the marks rather than replaced one after another: names may look like marks.
+        pieces = page.read_text("utf-8").split("@@")
+        parts["body"] = "".join(parts[p] if k % 2 else p for k, p in enumerate(pieces))
+    return str(parts["body"])
 
 
 def scene_html(scene: Scene) -> str:
     """The page; every name in it is data, never markup or code."""
-    folder = files("picchio.visuals.scene") / "page_files"
     packer = Packer()
-    data = scene_data(scene, packer)
-    parts = {
-        "title": escape(scene.title),
-        "subtitle": escape(scene.subtitle),
-        "judged": "".join(
+    return page_html(
+        "picchio.visuals.scene", _SCRIPTS, packer,
+        kind="scene",
+        told=escape(f"3-D scene of {scene.title}"),
+        data=scene_data(scene, packer),
+        policy=f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n',
+        subtitle=escape(scene.subtitle),
+        judged="".join(
             f'<p id="{name}">{escape(text)}</p>'
             for name, text in (("estimated", scene.notice), ("judged", scene.verdict))
             if text
         ),
-        "version": escape(scene.version),
-        "style": (folder / "page.css").read_text("utf-8"),
-        "viewer": _viewer(),
-        "data": script_json(data),
-        "arrays": packer.text(),
-        "script": "\n".join((folder / name).read_text("utf-8") for name in _SCRIPTS),
-    }
-    # Split at the marks rather than replaced one after another: names may look like marks.
-    pieces = (folder / "page.html").read_text("utf-8").split("@@")
-    return "".join(parts[p] if k % 2 else p for k, p in enumerate(pieces))
+    )  # fmt: skip
 
 
 def scene_data(scene: Scene, packer: Packer) -> dict[str, Any]:

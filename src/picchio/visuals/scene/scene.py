@@ -11,7 +11,6 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.html import Page
 from picchio.core.processes import safe_start
-from picchio.core.provenance import package_version
 from picchio.core.results import Result
 from picchio.studies.envelopes import DirectionEnvelope
 from picchio.visuals.kinematics import Frame
@@ -89,7 +88,6 @@ class Scene(Page, Result):
     floor: dict[str, Any] = field(default_factory=dict)
     chosen: int = 0
     reach: float = 1.0
-    version: str = field(default_factory=package_version)
     file: Path | None = None
 
     def html(self) -> str:

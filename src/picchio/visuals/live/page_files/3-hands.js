@@ -1,14 +1,6 @@
 // --- hands: drag the tool, drag the arrow -------------------------------------------------
-const ray = new THREE.Raycaster(), plane = new THREE.Plane(), point = new THREE.Vector3();
+const plane = new THREE.Plane(), point = new THREE.Vector3();
 let held = null;
-
-function aim(event) {
-  const box = byId("pane").getBoundingClientRect();
-  const at = new THREE.Vector2(((event.clientX - box.left) / box.width) * 2 - 1,
-    1 - ((event.clientY - box.top) / box.height) * 2);
-  viewer.camera.updateMatrixWorld(true);
-  ray.setFromCamera(at, viewer.camera);
-}
 
 // A handle is as large as a finger, whatever is drawn.
 function near(object, event) {
@@ -58,6 +50,4 @@ function hands() {
   pane.addEventListener("pointermove", drag, true);
   for (const end of ["pointerup", "pointercancel"])
     pane.addEventListener(end, (event) => { if (held) event.stopPropagation(); held = null; }, true);
-  for (const button of document.querySelectorAll("#views button"))
-    button.onclick = () => look(button.dataset.view);
 }

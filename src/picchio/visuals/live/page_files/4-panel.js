@@ -5,12 +5,6 @@ const HEADS = [["joint", ""], ["peak", "mrad"], ["worst", "mrad"], ["torque", "N
   ["used", "%"], ["life, rivets", "P10 to P90"]];
 const rows = {}, sliders = [];
 
-function element(name, properties, ...children) {
-  const made = Object.assign(document.createElement(name), properties);
-  made.append(...children);
-  return made;
-}
-
 function say(text, bad) {
   byId("state").textContent = text;
   byId("state").className = bad ? "bad" : "";

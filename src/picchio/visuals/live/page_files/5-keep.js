@@ -1,11 +1,4 @@
 // --- keep: what is on the screen as a file ------------------------------------------------
-function download(name, content, type) {
-  const link = element("a", { download: `${data.robot.replace(/[^\w-]/g, "_")}-${name}` });
-  link.href = content.startsWith("data:") ? content : URL.createObjectURL(new Blob([content], { type }));
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-}
-
 function table() {
   const lines = [["model", "joint", "peak_deflection [rad]", "worst_deflection [rad]", "worst_x", "worst_y", "worst_z",
     "peak_torque [N*m]", "stress [Pa]", "utilisation", "drive_utilisation", "life [rivets]", "life_p10 [rivets]", "life_p90 [rivets]"]];
@@ -27,7 +20,7 @@ function svg() {
   const at = [0, 170, 250, 330, 410, 490, 560];
   const text = (x, y, content, bold) => lines.push(`<text x="${x}" y="${y}"${bold ? ' font-weight="bold"' : ""}>${clean(content)}</text>`);
   const pose = now.pose.map((q, j) => `${data.joints[j].name} ${q.toFixed(4)}`).join(", ");
-  text(12, h + 22, `${data.robot}: ${byId("robot-life").textContent}`, true);
+  text(12, h + 22, `${data.title}: ${byId("robot-life").textContent}`, true);
   text(12, h + 40, `pose: ${pose}`);
   text(12, h + 58, `force along (${now.direction.map((x) => x.toFixed(3)).join(", ")}); ` +
     Object.entries(blowSliders).map(([key, made]) => `${BLOWS[key][0]} ${made.out.textContent} ${BLOWS[key][1]}`).join(", "));
@@ -48,7 +41,6 @@ function kept({ toml, written, poses, problem }) {
 function keep() {
   byId("write").textContent = `put the pose into ${data.file}`;
   byId("write").onclick = () => socket.send(JSON.stringify({ write: true }));
-  byId("png").onclick = () => download("view.png", viewer.capture_image());
   byId("svg").onclick = () => download("view.svg", svg(), "image/svg+xml");
   byId("csv").onclick = () => download("values.csv", csv(), "text/csv");
   byId("toml").onclick = () => socket.send(JSON.stringify({ toml: true }));

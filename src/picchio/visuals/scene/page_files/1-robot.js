@@ -1,20 +1,10 @@
 // --- robot ------------------------------------------------------------------------------
-const turn = new THREE.Matrix4(), own = new THREE.Matrix4(), axis = new THREE.Vector3();
-
 function pathOf(layer, node) {
   return ROOT.concat(layer, node ? node.split("/") : []);
 }
 
 function place(layer, frame, moved) {
-  own.fromArray(frame.matrix);
-  if (frame.axis) {
-    axis.fromArray(frame.axis);
-    const at = frame.position + moved;
-    if (frame.prismatic) turn.makeTranslation(...axis.multiplyScalar(at).toArray());
-    else turn.makeRotationAxis(axis, at);
-    own.multiply(turn);
-  }
-  viewer.set_transform(pathOf(layer, frame.path), own.toArray());
+  viewer.set_transform(pathOf(layer, frame.path), jointAt(frame, frame.position + moved).toArray());
 }
 
 const moving = data.frames.filter((frame) => frame.axis && frame.follows);

@@ -21,29 +21,21 @@ function drawOverlay() {
   viewer.set_dirty();
 }
 
-function fillBar(element, scale) {
-  element.replaceChildren();
-  const strip = document.createElement("i"), ends = document.createElement("b");
-  strip.style.background = `linear-gradient(90deg, ${scale.colours.join(", ")})`;
-  for (const text of ["0", `${Number(scale.top.toPrecision(3))} ${scale.unit}`]) {
-    const end = document.createElement("span");
-    end.textContent = text;
-    ends.append(end);
-  }
-  element.append(strip, ends);
+function fillBar(bar, scale) {
+  const ends = ["0", `${Number(scale.top.toPrecision(3))} ${scale.unit}`];
+  bar.replaceChildren(element("i"), element("b", {}, ...ends.map((text) => element("span", {}, text))));
+  bar.firstChild.style.background = `linear-gradient(90deg, ${scale.colours.join(", ")})`;
 }
 
 // --- labels -----------------------------------------------------------------------------
 const spot = new THREE.Vector3(), centre = new THREE.Vector3();
 const leaders = byId("leaders");
 const labels = data.labels.map((label) => {
-  const element = document.createElement("span");
-  element.textContent = label.text;
-  element.className = label.layer;
+  const tag = element("span", { textContent: label.text, className: label.layer });
   const leader = document.createElementNS(leaders.namespaceURI, "line");
   leaders.append(leader);
-  byId("labels").append(element);
-  return { label, element, leader, way: 0 };
+  byId("labels").append(tag);
+  return { label, tag, leader, way: 0 };
 });
 
 // Where a label may stand: round what it names, ever further away. The first that is free is taken.
@@ -82,7 +74,7 @@ function placed(entry, x, y, box, room, taken) {
 function drawLabels() {
   const { offsetWidth: w, offsetHeight: h } = byId("labels"), taken = [];
   for (const entry of labels) {
-    const { label, element, leader } = entry;
+    const { label, tag, leader } = entry;
     let visible = shown(label.layer, label.joint);
     if (visible) {
       if (label.node) {
@@ -100,15 +92,15 @@ function drawLabels() {
       spot.project(viewer.camera);
       visible = spot.z < 1 && Math.abs(spot.x) < 1 && Math.abs(spot.y) < 1;
     }
-    element.hidden = !visible;
+    tag.hidden = !visible;
     const x = ((spot.x + 1) / 2) * w, y = ((1 - spot.y) / 2) * h;
-    const box = visible && { w: element.offsetWidth, h: element.offsetHeight };
+    const box = visible && { w: tag.offsetWidth, h: tag.offsetHeight };
     const at = visible && placed(entry, x, y, box, { w, h }, taken);
-    element.hidden = !at;
+    tag.hidden = !at;
     leader.style.display = at ? "" : "none";
     if (!at) continue;
     taken.push(at);
-    element.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px)`;
+    tag.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px)`;
     const ends = { x1: x, y1: y, x2: Math.min(Math.max(x, at.x), at.x + box.w),
       y2: Math.min(Math.max(y, at.y), at.y + box.h) };
     for (const [name, value] of Object.entries(ends)) leader.setAttribute(name, value.toFixed(1));

@@ -1,11 +1,6 @@
 // --- controls ---------------------------------------------------------------------------
 function options(select, texts, chosen) {
-  texts.forEach((text, k) => {
-    const option = document.createElement("option");
-    option.value = k;
-    option.textContent = text;
-    select.append(option);
-  });
+  select.append(...texts.map((text, k) => element("option", { value: k }, text)));
   select.value = chosen;
 }
 
@@ -30,15 +25,9 @@ function controls() {
   byId("play").onclick = () => play(!state.playing);
   for (const layer of data.layers) {
     state.on[layer.id] = layer.on;
-    const line = document.createElement("label"), box = document.createElement("input");
-    const text = document.createElement("span");
-    line.className = "check";
-    box.type = "checkbox";
-    box.id = `layer-${layer.id}`;
-    box.checked = layer.on;
+    const box = element("input", { type: "checkbox", id: `layer-${layer.id}`, checked: layer.on });
+    const line = element("label", { className: "check" }, box, element("span", {}, layer.text));
     box.onchange = () => { state.on[layer.id] = box.checked; drawOverlay(); };
-    text.textContent = layer.text;
-    line.append(box, text);
     const track = motion.tracks.find((t) => t.layer === layer.id);
     const colour = track ? track.colour : data.swatches[layer.id];
     if (colour) line.append(swatch(colour));
@@ -46,16 +35,13 @@ function controls() {
     if (data.scales[layer.id]) bars[layer.id] = addBar(data.scales[layer.id]);
   }
   if (data.scales.rivets) {
-    const title = document.createElement("label");
-    title.textContent = data.scales.rivets.title;
-    byId("layers").append(title);
+    byId("layers").append(element("label", {}, data.scales.rivets.title));
     addBar(data.scales.rivets);
   }
 }
 
 function swatch(colour) {
-  const patch = document.createElement("i");
-  patch.className = "swatch";
+  const patch = element("i", { className: "swatch" });
   patch.style.background = colour;
   return patch;
 }
@@ -63,17 +49,12 @@ function swatch(colour) {
 function tellDiagnosis({ verdict, lines }) {
   byId("diagnosis").hidden = false;
   byId("verdict").textContent = verdict;
-  for (const { text, layer } of lines) {
-    const line = document.createElement("li"), words = document.createElement("span");
-    words.textContent = text;
-    line.append(swatch(data.swatches[layer]), words);
-    byId("causes").append(line);
-  }
+  for (const { text, layer } of lines)
+    byId("causes").append(element("li", {}, swatch(data.swatches[layer]), element("span", {}, text)));
 }
 
 function addBar(scale) {
-  const bar = document.createElement("div");
-  bar.className = "bar";
+  const bar = element("div", { className: "bar" });
   fillBar(bar, scale);
   byId("layers").append(bar);
   return bar;

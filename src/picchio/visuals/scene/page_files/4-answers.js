@@ -1,14 +1,10 @@
 // --- answers: click a joint or a rivet, hover a ball, look along an axis -------------------
-const pick = new THREE.Raycaster(), flat = new THREE.Vector2();
 const frameAt = new Map(data.frames.map((frame) => [frame.path, frame]));
 
 function under(event, wanted) {
-  const box = byId("pane").getBoundingClientRect();
-  flat.set(((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2);
-  viewer.camera.updateMatrixWorld(true);
-  pick.setFromCamera(flat, viewer.camera);
+  aim(event);
   const shownNow = made.filter(({ object, item }) => object.visible && wanted(item));
-  const hit = pick.intersectObjects(shownNow.map(({ object }) => object), false)[0];
+  const hit = ray.intersectObjects(shownNow.map(({ object }) => object), false)[0];
   return hit && { ...hit, item: shownNow.find(({ object }) => object === hit.object).item };
 }
 
@@ -24,17 +20,9 @@ function jointOf(item) {
 
 function rowsOf(rows) {
   return rows.map(([words, value, source]) => {
-    const line = document.createElement("tr"), head = document.createElement("th"), cell = document.createElement("td");
-    head.textContent = words;
-    cell.textContent = value;
-    if (source) {
-      const from = document.createElement("small");
-      from.textContent = source.length > 160 ? `${source.slice(0, 157)}…` : source;
-      from.title = source;
-      cell.append(document.createElement("br"), from);
-    }
-    line.append(head, cell);
-    return line;
+    const cell = element("td", {}, value), short = source && source.length > 160 ? `${source.slice(0, 157)}…` : source;
+    if (source) cell.append(element("br"), element("small", { textContent: short, title: source }));
+    return element("tr", {}, element("th", {}, words), cell);
   });
 }
 
@@ -95,17 +83,6 @@ function hover(event) {
   byId("value").style.top = `${event.clientY + 14}px`;
 }
 
-function lookAlong(view) {
-  const [at, to] = data.camera.map((p) => new THREE.Vector3(...p)), far = at.distanceTo(to);
-  const way = { x: [1, 0, 0.001], y: [0, -1, 0.001], z: [0, -0.001, 1] }[view];
-  if (way) at.set(...way).multiplyScalar(far).add(to);
-  // The camera's node is turned: its y is the world's z.
-  viewer.camera.position.set(at.x, at.z, -at.y);
-  viewer.controls.target.set(to.x, to.z, -to.y);
-  viewer.controls.update();
-  viewer.set_dirty();
-}
-
 // A map can be cut open: of each axis, what is kept between two ends.
 function cuts() {
   const maps = made.filter(({ item }) => item.layer === "map");
@@ -123,10 +100,8 @@ function cuts() {
     const sign = side === "min" ? 1 : -1, [low, high] = [box.min[name], box.max[name]];
     const plane = new THREE.Plane(new THREE.Vector3(...way).multiplyScalar(sign), 1e9);
     planes.push(plane);
-    const label = document.createElement("label"), input = document.createElement("input"), out = document.createElement("output");
-    label.append(`${name} ${side === "min" ? "from" : "to"} `, out);
-    Object.assign(input, { type: "range", min: 0, max: 1, step: 0.005, value: side === "min" ? 0 : 1, id: `cut-${name}-${side}` });
-    label.htmlFor = input.id;
+    const id = `cut-${name}-${side}`, out = element("output");
+    const input = element("input", { id, type: "range", min: 0, max: 1, step: 0.005, value: side === "min" ? 0 : 1 });
     input.oninput = () => {
       const at = low + (high - low) * input.value;
       out.textContent = `${at.toFixed(2)} m`;
@@ -134,7 +109,7 @@ function cuts() {
       viewer.set_dirty();
     };
     input.oninput();
-    byId("cut").append(label, input);
+    byId("cut").append(element("label", { htmlFor: id }, `${name} ${side === "min" ? "from" : "to"} `, out), input);
   }
   for (const { object } of maps) object.material.clippingPlanes = planes;
 }
@@ -155,12 +130,4 @@ function answers() {
   pane.addEventListener("pointermove", hover);
   pane.addEventListener("pointerleave", () => { byId("value").hidden = true; });
   byId("card-close").onclick = () => { byId("card").hidden = true; };
-  for (const button of document.querySelectorAll("#views [data-view]"))
-    button.onclick = () => lookAlong(button.dataset.view);
-  byId("png").onclick = () => {
-    const link = document.createElement("a");
-    link.href = viewer.capture_image();
-    link.download = `${data.title.replace(/[^\w-]/g, "_")}.png`;
-    link.click();
-  };
 }

@@ -1,6 +1,19 @@
 const THREE = MeshCat.THREE;
 const data = JSON.parse(document.getElementById("data").textContent);
 const byId = (id) => document.getElementById(id);
+function element(name, properties, ...children) {
+  const made = Object.assign(document.createElement(name), properties);
+  made.append(...children);
+  return made;
+}
+
+function download(name, content, type) {
+  const link = element("a", { download: `${data.title.replace(/[^\w-]/g, "_")}-${name}` });
+  link.href = content.startsWith("data:") ? content : URL.createObjectURL(new Blob([content], { type }));
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
 const dark = matchMedia("(prefers-color-scheme: dark)").matches;
 const viewer = new MeshCat.Viewer(byId("pane"));
 const ROOT = ["picchio"];

@@ -1,7 +1,6 @@
-// --- stage: robot, rings, ball, arrow, tool ---------------------------------------------
+// --- parts: robot, rings, ball, arrow, tool ---------------------------------------------
 const reach = data.reach, parts = { rings: [], balls: {} };
 const nodes = data.frames.map(() => new THREE.Group());
-const turn = new THREE.Matrix4(), own = new THREE.Matrix4(), axis = new THREE.Vector3();
 const arm = new THREE.Group(), toolAt = new THREE.Vector3(), along = new THREE.Vector3(0, 0, 1);
 const root = () => viewer.scene_tree.find(ROOT).object;
 
@@ -22,9 +21,7 @@ function build(array) {
   parts.rings = data.rings.map((ring) => {
     if (!ring) return null;
     const mesh = new THREE.Mesh(shapes[ring.mesh], new THREE.MeshPhongMaterial({ color: 0x888888 }));
-    const through = new THREE.Mesh(mesh.geometry, mesh.material.clone());
-    Object.assign(through.material, { depthTest: false, transparent: true, opacity: 0.45 });
-    mesh.add(through);
+    shine(mesh);
     nodes[ring.frame].add(pinned(mesh, ring.matrix));
     return mesh;
   });
@@ -58,15 +55,7 @@ function build(array) {
 
 function stand(pose) {
   data.frames.forEach((frame, k) => {
-    own.fromArray(frame.matrix);
-    if (frame.axis) {
-      const at = frame.row.reduce((sum, r, i) => sum + r * pose[i], frame.shift);
-      axis.fromArray(frame.axis);
-      if (frame.prismatic) turn.makeTranslation(...axis.multiplyScalar(at).toArray());
-      else turn.makeRotationAxis(axis, at);
-      own.multiply(turn);
-    }
-    nodes[k].matrix.copy(own);
+    nodes[k].matrix.copy(jointAt(frame, frame.row.reduce((sum, r, i) => sum + r * pose[i], frame.shift)));
     nodes[k].matrixWorldNeedsUpdate = true;
   });
 }
@@ -120,8 +109,7 @@ function draw() {
 function sharpen(coarse) {
   pen.coarse = coarse;
   viewer.renderer.setPixelRatio(devicePixelRatio * (coarse ? 0.5 : 1));
-  const pane = byId("pane");
-  viewer.set_3d_pane_size(pane.offsetWidth, pane.offsetHeight);
+  fit();
 }
 
 function drawBall({ radii, subdivisions }) {
@@ -144,40 +132,4 @@ function drawBall({ radii, subdivisions }) {
     mesh.geometry.computeVertexNormals();
   }
   draw();
-}
-
-function look(view) {
-  const [x, y, z] = data.middle, far = 2.1 * reach, tilt = { x: [1, 0, 0.001], y: [0, -1, 0.001], z: [0, -0.001, 1] };
-  const way = tilt[view] || [0.55, -1, 0.5], size = Math.hypot(...way);
-  const at = way.map((w, k) => data.middle[k] + (far * w) / size);
-  // The camera's node is turned: its y is the world's z.
-  viewer.camera.position.set(at[0], at[2], -at[1]);
-  viewer.controls.target.set(x, z, -y);
-  viewer.controls.update();
-  viewer.set_dirty();
-}
-
-function stage() {
-  viewer.set_property(["Background"], "top_color", dark ? [0.09, 0.11, 0.13] : [0.98, 0.985, 0.99]);
-  viewer.set_property(["Background"], "bottom_color", dark ? [0.16, 0.19, 0.22] : [0.87, 0.9, 0.93]);
-  const grid = new THREE.GridHelper(2.4 * reach, 24);
-  grid.rotateX(Math.PI / 2);
-  grid.position.set(0, 0, data.floor);
-  Object.assign(grid.material, { opacity: dark ? 0.25 : 0.5, transparent: true });
-  viewer.set_object(["Grid"], grid);
-  viewer.scene_tree.find(["Axes", "<object>"]).object.scale.setScalar(0.2 * reach);
-  viewer.scene_tree.find(["Lights", "AmbientLight", "<object>"]).object.intensity = 0.5;
-  for (const side of ["PointLightNegativeX", "PointLightPositiveX"])
-    viewer.scene_tree.find(["Lights", side, "<object>"]).object.intensity = 0.1;
-  viewer.scene_tree.find(["Lights", "FillLight", "<object>"]).object.intensity = 0.22;
-  const sun = new THREE.DirectionalLight(0xffffff, 0.42);
-  sun.position.set(3, -4, 6);
-  viewer.set_object(["Lights", "Sun"], sun);
-  viewer.camera.fov = 42;
-  viewer.camera.near = reach / 100;
-  viewer.camera.far = reach * 60;
-  const fit = () => viewer.set_3d_pane_size(byId("pane").offsetWidth, byId("pane").offsetHeight);
-  addEventListener("resize", fit);
-  fit();
-  look("home");
 }
