@@ -171,12 +171,13 @@ def test_the_parts_in_which_a_ledger_is_read_change_nothing(
     rng = np.random.default_rng(seed)
     stamps = np.arange(samples.stamps[0] - 10**10, samples.stamps[-1] + 10**10, 2_000_000)
     on = (stamps // 10**9 % 2 == 1).astype(float)[:, None]
-    poses = shift.POSES[stamps // (2 * 10**9) % 3]
+    poses = shift.POSES[stamps // (2 * 10**9) % 3] + 1e-9 * np.arange(stamps.size)[:, None]
     slow = Stream("poses", 10_000_000, 1, 0.5, 0.5, {"operation": "upward"})
     with Ledger(tmp_path / "l", NAME) as book:
         for number, (a, b) in enumerate(cuts(samples, rng)):
             book.add(str(number), "m", "part", stream, [samples.between(a, b)])
-        for rows in np.array_split(np.arange(stamps.size), 5):
+        for begin in range(0, stamps.size, 3250):  # of 8.5 s, one every 6.5 s
+            rows = np.arange(begin, min(begin + 4250, stamps.size))
             few = rows[::700]  # poses come seldom: that of a run may be of another part
             part = Samples("poses", stamps[rows], on[rows], stamps[few], poses[few])
             book.add(f"slow{rows[0]}", "m", "slow", slow, [part])
