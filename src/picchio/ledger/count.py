@@ -41,7 +41,7 @@ from picchio.studies.tasks import Task
 
 MAPPING = "mapping.toml"
 _AT_ONCE = 256  # bursts that are held
-_READ = 2  # what is read of a log: where that becomes more, logs that are there are read anew
+_READ = 3  # what is read of a log: where that becomes more, logs that are there are read anew
 
 
 @one_thread()
