@@ -417,8 +417,8 @@ class _Rung:
             good = error < _DIM * np.median(error)
             found.append(Reading(f"stiffness of {name}", "stiffness_drift", name, clock[good],
                                  column[good], np.empty((0, int(good.sum())))))  # fmt: skip
-        # Modes differ in damping, and a mode that hardly rings tells little of it: what each usually
-        # has is taken out, and their mean put back, by which robots differ.
+        # Modes differ in damping, and a mode that hardly rings tells little of it: what each
+        # usually has is taken out, and their mean put back, by which robots differ.
         weight, ratio, middle = np.array(self._damped).transpose(1, 0, 2)
         usual = np.nanmedian(middle, axis=0)
         damping = (ratio - weight * np.nan_to_num(usual)).sum(axis=1) / weight.sum(axis=1)
