@@ -1,6 +1,6 @@
 """How often a change is told, dated and sized, and how often one is told where there is none.
 
-    python benchmarks/changes.py [--histories 100] [--logs 3]
+    python benchmarks/changes.py [--histories 100] [--logs 3] [--swaps 3]
 
 Histories of 200 shifts of five readings with 1 % noise a shift; in one of them something moves by
 3 % after shift 60: at once, over 60 shifts, or until the end. Without a change: another size of the
@@ -15,7 +15,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-import pandas
 
 import picchio
 from picchio.ledger.watch.changes import ALARMS, Reading, find
@@ -26,7 +25,7 @@ sys.path[:0] = [
 ]
 
 import shift  # noqa: E402
-from test_changes import moves, no_swaps, ringing, swapped  # noqa: E402
+from test_changes import LOG_MAPPING, no_swaps, shift_log, swapped, swapped_logs  # noqa: E402
 
 DAY = 86_400 * 10**9
 COUNT, BEGIN, SIZE, NOISE = 200, 60, -0.03, 0.01
@@ -67,48 +66,12 @@ def swaps(count: int) -> None:
     print(f"no swap, {count} histories each, told as one: {words}")
 
 
-LINKS = {"force": "force", "temp": "temperature.joint_1"} | {
-    f"{short}{k}": f"{long}.joint_{k}" for k in (1, 2, 3) for short, long in
-    (("m", "motor_position"), ("l", "position"), ("t", "torque"), ("d", "deflection"))
-}  # fmt: skip
 SHIFTS, MOVED = 60, 40
-
-
-def shift_log(path: Path, number: int, rng, softer, friction: float, gap: float, warm: float):
-    """A shift: the arm swings, then sets three rivets at three places and rings after each."""
-    parts = []
-    samples, _ = moves(rng, friction=friction, gap=gap, rate=500.0)
-    table = {"force": np.zeros(samples.stamps.size)}
-    for k in (1, 2, 3):
-        table |= {f"m{k}": samples.poses[:, k - 1], f"d{k}": np.zeros(samples.stamps.size),
-                  f"l{k}": samples.others[f"position.joint_{k}"][1],
-                  f"t{k}": samples.others[f"torque.joint_{k}"][1]}  # fmt: skip
-    parts.append(pandas.DataFrame(table))
-    for place in range(3):
-        time, joints = ringing(rng, shift.POSES[place], softer)
-        joints = 1e-4 * joints / joints.std() + 3e-6 * rng.standard_normal(joints.shape)
-        pose = shift.POSES[place][:, None] + 1e-5 * rng.standard_normal(joints.shape)
-        table = {"force": np.where(time < 0.005, 500.0, 0.0)}
-        for k in (1, 2, 3):
-            table |= {f"m{k}": pose[k - 1], f"l{k}": pose[k - 1], f"d{k}": joints[k - 1],
-                      f"t{k}": np.zeros(time.size)}  # fmt: skip
-        parts.append(pandas.DataFrame(table))
-    whole = pandas.concat(parts, ignore_index=True)
-    # A second between the parts, in which the arm moves and nothing is logged.
-    later = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
-    stamps = shift.BEGIN + number * DAY + 2_000_000 * np.arange(len(whole)) + 10**9 * later
-    whole.insert(0, "stamp", stamps)
-    whole["temp"] = warm
-    whole.to_parquet(path / f"{number:03d}.parquet")
 
 
 def from_logs(count: int) -> None:
     """Histories as logs, through the whole of `count`; all follow the temperature."""
     robot = picchio.load_robot("fanuc_like_3dof")
-    mapping = 'format = "picchio-mapping/1"\n' + "".join(
-        f'[[channel]]\nfrom = "{a}"\nto = "{b}"\n' for a, b in LINKS.items()
-    )
-    mapping += "[blows]\nthreshold = 100.0\ndirection = [1.0, 0.0, 0.0]\n"
     for kind, target in (("nothing", None), ("joint_2 4 % softer", "stiffness of joint_2"),
                          ("friction 20 % more", "friction of joint_"),
                          ("lost motion doubled", "lost motion of joint_")):  # fmt: skip
@@ -118,7 +81,7 @@ def from_logs(count: int) -> None:
             with tempfile.TemporaryDirectory() as place:
                 logs = Path(place) / "logs"
                 logs.mkdir()
-                (logs / "mapping.toml").write_text(mapping)
+                (logs / "mapping.toml").write_text(LOG_MAPPING)
                 for number in range(SHIFTS):
                     late = number >= MOVED
                     warm = 20.0 + 5.0 * np.sin(number / 8.0) + rng.standard_normal()
@@ -137,12 +100,34 @@ def from_logs(count: int) -> None:
               f"rightly {dated}, {others} other changes told", flush=True)  # fmt: skip
 
 
+def swaps_in_logs(count: int) -> None:
+    """Fleets of three whose logs of two are swapped, through the whole of `count`."""
+    told = right = dated = alarms = 0
+    for seed in range(count):
+        with tempfile.TemporaryDirectory() as place:
+            rows = swapped_logs(Path(place), SHIFTS, MOVED, seed)
+        found = [rows[name]["another_robot"] for name in ("a", "b")]
+        told += sum(each is not None for each in found)
+        right += sum(each is not None and each["like"] == other
+                     for each, other in zip(found, "ba", strict=True))  # fmt: skip
+        day = [str(np.datetime64(shift.BEGIN + (MOVED + k) * DAY, "ns"))[:10] for k in range(-2, 3)]
+        dated += sum(each is not None and each["since"] in day for each in found)
+        alarms += rows["c"]["another_robot"] is not None
+    print(f"{count} fleets of three, {SHIFTS} logs each, two robots swapped after {MOVED}: told of "
+          f"{told} of {2 * count}, whose logs they are of {right}, within two shifts of "
+          f"{dated}; told of {alarms} of {count} others")  # fmt: skip
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--histories", type=int, default=100)
     parser.add_argument("--logs", type=int, default=0, help="histories of each kind, as logs")
+    parser.add_argument("--swaps", type=int, default=0, help="fleets with swapped logs")
     asked = parser.parse_args()
     count = asked.histories
+    if asked.swaps:
+        swaps_in_logs(asked.swaps)
+        return
     if asked.logs:
         from_logs(asked.logs)
         return

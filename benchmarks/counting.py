@@ -8,7 +8,9 @@ it are enough: the ratio is that of the processor time a message.
 
 A robot that sets a rivet every 20 s; the log holds the trigger and six angles. The bare reading of
 the same file is timed beside it. Each is a process of its own; what reads a log for it counts, too.
-With `--days` there are so many logs, of as many days, in one folder.
+With `--days` there are so many logs, of as many days, in one folder. With `--each` they come one
+after the other into one ledger, each counted by a process of its own and then deleted; at last all
+of them are counted anew from the ledger.
 """
 
 from __future__ import annotations
@@ -54,6 +56,10 @@ import picchio
 robot = picchio.load_robot(sys.argv[4])
 found = picchio.count(robot, sys.argv[1], sys.argv[2], mapping=sys.argv[3])
 n = found.blows"""
+# What the ledger remembers of single bursts is emptied, as where the model has changed.
+ANEW = 'import sqlite3\nsqlite3.connect(sys.argv[2]).executescript("DELETE FROM burst")\n' + (
+    COUNT.replace("robot, sys.argv[1]", "robot, None")
+)
 # The memory is that of the process itself, and that of the largest of those that read for it.
 TIMED = """import json, resource, sys, time
 def cpu():
@@ -65,11 +71,11 @@ child = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
 print(json.dumps([n, time.perf_counter() - begin, cpu() - before, peak, child]))"""
 
 
-def pieces(hours: float, poses: np.ndarray, day: int):
+def pieces(hours: float, poses: np.ndarray, day: int, rate: int):
     """Stamps ns, the trigger, the angles, a million rows at a time."""
-    rows, rng = int(hours * 3600 * RATE), np.random.default_rng(day)
+    rows, rng = int(hours * 3600 * rate), np.random.default_rng(day)
     for first in range(0, rows, 1 << 20):
-        time = np.arange(first, min(first + (1 << 20), rows)) / RATE
+        time = np.arange(first, min(first + (1 << 20), rows)) / rate
         rivet = (time // APART).astype(int)
         on = ((time % APART) > 5.0) & ((time % APART) < 5.0 + ON)
         angles = poses[rivet % len(poses)]
@@ -78,15 +84,17 @@ def pieces(hours: float, poses: np.ndarray, day: int):
         yield begin + np.rint(time * 1e9).astype(np.int64), on.astype(float), angles
 
 
-def write(path: Path, hours: float, names: list[str], poses: np.ndarray, day: int = 0) -> int:
+def write(
+    path: Path, hours: float, names: list[str], poses: np.ndarray, day: int = 0, rate: int = RATE
+) -> int:
     import pyarrow
     import pyarrow.parquet
 
     if path.suffix in (".mcap", ".bag", ".db3"):
-        return write_messages(path, names, pieces(hours, poses, day))
+        return write_messages(path, names, pieces(hours, poses, day, rate))
     rows, writer = 0, None
     with open(path, "w", newline="") as text:
-        for stamp, on, angles in pieces(hours, poses, day):
+        for stamp, on, angles in pieces(hours, poses, day, rate):
             columns = {"stamp": stamp, "on": on, **dict(zip(names, angles.T, strict=True))}
             table = pyarrow.table(columns)
             rows += len(stamp)
@@ -173,12 +181,29 @@ def timed(code: str, *arguments: object) -> list[float]:
     return json.loads(done.stdout.splitlines()[-1])
 
 
+def one_by_one(folder: Path, days: int, make, rules: Path) -> None:
+    """A log a day, as they come; then all of them once more."""
+    ledger = folder / "ledger"
+    for day in range(days):
+        log = make(day)
+        full = timed(COUNT, log.parent, ledger, rules, ROBOT)
+        log.unlink()
+        print(f"after {day + 1} days: {full[0]:.0f} blows, {full[1]:.1f} s ({full[2]:.1f} s of "
+              f"CPU), {full[3]:.0f} MB and {full[4]:.0f} MB of the reader; the ledger "
+              f"{ledger.stat().st_size / 1e6:.0f} MB", flush=True)  # fmt: skip
+    full = timed(ANEW, "-", ledger, rules, ROBOT)
+    print(f"{days} days counted anew: {full[0]:.0f} blows, {full[1]:.1f} s ({full[2]:.1f} s of "
+          f"CPU), {full[3]:.0f} MB")  # fmt: skip
+
+
 def main() -> None:
     import picchio
 
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--hours", type=float, default=24.0)
     parser.add_argument("--days", type=int, default=1, help="logs of so many hours each")
+    parser.add_argument("--each", action="store_true", help="one log after the other")
+    parser.add_argument("--rate", type=int, default=RATE, help="samples a second")
     parser.add_argument("--bare", type=float, default=0.2, help="h of messages read barely")
     parser.add_argument("--kind", choices=tuple(READ), default="parquet")
     parser.add_argument("--folder")
@@ -191,7 +216,6 @@ def main() -> None:
         logs, rules = folder / "logs", folder / "mapping.toml"
         logs.mkdir()
         days = [logs / f"day{k:02d}.{kind}" for k in range(asked.days)]
-        rows = sum(write(day, asked.hours, names, poses, k) for k, day in enumerate(days))
         text = MAPPING.format(operation=task.operations[0].name)
         messages = kind in ("mcap", "bag", "db3")
         if messages:
@@ -201,6 +225,17 @@ def main() -> None:
         for name in names:
             text += f'[[channel]]\nfrom = "{before}{name}"\nto = "position.{name}"\n'
         rules.write_text(text)
+
+        def make(day: int) -> Path:
+            write(days[day], asked.hours, names, poses, day, asked.rate)
+            return days[day]
+
+        if asked.each:
+            one_by_one(folder, asked.days, make, rules)
+            return
+        rows = sum(
+            write(day, asked.hours, names, poses, k, asked.rate) for k, day in enumerate(days)
+        )
         size = sum(day.stat().st_size for day in days) / 1e6
         print(f"{rows} rows of {len(names)} joints in {len(days)} logs, {size:.0f} MB, {kind}")
         # What is compiled once is not counted.

@@ -1,14 +1,16 @@
 """What changed, in histories where it is known, and in histories where nothing did."""
 
 import numpy as np
+import pandas
 import pytest
 import shift
 from scipy.linalg import eigh
 
 import picchio
+from picchio.ledger.fleet import count_fleet
 from picchio.ledger.samples import Samples
 from picchio.ledger.store import Stream
-from picchio.ledger.watch.changes import FIRST, Reading, find, readings_of
+from picchio.ledger.watch.changes import FIRST, BlowReadings, Reading, find, readings_of
 from picchio.ledger.watch.drives import drives
 from picchio.ledger.watch.exchange import exchange, signature, whose
 from picchio.ledger.watch.ringing import decaying, ring_downs
@@ -238,7 +240,7 @@ def test_frequencies_of_a_decay_are_fitted():
     assert damping == pytest.approx([0.03, 0.025], rel=0.05)
 
 
-def ringing(rng, pose, softer, seconds=1.0, rate=500.0):
+def ringing(rng, pose, softer, seconds=1.0, rate=500.0, damping=1.0):
     """A blow and its ring-down with softened joints: deflections of all joints, in `worlds`."""
     arm = robots.load(NAME)
     mass, gravity, _ = bench.rest(bench.nominal_chain(NAME), pose)
@@ -248,7 +250,7 @@ def ringing(rng, pose, softer, seconds=1.0, rate=500.0):
     start = shapes.T @ rng.normal(size=3)
     joints = np.zeros((3, time.size))
     for k in range(3):
-        w, z = np.sqrt(squared[k]), arm.damping_ratio
+        w, z = np.sqrt(squared[k]), damping * arm.damping_ratio
         damped = w * np.sqrt(1.0 - z * z)
         joints += np.outer(shapes[:, k] * start[k],
                            np.exp(-z * w * time) * np.sin(damped * time) / damped)  # fmt: skip
@@ -276,7 +278,8 @@ def test_the_joint_that_softens_is_found_by_its_frequencies():
             poses = pose + 1e-5 * rng.standard_normal((stamps[::10].size, 3))
             samples = Samples("force", stamps, force, stamps[::10], poses, others)
             features += ring_downs(samples, stream, model)
-    readings = readings_of(model, [], features)
+    features.sort(key=lambda row: row[1])
+    readings = readings_of(model, BlowReadings(), features)
     assert {r.target for r in readings} == {"joint_1", "joint_2", "joint_3", "robot"}
     changes = find(readings)
     assert [c.reading.target for c in changes] == ["joint_2"]
@@ -285,3 +288,78 @@ def test_the_joint_that_softens_is_found_by_its_frequencies():
     assert told["low"] < -0.04 < told["high"]
     assert told["since_low"] <= "2026-04-10" <= told["since_high"]
     assert "stiffness of joint_2 fell by" in told["words"]
+
+
+LINKS = {"force": "force", "temp": "temperature.joint_1"} | {
+    f"{short}{k}": f"{long}.joint_{k}" for k in (1, 2, 3) for short, long in
+    (("m", "motor_position"), ("l", "position"), ("t", "torque"), ("d", "deflection"))
+}  # fmt: skip
+LOG_MAPPING = (
+    'format = "picchio-mapping/1"\n'
+    + "".join(f'[[channel]]\nfrom = "{a}"\nto = "{b}"\n' for a, b in LINKS.items())
+    + "[blows]\nthreshold = 100.0\ndirection = [1.0, 0.0, 0.0]\n"
+)
+
+
+def shift_log(path, number, rng, softer, friction, gap, warm, *, offset=0.0, damping=1.0):
+    """A shift: the arm swings, then sets three rivets at three places and rings after each."""
+    parts = []
+    samples, _ = moves(rng, friction=friction, gap=gap, offset=offset, rate=500.0)
+    table = {"force": np.zeros(samples.stamps.size)}
+    for k in (1, 2, 3):
+        table |= {f"m{k}": samples.poses[:, k - 1], f"d{k}": np.zeros(samples.stamps.size),
+                  f"l{k}": samples.others[f"position.joint_{k}"][1],
+                  f"t{k}": samples.others[f"torque.joint_{k}"][1]}  # fmt: skip
+    parts.append(pandas.DataFrame(table))
+    for place in range(3):
+        time, joints = ringing(rng, shift.POSES[place], softer, damping=damping)
+        joints = 1e-4 * joints / joints.std() + 3e-6 * rng.standard_normal(joints.shape)
+        pose = shift.POSES[place][:, None] + 1e-5 * rng.standard_normal(joints.shape)
+        table = {"force": np.where(time < 0.005, 500.0, 0.0)}
+        for k in (1, 2, 3):
+            table |= {f"m{k}": pose[k - 1], f"l{k}": pose[k - 1], f"d{k}": joints[k - 1],
+                      f"t{k}": np.zeros(time.size)}  # fmt: skip
+        parts.append(pandas.DataFrame(table))
+    whole = pandas.concat(parts, ignore_index=True)
+    # A second between the parts, in which the arm moves and nothing is logged.
+    later = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    stamps = shift.BEGIN + number * DAY + 2_000_000 * np.arange(len(whole)) + 10**9 * later
+    whole.insert(0, "stamp", stamps)
+    whole["temp"] = warm
+    whole.to_parquet(path / f"{number:03d}.parquet")
+
+
+def swapped_logs(folder, shifts, day, seed):
+    """Three robots of one type, the logs of two of them swapped from a shift on: the fleet's rows.
+
+    Stiffness differs by 5 % a joint, damping by 20 %, friction by 15 %, lost motion by 30 %, and
+    all of them have an offset of the torque of some N m; the hall is as warm for all.
+    """
+    draw = np.random.default_rng([55, seed])
+    cells, books = folder / "cells", folder / "books"
+    books.mkdir()
+    for name in "abc":
+        (cells / name).mkdir(parents=True)
+    (cells / "mapping.toml").write_text(LOG_MAPPING)
+    warmth = 20.0 + 5.0 * np.sin(np.arange(shifts) / 8.0) + draw.standard_normal(shifts)
+    for name in "abc":
+        *soft, damping, rub = np.exp(draw.normal(0.0, [0.05, 0.05, 0.05, 0.2, 0.15]))
+        gap, offset = 1e-4 * np.exp(0.3 * draw.standard_normal()), 8.0 * draw.standard_normal()
+        for number, warm in enumerate(warmth):
+            to = name if number < day else {"a": "b", "b": "a"}.get(name, name)
+            softer = np.array(soft) * (1.0 - 2e-3 * (warm - 20.0))
+            shift_log(cells / to, number, np.random.default_rng([seed, number, ord(name)]),
+                      softer, rub - 0.01 * (warm - 20.0), gap, warm, offset=offset,
+                      damping=damping)  # fmt: skip
+    found = count_fleet(picchio.load_robot(NAME), cells, books)
+    return {row["name"]: row for row in found.robots}
+
+
+@pytest.mark.slow
+def test_logs_of_two_robots_that_are_swapped_are_told(tmp_path):
+    """Logs of simulated robots through the whole of `count`, and a third that stays what it is."""
+    rows = swapped_logs(tmp_path, 40, 34, seed=1)
+    assert [rows[name]["another_robot"]["like"] for name in "ab"] == ["b", "a"]
+    assert rows["c"]["another_robot"] is None
+    dates = {rows[name]["another_robot"]["since"] for name in "ab"}
+    assert dates == {"2026-04-04"}

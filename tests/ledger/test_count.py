@@ -2,6 +2,7 @@
 
 import json
 import sqlite3
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,10 +12,14 @@ import picchio
 from picchio.campaign.importing.mapping import Mapping
 from picchio.core.errors import InputError, OutputError
 from picchio.fatigue.sn.library import load_sn_curve
+from picchio.ledger import blows as ledger_blows
 from picchio.ledger import count as counting
-from picchio.ledger.blows import covered, within
-from picchio.ledger.count import add_log, count, recount
-from picchio.ledger.damage import together
+from picchio.ledger import counted as counted_module
+from picchio.ledger import store
+from picchio.ledger.blows import Blow, bursts, covered, uncovered
+from picchio.ledger.count import add_log, blows_held, count, recount
+from picchio.ledger.damage import AS_LOGGED, Sum, burst_damages_of, resting
+from picchio.ledger.forecast import typical
 from picchio.ledger.samples import Samples, read_samples
 from picchio.ledger.store import Ledger, Stream
 from picchio.model.model import Model
@@ -117,8 +122,14 @@ def counted(book, robot, curves, task, cache):
     """The totals, with what has been computed of bursts kept between ledgers."""
     book.remember(cache[0], cache[1])
     found = recount(book, Model.of(robot), curves, task)
-    cache[1].update(book.computed(cache[0]))
+    known = book._base.execute("SELECT key, damage FROM burst WHERE model = ?", cache[:1])
+    cache[1].update(known)
     return found
+
+
+def blows_in(book, robot, task):
+    """All blows that a ledger holds."""
+    return list(blows_held(book, Model.of(robot), task)[0])
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -129,7 +140,7 @@ def test_cuts_order_repeats_and_faults_change_nothing(tmp_path, robot, task, str
     with Ledger(tmp_path / "whole", NAME) as book:
         book.add("log", "m", "log", stream, [samples])
         expected = counted(book, robot, curves, task, cache)
-    assert len(expected.blows) == 36
+    assert expected.blows == 36
     rng = np.random.default_rng(seed)
     for trial in range(10):
         with Ledger(tmp_path / f"cut{trial}", NAME) as book:
@@ -145,9 +156,72 @@ def test_cuts_order_repeats_and_faults_change_nothing(tmp_path, robot, task, str
                 book.add(str(number), "m", "part", stream, [part])
             found = counted(book, robot, curves, task, cache)
         np.testing.assert_allclose(found.totals.damage, expected.totals.damage, rtol=1e-9, atol=0.0)
-        assert len(found.blows) == len(expected.blows)
+        assert found.blows == expected.blows
         assert (found.spans == expected.spans).all()
-        assert not any(blow.cut for blow in found.blows)
+        assert found.cut == 0
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_the_parts_in_which_a_ledger_is_read_change_nothing(
+    tmp_path, robot, task, stretch, seed, monkeypatch
+):
+    """In parts of a few samples, blows and bursts; all at once, by sorting, it is the same."""
+    samples, stream, curve = stretch
+    curves = curves_of(robot, load_sn_curve(str(curve)))
+    rng = np.random.default_rng(seed)
+    stamps = np.arange(samples.stamps[0] - 10**10, samples.stamps[-1] + 10**10, 2_000_000)
+    on = (stamps // 10**9 % 2 == 1).astype(float)[:, None]
+    poses = shift.POSES[stamps // (2 * 10**9) % 3] + 1e-9 * np.arange(stamps.size)[:, None]
+    slow = Stream("poses", 10_000_000, 1, 0.5, 0.5, {"operation": "upward"})
+    with Ledger(tmp_path / "l", NAME) as book:
+        for number, (a, b) in enumerate(cuts(samples, rng)):
+            book.add(str(number), "m", "part", stream, [samples.between(a, b)])
+        for begin in range(0, stamps.size, 3250):  # of 8.5 s, one every 6.5 s
+            rows = np.arange(begin, min(begin + 4250, stamps.size))
+            few = rows[::700]  # poses come seldom: that of a run may be of another part
+            part = Samples("poses", stamps[rows], on[rows], stamps[few], poses[few])
+            book.add(f"slow{rows[0]}", "m", "slow", slow, [part])
+        whole, blows = recount(book, Model.of(robot), curves, task), blows_in(book, robot, task)
+        for module, name, few in ((store, "_HELD", 50), (ledger_blows, "_AT_ONCE", 3),
+                                  (counting, "_AT_ONCE", 2)):  # fmt: skip
+            monkeypatch.setattr(module, name, few)
+        again, parts = recount(book, Model.of(robot), curves, task), blows_in(book, robot, task)
+    assert whole.seen == 36 < whole.blows
+    told = [[(b.onset, b.kind, b.cut, b.force.tobytes(), b.pose.tobytes()) for b in each]
+            for each in (blows, parts)]  # fmt: skip
+    assert told[0] == told[1] == sorted(told[0], key=lambda b: b[0])
+    np.testing.assert_allclose(again.totals.scaled, whole.totals.scaled, rtol=1e-12, atol=0.0)
+    np.testing.assert_allclose(again.hours[1], whole.hours[1], rtol=1e-12, atol=0.0)
+    assert again.kinds == whole.kinds
+
+
+def test_what_is_held_of_bursts_is_bounded(robot, stretch, tmp_path, task, monkeypatch):
+    """Ten times as many bursts at as many places take no more room; the sums are all of them."""
+    samples, stream, curve = stretch
+    curves = curves_of(robot, load_sn_curve(str(curve)))
+    monkeypatch.setattr(counted_module, "_STRETCHES", 8)
+    monkeypatch.setattr(counted_module, "_PLACES", 10)
+    with Ledger(tmp_path / "l", NAME) as book:
+        book.add("log", "m", "log", stream, [samples])
+        blows = blows_in(book, robot, task)
+    model, rng, found = Model.of(robot), np.random.default_rng(1), counted_module.Counted(curves)
+    first = next(bursts(blows, resting(model)))
+    (made,) = burst_damages_of(model, curves, [first])
+    alone, heavy = made.alone[:, AS_LOGGED], 70
+    for k in range(101):
+        later = replace(first.blows[0], onset=first.onset + k * 6 * 10**11)
+        burst = replace(first, blows=(later,), pose=first.pose + 0.1 * rng.integers(0, 9, 3))
+        times = 1000.0 if k == heavy else 1.0
+        found.add([burst], [replace(made, alone=times * made.alone)])
+    found.close(np.empty((0, 2), np.int64))
+    assert found.blows == found.bursts == 101 and len(found.stretches) <= 8
+    sums = [sum(s.damage for s in found.stretches), found.hours[1][:, 2:].sum(axis=0)]
+    np.testing.assert_allclose(sums[0], 1100.0 * alone, rtol=1e-12)
+    np.testing.assert_allclose(sums[1], found.totals.damage, rtol=1e-12)
+    assert len(found.places) <= 10 and found.places[0].damage.max() > 0.9 * sums[1].max()
+    # The one that did nearly all of it stands for its stretch.
+    onsets = {each.burst.onset for each in typical(found.stretches)}
+    assert onsets == {first.onset + heavy * 6 * 10**11}
 
 
 def test_a_blow_on_the_edge_waits_for_its_other_half(tmp_path, robot, task, stretch):
@@ -157,16 +231,16 @@ def test_a_blow_on_the_edge_waits_for_its_other_half(tmp_path, robot, task, stre
     with Ledger(tmp_path / "l", NAME) as book:
         book.add("all", "m", "all", stream, [samples])
         whole = counted(book, robot, curves, task, cache)
-        middle = whole.blows[20]
+        middle = blows_in(book, robot, task)[20]
         cut = middle.onset + int(0.4e9 * middle.time[-1])
     with Ledger(tmp_path / "m", NAME) as book:
         book.add("late", "m", "late", stream, [samples.between(cut + 1, 2**62)])
-        half = counted(book, robot, curves, task, cache)
-        assert half.blows[0].cut and len(half.blows) == 16
+        half = blows_in(book, robot, task)
+        assert half[0].cut and len(half) == 16
         book.add("early", "m", "early", stream, [samples.between(0, cut)])
-        found = counted(book, robot, curves, task, cache)
-    assert found.blows[20].onset == middle.onset
-    assert (found.blows[20].force == middle.force).all()
+        found, again = counted(book, robot, curves, task, cache), blows_in(book, robot, task)[20]
+    assert again.onset == middle.onset
+    assert (again.force == middle.force).all()
     assert (found.totals.damage == whole.totals.damage).all()
 
 
@@ -247,13 +321,12 @@ def test_a_moment_counts_once_whoever_saw_it(tmp_path, robot, task, stretch):
     with Ledger(tmp_path / "l", NAME) as book:
         book.add("slow", "m", "slow", slow, [trigger])
         assumed = recount(book, Model.of(robot), curves, task)
-        assert len(assumed.blows) == 5 * 25 and not any(b.seen for b in assumed.blows)
+        assert (assumed.blows, assumed.seen) == (5 * 25, 0)
         book.add("fast", "m", "fast", stream, [samples])
-        both = recount(book, Model.of(robot), curves, task)
-    seen = sum(blow.seen for blow in both.blows)
-    assert seen == 36
-    later = [b for b in both.blows if b.onset > samples.stamps[-1]]
-    assert len(both.blows) == 36 + len(later) and later and not any(b.seen for b in later)
+        both, blows = recount(book, Model.of(robot), curves, task), blows_in(book, robot, task)
+    assert both.seen == 36
+    later = [b for b in blows if b.onset > samples.stamps[-1]]
+    assert both.blows == 36 + len(later) and later and not any(b.seen for b in later)
 
 
 class Square(shift.Rivet):
@@ -278,9 +351,8 @@ def test_accelerations_tell_the_size_of_a_blow(tmp_path, robot, task):
                     0.1 * mobility * 800.0, {"sensor": sensor})  # fmt: skip
     with Ledger(tmp_path / "l", NAME) as book:
         book.add("a", "m", "a", stream, [samples])
-        found = recount(book, Model.of(robot), curves_of(robot), task)
-    assert len(found.blows) == 12
-    peaks = np.array([blow.peak for blow in found.blows])
+        peaks = np.array([blow.peak for blow in blows_in(book, robot, task)])
+    assert len(peaks) == 12
     assert peaks.mean() == pytest.approx(800.0, rel=0.01)
     assert peaks == pytest.approx([800.0] * 12, rel=0.05)
 
@@ -298,8 +370,7 @@ def test_poses_alone_stand_for_rivets(tmp_path, robot, task):
     with Ledger(tmp_path / "l", NAME) as book:
         book.add("a", "m", "a", stream, [samples])
         found = recount(book, Model.of(robot), curves_of(robot), task)
-    assert len(found.blows) == 3 * task.operations[2].hits_per_rivet
-    assert {blow.kind for blow in found.blows} == {"poses"}
+    assert dict(found.kinds) == {"poses": 3 * task.operations[2].hits_per_rivet}
 
 
 def test_intervals_of_time():
@@ -311,7 +382,10 @@ def test_intervals_of_time():
     found = covered(spans, 1)
     assert sum(b - a + 1 for a, b in found) == marked.sum()
     when = np.arange(10_100)
-    assert (within(when, found) == marked).all()
+    nothing = np.empty(0)
+    blows = [Blow(int(t), "force", nothing, nothing, nothing, nothing) for t in when]
+    assert [blow.onset for blow in uncovered(blows, found)] == when[~marked].tolist()
+    assert list(uncovered(blows, found[:0])) == blows
 
 
 def test_residues_counted_together_are_the_whole_history():
@@ -334,7 +408,10 @@ def test_residues_counted_together_are_the_whole_history():
         closed = [[damage(counter.cycles("discarded").scaled(s), curve) for s in SCALES]]
         half = [[damage(counter.cycles("half-cycles").scaled(s), curve) for s in SCALES]]
         made.append(BurstDamage(np.array(closed), np.array(half), np.zeros(1), (counter.residue,)))
-    totals = together(made, [curve])
+    added = Sum([curve])
+    for part in (made[:7], made[7:8], made[8:]):
+        added.add(part)
+    totals = added.totals
     assert totals.damage[0] == pytest.approx(shift.cost(np.concatenate(histories)), rel=1e-12)
     assert totals.alone[0] == pytest.approx(sum(map(shift.cost, histories)), rel=1e-12)
     scaled = totals.at(np.array([1.0, 1.3, 2.0, 4.0]))[0]
@@ -422,21 +499,24 @@ def test_the_command_counts_and_its_page_shows_it(tmp_path, stretch, in_process,
 
 
 def test_a_model_that_must_be_computed_one_by_one_counts_the_same(robot, stretch, tmp_path, task):
-    from picchio.ledger.damage import _exactly, burst_damages_of
+    from picchio.ledger.damage import _exactly
 
     samples, stream, curve = stretch
     model = Model.of(robot)
     curves = curves_of(robot, load_sn_curve(str(curve)))
     with Ledger(tmp_path / "l", NAME) as book:
         book.add("log", "m", "log", stream, [samples])
-        found = recount(book, model, curves, task)
-    burst = found.bursts[0]
+        burst = next(bursts(blows_in(book, robot, task), resting(model)))
     (fast,) = burst_damages_of(model, curves, [burst])
     slow = _exactly(model, curves, burst)
     np.testing.assert_allclose(fast.peak, slow.peak, rtol=1e-6)
     np.testing.assert_allclose(fast.alone, slow.alone, rtol=1e-4)
-    together_fast, together_slow = together([fast] * 3, curves), together([slow] * 3, curves)
-    np.testing.assert_allclose(together_fast.damage, together_slow.damage, rtol=1e-4)
+    totals = []
+    for each in (fast, slow):
+        added = Sum(curves)
+        added.add([each] * 3)
+        totals.append(added.totals.damage)
+    np.testing.assert_allclose(*totals, rtol=1e-4)
 
 
 def test_a_bag_whose_topics_have_clocks_of_their_own(robot, tmp_path, task):
@@ -482,11 +562,11 @@ def test_a_bag_whose_topics_have_clocks_of_their_own(robot, tmp_path, task):
     rules = picchio.campaign.importing.mapping.read_mapping(tmp_path / "m.toml")
     with Ledger(tmp_path / "l", NAME) as book:
         add_log(book, path, rules, Model.of(robot), task)
-        found = recount(book, Model.of(robot), curves_of(robot), task)
-    assert len(found.blows) == 12
-    np.testing.assert_allclose([b.peak for b in found.blows], made[0].peaks, rtol=0.01)
-    np.testing.assert_allclose(found.blows[0].pose, shift.POSES[made[0].place], atol=2e-4)
-    np.testing.assert_allclose(found.blows[3].direction, shift.DIRECTIONS[made[0].place], atol=0.01)
+        found = blows_in(book, robot, task)
+    assert len(found) == 12
+    np.testing.assert_allclose([b.peak for b in found], made[0].peaks, rtol=0.01)
+    np.testing.assert_allclose(found[0].pose, shift.POSES[made[0].place], atol=2e-4)
+    np.testing.assert_allclose(found[3].direction, shift.DIRECTIONS[made[0].place], atol=0.01)
 
 
 def test_a_topic_that_is_silent_for_blocks_holds_its_value(robot, tmp_path, monkeypatch):

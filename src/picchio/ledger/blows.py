@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -18,8 +19,13 @@ from picchio.studies.tasks import Operation
 _SAME_POSE = 2e-3
 # Blows that are computed as one history: a longer one is cut, and rings down as if from there.
 _LONGEST = 600
+_AT_ONCE = 512  # blows whose poses are looked at together
 # A smooth blow of 20 samples has 0.2 % less impulse by straight lines: four times as many do.
 _FINER = 4
+
+
+SEEN = ("force", "acceleration")
+"""Kinds of blows whose size was logged."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -47,7 +53,7 @@ class Blow:
     @property
     def seen(self) -> bool:
         """Whether its size was logged, and not assumed."""
-        return self.kind in ("force", "acceleration")
+        return self.kind in SEEN
 
     @property
     def peak(self) -> float:
@@ -109,20 +115,17 @@ def covered(spans: IndexArray, gap: int) -> IndexArray:
     return np.column_stack([order[np.append(0, cuts), 0], ends[np.append(cuts - 1, len(ends) - 1)]])
 
 
-def within(when: IndexArray, intervals: IndexArray) -> IndexArray:
-    """Whether times lie in any of some intervals.
+def uncovered(blows: Iterable[Blow], intervals: IndexArray) -> Iterator[Blow]:
+    """The blows that begin in none of some intervals.
 
     Args:
-        when: (m,) ns.
-        intervals: (s, 2), as of `covered`.
-
-    Returns:
-        (m,) bool.
+        blows: any.
+        intervals: (s, 2) ns, as of `covered`.
     """
-    if not len(intervals):
-        return np.zeros(when.shape, dtype=bool)
-    at = np.searchsorted(intervals[:, 0], when, side="right") - 1
-    return (at >= 0) & (when <= intervals[np.maximum(at, 0), 1])
+    for blow in blows:
+        at = int(np.searchsorted(intervals[:, 0], blow.onset, side="right"))
+        if not (intervals[at - 1 : at, 1] >= blow.onset).any():
+            yield blow
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +154,12 @@ def runs(kept: Kept) -> list[Run]:
 
     Args:
         kept: what the ledger holds of it.
+
+    Raises:
+        InputError: no pose anywhere.
     """
     stream, found = kept.stream, []
-    size = magnitude(kept.values) if kept.values.shape[1] else np.zeros(kept.stamps.size)
+    size = magnitude(kept.values)
     for piece in pieces(kept.stamps, stream.gap):
         own, stamps, values = size[piece], kept.stamps[piece], kept.values[piece]
         active = own > stream.foot
@@ -165,11 +171,13 @@ def runs(kept: Kept) -> list[Run]:
         for a, b in zip(start[tops > stream.threshold], end[tops > stream.threshold], strict=True):
             first, last = max(a - 1, 0), min(b + 1, own.size)
             at = np.searchsorted(kept.pose_stamps, stamps[a], side="right") - 1
-            pose = kept.poses[max(at, 0)] if len(kept.poses) else np.empty(0)
+            if not len(kept.poses):
+                raise InputError("no position was logged, so that nobody knows where the robot "
+                                 "stood", key="channel")  # fmt: skip
             found.append(
                 Run(
                     int(stamps[a]), int(stamps[b - 1]), stamps[first:last], values[first:last],
-                    pose, first == a or last == b,
+                    kept.poses[max(at, 0)], first == a or last == b,
                 )
             )  # fmt: skip
     return found
@@ -225,34 +233,25 @@ def _zero(time: FloatArray, values: FloatArray) -> tuple[float, float]:
 
 
 def measured(
-    kept: Kept, direction: FloatArray | None, rotation: Callable[[FloatArray], FloatArray] | None
-) -> list[Blow]:
-    """The blows of a stream with a force.
+    run: Run, direction: FloatArray | None, rotation: Callable[[FloatArray], FloatArray] | None
+) -> Blow:
+    """The blow that a run of a force is.
 
     Args:
-        kept: what the ledger holds of it.
+        run: its samples.
         direction: (3,) unit, of one channel; None of three.
         rotation: from a pose to (3, 3), the axes that the direction or the channels are in; None
             where they are the world's.
-
-    Raises:
-        InputError: no pose anywhere.
     """
-    found = []
-    for run in runs(kept):
-        if not run.pose.size:
-            raise InputError("no position was logged, so that nobody knows where the robot stood",
-                             key="channel")  # fmt: skip
-        turn = np.eye(3) if rotation is None else rotation(run.pose)
-        if direction is not None:
-            along, values = direction, run.values[:, 0]
-        else:
-            whole = run.values.sum(axis=0)
-            along = whole / np.linalg.norm(whole)
-            values = run.values @ along
-        time, force = shaped(run.stamps, values, run.onset, run.last)
-        found.append(Blow(run.onset, "force", time, force, turn @ along, run.pose, run.cut))
-    return found
+    turn = np.eye(3) if rotation is None else rotation(run.pose)
+    if direction is not None:
+        along, values = direction, run.values[:, 0]
+    else:
+        whole = run.values.sum(axis=0)
+        along = whole / np.linalg.norm(whole)
+        values = run.values @ along
+    time, force = shaped(run.stamps, values, run.onset, run.last)
+    return Blow(run.onset, "force", time, force, turn @ along, run.pose, run.cut)
 
 
 Shape = tuple[float, FloatArray, FloatArray]
@@ -316,8 +315,8 @@ def _shapes(operation: Operation, hits: int, model: Model) -> list[Shape]:
     return found
 
 
-def bursts(blows: Sequence[Blow], rest: Callable[[FloatArray], FloatArray]) -> list[Burst]:
-    """The blows that are computed together.
+def bursts(blows: Iterable[Blow], rest: Callable[[FloatArray], FloatArray]) -> Iterator[Burst]:
+    """The blows that are computed together, by time.
 
     A blow joins the one before it where the robot stands at the same pose and has not come to
     rest.
@@ -326,34 +325,24 @@ def bursts(blows: Sequence[Blow], rest: Callable[[FloatArray], FloatArray]) -> l
         blows: by time.
         rest: from poses (p, nv) to (p,) s: how long the robot rings there.
     """
-    if not blows:
-        return []
-    poses = np.array([blow.pose for blow in blows])
-    onset = np.array([blow.onset for blow in blows])
-    end = np.array([blow.onset + int(blow.time[-1] * 1e9) for blow in blows])
-    moved = np.abs(np.diff(poses, axis=0)).max(axis=1) > _SAME_POSE
-    silence = (onset[1:] - end[:-1]) * 1e-9
-    places, which = np.unique(poses[:-1], axis=0, return_inverse=True)
-    near = silence < (rest(places)[which.ravel()] if len(places) else silence)
-    found: list[Burst] = []
-    shapes: dict[bytes, Burst] = {}
-    part = [blows[0]]
-    for k, blow in enumerate(blows[1:]):
-        if moved[k] or not near[k] or len(part) >= _LONGEST:
-            found.append(_shared(burst(part), shapes))
-            part = []
-        part.append(blow)
-    found.append(_shared(burst(part), shapes))
-    return found
-
-
-def _shared(made: Burst, shapes: dict[bytes, Burst]) -> Burst:
-    """The burst, its force held once where another's is the same: those assumed mostly are."""
-    told = b"".join(part.tobytes() for part in (made.start, made.constant, made.slope))
-    one = shapes.setdefault(hashlib.blake2b(told, digest_size=20).digest(), made)
-    if one is made:
-        return made
-    return replace(made, start=one.start, constant=one.constant, slope=one.slope)
+    coming = iter(blows)
+    part: list[Blow] = []
+    while new := list(islice(coming, _AT_ONCE)):
+        row = [*part[-1:], *new]
+        poses = np.array([blow.pose for blow in row])
+        onset = np.array([blow.onset for blow in row])
+        end = np.array([blow.onset + int(blow.time[-1] * 1e9) for blow in row])
+        moved = np.abs(np.diff(poses, axis=0)).max(axis=1) > _SAME_POSE
+        places, which = np.unique(poses[:-1], axis=0, return_inverse=True)
+        near = (onset[1:] - end[:-1]) * 1e-9 < rest(places)[which.ravel()]
+        part += new[: len(new) - len(moved)]  # the very first one
+        for blow, joins in zip(row[1:], near & ~moved, strict=True):
+            if not joins or len(part) >= _LONGEST:
+                yield burst(part)
+                part = []
+            part.append(blow)
+    if part:
+        yield burst(part)
 
 
 def burst(blows: Sequence[Blow]) -> Burst:

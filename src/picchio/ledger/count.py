@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
-from itertools import chain
+from heapq import merge
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -13,23 +14,18 @@ import numpy as np
 from picchio.campaign.channels import AXES
 from picchio.campaign.importing.importer import ENDINGS
 from picchio.campaign.importing.mapping import Mapping, read_mapping
+from picchio.core.arrays import IndexArray
 from picchio.core.errors import InputError, warn_user
 from picchio.core.files import sha256
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.ledger.blows import Blow, bursts, covered, within
-from picchio.ledger.damage import (
-    BurstDamage,
-    burst_damages_of,
-    fingerprint,
-    resting,
-    together,
-    unscaled,
-)
+from picchio.ledger.blows import Blow, Burst, bursts, covered, uncovered
+from picchio.ledger.counted import Counted
+from picchio.ledger.damage import BurstDamage, burst_damages_of, fingerprint, resting, unscaled
 from picchio.ledger.finding import blows_of, standing, stream_of
 from picchio.ledger.forecast import UNLIKELY, Worlds, worlds
-from picchio.ledger.result import SECONDS_A_DAY, Count, Counted
+from picchio.ledger.result import Count
 from picchio.ledger.samples import Samples, by_names, read_samples
 from picchio.ledger.store import Ledger
 from picchio.ledger.watch.changes import find, readings_of
@@ -44,7 +40,8 @@ from picchio.studies.rivet.life_rules import curves_of
 from picchio.studies.tasks import Task
 
 MAPPING = "mapping.toml"
-_READ = 2  # what is read of a log: where that becomes more, logs that are there are read anew
+_AT_ONCE = 256  # bursts that are held
+_READ = 3  # what is read of a log: where that becomes more, logs that are there are read anew
 
 
 @one_thread()
@@ -117,13 +114,11 @@ def count(
         except InputError as error:
             raise _to_map(error, files[0] if files else None, bare, names) from None
         logs = len(book.logs())
-        readings = readings_of(model, counted.blows, book.features())
+        readings = readings_of(model, counted.readings, book.features())
     changes, other = find(readings), exchange(readings)
     drawn = None
-    if counted.bursts and any(curve is not None for curve in curves):
-        day = np.array([b.onset for b in counted.bursts]) // (SECONDS_A_DAY * 10**9)
-        drawn = worlds(unscaled(model), curves, sn_curve, counted.bursts, counted.totals, day,
-                       samples, seed)  # fmt: skip
+    if counted.blows and any(curve is not None for curve in curves):
+        drawn = worlds(unscaled(model), curves, sn_curve, counted, samples, seed)
     inputs = [*bare.files, *work.files, *([rules_file] if rules_file else [])]
     notes = (*names, *_notes(counted, rules, model), *_surprises(drawn, model))
     return Count(
@@ -157,10 +152,11 @@ def _notes(counted: Counted, rules: Mapping | None, model: Model) -> tuple[str, 
         "of all bursts close together counts, too, so that this is more than assess tells for the "
         "same rivets one by one",
     ]
-    cut = sum(blow.cut for blow in counted.blows)
-    if cut:
-        notes.append(f"{cut} blows are cut by the end of a log whose neighbour is not there yet")
-    kinds = {blow.kind for blow in counted.blows}
+    if counted.cut:
+        notes.append(
+            f"{counted.cut} blows are cut by the end of a log whose neighbour is not there yet"
+        )
+    kinds = counted.kinds.keys()
     if "acceleration" in kinds:
         notes.append(
             "sizes told from accelerations: peak times the mass that the tool feels; where "
@@ -276,27 +272,22 @@ def add_log(
         first = standing(next(stretches), task)
         stream = book.stream(stream_of(first, rules, task, robot))
         rest: Iterator[Samples] = (standing(part, task) for part in stretches)
-        features: list[tuple[str, int, float]] = []
-        spans: list[int] = []
+        sizes: list[int] = []
 
-        def looked_at() -> Iterator[Samples]:
-            for part in chain([first], rest):
-                spans.append(part.stamps.size)
-                features.extend(ring_downs(part, stream, model))
-                features.extend(temperatures(part))
-                features.extend(drives(part, model))
-                yield part
+        def shown(part: Samples) -> Iterator[tuple[str, int, float]]:
+            sizes.append(part.stamps.size)
+            return chain(ring_downs(part, stream, model), temperatures(part), drives(part, model))
 
-        book.add(log, how, file.name, stream, looked_at(), features)
+        book.add(log, how, file.name, stream, chain([first], rest), shown)
     except StopIteration:
         raise InputError("is empty", file=file) from None
     except InputError as error:
         raise error if error.file is not None else error.placed(file=file) from None
-    if len(spans) == 1:
+    if len(sizes) == 1:
         return first.detected
     # What was told of the rate was that of the first stretch.
     lines = (line.partition(", measured from")[0] for line in first.detected)
-    return (*lines, f"{sum(spans)} samples")
+    return (*lines, f"{sum(sizes)} samples")
 
 
 def recount(book: Ledger, model: Model, curves: Sequence[SNCurve | None], task: Task) -> Counted:
@@ -311,27 +302,49 @@ def recount(book: Ledger, model: Model, curves: Sequence[SNCurve | None], task: 
     Raises:
         InputError: see `measured`; a model without damping.
     """
-    blows: list[Blow] = []
-    over = np.empty((0, 2), np.int64)
-    for kept in book.kept():
-        spans = covered(kept.spans, kept.stream.gap)
-        found = blows_of(kept, model, task)
-        when = np.array([blow.onset for blow in found], np.int64)
-        # A moment of the robot counts once: by the surest stream that saw it.
-        blows += [b for b, hidden in zip(found, within(when, over), strict=True) if not hidden]
-        over = covered(np.concatenate([over, spans]), kept.stream.gap)
-    blows.sort(key=lambda blow: blow.onset)
+    blows, spans = blows_held(book, model, task)
     model = unscaled(model)  # the blows have their effects in them
+    name, found = fingerprint(model, curves), Counted(curves)
     grouped = bursts(blows, resting(model))
-    name = fingerprint(model, curves)
-    known = book.computed(name)
-    keys = [burst.key for burst in grouped]
-    new = {key: burst for key, burst in zip(keys, grouped, strict=True) if key not in known}
+    while part := list(islice(grouped, _AT_ONCE)):
+        found.add(part, _damages(book, name, model, curves, part))
+    found.close(spans)
+    return found
+
+
+def blows_held(book: Ledger, model: Model, task: Task) -> tuple[Iterator[Blow], IndexArray]:
+    """The blows of all logs of a ledger, found as they are asked for.
+
+    Args:
+        book: the ledger.
+        model: the robot and its effects.
+        task: whose blows are assumed where none are seen.
+
+    Returns:
+        the blows by time, and (s, 2) ns, the time that was logged.
+
+    Raises:
+        InputError: see `blows_of`.
+    """
+    sources = []
+    over = np.empty((0, 2), np.int64)
+    for stream, spans in book.streams():
+        # A moment of the robot counts once: by the surest stream that saw it.
+        sources.append(uncovered(blows_of(stream, book.kept(stream), model, task), over))
+        over = covered(np.concatenate([over, covered(spans, stream.gap)]), stream.gap)
+    return merge(*sources, key=lambda blow: blow.onset), over
+
+
+def _damages(
+    book: Ledger, name: str, model: Model, curves: Sequence[SNCurve | None], part: Sequence[Burst]
+) -> list[BurstDamage]:
+    """What each burst does; what was computed before is taken from the ledger."""
+    keys = [burst.key for burst in part]
+    known = book.computed(name, keys)
+    new = {key: burst for key, burst in zip(keys, part, strict=True) if key not in known}
     if new:
         made = burst_damages_of(model, curves, list(new.values()))
         fresh = {key: one.packed() for key, one in zip(new, made, strict=True)}
         book.remember(name, fresh)
         known |= fresh
-    each = {key: BurstDamage.unpacked(known[key], len(curves)) for key in dict.fromkeys(keys)}
-    damages = [each[key] for key in keys]
-    return Counted(blows, grouped, damages, together(damages, curves), over)
+    return [BurstDamage.unpacked(known[key], len(curves)) for key in keys]

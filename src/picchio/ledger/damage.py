@@ -14,7 +14,8 @@ from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.processes import on_threads
 from picchio.excitation.measured import MeasuredForce
-from picchio.fatigue.counting.counter import RainflowCounter, rainflow
+from picchio.fatigue.counting.counter import RainflowCounter
+from picchio.fatigue.counting.cycles import Cycles
 from picchio.fatigue.miner import damage
 from picchio.fatigue.shaft_stress import stress_per_torque
 from picchio.fatigue.sn.curve import SNCurve
@@ -28,7 +29,8 @@ from picchio.vibration.closed_form.response import RING_DOWN_LEVEL, ring_down
 
 SCALES = np.exp(np.linspace(-0.9, 0.9, 13))
 """Of the load, at which damage is computed: what an error of the force or the strength does."""
-_AS_LOGGED = 6
+AS_LOGGED = 6
+"""Which of `SCALES` is 1."""
 _BATCH = 128
 
 
@@ -211,13 +213,11 @@ class Totals:
         damage: (n,) Miner's sum of each joint; NaN without a curve.
         scaled: (n, s) at each of `SCALES` of the load.
         alone: (n,) the sum of the bursts each by itself, as `assess` has it.
-        shares: (b, n) of the damage, by burst; they add up to it.
     """
 
     damage: FloatArray
     scaled: FloatArray
     alone: FloatArray
-    shares: FloatArray
 
     def at(self, scale: FloatArray) -> FloatArray:
         """(n, m) the damage were the load so many times as large.
@@ -242,34 +242,45 @@ class Totals:
         return found
 
 
-def together(found: Sequence[BurstDamage], curves: Sequence[SNCurve | None]) -> Totals:
-    """All bursts in the order of time: what closes within each, and what their residues close.
+class Sum:
+    """Bursts in the order of time: what closes within each, and what their residues close.
 
     Counting the residues one after the other is counting the whole history: the four-point rule
-    takes the same cycles out of it in either way.
+    takes the same cycles out of it in either way. Only what no cycle has used yet is held.
 
     Args:
-        found: by time.
         curves: of the n joints.
     """
-    n = len(curves)
-    total, scaled, alone = np.full(n, np.nan), np.zeros((n, SCALES.size)), np.full(n, np.nan)
-    shares = np.zeros((len(found), n))
-    for j, curve in enumerate(curves):
-        if curve is None:
-            continue
-        residues = [each.residue[j] for each in found if each.residue[j].size]
-        outer = rainflow(np.concatenate(residues)) if residues else None
-        for s, scale in enumerate(SCALES):
-            inner = math.fsum(float(each.closed[j, s]) for each in found)
-            whole = 0.0 if outer is None else damage(outer.scaled(scale), curve)
-            scaled[j, s] = inner + whole
-        total[j] = scaled[j, _AS_LOGGED]
-        own = np.array([each.alone[j, _AS_LOGGED] for each in found])
-        alone[j] = math.fsum(own)
-        if alone[j] > 0.0:
-            shares[:, j] = own * (total[j] / alone[j])
-    return Totals(total, scaled, alone, shares)
+
+    def __init__(self, curves: Sequence[SNCurve | None]) -> None:
+        self._scaled = np.zeros((len(curves), SCALES.size))
+        self._open = {j: (c, RainflowCounter()) for j, c in enumerate(curves) if c is not None}
+        self.alone: FloatArray = np.array([np.nan if c is None else 0.0 for c in curves])
+
+    def add(self, found: Sequence[BurstDamage]) -> None:
+        """Further bursts.
+
+        Args:
+            found: by time.
+        """
+        self._scaled += np.sum([each.closed for each in found], axis=0)
+        self.alone += np.sum([each.alone[:, AS_LOGGED] for each in found], axis=0)
+        for j, (curve, counter) in self._open.items():
+            counter.add(np.concatenate([each.residue[j] for each in found]))
+            self._scaled[j] += _costs(counter.taken(), curve)
+
+    @property
+    def totals(self) -> Totals:
+        """Of all bursts so far, what is left of the residues as half cycles."""
+        scaled = self._scaled.copy()
+        for j, (curve, counter) in self._open.items():
+            scaled[j] += _costs(counter.cycles(), curve)
+        return Totals(scaled[:, AS_LOGGED] + 0.0 * self.alone, scaled, self.alone.copy())
+
+
+def _costs(cycles: Cycles, curve: SNCurve) -> FloatArray:
+    """(s,) the damage at each of `SCALES`."""
+    return np.array([damage(cycles.scaled(scale), curve) for scale in SCALES])
 
 
 def unscaled(model: Model) -> Model:

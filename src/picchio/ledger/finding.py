@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -113,53 +114,62 @@ def standing(samples: Samples, task: Task) -> Samples:
     return replace(samples, stamps=samples.pose_stamps, values=near[:, None].astype(float))
 
 
-def blows_of(kept: Kept, model: Model, task: Task) -> list[Blow]:
-    """The blows of a stream.
+def blows_of(
+    stream: Stream, parts: Iterable[Kept], model: Model, task: Task
+) -> Iterator[Blow]:  # fmt: skip
+    """The blows of a stream, by time.
 
     Args:
-        kept: what the ledger holds of it.
+        stream: which.
+        parts: what the ledger holds of it, by time: no run crosses two of them.
         model: the robot, and the effects on blows that are assumed.
         task: whose blows are assumed where none are seen.
 
     Raises:
-        InputError: see `measured`; an operation that is not told.
+        InputError: no pose anywhere; an operation that is not told.
     """
-    settings, robot = kept.stream.settings, model.robot
+    settings, robot = stream.settings, model.robot
 
     def turn(pose: FloatArray) -> FloatArray:
         return robot.frame_placement(pose, robot.tool_frame)[1]
 
     rotation = turn if settings.get("frame") == "tool" else None
-    if kept.stream.kind == "force":
-        given = settings.get("direction")
-        along = None if given is None or kept.stream.columns == 3 else unit_vector(given)
-        return measured(kept, along, rotation)
-    found: list[Blow] = []
+    given = settings.get("direction")
+    fixed = None if given is None or stream.columns == 3 else unit_vector(given)
     shapes: dict[tuple[int, int], list[Shape]] = {}
     gains: dict[tuple[Any, ...], FloatArray] = {}
     hit, before = 0, 0  # of a rivet, and ns of the blow before
-    for run in runs(kept):
-        if not run.pose.size:
-            raise InputError("no position was logged, so that nobody knows where the robot stood",
-                             key="channel")  # fmt: skip
-        if kept.stream.kind == "acceleration":
+
+    def told(run: Run) -> Iterator[Blow]:
+        nonlocal hit, before
+        if stream.kind == "force":
+            yield measured(run, fixed, rotation)
+            return
+        if stream.kind == "acceleration":
             meant = _operations(task, settings.get("operation"), run.pose)
-            for jolt, peak in _jolts(run, kept.stream.threshold, meant[0]):
+            for jolt, peak in _jolts(run, stream.threshold, meant[0]):
                 blow = _felt(jolt, peak, settings, meant, task, model, shapes)
                 near = blow.onset - before < 2e9 * meant[0].excitation.period
                 hit, before = hit + 1 if near else 0, blow.onset
-                found.append(_corrected(blow, hit, kept, meant[0], model, gains))
-            continue
+                yield _corrected(blow, hit, stream, meant[0], model, gains)
+            return
         operation = _operation(task, settings.get("operation"), run.pose)
         period = operation.excitation.period
         length = (run.last - run.onset) * 1e-9
         hits = 1 if settings.get("trigger") == "blow" else 1 + int(length / period)
-        if kept.stream.kind == "poses":
+        if stream.kind == "poses":
             hits = (
                 operation.hits_per_rivet if length >= 0.5 * period * operation.hits_per_rivet else 0
             )
-        found += assumed(run, operation, kept.stream.kind, hits, model, shapes)
-    return found
+        yield from assumed(run, operation, stream.kind, hits, model, shapes)
+
+    late: list[Blow] = []  # blows that are assumed may go on after the next run has begun
+    for kept in parts:
+        for run in runs(kept):
+            yield from (blow for blow in late if blow.onset < run.onset)
+            late = [*(blow for blow in late if blow.onset >= run.onset), *told(run)]
+            late.sort(key=lambda blow: blow.onset)
+    yield from late
 
 
 def _jolts(run: Run, threshold: float, operation: Operation) -> list[tuple[Run, FloatArray]]:
@@ -210,7 +220,7 @@ def _felt(
 
 
 def _corrected(
-    blow: Blow, hit: int, kept: Kept, operation: Operation, model: Model,
+    blow: Blow, hit: int, stream: Stream, operation: Operation, model: Model,
     gains: dict[tuple[Any, ...], FloatArray],
 ) -> Blow:  # fmt: skip
     """The blow, less what the springs' pull is taken for.
@@ -222,7 +232,7 @@ def _corrected(
     """
     if model.nonlinear:
         return blow
-    step = kept.stream.gap / STEPS
+    step = stream.gap / STEPS
     key = (operation.name, *np.round(blow.pose / NEAR), *np.round(blow.direction, 2))
     if key not in gains and step:
         excitation, hits = operation.excitation, operation.hits_per_rivet
@@ -233,14 +243,13 @@ def _corrected(
         read[quiet:] = response.acceleration(time[: time.size - quiet], blow.direction).T
         stamps = np.rint(1e9 * time).astype(np.int64)
         size = blow.peak / excitation.peak_force
-        made = Kept(kept.stream, np.empty((0, 2), np.int64), stamps, size * read, stamps[:1],
-                    blow.pose[None])  # fmt: skip
+        made = Kept(stream, stamps, size * read, stamps[:1], blow.pose[None])
         mass, jacobian = ManyPoses(unscaled(model), blow.pose[None]).mass_and_jacobian()
         per = jacobian[0] @ np.linalg.solve(mass[0], blow.direction @ jacobian[0])
         told = [
             float(peak @ per) / (blow.peak * float(per @ per))
             for run in runs(made)
-            for _, peak in _jolts(run, kept.stream.threshold, operation)
+            for _, peak in _jolts(run, stream.threshold, operation)
         ]
         gains[key] = np.array(told) if len(told) == hits else np.ones(1)
     known = gains.get(key, np.ones(1))

@@ -13,7 +13,7 @@ from picchio.excitation.measured import MeasuredForce
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.uncertain_lives import Draws, Uncertain
 from picchio.ledger.blows import Burst
-from picchio.ledger.damage import Totals
+from picchio.ledger.counted import Counted, Stretch
 from picchio.model.model import Model
 from picchio.robot.spread import root_of
 from picchio.studies.rivet.variation import WornParts
@@ -25,7 +25,6 @@ UNLIKELY = 0.05
 """Share of the worlds: where a joint is whole in fewer, something is not as it was taken to be."""
 # Bursts that stand for all; their damage is followed through every drawn world.
 _TYPICAL = 4
-_LONGEST = 4000  # pieces of the force: a longer burst is not typical
 FORCE_SPREAD = {"force": 0.05, "acceleration": 0.075, "trigger": 0.15, "poses": 0.15}
 """Of a blow's size, one factor for all blows: a calibrated force; one told from an acceleration
 (5 % each of the sensor and of the blow's width, which is the task's, the rest of the masses and of
@@ -106,21 +105,22 @@ def quantiles(values: FloatArray) -> dict[str, float]:
     return {name: float(order[rank]) for name, rank in ranks.items()}
 
 
-def typical(bursts: Sequence[Burst], weight: FloatArray) -> list[int]:
-    """Bursts that stand for all: as many in each stretch of equal weight.
+def typical(stretches: Sequence[Stretch]) -> list[Stretch]:
+    """Stretches whose bursts stand for all: as many in each part of equal damage.
 
     Args:
-        bursts: by time.
-        weight: (b,) not negative.
+        stretches: by time.
 
     Returns:
-        their indices.
+        some of them, one perhaps several times.
     """
+    done = np.array([each.damage for each in stretches])
+    weight = (done / np.maximum(done.sum(axis=0), 1e-300)).max(axis=1)
     whole = np.cumsum(weight + 1e-12 * max(float(weight.max()), 1e-300))
     targets = (np.arange(_TYPICAL) + 0.5) / _TYPICAL * whole[-1]
-    chosen = [int(k) for k in np.searchsorted(whole, targets)]
-    short = [k for k in chosen if bursts[k].start.size <= _LONGEST]
-    return short or [int(np.argmin([b.start.size for b in bursts]))]
+    chosen = [stretches[int(k)] for k in np.searchsorted(whole, targets)]
+    short = [each for each in chosen if each.short]
+    return short or [min(stretches, key=lambda each: each.burst.start.size)]
 
 
 def force_of(burst: Burst) -> MeasuredForce:
@@ -145,9 +145,7 @@ def worlds(
     model: Model,
     curves: Sequence[SNCurve | None],
     sn_curve: str | SNCurve | None,
-    bursts: Sequence[Burst],
-    totals: Totals,
-    days: FloatArray,
+    counted: Counted,
     samples: int,
     seed: int,
 ) -> Worlds:
@@ -160,24 +158,21 @@ def worlds(
         model: the robot and its effects.
         curves: of the n joints.
         sn_curve: as given for all shafts, or None.
-        bursts: by time.
-        totals: their damage.
-        days: (b,) the day of each burst.
+        counted: all bursts.
         samples: worlds to draw, at most 256.
         seed: of the draws.
 
     Returns:
         what the joints have suffered in each.
     """
-    share = totals.shares / np.maximum(np.nansum(totals.shares, axis=0), 1e-300)
-    which = typical(bursts, share.max(axis=1) if share.size else np.ones(len(bursts)))
+    which = typical(counted.stretches)
     operations = tuple(
-        Operation(str(k), bursts[k].direction, force_of(bursts[k]), 1, bursts[k].pose[None],
-                  float(which.count(k)))
-        for k in dict.fromkeys(which)
+        Operation(str(k), each.burst.direction, force_of(each.burst), 1, each.burst.pose[None],
+                  float(which.count(each)))
+        for k, each in enumerate(dict.fromkeys(which))
     )  # fmt: skip
-    seen = [blow.kind for burst in bursts for blow in burst.blows]
-    force = math.sqrt(sum(FORCE_SPREAD[kind] ** 2 for kind in seen) / len(seen))
+    squares = sum(count * FORCE_SPREAD[kind] ** 2 for kind, count in counted.kinds.items())
+    force = math.sqrt(squares / counted.blows)
     inputs = {k: v for k, v in DEFAULT_INPUTS.items() if k != "width"}
     inputs["force"] = Uncertain(1.0, force)
     stress = WornParts.of(model.robot, sn_curve)
@@ -188,22 +183,24 @@ def worlds(
     per = 1.0 / sampler.run(scores).lives  # (k, m) of a typical burst
     n, m = len(curves), per.shape[1]
     damage = np.full((n, m), np.nan)
-    count = len(bursts)
+    count, totals = counted.bursts, counted.totals
     for row, j in enumerate(stress.columns):
-        chosen = totals.shares[which, j].mean() * count
+        chosen = np.mean([each.own[j] for each in which]) * counted.together[j] * count
         # What the typical ones leave out of the whole, and what residues close together.
         scale = totals.damage[j] / chosen if chosen > 0.0 else 1.0
         own = totals.alone[j] / totals.damage[j] if totals.damage[j] > 0.0 else 1.0
         damage[j] = per[row] * count * scale / own if chosen > 0.0 else per[row] * count
-    return Worlds(damage, _mix(totals, days, m, seed))
+    return Worlds(damage, _mix(counted, m, seed))
 
 
-def _mix(totals: Totals, days: FloatArray, m: int, seed: int) -> FloatArray:
+def _mix(counted: Counted, m: int, seed: int) -> FloatArray:
     """(m,) damage of a blow over its mean so far, from as many days drawn anew."""
-    worst = int(np.nanargmax(totals.damage)) if np.isfinite(totals.damage).any() else 0
-    _, day = np.unique(days, return_inverse=True)
-    done = np.bincount(day, totals.shares[:, worst])
-    blows = np.bincount(day).astype(float)
+    damage = counted.totals.damage
+    worst = int(np.nanargmax(damage)) if np.isfinite(damage).any() else 0
+    hour, table = counted.hours
+    _, day = np.unique(hour // 24, return_inverse=True)
+    done = np.bincount(day, table[:, 2 + worst])
+    blows = np.bincount(day, table[:, 1])
     if done.size < 2 or not done.sum() > 0.0:
         return np.ones(m)
     rng = np.random.default_rng(seed)

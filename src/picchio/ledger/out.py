@@ -44,7 +44,7 @@ def prometheus(found: Count) -> str:
     values["picchio_logged_seconds_total"].append((own, logged))
     values["picchio_changes"].append((own, len(found.changes)))
     if found.blows:
-        last = found.counted.blows[-1].onset * 1e-9
+        last = found.counted.last * 1e-9
         values["picchio_last_blow_timestamp_seconds"].append((own, last))
     for joint in found.joints():
         if math.isnan(joint["damage"]):

@@ -11,12 +11,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from picchio.core.arrays import FloatArray, IndexArray
+from picchio.core.arrays import FloatArray
 from picchio.core.results import TableResult
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.ledger.blows import Blow, Burst
-from picchio.ledger.damage import BurstDamage, Totals
-from picchio.ledger.finding import NEAR
+from picchio.ledger.counted import HOUR, Counted
 from picchio.ledger.forecast import Worlds, quantiles
 from picchio.ledger.out import opc_ua
 from picchio.ledger.watch.exchange import Exchange
@@ -25,25 +23,6 @@ from picchio.model.model import Model
 SECONDS_A_DAY = 86_400
 _LATELY = 28  # days that today's pace is taken from
 _STATIONS = 12
-
-
-@dataclass(frozen=True, eq=False)
-class Counted:
-    """What a ledger holds, as blows and damage.
-
-    Attributes:
-        blows: by time.
-        bursts: by time.
-        damages: of each burst.
-        totals: of all.
-        spans: (s, 2) ns, the time that was logged.
-    """
-
-    blows: list[Blow]
-    bursts: list[Burst]
-    damages: list[BurstDamage]
-    totals: Totals
-    spans: IndexArray
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,13 +70,12 @@ class Count(TableResult):
     @property
     def blows(self) -> int:
         """How many."""
-        return len(self.counted.blows)
+        return self.counted.blows
 
     @property
     def seen_share(self) -> float:
         """Of the blows whose size was logged; 1 where there is none."""
-        seen = sum(blow.seen for blow in self.counted.blows)
-        return seen / self.blows if self.blows else 1.0
+        return self.counted.seen / self.blows if self.blows else 1.0
 
     @property
     def hours(self) -> float:
@@ -110,10 +88,10 @@ class Count(TableResult):
         """Today's pace: over the last 28 days, or as many as there are; 0 of no blow."""
         if not self.blows:
             return 0.0
-        last, first = self.counted.blows[-1].onset, self.counted.blows[0].onset
-        span = _LATELY * SECONDS_A_DAY * 1_000_000_000
-        days = min(max((last - first) / 1e9 / SECONDS_A_DAY, 1.0), _LATELY)
-        return sum(blow.onset > last - span for blow in self.counted.blows) / days
+        span = (self.counted.last - self.counted.first) / 1e9 / SECONDS_A_DAY
+        hour, table = self.counted.hours
+        lately = hour > hour[-1] - 24 * _LATELY
+        return float(table[lately, 0].sum() / min(max(span, 1.0), _LATELY))
 
     def left(self, joint: int) -> dict[str, float] | None:
         """P10, P50 and P90 of the blows until a joint's sum is one.
@@ -140,7 +118,7 @@ class Count(TableResult):
             days = blows / self.blows_a_day if self.blows_a_day else math.inf
             found[name] = None
             if days < 36500:
-                last = datetime.fromtimestamp(self.counted.blows[-1].onset / 1e9, UTC)
+                last = datetime.fromtimestamp(self.counted.last / 1e9, UTC)
                 found[name] = (last + timedelta(days=days)).date().isoformat()
         return found
 
@@ -177,37 +155,23 @@ class Count(TableResult):
 
     def days(self) -> list[dict[str, Any]]:
         """Of each day with blows: date, blows, and the damage of each joint."""
-        if not self.counted.bursts:
-            return []
-        day = np.array([burst.onset for burst in self.counted.bursts]) // (86_400 * 10**9)
-        blows = np.array([len(burst.blows) for burst in self.counted.bursts])
+        hour, table = self.counted.hours
+        day = hour // (SECONDS_A_DAY * 10**9 // HOUR)
         found = []
         for which in np.unique(day):
-            rows = day == which
+            rows = table[day == which].sum(axis=0)
             date = datetime.fromtimestamp(int(which) * SECONDS_A_DAY, UTC).date().isoformat()
-            found.append({"date": date, "blows": int(blows[rows].sum()),
-                          "damage": self.counted.totals.shares[rows].sum(axis=0)})  # fmt: skip
+            found.append({"date": date, "blows": int(rows[0]), "damage": rows[2:]})
         return found
 
     def stations(self) -> list[dict[str, Any]]:
         """Where the damage comes from: pose, direction, blows, share of each joint's damage."""
-        if not self.counted.bursts:
-            return []
-        places: dict[tuple[float, ...], list[int]] = {}
-        for k, burst in enumerate(self.counted.bursts):
-            key = (*np.round(burst.pose / NEAR).tolist(), *np.round(2 * burst.direction).tolist())
-            places.setdefault(key, []).append(k)
-        whole = np.maximum(np.nansum(self.counted.totals.shares, axis=0), 1e-300)
-        found = []
-        for rows in places.values():
-            first = self.counted.bursts[rows[0]]
-            found.append({
-                "pose": first.pose, "direction": first.direction,
-                "blows": sum(len(self.counted.bursts[k].blows) for k in rows),
-                "share": self.counted.totals.shares[rows].sum(axis=0) / whole,
-            })  # fmt: skip
-        found.sort(key=lambda s: (-float(np.max(s["share"])), -s["blows"]))
-        return found[:_STATIONS]
+        whole = np.maximum(np.nan_to_num(self.counted.totals.damage), 1e-300)
+        return [
+            {"pose": place.pose, "direction": place.direction, "blows": place.blows,
+             "share": place.damage / whole}
+            for place in self.counted.places[:_STATIONS]
+        ]  # fmt: skip
 
     def _headline(self) -> str:
         text = f"{self.blows} blows in {self.logs} log{'s' * (self.logs != 1)}"
@@ -263,8 +227,8 @@ class Count(TableResult):
             "blows": self.blows,
             "seen_share": self.seen_share,
             "hours_logged": self.hours,
-            "from": _iso(self.counted.blows[0].onset) if self.blows else None,
-            "to": _iso(self.counted.blows[-1].onset) if self.blows else None,
+            "from": _iso(self.counted.first) if self.blows else None,
+            "to": _iso(self.counted.last) if self.blows else None,
             "blows_a_day": self.blows_a_day,
             "joints": self.joints(),
             "ends": None if first is None else self.model.robot.flexible_names[first],

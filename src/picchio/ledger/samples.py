@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from picchio.campaign.channels import AXES, LOG_KINDS, Channel, kinds, parse_channel
-from picchio.campaign.importing.importer import combined, joined, read_blocks
-from picchio.campaign.importing.mapping import Mapping, TimeTable
+from picchio.campaign.importing import detect
+from picchio.campaign.importing.aligned import aligned
+from picchio.campaign.importing.importer import beside, called, combined, kind_of, read_blocks
+from picchio.campaign.importing.mapping import JoinTable, Mapping, TimeTable
 from picchio.campaign.importing.named import named
-from picchio.campaign.importing.raw import RawFile
+from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.campaign.importing.resample import clocked, taken_samples
 from picchio.campaign.units import Conversion
 from picchio.core.arrays import FloatArray, IndexArray
@@ -24,7 +26,6 @@ KINDS = ("force", "acceleration", "trigger", "poses")
 BLOCK = 1 << 16
 """Samples that are held at a time of a log that can be read in blocks."""
 _OWN_CLOCKS = ("mcap", "bag")  # a topic may have no message for a while
-_LATE = 8  # stretches without a blow's channel that are put off
 STEPS = 5.0
 """Of the usual step: a longer one is a gap."""
 
@@ -80,38 +81,58 @@ class Samples:
         return int(STEPS * self.usual_step)
 
 
-def read_samples(path: Path, mapping: Mapping, robot: FlexibleRobot) -> Iterator[Samples]:
+def read_samples(
+    path: Path, mapping: Mapping, robot: FlexibleRobot, size: int = BLOCK
+) -> Iterator[Samples]:
     """A log in stretches, in bounded memory where its kind of file allows: see `read_blocks`.
 
     Args:
         path: the file.
         mapping: which series become which channels.
         robot: whose joints the poses are of.
+        size: samples that are held at a time.
 
     Raises:
         InputError: the file can't be read, the mapping does not fit it or the robot, or nothing
             says when it was recorded.
     """
-    plan = _Plan(mapping, robot)
-    fixed = mapping
-    held: list[Samples] | None = []
-    for raw in read_blocks(path, mapping, plan.needed, BLOCK):
-        if mapping.join:
-            found = joined(raw, fixed)
-        else:
-            found = clocked(raw, fixed.time, None, plan.series & set(raw.channels))
-        if fixed is mapping and mapping.time.series is None and mapping.time.rate is None:
-            fixed = _fixed(raw, mapping)
-        made = plan.samples(found)
+    plan = _Plan(mapping, robot, kind_of(path, mapping))
+    blocks = _dated(read_blocks(path, mapping, plan.needed, size), mapping.time, plan.series)
+    if plan.apart:
+        joins = [_joined(path, mapping, table, size) for table in mapping.join]
         # The first stretch says what the log's step is; a topic may begin later than others.
-        if held is not None and made.stamps.size < 2 and plan.kind != "poses" and len(held) < _LATE:
-            held.append(made)
-            continue
-        yield made
-        yield from held or ()
-        held = None
+        blow = plan.seen.get(plan.kind, ())
+        blocks = aligned([blocks, *joins], {s: 1 + (s in blow) for s in plan.series})
+    for raw in blocks:
+        yield plan.samples(raw)
     plan.require_all(path)
-    yield from held or ()
+
+
+def _dated(
+    blocks: Iterator[RawFile], asked: TimeTable, names: set[str] | None, key: str = "time.start"
+) -> Iterator[RawFile]:
+    """The blocks with the clock that the first one shows: the others must not differ."""
+    for raw in blocks:
+        made = clocked(raw, asked, None, names and names & set(raw.channels))
+        if made.epoch is None:
+            raise InputError(
+                "nothing says when this log was recorded, so that its blows cannot be told from "
+                "another log's", file=raw.path, key=key,
+                hint="give [time] start in the mapping, or stamps with a date",
+            )  # fmt: skip
+        yield made
+        if asked.series is None and asked.rate is None:
+            asked = _fixed(raw, asked)
+
+
+def _joined(path: Path, mapping: Mapping, table: JoinTable, size: int) -> Iterator[RawFile]:
+    """The blocks of a joined file."""
+    file, rules = beside(path, mapping, table)
+    names = {entry.series for entry in rules.channel}
+    needed = names | ({table.time.series} if table.time.series else set())
+    blocks = read_blocks(file, rules, needed, size)
+    for raw in _dated(blocks, table.time, names, "join.time.start"):
+        yield called(raw, table.name, table.shift)
 
 
 def by_names(path: Path, robot: FlexibleRobot) -> tuple[Mapping | None, tuple[str, ...]]:
@@ -142,28 +163,27 @@ def by_names(path: Path, robot: FlexibleRobot) -> tuple[Mapping | None, tuple[st
     return Mapping(channel=[one.entry for one in taken]), tuple(lines)
 
 
-def _fixed(raw: RawFile, mapping: Mapping) -> Mapping:
-    """The mapping with the clock that the first block showed: the others must not differ."""
-    from picchio.campaign.importing import detect
-
+def _fixed(raw: RawFile, asked: TimeTable) -> TimeTable:
+    """`[time]` with the series and unit that are its clock."""
     if all(channel.time is not None for channel in raw.channels.values()):
-        return mapping
+        return asked
     found = detect.require(detect.clock(raw), raw)
-    time = mapping.time.model_copy(update={"series": found.series, "unit": found.unit})
-    return mapping.model_copy(update={"time": time})
+    return asked.model_copy(update={"series": found.series, "unit": found.unit})
 
 
 class _Plan:
     """What the series of a mapping are for."""
 
-    def __init__(self, mapping: Mapping, robot: FlexibleRobot) -> None:
+    def __init__(self, mapping: Mapping, robot: FlexibleRobot, kind: str) -> None:
         self.mapping, self.robot = mapping, robot
+        self.apart = kind in _OWN_CLOCKS or bool(mapping.join)  # series have their own clocks
         self.series = {s for _, _, parts, _ in mapping.entries for s in parts}
         self.series |= {entry.series for entry in mapping.filter}
         self.needed = self.series | ({mapping.time.series} if mapping.time.series else set())
         self.zero: int | None = None
         self.met: set[str] = set()
         self.last: dict[str, tuple[IndexArray, FloatArray]] = {}
+        self.before: dict[str, tuple[int, float]] = {}
         self.poses: dict[str, int] = {}
         self.seen: dict[str, list[str]] = {}
         names = robot.joint_names
@@ -206,25 +226,21 @@ class _Plan:
         return link == self.robot.link_of(self.robot.tool_frame)
 
     def samples(self, raw: RawFile) -> Samples:
-        if raw.epoch is None:
-            raise InputError(
-                "nothing says when this log was recorded, so that its blows cannot be told from "
-                "another log's", file=raw.path, key="time.start",
-                hint="give [time] start in the mapping, or stamps with a date",
-            )  # fmt: skip
+        assert raw.epoch is not None
+        filtered = self._filtered(raw) if self.apart else raw
         values: dict[str, tuple[IndexArray, FloatArray]] = {}
         asked = self._window(raw.epoch)
+        self.met |= raw.channels.keys()
         for key, to, parts, entry in self.mapping.entries:
-            if raw.kind in _OWN_CLOCKS and not parts.keys() <= raw.channels.keys():
+            if self.apart and not parts.keys() <= raw.channels.keys():
                 continue  # no message of this topic in this stretch
-            self.met |= parts.keys()
             series = {s: raw.channel(s, key=key) for s in parts}
             first = next(iter(series.values()))
             assert first.time is not None
             channel, convert = _channel(to, entry.unit or first.unit)
             stored = combined({s: c.values for s, c in series.items()}, parts)
             stored = entry.sign * (entry.scale * stored.astype(np.float64) + entry.offset)
-            take = taken_samples(raw, first, asked, self.mapping.filter, None)
+            take = taken_samples(filtered, first, asked, self.mapping.filter, None)
             stamps = raw.epoch + np.rint(first.time * 1e9).astype(np.int64)
             values[channel.name] = (stamps[take], convert(stored)[take])
         names = tuple(self.seen.get(self.kind, ()))
@@ -240,6 +256,21 @@ class _Plan:
         used = {*names, *self.poses}
         others = {n: v for n, v in values.items() if n not in used}
         return Samples(self.kind, stamps, table, at, poses, others, raw.detected, names)
+
+    def _filtered(self, raw: RawFile) -> RawFile:
+        """The block with what filters look at as it was last before: it holds until the next."""
+        channels, epoch = dict(raw.channels), raw.epoch or 0
+        for series in {entry.series for entry in self.mapping.filter}:
+            stamp, value = self.before.get(series, (-(2**62), np.nan))
+            nothing = RawChannel(series, np.empty(0), np.empty(0))
+            own = channels.get(series, nothing)
+            assert own.time is not None
+            when, what = own.time[-1:], own.values[-1:]
+            for time, size in zip(when, what, strict=True):
+                self.before[series] = epoch + round(float(time) * 1e9), size
+            channels[series] = replace(own, time=np.append((stamp - epoch) * 1e-9, own.time),
+                                       values=np.append(value, own.values))  # fmt: skip
+        return replace(raw, channels=channels)
 
     def _window(self, epoch: int) -> TimeTable:
         """`[time]` with begin and end in s of this stretch, not of the file."""
@@ -272,8 +303,10 @@ class _Plan:
 
     def require_all(self, path: Path) -> None:
         """Raise where a series that the mapping names was nowhere in the file."""
-        for key, _, parts, _ in self.mapping.entries:
-            for series in sorted(parts.keys() - self.met):
+        named = [(key, series) for key, _, parts, _ in self.mapping.entries for series in parts]
+        named += [(f"filter[{i}].series", f.series) for i, f in enumerate(self.mapping.filter)]
+        for key, series in named:
+            if series not in self.met:
                 first = next(read_blocks(path, self.mapping, None, BLOCK), None)
                 raise InputError(f"{path.name} has no such series", key=key, value=series,
                                  choices=first.channels if first else ())  # fmt: skip

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -43,6 +43,8 @@ CREATE INDEX pose_log ON pose (log);
 CREATE INDEX feature_log ON feature (log);
 """
 _PATIENCE = 60.0  # s that a writer waits for another
+_HELD = 1 << 17  # samples of a stream that are looked at together
+_NEVER = 2**63 - 1  # ns
 
 
 @dataclass(frozen=True)
@@ -74,11 +76,10 @@ class Stream:
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """What a ledger holds of a stream.
+    """What a ledger holds of a stream, or a part of it that begins and ends in silence.
 
     Attributes:
         stream: which.
-        spans: (s, 2) int64 ns, the time that was logged; in any order, overlaps included.
         stamps: (m,) int64 ns, ascending, each once.
         values: (m, k).
         pose_stamps: (p,) int64 ns, ascending, each once.
@@ -86,7 +87,6 @@ class Kept:
     """
 
     stream: Stream
-    spans: IndexArray
     stamps: IndexArray
     values: FloatArray
     pose_stamps: IndexArray
@@ -130,7 +130,7 @@ def worth_keeping(samples: Samples, stream: Stream) -> tuple[BoolArray, BoolArra
     Returns:
         (m,) of the samples, (p,) of the poses.
     """
-    size = magnitude(samples.values) if samples.values.shape[1] else np.zeros(samples.stamps.size)
+    size = magnitude(samples.values)
     keep = np.zeros(samples.stamps.size, dtype=bool)
     begins: list[IndexArray] = []
     for piece in pieces(samples.stamps, stream.gap):
@@ -154,6 +154,55 @@ def worth_keeping(samples: Samples, stream: Stream) -> tuple[BoolArray, BoolArra
             at = np.searchsorted(samples.pose_stamps, when, side="right") - 1
             standing[np.maximum(at, 0)] = True
     return keep, standing
+
+
+class _Union:
+    """The samples of all logs of a stream, each stamp once, ascending, read as they are needed."""
+
+    def __init__(self, book: Ledger, table: str, stream: Stream) -> None:
+        self._book, self._table, self._at = book, table, 0
+        with book._told():
+            rows = book._base.execute(
+                f"SELECT substr({table}.stamps, 1, 8), {table}.rowid FROM {table} "
+                f"JOIN log ON log.id = {table}.log WHERE log.stream = ?", (stream.id,),
+            ).fetchall()  # fmt: skip
+        found = sorted((int.from_bytes(first, "little", signed=True), row) for first, row in rows)
+        self._rows = np.array([*found, (_NEVER, 0)])
+        columns = 0 if table == "pose" else stream.columns
+        self.stamps, self.values = np.empty(0, np.int64), np.empty((0, columns))
+
+    @property
+    def begin(self) -> int:
+        """Ns, where what was not read yet begins."""
+        return int(self._rows[self._at, 0])
+
+    def read(self, last: int = _NEVER - 1, size: int = _NEVER) -> None:
+        """Read what begins until `last`, ns, or until so many samples are held."""
+        stamps, values = [self.stamps], [self.values]
+        while self.begin <= last and sum(map(len, stamps)) < size:
+            with self._book._told():
+                row = self._book._base.execute(
+                    f"SELECT stamps, sizes FROM {self._table} WHERE rowid = ?",
+                    (int(self._rows[self._at, 1]),),
+                ).fetchone()
+            if row is None:
+                raise OutputError("was changed by another process meanwhile: run it again",
+                                  file=self._book.path)  # fmt: skip
+            stamps.append(np.frombuffer(row[0], "<i8"))
+            values.append(np.frombuffer(row[1], "<f8").reshape(stamps[-1].size, -1))
+            self._at += 1
+        if len(stamps) == 1:
+            return
+        when, what = np.concatenate(stamps), np.concatenate([v for v in values if len(v)])
+        # Two logs that disagree at a stamp: the larger sample, whichever came first.
+        order = np.lexsort((*what.T, magnitude(what), when))
+        when, what = when[order], what[order]
+        once = np.append(np.diff(when) > 0, True)
+        self.stamps, self.values = when[once], what[once]
+
+    def drop(self, count: int) -> None:
+        """Forget the first samples."""
+        self.stamps, self.values = self.stamps[count:].copy(), self.values[count:].copy()
 
 
 class Ledger:
@@ -267,7 +316,7 @@ class Ledger:
 
     def add(
         self, log: str, mapping: str, name: str, stream: Stream, stretches: Iterable[Samples],
-        features: Iterable[tuple[str, int, float]] = (),
+        features: Callable[[Samples], Iterable[tuple[str, int, float]]] = lambda _: (),
     ) -> int:  # fmt: skip
         """Keep what matters of a log; one that is held already is replaced.
 
@@ -277,7 +326,7 @@ class Ledger:
             name: of its file, for people.
             stream: that it belongs to.
             stretches: of the log, in any order.
-            features: (name, ns, value) of single numbers that it shows.
+            features: (name, ns, value) of single numbers that a stretch shows.
 
         Returns:
             how many samples it had.
@@ -291,7 +340,7 @@ class Ledger:
                 "INSERT OR IGNORE INTO stream VALUES (?, ?, ?, ?, ?)",
                 (stream.id, stream.kind, stream.gap, stream.columns, settings),
             )
-            first, last, count = 2**63 - 1, 0, 0
+            first, last, count = _NEVER, 0, 0
             detected: tuple[str, ...] = ()
             for samples in stretches:
                 clock = samples.stamps if samples.stamps.size else samples.pose_stamps
@@ -311,9 +360,8 @@ class Ledger:
                     if stamps.size:
                         row = (log, _packed(stamps, "<i8"), _packed(values, "<f8"))
                         base.execute(f"INSERT INTO {table} VALUES (?, ?, ?)", row)
-            base.executemany(
-                "INSERT INTO feature VALUES (?, ?, ?, ?)", [(log, *each) for each in features]
-            )
+                base.executemany("INSERT INTO feature VALUES (?, ?, ?, ?)",
+                                 [(log, *each) for each in features(samples)])  # fmt: skip
             told = json.dumps(detected)
             base.execute("INSERT OR REPLACE INTO log VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
                          (log, stream.id, mapping, name, first, last, count, told))  # fmt: skip
@@ -326,67 +374,87 @@ class Ledger:
                 "SELECT id, name, first, last, samples FROM log ORDER BY first, id"
             ).fetchall()
 
-    def kept(self) -> list[Kept]:
-        """Everything that is held, a stream at a time, the surest kinds first."""
+    def streams(self) -> list[tuple[Stream, IndexArray]]:
+        """Each stream with logs, the surest kinds first, and the time that was logged.
+
+        Returns:
+            streams with (s, 2) int64 ns, in any order, overlaps included.
+        """
+        from picchio.ledger.samples import KINDS
+
         found = []
         with self._told():
-            rows = self._base.execute(
+            for key, kind, gap, columns, settings in self._base.execute(
                 "SELECT id, kind, gap, columns, settings FROM stream"
-            ).fetchall()
-            for key, kind, gap, columns, settings in rows:
+            ).fetchall():
                 threshold, foot, more = json.loads(settings)
-                stream = Stream(kind, gap, columns, threshold, foot, more)
                 spans = self._base.execute(
                     "SELECT span.first, span.last FROM span JOIN log ON log.id = span.log "
                     "WHERE log.stream = ?", (key,),
                 ).fetchall()  # fmt: skip
-                if not spans:
-                    continue
-                stamps, values = self._union("run", key, columns)
-                at, poses = self._union("pose", key, 0)
-                found.append(Kept(stream, np.array(spans, np.int64), stamps, values, at, poses))
-        from picchio.ledger.samples import KINDS
+                if spans:
+                    stream = Stream(kind, gap, columns, threshold, foot, more)
+                    found.append((stream, np.array(spans, np.int64)))
+        return sorted(found, key=lambda each: (KINDS.index(each[0].kind), each[0].id))
 
-        return sorted(found, key=lambda k: (KINDS.index(k.stream.kind), k.stream.id))
+    def kept(self, stream: Stream) -> Iterator[Kept]:
+        """What is held of a stream, by time, in parts: memory does not grow with the ledger.
 
-    def _union(self, table: str, stream: str, columns: int) -> tuple[IndexArray, FloatArray]:
-        """The samples of all logs of a stream, each stamp once, ascending."""
-        stamps, values = [], []
-        for at, sizes in self._base.execute(
-            f"SELECT {table}.stamps, {table}.sizes FROM {table} "
-            f"JOIN log ON log.id = {table}.log WHERE log.stream = ?", (stream,),
-        ):  # fmt: skip
-            stamps.append(np.frombuffer(at, "<i8"))
-            values.append(np.frombuffer(sizes, "<f8").reshape(stamps[-1].size, -1))
-        if not stamps:
-            return np.empty(0, np.int64), np.empty((0, columns))
-        when, what = np.concatenate(stamps), np.concatenate(values)
-        # Two logs that disagree at a stamp: the larger sample, whichever came first.
-        order = np.lexsort((*what.T, magnitude(what) if what.shape[1] else when * 0, when))
-        when, what = when[order], what[order]
-        last = np.append(np.diff(when) > 0, True)
-        return when[last], what[last]
+        A part ends at a gap or at a sample below the foot, which the next one begins with, so that
+        no run is cut. Each part has the last pose before it.
 
-    def features(self) -> list[tuple[str, int, float]]:
-        """(name, ns, value), each once, by name and time."""
+        Args:
+            stream: as `streams` gives it.
+
+        Raises:
+            OutputError: another process changed the ledger meanwhile.
+        """
+        held, poses = _Union(self, "run", stream), _Union(self, "pose", stream)
+        poses.read(size=1)  # where a run is before every pose, the first counts
+        while True:
+            held.read(size=2 * held.stamps.size + _HELD)
+            ended = held.begin == _NEVER
+            # Another log may yet have samples from there on.
+            known = held.stamps[: np.searchsorted(held.stamps, held.begin)]
+            quiet = np.flatnonzero(magnitude(held.values[: known.size]) <= stream.foot)[-1:]
+            apart = np.flatnonzero(np.diff(known) > stream.gap)[-1:] + 1
+            begin = known.size if ended else max([0, *quiet, *apart])
+            if begin == 0 and not ended:
+                continue
+            end = begin + int(not ended and begin in quiet)
+            poses.read(last=int(known[:end][-1:].max(initial=0)))
+            yield Kept(stream, held.stamps[:end], held.values[:end], poses.stamps, poses.values)
+            if ended:
+                return
+            held.drop(begin)
+            at = np.searchsorted(poses.stamps, held.stamps[0], side="right")
+            poses.drop(max(int(at) - 1, 0))
+
+    def features(self) -> Iterator[tuple[str, int, float]]:
+        """(name, ns, value), each once, by time, name and value."""
         with self._told():
-            return self._base.execute(
-                "SELECT DISTINCT name, stamp, value FROM feature ORDER BY name, stamp, value"
-            ).fetchall()
+            yield from self._base.execute(
+                "SELECT DISTINCT name, stamp, value FROM feature ORDER BY stamp, name, value"
+            )
 
-    def computed(self, model: str) -> dict[bytes, bytes]:
+    def computed(self, model: str, keys: Iterable[bytes]) -> dict[bytes, bytes]:
         """What has been computed of bursts with a model.
 
         Args:
             model: its hash.
+            keys: of the bursts.
 
         Returns:
-            {the burst's hash: its numbers}.
+            {the burst's hash: its numbers} of those that are known.
         """
+        found = {}
         with self._told():
-            return dict(
-                self._base.execute("SELECT key, damage FROM burst WHERE model = ?", (model,))
-            )
+            for key in keys:
+                for (value,) in self._base.execute(
+                    "SELECT damage FROM burst WHERE model = ? AND key = ?", (model, key)
+                ):
+                    found[key] = value
+        return found
 
     def remember(self, model: str, found: dict[bytes, bytes]) -> None:
         """Keep what was computed of bursts; that of other models goes.

@@ -14,7 +14,13 @@ from picchio.campaign.campaign import Campaign, load_campaign
 from picchio.campaign.channels import TIME, parse_channel
 from picchio.campaign.importing.detect import implausible, told
 from picchio.campaign.importing.isolated import blocks_isolated, read_isolated
-from picchio.campaign.importing.mapping import ChannelTable, Mapping, TimeTable, read_mapping
+from picchio.campaign.importing.mapping import (
+    ChannelTable,
+    JoinTable,
+    Mapping,
+    TimeTable,
+    read_mapping,
+)
 from picchio.campaign.importing.raw import RawChannel, RawFile
 from picchio.campaign.importing.readers import read_csv, read_parquet
 from picchio.campaign.importing.resample import clocked, common_clock
@@ -88,11 +94,11 @@ def read_blocks(
 ) -> Iterator[RawFile]:
     """The series of a log in blocks, so that memory does not grow with it, where its kind allows.
 
-    CSV, Parquet, MCAP, ROS bags; others, and what a mapping joins or filters, come as one block.
+    CSV, Parquet, MCAP, ROS bags; others come as one block.
 
     Args:
         path: the file.
-        mapping: how it is written, and which time to take.
+        mapping: how it is written, which time to take, which rows of a table.
         names: of the series that are needed, all where None; others may be there, too.
         size: samples of a table.
 
@@ -100,15 +106,37 @@ def read_blocks(
         InputError: as `read_raw`.
     """
     kind = kind_of(path, mapping)
-    if (mapping and (mapping.join or mapping.filter)) or kind not in _IN_BLOCKS:
+    if kind not in _IN_BLOCKS:
         yield read_raw(path, mapping)
     elif kind == "csv":
-        yield from read_csv.blocks(path, mapping, size)
+        yield from _tables(read_csv.blocks(path, mapping, size), mapping, size)
     elif kind == "parquet":
-        yield from read_parquet.blocks(path, None, size)
+        yield from _tables(read_parquet.blocks(path, None, size), mapping, size)
     else:
         clock = mapping.time.model_dump(mode="json") if mapping else {}
         yield from blocks_isolated(f"{_ROOM}.{_ISOLATED[kind]}", path, clock, names)
+
+
+def _tables(blocks: Iterator[RawFile], mapping: Mapping | None, size: int) -> Iterator[RawFile]:
+    """Blocks of a table, of the rows that pass; of more than one row each, where there are two."""
+    before, held = 0, None
+    for raw in blocks:
+        new = raw if mapping is None else _rows(raw, mapping)
+        if held is not None and min(held.rows, new.rows) > 1 and held.rows + new.rows > size:
+            yield replace(held, before=before)
+            before, held = before + held.rows, None
+        held = new if held is None else _below(held, new)
+    if held is not None:
+        yield replace(held, before=before)
+
+
+def _below(above: RawFile, raw: RawFile) -> RawFile:
+    """Two blocks of a table as one."""
+    channels = {
+        name: replace(c, values=np.concatenate([c.values, raw.channels[name].values]))
+        for name, c in above.channels.items() if name in raw.channels
+    }  # fmt: skip
+    return replace(above, channels=channels)
 
 
 def _rows(raw: RawFile, mapping: Mapping) -> RawFile:
@@ -210,38 +238,57 @@ def joined(raw: RawFile, mapping: Mapping, mapping_file: Path | None = None) -> 
     own |= {entry.series for entry in mapping.filter if entry.series in raw.channels}
     first = clocked(raw, mapping.time, mapping_file, own)
     for table in mapping.join:
-        name = table.file.replace("{stem}", raw.path.stem)
-        path = regular_file(raw.path.parent / name)
-        rules = Mapping(source=table.source, time=table.time, channel=mapping.channel,
-                        coupling=mapping.coupling)  # fmt: skip
-        other = clocked(read_raw(path, _only(rules, table.name)), table.time, mapping_file)
+        path, rules = beside(raw.path, mapping, table)
+        other = clocked(read_raw(path, rules), table.time, mapping_file)
         if (first.epoch is None) != (other.epoch is None):
             raise InputError("one of the two files says when its clock was at zero, the other "
                              "does not", file=path, hint="give its [time] start")  # fmt: skip
         shift = table.shift
         if first.epoch is not None and other.epoch is not None:
             shift += (other.epoch - first.epoch) * 1e-9
-        more = {
-            f"{table.name}:{key}": replace(
-                c, name=f"{table.name}:{key}", time=None if c.time is None else c.time + shift
-            )
-            for key, c in other.channels.items()
-        }
-        lines = tuple(f"{path.name}: {line}" for line in other.detected)
-        first = replace(first, channels={**first.channels, **more},
-                        detected=(*first.detected, *lines))  # fmt: skip
+        other = called(other, table.name, shift)
+        first = replace(first, channels={**first.channels, **other.channels},
+                        detected=(*first.detected, *other.detected))  # fmt: skip
     return first
 
 
-def _only(mapping: Mapping, name: str) -> Mapping:
-    """The mapping with the series of a joined file, as that file names them."""
+def called(raw: RawFile, name: str, shift: float) -> RawFile:
+    """A joined file's series under the names that the mapping has for them.
+
+    Args:
+        raw: the file, with its clock.
+        name: of the join.
+        shift: s, added to its times.
+    """
+    channels = {
+        f"{name}:{key}": replace(
+            c, name=f"{name}:{key}", time=None if c.time is None else c.time + shift
+        )
+        for key, c in raw.channels.items()
+    }
+    lines = tuple(f"{raw.path.name}: {line}" for line in raw.detected)
+    return replace(raw, channels=channels, detected=lines)
+
+
+def beside(path: Path, mapping: Mapping, table: JoinTable) -> tuple[Path, Mapping]:
+    """A joined file, and the mapping with its series as that file names them.
+
+    Args:
+        path: the first file.
+        mapping: of both.
+        table: the join.
+
+    Raises:
+        InputError: there is no such file.
+    """
     entries = [
         ChannelTable(series=s.partition(":")[2], to="force")
         for _, _, parts, _ in mapping.entries
         for s in parts
-        if s.startswith(f"{name}:")
+        if s.startswith(f"{table.name}:")
     ]
-    return mapping.model_copy(update={"channel": entries, "coupling": []})
+    file = regular_file(path.parent / table.file.replace("{stem}", path.stem))
+    return file, Mapping.model_construct(source=table.source, time=table.time, channel=entries)
 
 
 def read_mapped(

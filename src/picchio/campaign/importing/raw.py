@@ -43,6 +43,7 @@ class RawFile:
         taken: when it was recorded, where the format says.
         epoch: ns from 1970 to zero of the channels' times, where the file says.
         detected: what was found out about the file, a sentence each.
+        before: samples of a table that stand in the blocks before this one.
     """
 
     path: Path
@@ -51,6 +52,12 @@ class RawFile:
     taken: datetime | None = None
     epoch: int | None = None
     detected: tuple[str, ...] = ()
+    before: int = 0
+
+    @property
+    def rows(self) -> int:
+        """Samples of the first series: a table's rows."""
+        return next((c.values.size for c in self.channels.values()), 0)
 
     def channel(self, name: str, *, mapping: Path | None = None, key: str = "from") -> RawChannel:
         """A series by name.

@@ -103,7 +103,7 @@ def clocked(
         stamp = time if time is not None else entry.time
         if stamp is None:
             assert asked.rate is not None
-            stamp = np.arange(entry.values.size) / asked.rate
+            stamp = (raw.before + np.arange(entry.values.size)) / asked.rate
         if stamp.size != entry.values.size:
             raise InputError(f"has {entry.values.size} samples and its clock {stamp.size}",
                              file=raw.path, key=name)  # fmt: skip
@@ -160,7 +160,9 @@ def taken_samples(
                 raise InputError("the file states no date; give s in its own time", file=mapping,
                                  key=f"time.{key}", value=str(moment))  # fmt: skip
             moment = (detect.nanoseconds(moment) - raw.epoch) * 1e-9
-        kept = kept & ((series.time >= moment) if after else (series.time <= moment))
+        # To the nanosecond: a block of a log counts from its own beginning.
+        ns, limit = np.rint(series.time * 1e9), np.rint(moment * 1e9)
+        kept = kept & ((ns >= limit) if after else (ns <= limit))
     for i, entry in enumerate(filters):
         other = raw.channel(entry.series, mapping=mapping, key=f"filter[{i}].series")
         held = entry.passes(other.values)

@@ -115,6 +115,15 @@ class RainflowCounter:
             count,
         )
 
+    def taken(self) -> Cycles:
+        """The cycles that have closed, which are then forgotten: memory stays bounded.
+
+        What `cycles` gives after is the rest.
+        """
+        closed, self._closed = [(np.empty(0), np.empty(0)), *self._closed], []
+        ranges, means = (np.concatenate(part) for part in zip(*closed, strict=True))
+        return Cycles.trusted(ranges, means, np.ones(ranges.size))
+
     @property
     def residue(self) -> FloatArray:
         """(r,) the turning points of the residue, as if the history ended here."""

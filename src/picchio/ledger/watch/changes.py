@@ -7,16 +7,17 @@ simulating histories in which nothing happens.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cache
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray, IndexArray
-from picchio.ledger.blows import Blow
+from picchio.ledger.blows import Burst
 from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model
 
@@ -238,134 +239,188 @@ def _told(reading: Reading, table: FloatArray) -> Change:
     )  # fmt: skip
 
 
+class Means:
+    """The mean of each shift of numbers that come a few at a time."""
+
+    def __init__(self) -> None:
+        self._sums: dict[int, FloatArray] = {}
+
+    def add(self, when: IndexArray, values: FloatArray) -> None:
+        """Further numbers.
+
+        Args:
+            when: (m,) ns.
+            values: (m,).
+        """
+        shift, at = np.unique(when // SHIFT, return_inverse=True)
+        rows = np.column_stack([np.bincount(at, values), np.bincount(at)]) if at.size else ()
+        for which, row in zip(shift.tolist(), rows, strict=True):
+            self._sums[which] = self._sums.get(which, 0.0) + row
+
+    @property
+    def by_shift(self) -> dict[int, float]:
+        """{shift: its mean}, by time."""
+        return {which: float(row[0] / row[1]) for which, row in sorted(self._sums.items())}
+
+    def reading(self, name: str, effect: str, target: str) -> Reading:
+        """The means as a reading without covariates.
+
+        Args:
+            name: see `Reading`, as the others.
+            effect: likewise.
+            target: likewise.
+        """
+        means = self.by_shift
+        when = np.array([*means], np.int64) * SHIFT + SHIFT // 2
+        return Reading(name, effect, target, when, np.array([*means.values()]),
+                       np.empty((0, when.size)))  # fmt: skip
+
+
+class BlowReadings:
+    """Force, width and rate of the blows that a force shows, of each shift."""
+
+    def __init__(self) -> None:
+        self._force, self._width, self._gap = Means(), Means(), Means()
+
+    def add(self, bursts: Iterable[Burst]) -> None:
+        """Further bursts.
+
+        Args:
+            bursts: by time.
+        """
+        for burst in bursts:
+            seen = [blow for blow in burst.blows if blow.kind == "force" and not blow.cut]
+            onset = np.array([blow.onset for blow in seen], np.int64)
+            peak = np.array([blow.peak for blow in seen])
+            width = np.array([blow.impulse for blow in seen]) / np.maximum(peak, 1e-300)
+            self._force.add(onset, np.log(peak))
+            self._width.add(onset, np.log(np.maximum(np.abs(width), 1e-9)))
+            gap = np.diff(onset) * 1e-9
+            near = (gap > 0.0) & (gap < 3.0 * np.median(gap)) if gap.size else gap > 0.0
+            self._gap.add(onset[1:][near], np.log(gap[near]))
+
+    @property
+    def readings(self) -> list[Reading]:
+        """Those that there are."""
+        found = [
+            self._force.reading("force of the blows", "force_drift", "tool"),
+            self._width.reading("width of the blows", "pulse_width", "tool"),
+            self._gap.reading("time between blows", "pulse_rate", "tool"),
+        ]
+        return [reading for reading in found if reading.values.size]
+
+
 def readings_of(
-    model: Model, blows: Sequence[Blow], features: Sequence[tuple[str, int, float]]
+    model: Model, blows: BlowReadings, features: Iterable[tuple[str, int, float]]
 ) -> list[Reading]:
     """What each shift shows: force, width and rate of the blows, the joints' stiffness and drives.
 
     Args:
         model: the robot and its effects: where frequencies are compared with.
-        blows: by time.
-        features: what the ledger holds of ring-downs, temperatures and drives: see `ring_downs` and
-            `drives`.
+        blows: what all blows show.
+        features: what the ledger holds of ring-downs, temperatures and drives, by time: see
+            `ring_downs` and `drives`.
     """
-    found = []
-    seen = [blow for blow in blows if blow.kind == "force" and not blow.cut]
-    if seen:
-        onset = np.array([blow.onset for blow in seen])
-        peak = np.array([blow.peak for blow in seen])
-        width = np.array([blow.impulse for blow in seen]) / np.maximum(peak, 1e-300)
-        found.append(_shifts("force of the blows", "force_drift", "tool", onset, np.log(peak)))
-        found.append(_shifts("width of the blows", "pulse_width", "tool", onset,
-                             np.log(np.maximum(np.abs(width), 1e-9))))  # fmt: skip
-        gap = np.diff(onset) * 1e-9
-        near = (gap > 0.0) & (gap < 3.0 * np.median(gap)) if gap.size else np.zeros(0, bool)
-        if near.any():
-            found.append(_shifts("time between blows", "pulse_rate", "tool", onset[1:][near],
-                                 np.log(gap[near])))  # fmt: skip
-    table: dict[int, dict[str, float]] = {}
-    warmth: list[tuple[int, float]] = []
-    driven: dict[str, list[tuple[int, float]]] = {}
-    for name, stamp, value in features:
-        if name == "temperature":
-            warmth.append((stamp, value))
-        elif "." in name:
-            driven.setdefault(name, []).append((stamp, value))
-        else:
-            table.setdefault(stamp, {})[name] = value
-    found += _stiffness(model, table)
-    for name, told in sorted(driven.items()):
+    rung = _Rung(model)
+    warmth: Means = Means()
+    driven: dict[str, Means] = {}
+    for shift, rows in groupby(features, key=lambda row: row[1] // SHIFT):
+        table: dict[int, dict[str, float]] = {}
+        numbers: dict[str, list[tuple[int, float]]] = {}
+        for name, stamp, value in rows:
+            if name == "temperature" or "." in name:
+                numbers.setdefault(name, []).append((stamp, value))
+            else:
+                table.setdefault(stamp, {})[name] = value
+        rung.add(shift, [told for told in table.values() if "q0" in told])
+        for name, told in numbers.items():
+            when, size = np.array([t for t, _ in told]), np.array([x for _, x in told])
+            plain = name.partition(".")[0] in ("temperature", "offset")
+            means = warmth if name == "temperature" else driven.setdefault(name, Means())
+            means.add(when, size if plain else np.log(size))
+    found = [*blows.readings, *rung.readings]
+    for name, means in sorted(driven.items()):
         kind, _, joint = name.partition(".")
         words, effect = _DRIVEN[kind]
-        when, size = np.array([t for t, _ in told]), np.array([x for _, x in told])
-        values = size if kind == "offset" else np.log(size)
-        found.append(_shifts(f"{words} {joint}", effect, joint, when, values))
-    return [_warmed(reading, warmth) for reading in found]
+        found.append(means.reading(f"{words} {joint}", effect, joint))
+    return [_warmed(reading, warmth.by_shift) for reading in found]
 
 
-def _shifts(name: str, effect: str, target: str, when: IndexArray, values: FloatArray) -> Reading:
-    """The mean of each shift."""
-    shift = when // SHIFT
-    which, at = np.unique(shift, return_inverse=True)
-    mean = np.bincount(at, values) / np.bincount(at)
-    return Reading(
-        name, effect, target, which * SHIFT + SHIFT // 2, mean, np.empty((0, which.size))
-    )
-
-
-def _warmed(reading: Reading, warmth: Sequence[tuple[int, float]]) -> Reading:
+def _warmed(reading: Reading, warmth: Mapping[int, float]) -> Reading:
     """The reading with the temperature of its shifts, where each has one."""
-    if not warmth:
+    shifts = (reading.when // SHIFT).tolist()
+    if not warmth.keys() >= set(shifts):
         return reading
-    mean = _shifts("", "", "", np.array([w[0] for w in warmth]), np.array([w[1] for w in warmth]))
-    known = dict(zip(mean.when.tolist(), mean.values.tolist(), strict=True))
-    if not all(int(when) in known for when in reading.when):
-        return reading
-    values = np.array([[known[int(when)] for when in reading.when]])
-    return Reading(
-        reading.name, reading.effect, reading.target, reading.when, reading.values, values
-    )
+    return replace(reading, covariates=np.array([[warmth[shift] for shift in shifts]]))
 
 
-def _stiffness(model: Model, table: dict[int, dict[str, float]]) -> list[Reading]:
+class _Rung:
     """Each joint's stiffness, and the damping, of each shift, from the frequencies of ring-downs.
 
     ln f_i moves by half the sum of s_ij d ln k_j, s_ij the share of joint j in the strain energy
     of mode i.
     """
-    rows = [(stamp, told) for stamp, told in sorted(table.items()) if "q0" in told]
-    if not rows:
-        return []
-    nv, n = len(model.robot.joint_names), len(model.robot.flexible_joints)
-    poses = np.array([[told[f"q{k}"] for k in range(nv)] for _, told in rows])
-    many = ManyPoses(model, poses)
-    if not many.compiled:
-        return []
-    mass, _ = many.mass_and_jacobian()
-    root = np.linalg.inv(np.linalg.cholesky(mass))
-    squared, vectors = np.linalg.eigh(np.einsum("pij,pj,pkj->pik", root, many.stiffness, root))
-    shapes = np.einsum("pji,pjk->pik", root, vectors)
-    share = many.stiffness[:, :, None] * shapes**2 / squared[:, None, :]
-    frequency = np.sqrt(squared) / (2.0 * np.pi)
-    by_shift: dict[int, list[tuple[FloatArray, float, float, float]]] = {}
-    # Modes differ in damping, and a mode that hardly rings tells little of it.
-    usual = [
-        float(np.median(own)) if (own := [np.log(t[f"z{i}"]) for _, t in rows if f"z{i}" in t])
-        else 0.0 for i in range(n)
-    ]  # fmt: skip
-    for k, (stamp, told) in enumerate(rows):
-        for i in range(n):
-            if f"f{i}" in told:
-                off = float(np.log(told[f"f{i}"] / frequency[k, i]))
-                damped = float(np.log(told[f"z{i}"])) - usual[i]
-                entry = (0.5 * share[k, :, i], off, told[f"e{i}"], damped)
-                by_shift.setdefault(stamp // SHIFT, []).append(entry)
-    when: list[int] = []
-    damping: list[float] = []
-    stiffness: list[FloatArray] = []
-    errors: list[FloatArray] = []
-    for shift, entries in sorted(by_shift.items()):
-        weight = 1.0 / np.maximum(np.array([e[2] for e in entries]), 1e-4)
-        left = np.array([e[0] for e in entries]) * weight[:, None]
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self._when: list[int] = []
+        self._stiffness: list[FloatArray] = []
+        self._errors: list[FloatArray] = []
+        # By mode: the weight of its ring-downs, the sum of their ln z, the middle one.
+        self._damped: list[FloatArray] = []
+
+    def add(self, shift: int, rows: Sequence[dict[str, float]]) -> None:
+        """The ring-downs of a shift."""
+        nv = len(self._model.robot.joint_names)
+        many = ManyPoses(
+            self._model, np.array([[told[f"q{k}"] for k in range(nv)] for told in rows])
+        ) if rows else None  # fmt: skip
+        if many is None or not many.compiled:
+            return
+        mass, _ = many.mass_and_jacobian()
+        root = np.linalg.inv(np.linalg.cholesky(mass))
+        squared, vectors = np.linalg.eigh(np.einsum("pij,pj,pkj->pik", root, many.stiffness, root))
+        shapes = np.einsum("pji,pjk->pik", root, vectors)
+        share = many.stiffness[:, :, None] * shapes**2 / squared[:, None, :]
+        frequency = np.sqrt(squared) / (2.0 * np.pi)
+        n = frequency.shape[1]
+        found = [(k, i, told) for k, told in enumerate(rows) for i in range(n) if f"f{i}" in told]
+        pose, mode = (np.array([each[part] for each in found], int) for part in (0, 1))
+        off = np.array([told[f"f{i}"] for _, i, told in found]) / frequency[pose, mode]
+        weight = 1.0 / np.maximum(np.array([told[f"e{i}"] for _, i, told in found]), 1e-4)
+        ratio = np.log([told[f"z{i}"] for _, i, told in found])
+        left = 0.5 * share[pose, :, mode] * weight[:, None]
         # Of a joint that no mode shows nothing is told: the smallest change that fits.
-        size, *_, values = np.linalg.lstsq(
-            left, np.array([e[1] for e in entries]) * weight, rcond=1e-3
-        )
+        size, *_, values = np.linalg.lstsq(left, np.log(off) * weight, rcond=1e-3)
         if values.size < n or values[-1] < 1e-3 * values[0]:
-            continue
-        when.append(shift * SHIFT + SHIFT // 2)
-        stiffness.append(size)
-        errors.append(np.sqrt(np.diag(np.linalg.inv(left.T @ left))))
-        damping.append(float(np.average([e[3] for e in entries], weights=weight**2)))
-    if not when:
-        return []
-    clock, nothing = np.array(when), np.empty((0, len(when)))
-    found = []
-    for name, column, error in zip(
-        model.robot.flexible_names, np.array(stiffness).T, np.array(errors).T, strict=True
-    ):
-        # A shift that hardly shows the joint would be taken for one in which it changed.
-        good = error < _DIM * np.median(error)
-        found.append(Reading(f"stiffness of {name}", "stiffness_drift", name, clock[good],
-                             column[good], np.empty((0, int(good.sum())))))  # fmt: skip
-    return [*found, Reading("damping", "modal_damping", "robot", clock, np.array(damping), nothing)]
+            return
+        self._when.append(shift * SHIFT + SHIFT // 2)
+        self._stiffness.append(size)
+        self._errors.append(np.sqrt(np.diag(np.linalg.inv(left.T @ left))))
+        middle = [np.median(ratio[mode == i]) if (mode == i).any() else np.nan for i in range(n)]
+        self._damped.append(np.array([
+            np.bincount(mode, weight**2, n), np.bincount(mode, weight**2 * ratio, n), middle
+        ]))  # fmt: skip
+
+    @property
+    def readings(self) -> list[Reading]:
+        """A reading a joint, and that of the damping; none where nothing rang."""
+        if not self._when:
+            return []
+        clock, nothing = np.array(self._when), np.empty((0, len(self._when)))
+        found = []
+        for name, column, error in zip(
+            self._model.robot.flexible_names, np.array(self._stiffness).T, np.array(self._errors).T,
+            strict=True,
+        ):  # fmt: skip
+            # A shift that hardly shows the joint would be taken for one in which it changed.
+            good = error < _DIM * np.median(error)
+            found.append(Reading(f"stiffness of {name}", "stiffness_drift", name, clock[good],
+                                 column[good], np.empty((0, int(good.sum())))))  # fmt: skip
+        # Modes differ in damping, and a mode that hardly rings tells little of it: what each
+        # usually has is taken out, and their mean put back, by which robots differ.
+        weight, ratio, middle = np.array(self._damped).transpose(1, 0, 2)
+        usual = np.nanmedian(middle, axis=0)
+        damping = (ratio - weight * np.nan_to_num(usual)).sum(axis=1) / weight.sum(axis=1)
+        damping += np.nanmean(usual)
+        return [*found, Reading("damping", "modal_damping", "robot", clock, damping, nothing)]

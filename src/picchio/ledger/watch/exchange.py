@@ -22,6 +22,7 @@ ALARMS = 0.02
 """Share of histories of `_HORIZON` shifts of one robot in which one is told nevertheless."""
 _HORIZON, _HISTORIES = 200, 1000
 _SMALLEST = 0.005  # relative: the middle one of the changes; logs of one robot differ so little
+_REFERENCE = 20.0  # deg C, as of ISO 1
 _CLOSE = 3.0  # standard deviations, root mean square: so near another robot's past must be
 
 
@@ -86,7 +87,7 @@ def exchange(readings: Sequence[Reading], alarms: float = ALARMS) -> Exchange | 
         return None
     changed = tuple(own[i].name for i in range(len(own)) if abs(sizes[i]) >= most[0])
     sides = [
-        {r.name: _signature(r.values[part]) for r in own
+        {r.name: _signature(_as_at_20(r, int(when[k]))[part]) for r in own
          if (part := (r.when >= when[k]) == late).any()}
         for late in (False, True)
     ]  # fmt: skip
@@ -100,10 +101,22 @@ def signature(readings: Sequence[Reading]) -> dict[str, tuple[float, float]]:
         readings: of one robot.
     """
     return {
-        r.name: _signature(r.values)
+        r.name: _signature(_as_at_20(r, int(r.when[0])))
         for r in readings
         if r.effect not in _OF_THE_TOOL and r.values.size > 1
     }
+
+
+def _as_at_20(reading: Reading, since: int) -> FloatArray:
+    """The values as they were at 20 deg C: robots are compared at one temperature.
+
+    What a degree does is fitted beside a mean before and one since.
+    """
+    late = reading.when >= since
+    warmer = reading.covariates - _REFERENCE
+    table = np.column_stack([~late, late, warmer.T]).astype(float)
+    slope = np.linalg.lstsq(table, reading.values, rcond=None)[0][2:]
+    return np.asarray(reading.values - slope @ warmer)
 
 
 def _signature(values: FloatArray) -> tuple[float, float]:

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-_POINTS = 1000
 _FEW_DAYS = 5
 
 
@@ -100,11 +99,11 @@ def plot_life_used(found: Count) -> Axes:
         found: the count.
     """
     axes = blank_figure()
-    onset = np.array([burst.onset for burst in found.counted.bursts])
-    total = 100.0 * np.cumsum(found.counted.totals.shares, axis=0)
-    few = np.unique(np.linspace(0, len(onset) - 1, _POINTS).astype(int))
-    when = onset[few].astype("datetime64[ns]")
-    when, total = np.append(when[:1], when), np.vstack([0.0 * total[:1], total[few]])
+    parts = found.counted.stretches
+    when = np.array([part.last for part in parts]).astype("datetime64[ns]")
+    done = np.array([part.damage for part in parts]) * found.counted.together
+    total = 100.0 * np.cumsum(done, axis=0)
+    when, total = np.append(when[:1], when), np.vstack([0.0 * total[:1], total])
     for j, name in enumerate(found.model.robot.flexible_names):
         if found.curves[j] is not None:
             axes.plot(when, total[:, j], drawstyle="steps-post", label=name, **look(j))

@@ -84,9 +84,7 @@ def _table(
     if not layout.header:
         names = [str(i + 1) for i in range(len(cells))]
     skip = layout.header + layout.units
-    units: list[str | None] = [None] * len(names)
-    if layout.units and len(rows) > 1 and len(rows[1]) == len(names):
-        units = [cell.strip(" []()") or None for cell in rows[1]]
+    units = _units(rows[1] if layout.units and len(rows) > 1 else [], len(names))
     body, places = rows[skip:], [n + shift for n, _ in kept[skip:]]
     if len(body) != len(places):
         raise InputError("a quoted cell goes over several lines, or its quote is not closed",
@@ -213,8 +211,15 @@ def _fast(path: Path, head: list[str], lines: list[str], layout: SourceTable) ->
     names = _names(head, cells, layout)
     if len(names) != cells:
         return None
-    channels = {n: RawChannel(n, c) for n, c in zip(names, columns, strict=True)}
+    units = _units(split(head[1].rstrip("\r\n"), layout.delimiter) if layout.units else [], cells)
+    channels = {n: RawChannel(n, c, unit=u) for n, c, u in zip(names, columns, units, strict=True)}
     return RawFile(path, "csv", channels, detected=(told(layout),))
+
+
+def _units(cells: list[str], columns: int) -> list[str | None]:
+    """The units that a line states; none where it has not as many cells as there are columns."""
+    found = [cell.strip(" []()") or None for cell in cells]
+    return found if len(found) == columns else [None] * columns
 
 
 def _names(head: list[str], cells: int, layout: SourceTable) -> list[str]:
