@@ -278,13 +278,15 @@ class PercussionSetup:
         struck = self.struck(model)
         system = self._system(model, struck.blows)
         blows = [(self.struck(one), self.struck(other)) for one, other in pairs]
-        alone = [k for k, pair in enumerate(blows) if each_blow and not pair[0].alike(pair[1])]
-        together = [k for k in range(len(pairs)) if k not in alone]
-        systems = [
-            self._system(m, s.blows)
-            for k in together for m, s in zip(pairs[k], blows[k], strict=True)
+        around = [
+            (self._system(one, ours.blows), self._system(other, theirs.blows))
+            for (one, other), (ours, theirs) in zip(pairs, blows, strict=True)
+        ]
+        alone = [
+            k for k, (ours, theirs) in enumerate(blows)
+            if each_blow and not ours.alike(theirs) and all(s is system for s in around[k])
         ]  # fmt: skip
-        around = list(zip(systems[::2], systems[1::2], strict=True))
+        together = [k for k in range(len(pairs)) if k not in alone]
         louder = np.array([
             (after.peak - before.peak) / struck.peak
             if before.alike(struck) and after.alike(struck) else np.nan
@@ -297,7 +299,7 @@ class PercussionSetup:
             key = taken.samples, taken.at_jumps
             if key not in made:
                 plan, count = self._plan(struck, system, *key), taken.samples.count
-                found = motion_changes(system, plan, count, around, louder)
+                found = motion_changes(system, plan, count, [around[k] for k in together], louder)
                 apart = blow_changes(system, *key, [_differing(*blows[k]) for k in alone])
                 if found is None or apart is None:
                     return None
