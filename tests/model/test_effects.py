@@ -526,3 +526,25 @@ def test_a_saved_model_with_a_value_out_of_bounds_is_named_with_its_file(tmp_pat
         f"{saved}: mount_resonance.damping_ratio: must lie between 0.001 and 0.7"
     )
     assert "0.7, got 1.5" in line
+
+
+def test_plants_that_begin_alike_do_not_change_each_other(arm):
+    """Of models that share all but the last effect the rest is made once: each has its own last."""
+    pose = arm.pose([0.3, 0.5, -0.8])
+    first = effect_class("payload")("tool", mass=3.0)
+    last = [
+        effect_class("joint_stiffness")("joint_2", scale=0.7),
+        effect_class("cable")("joint_2", stiffness=2e4, damping=10.0),
+        effect_class("base_compliance")("rz", stiffness=1e6, damping=10.0),
+        effect_class("backlash")("joint_1", gap=1e-3),
+    ]
+    shared = Geometry.of(arm, pose)
+    for effects in ([first, each] for each in (*last, *last[::-1])):
+        one, alone = (
+            Model(arm).with_effects(effects).plant(geometry).build(np.array([0.0, 0.0, 1.0]))
+            for geometry in (shared, Geometry.of(arm, pose))
+        )
+        assert one.coordinates == alone.coordinates
+        assert one.elements == alone.elements
+        for name in ("mass", "stiffness", "damping", "gravity_curvature", "force"):
+            assert np.array_equal(getattr(one, name), getattr(alone, name)), name

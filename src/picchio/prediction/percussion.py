@@ -53,6 +53,8 @@ _KEPT_IN_COMMON = 48
 _SLIGHTLY = 1e-6
 # Relative difference of rounding.
 _SAME = 1e-12
+BY_MODES = ("structure", "blows")
+"""Where effects change the motion without a change of its steps: see `PercussionSetup.changes`."""
 _SILENCE = PiecewiseForce(np.zeros(1), np.inf, *np.zeros((4, 1)))
 
 

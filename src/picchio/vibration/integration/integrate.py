@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -20,6 +21,8 @@ ROUGH_STEP = 2e-4
 _EDGE = 1e-10
 _ON = 1e-6  # of a step: a jump so near a sample is at it
 AtJumps = Literal["after", "mean", "moments"]
+Pushed = Callable[[FloatArray, float], FloatArray]
+"""The force, N, so many s after some times."""
 _GAUSS = 0.5 - np.sqrt(3.0) / 6.0
 _SHOOTING = 40
 _MASSLESS = "something that the model lets move has no mass"
@@ -177,13 +180,13 @@ def make_plan(
     lengths = np.diff(points)
     force0, force1 = force_lines(points, _GAUSS, *pieces)
     sample = sample_numbers(points, times, 2 * _EDGE, first)
-    after = force_beside(points, 2 * _EDGE, *pieces)
-    if at_jumps != "after":
-        after = 0.5 * (force_beside(points, -2 * _EDGE, *pieces) + after)
+
+    def pushed(time: FloatArray, later: float) -> FloatArray:
+        return np.asarray(force_beside(time, later, *pieces))
+
+    after = _beside(pushed, points, at_jumps)
     if at_jumps == "moments":
-        edges = edges.copy()  # the compiled code is made for arrays that can be written
-        jumps = force_beside(edges, 2 * _EDGE, *pieces) - force_beside(edges, -2 * _EDGE, *pieces)
-        added = jump_corrections(samples.start, samples.step, samples.count, first, edges, jumps)
+        added = _moments(pushed, edges, samples, first)
         after = after + np.where(sample >= 0, added[np.maximum(sample, 0)], 0.0)
     regular = np.abs(lengths - fine) < 1e-9 * fine + 2 * _EDGE
     same = np.full(lengths.size, -1)
@@ -208,20 +211,30 @@ def force_at(
     low, high = np.clip(ends + np.array([-2, 4]), 0, samples.count)
     times = samples.times[low:high]
 
-    def pushed(time: FloatArray) -> FloatArray:
-        return np.where(time >= 0.0, shape(time - start), 0.0)
+    def pushed(time: FloatArray, later: float) -> FloatArray:
+        return np.where(time + later >= 0.0, shape(time + later - start), 0.0)
 
-    after = pushed(times + 2 * _EDGE)
-    if at_jumps != "after":
-        after = 0.5 * (pushed(times - 2 * _EDGE) + after)
+    after = _beside(pushed, times, at_jumps)
     first = int(np.searchsorted(times, -_EDGE))
     if at_jumps == "moments":
         edges = np.unique(np.maximum([*(start + shape.start), start + shape.end], 0.0))
-        jumps = pushed(edges + 2 * _EDGE) - pushed(edges - 2 * _EDGE)
-        begin = samples.start + low * samples.step
-        after = after + jump_corrections(begin, samples.step, times.size, first, edges, jumps)
+        local = Samples(samples.start + low * samples.step, samples.step, times.size)
+        after = after + _moments(pushed, edges, local, first)
     out[low + first : high] = after[first:]
     return out
+
+
+def _beside(pushed: Pushed, points: FloatArray, at_jumps: AtJumps) -> FloatArray:
+    """(K,) N just after each point, or the mean of both of its sides."""
+    after = pushed(points, 2 * _EDGE)
+    return after if at_jumps == "after" else 0.5 * (pushed(points, -2 * _EDGE) + after)
+
+
+def _moments(pushed: Pushed, edges: FloatArray, samples: Samples, first: int) -> FloatArray:
+    """(count,) N that samples beside jumps get more, by `jump_corrections`."""
+    edges = edges.copy()  # the compiled code is made for arrays that can be written
+    jumps = pushed(edges, 2 * _EDGE) - pushed(edges, -2 * _EDGE)
+    return jump_corrections(samples.start, samples.step, samples.count, first, edges, jumps)
 
 
 def jump_corrections(

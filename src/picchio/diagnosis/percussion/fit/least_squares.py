@@ -15,6 +15,7 @@ from picchio.diagnosis.active_set import bounded_solution
 from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis, Unknown
+from picchio.prediction.percussion import BY_MODES
 
 # Windows that grow, s: a long one at once lets the fit skip cycles.
 WINDOWS = (0.06, 0.16, 0.4, None)
@@ -294,10 +295,6 @@ def fits_without(best: Fit, refit: Callable[[Hypothesis], Fit]) -> list[Fit]:
 # Jacobians of residuals: by differences, from a fit nearby, or updated from step to step.
 
 
-# What may change the motion without a change of its steps.
-_BY_MODES = ("structure", "blows")
-
-
 def jacobian(
     problem: Problem,
     hypothesis: Hypothesis,
@@ -384,7 +381,7 @@ def _by_modes(
     found: dict[int, tuple[float, tuple[Hypothesis, Hypothesis]]] = {}
     for k in wanted:
         unknown = unknowns[k]
-        if hypothesis.effects[unknown.effect].where not in _BY_MODES:
+        if hypothesis.effects[unknown.effect].where not in BY_MODES:
             continue
         ends = [
             min(max(vector[k] + way * unknown.step, unknown.lower), unknown.upper)

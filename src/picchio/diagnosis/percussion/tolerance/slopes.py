@@ -21,6 +21,7 @@ from picchio.diagnosis.percussion.fit.parallel import worker_pool
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, Inexact, Nudge, inexact, nudged
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
+from picchio.prediction.percussion import BY_MODES
 
 # By so many standard deviations a number is moved to see what it does; one of the structure, which
 # changes frequencies, by less, and a joint by so many rad. A blow that is moved by less than what
@@ -32,8 +33,6 @@ _TURN = 5e-6
 # all; and by so many standard deviations at least.
 _SEEN = 0.1
 _FINEST = 1e-6
-# What may change the motion without a change of its steps.
-_BY_MODES = ("structure", "blows")
 # What moves all records together by less than this, in units of the noise, need not be looked at.
 _IDLE = 0.01
 
@@ -252,7 +251,7 @@ def _by_modes(
     numbers = [
         (one, blow)
         for one in every
-        if one.where in _BY_MODES
+        if one.where in BY_MODES
         for blow in range(blows if one.each_blow else 1)
     ]
     model = problem.model.with_effects(effects)
