@@ -219,6 +219,8 @@ def test_what_is_held_of_bursts_is_bounded(robot, stretch, tmp_path, task, monke
     np.testing.assert_allclose(sums[0], 1100.0 * alone, rtol=1e-12)
     np.testing.assert_allclose(sums[1], found.totals.damage, rtol=1e-12)
     assert len(found.places) <= 10 and found.places[0].damage.max() > 0.9 * sums[1].max()
+    (told,) = (n for n in counting._notes(found, None, model) if "too many to tell apart" in n)
+    assert told.startswith(f"{found.forgotten} places ") and found.forgotten > 0
     # The one that did nearly all of it stands for its stretch.
     onsets = {each.burst.onset for each in typical(found.stretches)}
     assert onsets == {first.onset + heavy * 6 * 10**11}

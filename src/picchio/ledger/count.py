@@ -156,6 +156,11 @@ def _notes(counted: Counted, rules: Mapping | None, model: Model) -> tuple[str, 
         notes.append(
             f"{counted.cut} blows are cut by the end of a log whose neighbour is not there yet"
         )
+    if counted.forgotten:
+        notes.append(
+            f"{counted.forgotten} places that had done the least are not among those told: they "
+            "were too many to tell apart; life and damage count all of them"
+        )
     kinds = counted.kinds.keys()
     if "acceleration" in kinds:
         notes.append(

@@ -79,6 +79,7 @@ class Counted:
         self.readings = BlowReadings()
         self.kinds: Counter[str] = Counter()
         self.cut = 0
+        self.forgotten = 0  # places
         self.first = self.last = 0  # ns, onsets
         self.stretches: list[Stretch] = []
         self._each = 1  # bursts of a stretch
@@ -113,6 +114,7 @@ class Counted:
             self._stand(Stretch(1, own, burst.onset, slim, own))
         if len(self._places) > _PLACES:
             worst = sorted(self._places.items(), key=lambda each: -self._weight(each[1].damage))
+            self.forgotten += len(worst) - _PLACES // 2
             self._places = dict(worst[: _PLACES // 2])
 
     def close(self, spans: IndexArray) -> None:
