@@ -55,6 +55,8 @@ def test_drag_slide_click_and_export(page_of, pictures, tmp_path) -> None:
     assert moved["tool"][2] > first["tool"][2] + 0.05
     assert page.locator("#joints").inner_text() != before
     assert not np.allclose(moved["pose"], first["pose"])
+    wide = page.evaluate("(t => [t.scrollWidth, t.parentElement.clientWidth])(joints)")
+    assert wide[0] <= wide[1]  # the life, at the table's end, can be seen
     # What stands in the page is what the method says there.
     row = page.locator("#joints tbody tr").nth(1).locator("td").all_inner_texts()
     stated = picchio.assess(live.session.robot, live.task, uncertainty=False).operations[0]

@@ -105,6 +105,8 @@ function tell(values) {
       if (!k) paintRing(j, share);
     });
   });
+  const shafts = Object.values(values.models).some((model) => model && model.joints.some((joint) => joint.stress !== null));
+  byId("joints").classList.toggle("no-shafts", !shafts);
   byId("frequencies").textContent = data.models.filter((name) => values.models[name]).map((name) =>
     `natural frequencies${data.models.length > 1 ? `, ${name}` : ""}: ` +
     [values.models[name].natural_frequencies.map(number3).join(", ") + " Hz", ...values.models[name].notes].join("; ")).join("; ");
