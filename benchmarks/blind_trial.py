@@ -31,6 +31,7 @@ import secrets
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -81,7 +82,7 @@ def cases(draws):
                 yield {"robot": robot, "kind": "single", "snr": 40, "draw": 3 * draw + n}
 
 
-def wrong_cases(robots, kinds, seeds, times, sensors=None, keys=None, snr=40):
+def wrong_cases(robots, kinds, seeds, times, sensors=None, keys=None, snr=40, effects=None):
     """Cases in worlds that are a little wrong, seed by seed.
 
     Args:
@@ -91,15 +92,14 @@ def wrong_cases(robots, kinds, seeds, times, sensors=None, keys=None, snr=40):
         sensors: that are read; accelerometer and deflections where None.
         keys: of what is off; everything where None.
         snr: dB.
+        effects: names of what is hidden first, in turn; drawn where None.
     """
     more = {"sensors": sensors} if sensors else {}
     more |= {"only": keys} if keys else {}
-    for draw in seeds:
-        for kind in kinds:
-            for robot in robots:
-                for size in times:
-                    head = {"robot": robot, "kind": kind, "snr": snr, "draw": draw}
-                    yield {**head, "mismatch": size, **more}
+    chosen = [{"effect": name} for name in effects or ()] or [{}]
+    for draw, kind, own, robot, size in product(seeds, kinds, chosen, robots, times):
+        head = {"robot": robot, "kind": kind, "snr": snr, "draw": draw}
+        yield {**head, "mismatch": size, **more, **own}
 
 
 def one(case, salt, method="diagnose", workers=1):
@@ -168,6 +168,7 @@ def main():
     wrong.add_argument("--seeds", type=span, default=range(10), help="draws a:b, without b")
     wrong.add_argument("--sensors", type=words, help="such as accelerometer; else with deflections")
     wrong.add_argument("--errors", type=words, help="keys of [tolerance] that are off; else all")
+    wrong.add_argument("--effects", type=words, help="hidden first, in turn; else drawn")
     wrong.add_argument("--snr", type=int, default=40, help="dB")
     given = parser.parse_args()
     rows = []
@@ -189,7 +190,7 @@ def main():
         todo = []
         for case in cases(given.draws) if given.mismatch is None else wrong_cases(
             given.robots, given.kinds, given.seeds, given.mismatch, given.sensors, given.errors,
-            given.snr,
+            given.snr, given.effects,
         ):  # fmt: skip
             name = trial.name_of(case)
             wanted = not given.only or any(part in name for part in given.only.split(","))

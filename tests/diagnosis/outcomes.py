@@ -28,9 +28,6 @@ SAME = (
     {"joint_stiffness", "servo_compliance"},  # a motor without inertia that yields
     {"sensor_axes", "sensor_misalignment"},
 )
-# Outside effects that the catalogue has had since, by the names that it has for them: then they are
-# causes like others. Those of the same name need no entry.
-KNOWN_AS: dict[str, str] = {}
 # A tolerance -> the effects that a cause is called when it is exceeded, beside its own name.
 CALLED = {
     "stiffness": {"joint_stiffness"},
@@ -98,9 +95,10 @@ def judge(case, truth, row):
         row: verdict, claimed, alternatives.
     """
     groups, first = tuple(truth["noise"]), next(iter(truth["nuisances"]["stiffness"]))
-    known = catalogue()
-    causes = [(KNOWN_AS.get(c["effect"], c["effect"]), c["target"]) for c in truth["causes"]]
-    hidden = [cause for cause in causes if cause[0] in known and case["kind"] != "left-out"]
+    # What is outside the catalogue, or left out of it, is not in it, whatever it has learnt since.
+    known = () if case["kind"] in ("outside", "left-out") else catalogue()
+    causes = [(c["effect"], c["target"]) for c in truth["causes"]]
+    hidden = [cause for cause in causes if cause[0] in known]
     beyond = errors.beyond(truth["errors"], EXCEEDED)
     false = [
         list(cause)

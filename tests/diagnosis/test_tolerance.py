@@ -54,7 +54,7 @@ def _random_slopes(rng, samples, own, shared, means=""):
         *(_number(f"shared {i}", True, means if i == 0 else "") for i in range(shared)),
     )
     columns = rng.normal(size=(2, samples, own + shared)) * np.exp(rng.normal(size=own + shared))
-    return Slopes(what, own, columns.astype(np.float32))
+    return Slopes.of(what, own, columns.astype(np.float32))
 
 
 @pytest.fixture
@@ -354,7 +354,7 @@ def test_numbers_that_are_absurdly_far_off_speak_for_no_model():
     names = [str(pose) for pose in range(6)]
     slope, other = np.linalg.qr(rng.normal(size=(1000, 2)))[0].T
     what = (_number("own", False),)
-    marginal = Marginal({n: Slopes(what, 1, 10.0 * slope[None, :, None]) for n in names})
+    marginal = Marginal({n: Slopes.of(what, 1, 10.0 * slope[None, :, None]) for n in names})
 
     def left(along, beside):
         """A fit that leaves so many deviations of what is not exact, and as much of something."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -22,6 +22,7 @@ from picchio.diagnosis.percussion.conclude.causes import (
     with_solved,
 )
 from picchio.diagnosis.percussion.conclude.holdout import held_out_remainder, holdout_gain
+from picchio.diagnosis.percussion.conclude.others import weighed
 from picchio.diagnosis.percussion.conclude.verdict import (
     claimed_of,
     doubtful,
@@ -33,10 +34,10 @@ from picchio.diagnosis.percussion.conclude.verdict import (
 )
 from picchio.diagnosis.percussion.criteria.common_fault import common_faults
 from picchio.diagnosis.percussion.criteria.dominance import dominant_causes, explained_share
-from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic, bic_difference
+from picchio.diagnosis.percussion.criteria.equivalence import bic
 from picchio.diagnosis.percussion.criteria.exceeded import exceeded
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
-from picchio.diagnosis.percussion.criteria.remainder import Remainder, allowed, decisive_gain
+from picchio.diagnosis.percussion.criteria.remainder import Remainder, allowed
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence
 from picchio.diagnosis.percussion.data.problem import Problem, Split, held_out
 from picchio.diagnosis.percussion.fit.drawn import refit, with_solved_numbers
@@ -50,7 +51,6 @@ from picchio.diagnosis.percussion.search.candidates import (
     warm_up,
 )
 from picchio.diagnosis.percussion.search.select import (
-    alternatives,
     begin_search,
     run_search,
     start_from,
@@ -226,12 +226,7 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
     # More rivals can only lessen the confidence: what isn't sure by now won't be claimed.
     if causes and (leaves_little(after, left) or may_be_partial(causes, gain.explained, left)):
         search.say("looking for other causes that would do as well")
-        # Over the same samples: else a rival may lose, or win, by which of them it knows.
-        with problem.pinned(search.best.hypothesis.effects):
-            same, rivals = alternatives(search)
-        with problem.pinned(whole.hypothesis.effects):
-            same, refuted = _on_all_records(problem, whole, same)
-        causes = fitted_causes(search, whole, rivals, refuted)
+        same, rivals, causes = weighed(search, whole)
     common = common_faults(whole.hypothesis, reported_covariance(whole), problem.groups)
     verdict = verdict_of(causes, before, after, bool(same), gain.explained, common, left, beyond)
     remainder = held_out_remainder(problem, stands, judged)
@@ -314,30 +309,6 @@ def _fitted_to_all(search: Search, nominal: Fit) -> tuple[Fit, Evidence]:
             whole = refit(problem, stands.hypothesis, problem.records)
             after = fit_evidence(problem, whole)
     return whole, after
-
-
-def _on_all_records(
-    problem: Problem, whole: Fit, same: Sequence[Trial]
-) -> tuple[list[Trial], list[Trial]]:
-    """Rivals that do as well on all records, those held out included; and those that don't."""
-    kept: list[Trial] = []
-    refuted: list[Trial] = []
-    for trial in same:
-        with about_another(problem):
-            there = attempt(trial.label, partial(_refitted, problem, trial))
-        if there is None:
-            continue
-        alike = bic_difference(problem, whole, there) < SAME
-        if allowed(problem):
-            alike = alike or decisive_gain(there, whole) < SAME
-        (kept if alike else refuted).append(replace(trial, fit=there, score=bic(there)))
-    return kept, refuted
-
-
-def _refitted(problem: Problem, trial: Trial) -> Fit:
-    """A trial fitted to all records, about its own inexact numbers."""
-    found = refit(problem, trial.fit.hypothesis, problem.records)
-    return found if trial.draws else settled(problem, found, problem.records, 1, anew=False)
 
 
 def _leads(search: Search) -> list[tuple[str, str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import zip_longest
 
 import numpy as np
@@ -45,11 +46,24 @@ class Slopes:
         what: the numbers, each as often as it has columns: the record's own first.
         own: how many columns are the record's own; the others the campaign shares.
         columns: (channels, samples, columns) in units of the noise, in single precision.
+        norms: (columns,) their norms as they were taken, whatever has been taken out of them since.
     """
 
     what: tuple[Inexact, ...]
     own: int
     columns: np.ndarray
+    norms: FloatArray
+
+    @classmethod
+    def of(cls, what: Sequence[Inexact], own: int, columns: np.ndarray) -> Slopes:
+        """Slopes as they are taken.
+
+        Args:
+            what: the numbers, as in the attributes.
+            own: as there.
+            columns: as there.
+        """
+        return cls(tuple(what), own, columns, np.sqrt((columns**2).sum(axis=(0, 1), dtype=float)))
 
     @property
     def means(self) -> tuple[str, ...]:
@@ -66,7 +80,8 @@ class Slopes:
         if kept.all():
             return self
         what = tuple(one for one, stays in zip(self.what, kept, strict=True) if stays)
-        return Slopes(what, int(kept[: self.own].sum()), self.columns[:, :, kept])
+        own = int(kept[: self.own].sum())
+        return Slopes(what, own, self.columns[:, :, kept], self.norms[kept])
 
     def moved(self, sizes: FloatArray) -> list[tuple[Inexact, FloatArray]]:
         """What is moved by how many standard deviations, (numbers,) each.
@@ -117,7 +132,7 @@ def all_slopes(
         for record, own in zip(records, columns or (), strict=False):
             blows = len(_starts(record))
             what = tuple(w for w in every[record.name] for _ in range(blows if w.each_blow else 1))
-            slopes[record.name] = Slopes(what, sum(not w.once for w in what), own)
+            slopes[record.name] = Slopes.of(what, sum(not w.once for w in what), own)
     if not problem.sizes:
         problem.idle |= _idle(slopes.values())
         slopes = {name: each.without(problem.idle) for name, each in slopes.items()}
@@ -152,7 +167,7 @@ def slopes_of(
     for k, one in enumerate(shared, len(own)):
         if one.name in order:
             together[:, :, k] = columns[:, :, order[one.name]]
-    return Slopes((*(what[k] for k in own), *shared), len(own), together)
+    return Slopes.of((*(what[k] for k in own), *shared), len(own), together)
 
 
 def _idle(slopes: Iterable[Slopes]) -> frozenset[str]:
@@ -199,10 +214,14 @@ def _number_by_number(
     both: bool,
 ) -> Iterator[list[FloatArray]]:
     """The columns of each number in turn."""
-    sizes = problem.sizes.get(record.name)
-    here = {}
-    if sizes is not None and problem.marginal is not None:
-        here = {one.name: (one, v) for one, v in problem.marginal.slopes[record.name].moved(sizes)}
+    sizes, here = problem.sizes.get(record.name), {}
+    norms: dict[str, list[float]] = {}
+    last = problem.marginal.slopes.get(record.name) if problem.marginal is not None else None
+    if last is not None:
+        for one, norm in zip(last.what, last.norms, strict=True):
+            norms.setdefault(one.name, []).append(float(norm))
+        if sizes is not None:
+            here = {one.name: (one, v) for one, v in last.moved(sizes)}
     # A pose asks for a geometry of its own, in which moved masses would have to be found anew.
     still = {name: pair for name, pair in here.items() if pair[0].where != "structure"}
     about = {
@@ -218,17 +237,19 @@ def _number_by_number(
         if one.where == POSE:  # its zero and its repeatability turn a joint alike
             index, sigma = one.change
             if index not in turned:
+                there, base = about[True]
                 turned[index] = (
                     sigma,
-                    _columns(problem, record, effects, about[True][1], one, about[True][0], end),
+                    _columns(problem, record, effects, base, one, there, end),
                 )
             known, columns = turned[index]
             yield [sigma / known * column for column in columns]
             continue
         there, base = about[False]
-        ahead = _columns(problem, record, effects, base, one, there, end)
+        move = partial(_columns, problem, record, effects, base, one, there, end, norms)
+        ahead = move()
         if both and one.where == "structure":
-            behind = _columns(problem, record, effects, base, one, there, end, -1.0)
+            behind = move(way=-1.0)
             ahead = [0.5 * (a + b) for a, b in zip(ahead, behind, strict=True)]
         yield ahead
     if not every:
@@ -305,28 +326,39 @@ def _columns(
     one: Inexact,
     here: Mapping[str, tuple[Inexact, FloatArray]],
     end: float | None,
+    norms: Mapping[str, Sequence[float]] = {},
     way: float = 1.0,
 ) -> list[FloatArray]:
-    """The change of the residual (channels, m): of every blow, where each has its own number."""
+    """The change of the residual (channels, m): of every blow, where each has its own number.
+
+    `norms` are those of the columns when they were last taken, which tell how fine a step need be.
+    """
     step = way * _STRUCTURE if one.where == "structure" else _STEP
     if one.where == POSE:
         step = _TURN / one.change[1]
 
     rough = any(effect.where == "nonlinear" for effect in effects) and one.where != POSE
 
-    def change(blow: int, step: float = step) -> FloatArray:
+    def fine_step(norm: float) -> float:
+        return math.copysign(max(_SEEN / max(norm, 1e-300), _FINEST), way)
+
+    def change(blow: int, step: float) -> FloatArray:
         there = _moved_on(here, one, blow, step)
         moved = attempt(one.name, lambda: _moved_residual(problem, record, effects, there, end))
         found = np.zeros_like(base) if moved is None else (moved - base) / step
-        fine = _SEEN / max(float(np.linalg.norm(found)), 1e-300)
-        if not rough or fine > 0.5 * abs(step) or abs(step) <= _FINEST:
+        fine = fine_step(float(np.linalg.norm(found)))
+        if not rough or abs(fine) > 0.5 * abs(step) or abs(step) <= _FINEST:
             return found
         # Where a joint sticks once more within the step, the slope is none of either side.
-        return change(blow, math.copysign(max(fine, _FINEST), step))
+        return change(blow, fine)
 
     # Each blow by itself: the first one's change, moved to the others, falls between samples, and
     # the little that is then wrong of all of them alike passes for a force that drifts.
-    return [change(k) for k in range(len(_starts(record)) if one.each_blow else 1)]
+    steps = [step] * (len(_starts(record)) if one.each_blow else 1)
+    if rough:
+        for blow, norm in enumerate(norms.get(one.name, ())):
+            steps[blow] = min(step, fine_step(norm), key=abs)
+    return [change(blow, each) for blow, each in enumerate(steps)]
 
 
 def _moved_residual(
