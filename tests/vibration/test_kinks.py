@@ -13,6 +13,7 @@ from picchio.model.geometry import Geometry
 from picchio.vibration.integration.element_kernel import element_force, kink_correction
 from picchio.vibration.integration.integrate import Samples, integrate
 
+HARDENING = (1, np.array([4e12, 0.0, 0.0, 0.0, 0.0, 0.0]))
 BACKLASH = (0, np.array([1e5, 2e-4, 1e-5, 0.0, 0.0, 0.0]))
 CONTACT = (4, np.array([1e5, 50.0, 10.0, 0.0, 0.0, 0.0]))
 LENGTH, POINTS = 4e-4, 4000
@@ -35,7 +36,9 @@ def by_quadrature(kind, parameters, d0, rate0, d1, rate1):
     return np.array([4 * mean - 6 * moment, 6 * moment - 2 * mean]), np.abs(values).max()
 
 
-@pytest.mark.parametrize("element", [BACKLASH, CONTACT], ids=["backlash", "contact"])
+@pytest.mark.parametrize(
+    "element", [BACKLASH, CONTACT, HARDENING], ids=["backlash", "contact", "hardening"]
+)
 def test_the_line_keeps_the_forces_mean_and_moment(element):
     kind, parameters = element
     rng = np.random.default_rng(4)
@@ -52,7 +55,7 @@ def test_the_line_keeps_the_forces_mean_and_moment(element):
         # Clear of the kink it is known in closed form, across it summed over 16 points.
         tolerance = (1e-6 if straight else 2e-2) * size + 1e-12
         assert np.abs(found - right).max() <= tolerance, (number, straight)
-    assert 10 < clear < 55
+    assert clear == 60 if kind == HARDENING[0] else 10 < clear < 55
 
 
 def test_play_is_followed_at_the_step_that_is_used():
@@ -71,15 +74,18 @@ def test_play_is_followed_at_the_step_that_is_used():
 
 
 @pytest.mark.parametrize(
-    ("torque", "smoothing", "least"), [(5.0, 5e-4, 1e-4), (50.0, 1e-4, 5e-4), (300.0, 5e-5, 1e-4)]
+    ("effect", "values", "least"),
+    [
+        ("coulomb_friction", {"torque": 5.0, "smoothing": 5e-4}, 1e-4),
+        ("coulomb_friction", {"torque": 50.0, "smoothing": 1e-4}, 5e-4),
+        ("coulomb_friction", {"torque": 300.0, "smoothing": 5e-5}, 1e-4),
+        ("hardening", {"cubic": 2e11}, 3e-4),  # at its peaks ten times as stiff as at rest
+    ],
 )
-def test_friction_that_fades_is_followed_at_the_step_that_is_used(torque, smoothing, least):
-    """Against scipy's Radau method, from edge to edge of the force."""
+def test_what_bends_is_followed_at_the_step_that_is_used(effect, values, least):
+    """Friction that fades and a spring that hardens, by scipy's Radau method between edges."""
     robot = picchio.load_robot("fanuc_like_3dof")
-    values = {"torque": torque, "smoothing": smoothing}
-    model = picchio.Model(robot).with_effects(
-        [effect_class("coulomb_friction")("joint_3", **values)]
-    )
+    model = picchio.Model(robot).with_effects([effect_class(effect)("joint_3", **values)])
     direction = np.array([0.0, 1.0, 0.0])
     system = model.plant(Geometry.of(robot, [0.3, 0.5, -0.8])).build(direction)
     nothing = np.zeros_like(system.mass_gradient)
@@ -91,9 +97,13 @@ def test_friction_that_fades_is_followed_at_the_step_that_is_used(torque, smooth
     train = picchio.PulseTrain(3000.0, 0.04, 0.004)
     samples = Samples(0.0, 1e-3, 400)
 
+    def torque(y):
+        if effect == "hardening":
+            return values["cubic"] * (row @ y[:n]) ** 3
+        return values["torque"] * np.tanh(row @ y[n:] / values["smoothing"])
+
     def slope(_, y, push):
-        held = system.stiffness @ y[:n] + system.damping @ y[n:]
-        held = held + torque * np.tanh(row @ y[n:] / smoothing) * row
+        held = system.stiffness @ y[:n] + system.damping @ y[n:] + torque(y) * row
         return np.concatenate([y[n:], inverse @ (system.force * push - held)])
 
     edges = [*np.sort(np.concatenate([0.04 * np.arange(10), 0.04 * np.arange(10) + 0.004])), 0.4]

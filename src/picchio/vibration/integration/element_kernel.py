@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 
@@ -107,15 +108,56 @@ def _line(mean, moment, out):
     out[1] = 6.0 * moment - 2.0 * mean
 
 
+# Gauss's rule of six points on [0, 1]: exact for polynomials up to the eleventh degree.
+_AT = 0.5 + 0.5 * np.polynomial.legendre.leggauss(6)[0]
+_WEIGHTS = 0.5 * np.polynomial.legendre.leggauss(6)[1]
+
+
+@njit(cache=True, nogil=True)
+def _bent(parameters, d0, rate0, d1, rate1, length, out):
+    """As `kink_correction`, of a cubic spring.
+
+    The force on a cubic path is a polynomial of the ninth degree, its first moment exact, too.
+    """
+    f0, f1 = -parameters[0] * d0 * d0 * d0, -parameters[0] * d1 * d1 * d1
+    mean, moment = 0.0, 0.0
+    for i in range(6):
+        s = _AT[i]
+        path, _ = _on_the_way(d0, rate0, d1, rate1, length, s)
+        above = -parameters[0] * path * path * path - f0 - (f1 - f0) * s
+        mean += _WEIGHTS[i] * above
+        moment += _WEIGHTS[i] * above * s
+    _line(mean, moment, out)
+
+
+@njit(cache=True, nogil=True)
+def _on_the_way(d0, rate0, d1, rate1, length, s):
+    """Deflection and rate at a share of a step, on the cubic path between its ends."""
+    a, b = (1.0 - s) * (1.0 - s), s * s
+    path = (
+        a * ((1.0 + 2.0 * s) * d0 + s * length * rate0)
+        + b * ((3.0 - 2.0 * s) * d1 - (1.0 - s) * length * rate1)
+    )  # fmt: skip
+    rate = (
+        6.0 * s * (1.0 - s) * (d1 - d0) / length
+        + (1.0 - s) * (1.0 - 3.0 * s) * rate0
+        + s * (3.0 * s - 2.0) * rate1
+    )
+    return path, rate
+
+
 @njit(cache=True, nogil=True)
 def kink_correction(kind, parameters, d0, rate0, d1, rate1, length, out):
-    """What the best straight line through a force with a kink has above its two ends' values.
+    """What the best straight line through a force has above its two ends' values.
 
     Over a step the force is taken as a straight line in time. Where the path from (d0, rate0) to
-    (d1, rate1), a cubic, crosses a kink, the line with the force's own mean and first moment is
-    better than the one through its ends. Into `out` (2,): to be added at start and end. Returns
-    whether the path stays clear of all kinks.
+    (d1, rate1), a cubic, crosses a kink, or a spring hardens, the line with the force's own mean
+    and first moment is better than the one through its ends. Into `out` (2,): to be added at start
+    and end. Returns whether the path stays clear of all kinks.
     """
+    if kind == 1:
+        _bent(parameters, d0, rate0, d1, rate1, length, out)
+        return True
     if _straight(kind, parameters, d0, rate0, d1, rate1, length, out):
         return True
     f0 = element_force(kind, parameters, d0, rate0, 0.0)
@@ -124,16 +166,7 @@ def kink_correction(kind, parameters, d0, rate0, d1, rate1, length, out):
     moment = 0.0
     for i in range(_POINTS):
         s = (i + 0.5) / _POINTS
-        a, b = (1.0 - s) * (1.0 - s), s * s
-        path = (
-            a * ((1.0 + 2.0 * s) * d0 + s * length * rate0)
-            + b * ((3.0 - 2.0 * s) * d1 - (1.0 - s) * length * rate1)
-        )  # fmt: skip
-        rate = (
-            6.0 * s * (1.0 - s) * (d1 - d0) / length
-            + (1.0 - s) * (1.0 - 3.0 * s) * rate0
-            + s * (3.0 * s - 2.0) * rate1
-        )
+        path, rate = _on_the_way(d0, rate0, d1, rate1, length, s)
         above = element_force(kind, parameters, path, rate, 0.0) - f0 - (f1 - f0) * s
         mean += above / _POINTS
         moment += above * s / _POINTS

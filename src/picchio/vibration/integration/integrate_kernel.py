@@ -28,7 +28,7 @@ from picchio.vibration.integration.step_kernel import fastest_rate, step_matrice
 
 # From so many time constants of the fastest mode on, matrices are cheaper than a series.
 _STIFF = 30.0
-_BACKLASH, _BOUC_WEN, _CONTACT, _BILINEAR = 0, 2, 4, 5
+_BOUC_WEN = 2
 
 
 @njit(cache=True, nogil=True)
@@ -171,7 +171,7 @@ def advance(kinds, parameters, rows, before, after, states, new_states):
 
 @njit(cache=True, nogil=True)
 def add_kink(start, end, length, row, pull, kind, parameters, bend, first, final):
-    """Put what an element does between two states (2N,) into its line; whether it has no kink."""
+    """Put what an element does between two states (2N,) into its line; whether it meets no kink."""
     n = row.size
     d0, rate0, d1, rate1 = 0.0, 0.0, 0.0, 0.0
     for j in range(n):
@@ -261,7 +261,7 @@ def integrate(
             crossed = False
             if kinds is not None:
                 for e in range(kinds.size):
-                    if kinds[e] == _BACKLASH or kinds[e] == _CONTACT or kinds[e] == _BILINEAR:
+                    if kinds[e] != _BOUC_WEN and kinds[e] != COULOMB:
                         straight = add_kink(
                             y, new, length, rows[e], pulls[e], kinds[e], parameters[e], bend,
                             first, final,
@@ -376,7 +376,7 @@ def integrate_with_friction(
             for i in range(n):
                 f1[i] = own[i] * force1[k] + p1[i]
             for e in range(elements):
-                if kinds[e] == _BACKLASH or kinds[e] == _CONTACT or kinds[e] == _BILINEAR:
+                if kinds[e] != _BOUC_WEN and kinds[e] != COULOMB:
                     add_kink(
                         y, new, lengths[k], rows[e], pulls[e], kinds[e], parameters[e], bend, f0,
                         f1,
