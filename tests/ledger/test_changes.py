@@ -1,5 +1,7 @@
 """What changed, in histories where it is known, and in histories where nothing did."""
 
+from itertools import groupby
+
 import numpy as np
 import pandas
 import pytest
@@ -9,8 +11,8 @@ from scipy.linalg import eigh
 import picchio
 from picchio.ledger.fleet import count_fleet
 from picchio.ledger.samples import Samples
-from picchio.ledger.store import Stream
-from picchio.ledger.watch.changes import FIRST, BlowReadings, Reading, find, readings_of
+from picchio.ledger.store import SHIFT, Stream
+from picchio.ledger.watch.changes import FIRST, Reading, Shown, find, readings_of
 from picchio.ledger.watch.drives import drives
 from picchio.ledger.watch.exchange import exchange, signature, whose
 from picchio.ledger.watch.ringing import decaying, ring_downs
@@ -278,8 +280,12 @@ def test_the_joint_that_softens_is_found_by_its_frequencies():
             poses = pose + 1e-5 * rng.standard_normal((stamps[::10].size, 3))
             samples = Samples("force", stamps, force, stamps[::10], poses, others)
             features += ring_downs(samples, stream, model)
-    features.sort(key=lambda row: row[1])
-    readings = readings_of(model, BlowReadings(), features)
+    shown = {}
+    for number, rows in groupby(sorted(features, key=lambda row: row[1]), lambda r: r[1] // SHIFT):
+        one = Shown(model)
+        one.read(rows)
+        shown[number] = one.told
+    readings = readings_of(robot.flexible_names, shown)
     assert {r.target for r in readings} == {"joint_1", "joint_2", "joint_3", "robot"}
     changes = find(readings)
     assert [c.reading.target for c in changes] == ["joint_2"]
