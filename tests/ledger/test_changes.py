@@ -369,3 +369,25 @@ def test_logs_of_two_robots_that_are_swapped_are_told(tmp_path):
     assert rows["c"]["another_robot"] is None
     dates = {rows[name]["another_robot"]["since"] for name in "ab"}
     assert dates == {"2026-04-04"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["coulomb_friction", "backlash"])
+def test_a_drive_that_changes_is_named_from_its_logs(tmp_path, kind):
+    """Friction 25 % more, or lost motion doubled; nothing else is told, nor too early."""
+    (tmp_path / "mapping.toml").write_text(LOG_MAPPING)
+    robot, rng = picchio.load_robot(NAME), np.random.default_rng([5, len(kind)])
+    for number in range(50):
+        late = number >= 38
+        rub = 1.25 if late and kind == "coulomb_friction" else 1.0
+        gap = 2e-4 if late and kind == "backlash" else 1e-4
+        warm = 20.0 + rng.standard_normal()
+        shift_log(tmp_path, number, rng, np.ones(3), rub, gap, warm)
+        if number == 37:  # enough for a change to be told
+            assert picchio.count(robot, tmp_path, tmp_path / "ledger").changes == ()
+    found = picchio.count(robot, tmp_path, tmp_path / "ledger")
+    assert {change["effect"] for change in found.changes} == {kind}
+    assert {change["target"] for change in found.changes} == {"joint_1", "joint_2", "joint_3"}
+    for change in found.changes:
+        assert change["since_low"] <= "2026-04-08" <= change["since_high"]
+        assert change["low"] < (0.25 if kind == "coulomb_friction" else 1.0) < change["high"]

@@ -377,8 +377,8 @@ class Ledger:
                 base.executemany("INSERT INTO feature VALUES (?, ?, ?, ?)",
                                  [(log, *each) for each in features(samples)])  # fmt: skip
             told = json.dumps(detected)
-            row = (log, stream.id, mapping, name, first, last, count, told, file)
-            base.execute("INSERT OR REPLACE INTO log VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
+            about = (log, stream.id, mapping, name, first, last, count, told, file)
+            base.execute("INSERT OR REPLACE INTO log VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", about)
         return count
 
     def logs(self) -> list[tuple[str, str, int, int, int]]:
