@@ -91,10 +91,11 @@ class Change:
         dates = [date_of(int(when[k])) for k in (self.onset, self.onset_low, self.onset_high)]
         days = (when[-1] - when[self.onset]) / 8.64e13
         moved = "rose" if self.value > 0.0 else "fell"
+        between = f" ({dates[1]} to {dates[2]})" if dates[1] < dates[2] else ""
         words = (
             f"{self.reading.name} {moved} by {100 * abs(self.value):.3g} % "
             f"({100 * self.low:+.3g} to {100 * self.high:+.3g} %) in the {days:.0f} days since "
-            f"{dates[0]} ({dates[1]} to {dates[2]}), {'gradually' if self.ramp else 'at once'}"
+            f"{dates[0]}{between}, {'gradually' if self.ramp else 'at once'}"
         )
         return {
             "effect": self.reading.effect, "target": self.reading.target, "since": dates[0],
