@@ -163,13 +163,14 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="the first split's seed")
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--within", type=float, default=1.5, help="s: a kill comes within these")
-    parser.add_argument("--fleet", type=int, default=0, help="robots on dask, of 20 logs each")
+    parser.add_argument("--fleet", type=int, default=0, help="robots on dask")
+    parser.add_argument("--logs", type=int, default=20, help="logs of each of them")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         if asked.splits:
             splits(Path(place), asked.splits, asked.first)
         if asked.fleet:
-            fleet(Path(place), asked.fleet, 20)
+            fleet(Path(place), asked.fleet, asked.logs)
         if asked.kills:
             kills(Path(place), asked.kills, asked.within)
 

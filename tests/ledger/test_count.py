@@ -274,6 +274,19 @@ def test_only_the_shifts_that_a_log_touches_are_counted(
     assert (totals[0] == totals[1]).all()
 
 
+def test_a_sum_of_what_another_process_changed_meanwhile_is_not_kept(tmp_path, stretch):
+    samples, stream, _ = stretch
+    number = int(samples.stamps[0] // SHIFT)
+    with Ledger(tmp_path / "l", NAME) as mine, Ledger(tmp_path / "l", NAME) as other:
+        before = mine.shifts()
+        other.add("log", "m", "log", stream, [samples])
+        mine.tell(number, "key", "{}")
+        assert mine.told(number, "key") is None
+        assert number in mine.shifts() and number not in before
+        mine.tell(number, "key", "{}")
+        assert other.told(number, "key") == "{}" and other.told(number, "other") is None
+
+
 def _blows(parts, stream, folder, robot, task):
     with Ledger(folder / "blows", NAME) as book:
         book.add("log", "m", "log", stream, parts)
