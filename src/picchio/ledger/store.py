@@ -459,7 +459,11 @@ class Ledger:
             )  # fmt: skip
 
     def shifts(self) -> dict[int, str]:
-        """{number: hash of the logs that it depends on} of each shift that was logged, by time."""
+        """Each shift that was logged, by time.
+
+        Returns:
+            {number: hash of the logs that it depends on}.
+        """
         logs: dict[int, set[str]] = {}
         with self._told():
             self._version = self._base.execute("PRAGMA data_version").fetchone()
