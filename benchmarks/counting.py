@@ -56,8 +56,8 @@ import picchio
 robot = picchio.load_robot(sys.argv[4])
 found = picchio.count(robot, sys.argv[1], sys.argv[2], mapping=sys.argv[3])
 n = found.blows"""
-# What the ledger remembers of single bursts is emptied, as where the model has changed.
-ANEW = 'import sqlite3\nsqlite3.connect(sys.argv[2]).executescript("DELETE FROM burst")\n' + (
+# What the ledger remembers of shifts is emptied, as where the model has changed.
+ANEW = 'import sqlite3\nsqlite3.connect(sys.argv[2]).executescript("DELETE FROM shift")\n' + (
     COUNT.replace("robot, sys.argv[1]", "robot, None")
 )
 # The memory is that of the process itself, and that of the largest of those that read for it.

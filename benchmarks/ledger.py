@@ -56,10 +56,9 @@ def splits(folder: Path, count: int, first: int) -> None:
     (samples,) = read_samples(path / "part0.parquet", rules, robot)
     stream = counting.stream_of(samples, rules, task, robot)
     curves = curves_of(robot, load_sn_curve(str(folder / "curve.toml")))
-    cache = (counting.fingerprint(Model.of(robot), curves), {})
     with Ledger(folder / "whole", tests.NAME) as book:
         book.add("log", "m", "log", stream, [samples])
-        expected = tests.counted(book, robot, curves, task, cache).totals.damage
+        expected = counting.recount(book, Model.of(robot), curves, task).totals.damage
     worst, faults, begin = 0.0, 0, time.perf_counter()
     for trial in range(first, first + count):
         rng = np.random.default_rng(trial)
@@ -77,7 +76,7 @@ def splits(folder: Path, count: int, first: int) -> None:
                     faults += 1
                 book._base = sound
                 book.add(str(number), "m", "part", stream, [part])
-            found = tests.counted(book, robot, curves, task, cache).totals.damage
+            found = counting.recount(book, Model.of(robot), curves, task).totals.damage
         worst = max(worst, float(np.abs(found / expected - 1.0).max()))
     print(f"{count} splits, repeats and orders with {faults} faults: the damage differs by "
           f"{worst:.3g} at most, relative ({time.perf_counter() - begin:.0f} s)")  # fmt: skip
@@ -164,13 +163,14 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="the first split's seed")
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--within", type=float, default=1.5, help="s: a kill comes within these")
-    parser.add_argument("--fleet", type=int, default=0, help="robots on dask, of 20 logs each")
+    parser.add_argument("--fleet", type=int, default=0, help="robots on dask")
+    parser.add_argument("--logs", type=int, default=20, help="logs of each of them")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         if asked.splits:
             splits(Path(place), asked.splits, asked.first)
         if asked.fleet:
-            fleet(Path(place), asked.fleet, 20)
+            fleet(Path(place), asked.fleet, asked.logs)
         if asked.kills:
             kills(Path(place), asked.kills, asked.within)
 

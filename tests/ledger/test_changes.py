@@ -1,5 +1,7 @@
 """What changed, in histories where it is known, and in histories where nothing did."""
 
+from itertools import groupby
+
 import numpy as np
 import pandas
 import pytest
@@ -9,8 +11,8 @@ from scipy.linalg import eigh
 import picchio
 from picchio.ledger.fleet import count_fleet
 from picchio.ledger.samples import Samples
-from picchio.ledger.store import Stream
-from picchio.ledger.watch.changes import FIRST, BlowReadings, Reading, find, readings_of
+from picchio.ledger.store import SHIFT, Stream
+from picchio.ledger.watch.changes import FIRST, Reading, Shown, find, readings_of
 from picchio.ledger.watch.drives import drives
 from picchio.ledger.watch.exchange import exchange, signature, whose
 from picchio.ledger.watch.ringing import decaying, ring_downs
@@ -278,8 +280,12 @@ def test_the_joint_that_softens_is_found_by_its_frequencies():
             poses = pose + 1e-5 * rng.standard_normal((stamps[::10].size, 3))
             samples = Samples("force", stamps, force, stamps[::10], poses, others)
             features += ring_downs(samples, stream, model)
-    features.sort(key=lambda row: row[1])
-    readings = readings_of(model, BlowReadings(), features)
+    shown = {}
+    for number, rows in groupby(sorted(features, key=lambda row: row[1]), lambda r: r[1] // SHIFT):
+        one = Shown(model)
+        one.read(rows)
+        shown[number] = one.told
+    readings = readings_of(robot.flexible_names, shown)
     assert {r.target for r in readings} == {"joint_1", "joint_2", "joint_3", "robot"}
     changes = find(readings)
     assert [c.reading.target for c in changes] == ["joint_2"]
@@ -363,3 +369,25 @@ def test_logs_of_two_robots_that_are_swapped_are_told(tmp_path):
     assert rows["c"]["another_robot"] is None
     dates = {rows[name]["another_robot"]["since"] for name in "ab"}
     assert dates == {"2026-04-04"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["coulomb_friction", "backlash"])
+def test_a_drive_that_changes_is_named_from_its_logs(tmp_path, kind):
+    """Friction 25 % more, or lost motion doubled; nothing else is told, nor too early."""
+    (tmp_path / "mapping.toml").write_text(LOG_MAPPING)
+    robot, rng = picchio.load_robot(NAME), np.random.default_rng([5, len(kind)])
+    for number in range(50):
+        late = number >= 38
+        rub = 1.25 if late and kind == "coulomb_friction" else 1.0
+        gap = 2e-4 if late and kind == "backlash" else 1e-4
+        warm = 20.0 + rng.standard_normal()
+        shift_log(tmp_path, number, rng, np.ones(3), rub, gap, warm)
+        if number == 37:  # enough for a change to be told
+            assert picchio.count(robot, tmp_path, tmp_path / "ledger").changes == ()
+    found = picchio.count(robot, tmp_path, tmp_path / "ledger")
+    assert {change["effect"] for change in found.changes} == {kind}
+    assert {change["target"] for change in found.changes} == {"joint_1", "joint_2", "joint_3"}
+    for change in found.changes:
+        assert change["since_low"] <= "2026-04-08" <= change["since_high"]
+        assert change["low"] < (0.25 if kind == "coulomb_friction" else 1.0) < change["high"]

@@ -11,7 +11,7 @@ from picchio.campaign.importing.mapping import read_mapping
 from picchio.campaign.importing.named import named
 from picchio.campaign.importing.template import mapping_template, write_mapping
 from picchio.core.errors import InputError
-from picchio.ledger.count import blows_held
+from picchio.ledger.count import blows_held, streams_of
 from picchio.ledger.store import Ledger
 from picchio.studies.tasks import load_task
 
@@ -58,7 +58,8 @@ def test_a_log_with_names_and_units_needs_no_mapping(tmp_path, robot):
     assert (again.counted.totals.damage == found.counted.totals.damage).all()
     # In the tool's axes the force has turned with it, and is as large.
     with Ledger(tmp_path / "l", NAME) as book:
-        blows = blows_held(book, found.model, load_task(how["task"], robot))[0]
+        task, streams = load_task(how["task"], robot), streams_of(book)[0]
+        blows = blows_held(book, streams, found.model, task, shift.BEGIN)
         peak = max(blow.peak for blow in blows)
     assert peak == pytest.approx(made[0].peaks.max(), rel=0.02)
 
@@ -124,7 +125,7 @@ def test_an_accelerometer_that_reads_gravity_tells_blows(tmp_path, robot):
     found = picchio.count(robot, tmp_path / "log.csv", tmp_path / "l", task=tmp_path / "task.toml")
     with Ledger(tmp_path / "l", NAME) as book:
         work = load_task(tmp_path / "task.toml", robot)
-        blows = list(blows_held(book, found.model, work)[0])
+        blows = list(blows_held(book, streams_of(book)[0], found.model, work, shift.BEGIN))
     assert len(blows) == 12
     assert all((blow.direction == [0.0, 0.0, 1.0]).all() for blow in blows)
     peaks = np.array([blow.peak for blow in blows])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
@@ -90,14 +89,6 @@ class Burst:
     def onset(self) -> int:
         """Ns from 1970, of the first blow."""
         return self.blows[0].onset
-
-    @property
-    def key(self) -> bytes:
-        """What tells it from others: the same key, the same damage."""
-        told = hashlib.blake2b(digest_size=20)
-        for part in (self.start, self.constant, self.slope, self.direction, self.pose):
-            told.update(np.ascontiguousarray(part).tobytes())
-        return told.digest()
 
 
 def covered(spans: IndexArray, gap: int) -> IndexArray:

@@ -20,15 +20,15 @@ from picchio.core.files import sha256
 from picchio.core.processes import one_thread
 from picchio.core.provenance import provenance
 from picchio.fatigue.sn.curve import SNCurve
-from picchio.ledger.blows import Blow, Burst, bursts, covered, uncovered
+from picchio.ledger.blows import Blow, bursts, covered, uncovered
 from picchio.ledger.counted import Counted
-from picchio.ledger.damage import BurstDamage, burst_damages_of, fingerprint, resting, unscaled
+from picchio.ledger.damage import burst_damages_of, fingerprint, resting, unscaled
 from picchio.ledger.finding import blows_of, standing, stream_of
-from picchio.ledger.forecast import UNLIKELY, Worlds, worlds
+from picchio.ledger.forecast import UNLIKELY, Worlds, typical, worlds
 from picchio.ledger.result import Count
 from picchio.ledger.samples import Samples, by_names, read_samples
-from picchio.ledger.store import Ledger
-from picchio.ledger.watch.changes import find, readings_of
+from picchio.ledger.store import MARGIN, SHIFT, Ledger, Stream
+from picchio.ledger.watch.changes import Shown, find, readings_of
 from picchio.ledger.watch.drives import drives
 from picchio.ledger.watch.exchange import exchange, signature
 from picchio.ledger.watch.ringing import ring_downs, temperatures
@@ -41,7 +41,8 @@ from picchio.studies.tasks import Task
 
 MAPPING = "mapping.toml"
 _AT_ONCE = 256  # bursts that are held
-_READ = 3  # what is read of a log: where that becomes more, logs that are there are read anew
+_READ = 4  # what is read of a log: where that becomes more, logs that are there are read anew
+_COUNTED = 1  # how a shift is counted: where that changes, shifts are counted anew
 
 
 @one_thread()
@@ -114,7 +115,7 @@ def count(
         except InputError as error:
             raise _to_map(error, files[0] if files else None, bare, names) from None
         logs = len(book.logs())
-        readings = readings_of(model, counted.readings, book.features())
+    readings = readings_of(bare.flexible_names, counted.shown)
     changes, other = find(readings), exchange(readings)
     drawn = None
     if counted.blows and any(curve is not None for curve in curves):
@@ -264,12 +265,18 @@ def add_log(
     """
     robot = model.robot
     parts = [file, *(file.parent / t.file.replace("{stem}", file.stem) for t in rules.join)]
-    log = hashlib.sha256("".join(sha256(p) for p in parts if p.is_file()).encode()).hexdigest()
+    # A month of logs is not read again for every count: path, size and time tell that it is known.
+    seen = json.dumps([
+        [str(p.resolve()), p.stat().st_size, p.stat().st_mtime_ns] for p in parts if p.is_file()
+    ])  # fmt: skip
     plan = rules.model_dump(mode="json", exclude={"record", "campaign"}, by_alias=True)
     poses = [op.poses.tolist() for op in task.operations]
     forces = [op.excitation.peak_force for op in task.operations]
     told = json.dumps([plan, robot.joint_names, forces, poses, _READ], sort_keys=True)
     how = hashlib.sha256(told.encode()).hexdigest()
+    if book.holds(seen, how, "file"):
+        return None
+    log = hashlib.sha256("".join(sha256(p) for p in parts if p.is_file()).encode()).hexdigest()
     if book.holds(log, how):
         return None
     try:
@@ -283,7 +290,7 @@ def add_log(
             sizes.append(part.stamps.size)
             return chain(ring_downs(part, stream, model), temperatures(part), drives(part, model))
 
-        book.add(log, how, file.name, stream, chain([first], rest), shown)
+        book.add(log, how, file.name, stream, chain([first], rest), shown, seen)
     except StopIteration:
         raise InputError("is empty", file=file) from None
     except InputError as error:
@@ -296,7 +303,7 @@ def add_log(
 
 
 def recount(book: Ledger, model: Model, curves: Sequence[SNCurve | None], task: Task) -> Counted:
-    """All that a ledger holds, as blows and damage; what was computed before is taken from it.
+    """All that a ledger holds, as blows and damage; a shift whose logs are known is taken from it.
 
     Args:
         book: the ledger.
@@ -307,49 +314,75 @@ def recount(book: Ledger, model: Model, curves: Sequence[SNCurve | None], task: 
     Raises:
         InputError: see `measured`; a model without damping.
     """
-    blows, spans = blows_held(book, model, task)
-    model = unscaled(model)  # the blows have their effects in them
-    name, found = fingerprint(model, curves), Counted(curves)
-    grouped = bursts(blows, resting(model))
-    while part := list(islice(grouped, _AT_ONCE)):
-        found.add(part, _damages(book, name, model, curves, part))
+    streams, spans = streams_of(book)
+    bare = unscaled(model)  # the blows have their effects in them
+    blows_are = [_COUNTED, repr(model.key("blows")), [sha256(file) for file in model.robot.files],
+                 [(op.name, op.direction.tolist(), op.poses.tolist(), op.hits_per_rivet,
+                   repr(op.excitation)) for op in task.operations]]  # fmt: skip
+    how = f"{fingerprint(bare, curves)}{json.dumps(blows_are)}"
+    rest, found = resting(bare), Counted(curves)
+    for number, logs in book.shifts().items():
+        key = hashlib.sha256(f"{how}{logs}".encode()).hexdigest()
+        text = book.told(number, key)
+        if text is None:
+            part, shown = Counted(curves), Shown(model)
+            grouped = bursts(blows_held(book, streams, model, task, number * SHIFT), rest)
+            while some := list(islice(grouped, _AT_ONCE)):
+                part.add(some, burst_damages_of(bare, curves, some))
+                shown.add(some)
+            shown.read(book.features(number))
+            text = json.dumps(part.told | {"shown": shown.told})
+            book.tell(number, key, text)
+        told = json.loads(text)
+        found.merge(told)
+        found.shown[number] = told["shown"]
     found.close(spans)
+    found.typical = {
+        each.onset: next(bursts(blows_held(book, streams, model, task, each.onset), rest))
+        for each in set(typical(found.stretches) if found.stretches else ())
+    }
     return found
 
 
-def blows_held(book: Ledger, model: Model, task: Task) -> tuple[Iterator[Blow], IndexArray]:
-    """The blows of all logs of a ledger, found as they are asked for.
+Streams = list[tuple[Stream, IndexArray]]
+"""With (s, 2) ns, the time that a surer one saw."""
+
+
+def streams_of(book: Ledger) -> tuple[Streams, IndexArray]:
+    """The streams of a ledger, the surest first, and (s, 2) ns, the time that was logged.
 
     Args:
         book: the ledger.
+    """
+    found, over = [], np.empty((0, 2), np.int64)
+    for stream, spans in book.streams():
+        found.append((stream, over))
+        over = covered(np.concatenate([over, covered(spans, stream.gap)]), stream.gap)
+    return found, over
+
+
+def blows_held(
+    book: Ledger, streams: Streams, model: Model, task: Task, first: int
+) -> Iterator[Blow]:
+    """The blows of all logs of a ledger from some time until its shift ends, by time.
+
+    Args:
+        book: the ledger.
+        streams: see `streams_of`.
         model: the robot and its effects.
         task: whose blows are assumed where none are seen.
-
-    Returns:
-        the blows by time, and (s, 2) ns, the time that was logged.
+        first: ns.
 
     Raises:
         InputError: see `blows_of`.
     """
-    sources = []
-    over = np.empty((0, 2), np.int64)
-    for stream, spans in book.streams():
-        # A moment of the robot counts once: by the surest stream that saw it.
-        sources.append(uncovered(blows_of(stream, book.kept(stream), model, task), over))
-        over = covered(np.concatenate([over, covered(spans, stream.gap)]), stream.gap)
-    return merge(*sources, key=lambda blow: blow.onset), over
-
-
-def _damages(
-    book: Ledger, name: str, model: Model, curves: Sequence[SNCurve | None], part: Sequence[Burst]
-) -> list[BurstDamage]:
-    """What each burst does; what was computed before is taken from the ledger."""
-    keys = [burst.key for burst in part]
-    known = book.computed(name, keys)
-    new = {key: burst for key, burst in zip(keys, part, strict=True) if key not in known}
-    if new:
-        made = burst_damages_of(model, curves, list(new.values()))
-        fresh = {key: one.packed() for key, one in zip(new, made, strict=True)}
-        book.remember(name, fresh)
-        known |= fresh
-    return [BurstDamage.unpacked(known[key], len(curves)) for key in keys]
+    end = (first // SHIFT + 1) * SHIFT
+    # A moment of the robot counts once: by the surest stream that saw it.
+    sources = [
+        uncovered(
+            blows_of(stream, book.kept(stream, (first - MARGIN, end + MARGIN)), model, task), over
+        )
+        for stream, over in streams
+    ]
+    found = merge(*sources, key=lambda blow: blow.onset)
+    return (blow for blow in found if first <= blow.onset < end)

@@ -1,10 +1,14 @@
-"""What bursts add up to, in bounded memory: by hour, by place, and some that stand for all."""
+"""What bursts add up to, in bounded memory: by hour, by place, and some that stand for all.
+
+The bursts of a shift are added up, and shifts are: what a shift tells can be kept as text.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -13,11 +17,10 @@ from picchio.fatigue.sn.curve import SNCurve
 from picchio.ledger.blows import SEEN, Burst
 from picchio.ledger.damage import AS_LOGGED, BurstDamage, Sum, Totals
 from picchio.ledger.finding import NEAR
-from picchio.ledger.watch.changes import BlowReadings
 
 HOUR = 3600 * 10**9
 """ns: what happens in the same hour (UTC) is added up."""
-_STRETCHES = 256  # at most
+_STRETCHES = 64  # at most
 _PLACES = 4096  # that are told apart; of more the half with the least damage are forgotten
 _LONGEST = 4000  # pieces of the force: a longer burst is not typical
 
@@ -30,20 +33,22 @@ class Stretch:
         bursts: how many.
         damage: (n,) of each by itself, added up.
         last: ns, the onset of the last.
-        burst: one that stands for them, with its first blow alone.
+        onset: ns, of one that stands for them.
+        pieces: of its force.
         own: (n,) its damage by itself.
     """
 
     bursts: int
     damage: FloatArray
     last: int
-    burst: Burst
+    onset: int
+    pieces: int
     own: FloatArray
 
     @property
     def short(self) -> bool:
         """Whether the burst is one that may be computed often."""
-        return self.burst.start.size <= _LONGEST
+        return self.pieces <= _LONGEST
 
 
 @dataclass(eq=False)
@@ -74,9 +79,11 @@ class Counted:
     """(s, 2) ns, the time that was logged; set where all has been added, as is `totals`."""
     totals: Totals
     """The damage of all bursts."""
+    typical: dict[int, Burst]
+    """By their onsets: bursts that stand for some of the stretches."""
 
     def __init__(self, curves: Sequence[SNCurve | None]) -> None:
-        self.readings = BlowReadings()
+        self.shown: dict[int, dict[str, Any]] = {}  # by shift: see `Shown`
         self.kinds: Counter[str] = Counter()
         self.cut = 0
         self.forgotten = 0  # places
@@ -97,21 +104,65 @@ class Counted:
         self.first = self.first or bursts[0].onset
         self.last = bursts[-1].blows[-1].onset
         self._sum.add(damages)
-        self.readings.add(bursts)
         for burst, made in zip(bursts, damages, strict=True):
             own, blows = made.alone[:, AS_LOGGED], len(burst.blows)
             self.kinds.update(blow.kind for blow in burst.blows)
-            self.cut += sum(blow.cut for blow in burst.blows)
+            self.cut += sum(bool(blow.cut) for blow in burst.blows)
             row, hour = np.array([blows, 1.0, *own]), burst.onset // HOUR
             self._hours[hour] = self._hours.get(hour, 0.0) + row
-            key = (*np.round(burst.pose / NEAR).tolist(), *np.round(2 * burst.direction).tolist())
-            place = self._places.setdefault(
-                key, Place(burst.pose, burst.direction, 0, np.zeros(own.size))
-            )
-            place.blows += blows
-            place.damage = place.damage + own
-            slim = replace(burst, blows=burst.blows[:1])
-            self._stand(Stretch(1, own, burst.onset, slim, own))
+            self._put(Place(burst.pose, burst.direction, blows, own))
+            self._stand(Stretch(1, own, burst.onset, burst.onset, burst.start.size, own))
+        self._forget()
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """All of it, as numbers and text for `merge`."""
+        whole = self._sum.burst
+        return {
+            "first": self.first, "last": self.last, "cut": self.cut, "forgotten": self.forgotten,
+            "kinds": self.kinds, "closed": whole.closed.tolist(), "alone": whole.alone.tolist(),
+            "residue": [part.tolist() for part in whole.residue],
+            "hours": {hour: row.tolist() for hour, row in self._hours.items()},
+            "places": [_listed(place) for place in self._places.values()],
+            "each": self._each, "stretches": [_listed(each) for each in self.stretches],
+        }  # fmt: skip
+
+    def merge(self, told: dict[str, Any]) -> None:
+        """What a later shift adds up to.
+
+        Args:
+            told: as `told` gives it.
+        """
+        if not told["first"]:
+            return
+        self.first, self.last = self.first or told["first"], told["last"]
+        self.cut += told["cut"]
+        self.forgotten += told["forgotten"]
+        self.kinds.update(told["kinds"])
+        parts = [np.array(part, float) for part in told["residue"]]
+        self._sum.add(
+            [BurstDamage(np.array(told["closed"]), np.array(told["alone"]), tuple(parts))]
+        )
+        for hour, row in told["hours"].items():
+            self._hours[int(hour)] = self._hours.get(int(hour), 0.0) + np.array(row)
+        for pose, direction, blows, damage in told["places"]:
+            self._put(Place(np.array(pose), np.array(direction), blows, np.array(damage)))
+        self._each = max(self._each, told["each"])
+        for bursts, damage, last, onset, pieces, own in told["stretches"]:
+            self._stand(Stretch(bursts, np.array(damage), last, onset, pieces, np.array(own)))
+        self._forget()
+
+    def _put(self, new: Place) -> None:
+        """Add what was done at a place."""
+        key = (*np.round(new.pose / NEAR).tolist(), *np.round(2 * new.direction).tolist())
+        place = self._places.get(key)
+        if place is None:
+            self._places[key] = new
+            return
+        place.blows += new.blows
+        place.damage = place.damage + new.damage
+
+    def _forget(self) -> None:
         if len(self._places) > _PLACES:
             worst = sorted(self._places.items(), key=lambda each: -self._weight(each[1].damage))
             self.forgotten += len(worst) - _PLACES // 2
@@ -138,10 +189,10 @@ class Counted:
 
     def _joined(self, one: Stretch, other: Stretch) -> Stretch:
         best = max(one, other, key=lambda s: (
-            s.short, self._weight(s.own) if s.short else -s.burst.start.size
+            s.short, self._weight(s.own) if s.short else -s.pieces
         ))  # fmt: skip
-        return Stretch(one.bursts + other.bursts, one.damage + other.damage, other.last, best.burst,
-                       best.own)  # fmt: skip
+        return replace(best, bursts=one.bursts + other.bursts, damage=one.damage + other.damage,
+                       last=other.last)  # fmt: skip
 
     def _weight(self, damage: FloatArray) -> float:
         """The largest share of any joint's damage so far."""
@@ -182,3 +233,8 @@ class Counted:
         """Where the damage comes from; those with the most of a joint's damage first."""
         found = [replace(p, damage=p.damage * self.together) for p in self._places.values()]
         return sorted(found, key=lambda p: (-self._weight(p.damage), -p.blows))
+
+
+def _listed(record: Place | Stretch) -> list[Any]:
+    """Its fields, arrays as lists."""
+    return [x.tolist() if isinstance(x, np.ndarray) else x for x in vars(record).values()]

@@ -41,35 +41,12 @@ class BurstDamage:
     Attributes:
         closed: (n, s) damage of what closes within it, at each of `SCALES`.
         alone: (n, s) of the burst by itself, its residue as half cycles.
-        peak: (n,) rad, largest deflection.
         residue: n arrays (r,), turning points of the stress that no cycle has used, Pa or share.
     """
 
     closed: FloatArray
     alone: FloatArray
-    peak: FloatArray
     residue: tuple[FloatArray, ...]
-
-    def packed(self) -> bytes:
-        """As bytes, to be kept."""
-        sizes = np.array([len(part) for part in self.residue], float)
-        parts = (sizes, self.closed.ravel(), self.alone.ravel(), self.peak, *self.residue)
-        return np.concatenate(parts).astype("<f8").tobytes()
-
-    @classmethod
-    def unpacked(cls, data: bytes, joints: int) -> BurstDamage:
-        """From what `packed` gave.
-
-        Args:
-            data: the bytes.
-            joints: n.
-        """
-        values = np.frombuffer(data, "<f8")
-        n, s = joints, SCALES.size
-        sizes = values[:n].astype(int)
-        ends = np.cumsum([n, n * s, n * s, n, *sizes])
-        _, closed, alone, peak, *residue = np.split(values, ends[:-1])
-        return cls(closed.reshape(n, s), alone.reshape(n, s), peak, tuple(residue))
 
 
 def fingerprint(model: Model, curves: Sequence[SNCurve | None]) -> str:
@@ -147,7 +124,7 @@ def _batch(
     many = ManyPoses(model, np.array([burst.pose for burst in bursts]))
     kept = np.full((b, n), -1)
     closed, alone = np.zeros((2, b, n, s))
-    residue, peak = np.zeros((b, n, MOST)), np.zeros((b, n))
+    residue = np.zeros((b, n, MOST))
     if many.compiled:
         mass, jacobian = many.mass_and_jacobian()
         along = np.ascontiguousarray([burst.direction for burst in bursts])
@@ -163,11 +140,11 @@ def _batch(
         on_threads(
             burst_damages, b, 1, begin, duration, constant, slope, mass, jacobian, many.stiffness,
             np.asarray(many.damping_ratio, float), along, factor, knots, lines, known, SCALES,
-            closed, alone, residue, kept, peak,
+            closed, alone, residue, kept,
         )  # fmt: skip
     return [
         _exactly(model, curves, burst) if kept[i, 0] < 0 else
-        BurstDamage(closed[i].copy(), alone[i].copy(), peak[i].copy(),
+        BurstDamage(closed[i].copy(), alone[i].copy(),
                     tuple(residue[i, j, : kept[i, j]].copy() for j in range(n)))
         for i, burst in enumerate(bursts)
     ]  # fmt: skip
@@ -201,8 +178,7 @@ def _exactly(model: Model, curves: Sequence[SNCurve | None], burst: Burst) -> Bu
             closed[j, s] = damage(counter.cycles("discarded").scaled(scale), curve)
             alone[j, s] = damage(counter.cycles("half-cycles").scaled(scale), curve)
         residue.append(counter.residue)
-    peak = np.array([np.abs(load.rest).max() for load in loads if load.rest is not None])
-    return BurstDamage(closed, alone, peak, tuple(residue))
+    return BurstDamage(closed, alone, tuple(residue))
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,6 +231,7 @@ class Sum:
     def __init__(self, curves: Sequence[SNCurve | None]) -> None:
         self._scaled = np.zeros((len(curves), SCALES.size))
         self._open = {j: (c, RainflowCounter()) for j, c in enumerate(curves) if c is not None}
+        self._waiting: list[tuple[FloatArray, ...]] = []
         self.alone: FloatArray = np.array([np.nan if c is None else 0.0 for c in curves])
 
     def add(self, found: Sequence[BurstDamage]) -> None:
@@ -265,13 +242,32 @@ class Sum:
         """
         self._scaled += np.sum([each.closed for each in found], axis=0)
         self.alone += np.sum([each.alone[:, AS_LOGGED] for each in found], axis=0)
+        self._waiting += [each.residue for each in found]
+        if len(self._waiting) >= _BATCH:
+            self._join()
+
+    def _join(self) -> None:
+        """Count the residues that wait; a few at a time would take as long as many."""
+        waiting, self._waiting = self._waiting, []
         for j, (curve, counter) in self._open.items():
-            counter.add(np.concatenate([each.residue[j] for each in found]))
+            counter.add(np.concatenate([np.empty(0), *(each[j] for each in waiting)]))
             self._scaled[j] += _costs(counter.taken(), curve)
+
+    @property
+    def burst(self) -> BurstDamage:
+        """All bursts so far as one."""
+        self._join()
+        closed, residue = self._scaled.copy(), [np.empty(0)] * len(self.alone)
+        for j, (curve, counter) in self._open.items():
+            closed[j] += _costs(counter.cycles("discarded"), curve)
+            residue[j] = counter.residue
+        alone = np.tile(np.nan_to_num(self.alone)[:, None], SCALES.size)
+        return BurstDamage(closed, alone, tuple(residue))
 
     @property
     def totals(self) -> Totals:
         """Of all bursts so far, what is left of the residues as half cycles."""
+        self._join()
         scaled = self._scaled.copy()
         for j, (curve, counter) in self._open.items():
             scaled[j] += _costs(counter.cycles(), curve)

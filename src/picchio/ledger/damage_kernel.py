@@ -88,7 +88,7 @@ def trimmed(residue, depth):  # type: ignore[no-untyped-def]
 @njit(cache=True, nogil=True, error_model="numpy")
 def burst_damages(  # type: ignore[no-untyped-def]
     first, last, begin, duration, constant, slope, mass, jacobian, stiffness, ratio, along, factor,
-    knots, lines, known, scales, closed, alone, residue, kept, peak,
+    knots, lines, known, scales, closed, alone, residue, kept,
 ):  # fmt: skip
     """Damage of b bursts from rest, ring-down included.
 
@@ -113,7 +113,6 @@ def burst_damages(  # type: ignore[no-untyped-def]
         alone: (b, n, s) out: of the burst by itself, its residue as half cycles.
         residue: (b, n, MOST) out: turning points of stress.
         kept: (b, n) -1, out: how many; left so where the exact path must be taken.
-        peak: (b, n) out: rad, largest deflection.
     """
     n = stiffness.shape[1]
     for b in range(first, last):
@@ -130,7 +129,6 @@ def burst_damages(  # type: ignore[no-untyped-def]
         stack, ranges, means = np.empty(size), np.empty(size), np.empty(size)
         for j in range(n):
             own = turns[j, : count[j]]
-            peak[b, j] = max(own.max(), -own.min())
             kept[b, j] = 0
             if known[j] < 0:
                 continue

@@ -120,7 +120,7 @@ def typical(stretches: Sequence[Stretch]) -> list[Stretch]:
     targets = (np.arange(_TYPICAL) + 0.5) / _TYPICAL * whole[-1]
     chosen = [stretches[int(k)] for k in np.searchsorted(whole, targets)]
     short = [each for each in chosen if each.short]
-    return short or [min(stretches, key=lambda each: each.burst.start.size)]
+    return short or [min(stretches, key=lambda each: each.pieces)]
 
 
 def force_of(burst: Burst) -> MeasuredForce:
@@ -167,9 +167,10 @@ def worlds(
     """
     which = typical(counted.stretches)
     operations = tuple(
-        Operation(str(k), each.burst.direction, force_of(each.burst), 1, each.burst.pose[None],
+        Operation(str(k), burst.direction, force_of(burst), 1, burst.pose[None],
                   float(which.count(each)))
         for k, each in enumerate(dict.fromkeys(which))
+        for burst in [counted.typical[each.onset]]
     )  # fmt: skip
     squares = sum(count * FORCE_SPREAD[kind] ** 2 for kind, count in counted.kinds.items())
     force = math.sqrt(squares / counted.blows)

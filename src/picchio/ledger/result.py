@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.results import TableResult
+from picchio.fatigue.miner import format_count
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.ledger.counted import HOUR, Counted
 from picchio.ledger.forecast import Worlds, quantiles
@@ -23,6 +24,39 @@ from picchio.model.model import Model
 SECONDS_A_DAY = 86_400
 _LATELY = 28  # days that today's pace is taken from
 _STATIONS = 12
+_MANY, _LITTLE = 1e12, 1e-8  # blows and share of a life: beyond these nobody needs the number
+
+
+def told_share(value: float, digits: int = 3) -> str:
+    """A share of a life, %, for people; "-" of none.
+
+    Args:
+        value: 1 is all of it.
+        digits: that are told.
+    """
+    if math.isnan(value):
+        return "-"
+    return f"{100 * value:.{digits}g}" if value > _LITTLE or not value else f"< {100 * _LITTLE:g}"
+
+
+def told_interval(interval: Sequence[float] | None, digits: int = 3) -> str:
+    """The same of an interval.
+
+    Args:
+        interval: low and high, or None.
+        digits: that are told.
+    """
+    ends = [told_share(value, digits) for value in interval or (math.nan,)]
+    return " to ".join(dict.fromkeys(ends))
+
+
+def told_blows(value: float) -> str:
+    """A number of blows, for people.
+
+    Args:
+        value: inf is "no end".
+    """
+    return f"> {_MANY:.0e}".replace("+", "") if _MANY < value < math.inf else format_count(value)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -82,6 +116,11 @@ class Count(TableResult):
         """h, the time that was logged."""
         spans = self.counted.spans
         return float((spans[:, 1] - spans[:, 0]).sum() / 3.6e12) if len(spans) else 0.0
+
+    @property
+    def logged(self) -> str:
+        """The same, for people."""
+        return f"{self.hours:.4g} h" if self.hours >= 1.0 else f"{60.0 * self.hours:.3g} min"
 
     @property
     def blows_a_day(self) -> float:
@@ -179,14 +218,14 @@ class Count(TableResult):
         if j is None:
             return f"{text}, no damage"
         names = self.model.robot.flexible_names
-        text += f", {names[j]} has used {100 * self.counted.totals.damage[j]:.3g} % of its life"
+        used = told_share(self.counted.totals.damage[j])
+        text += f", {names[j]} has used {used} % of its life"
         first = self.first_to_fail
         left = None if first is None else self.left(first)
         if first is None or left is None:
             return text
-        low, middle, high = (float(f"{left[p]:.2g}") for p in ("p10", "p50", "p90"))
-        text += f"; {names[first]} lasts {middle:,.0f} blows more"
-        return f"{text} (P10 to P90: {low:,.0f} to {high:,.0f})"
+        low, middle, high = (told_blows(float(f"{left[p]:.2g}")) for p in ("p10", "p50", "p90"))
+        return f"{text}; {names[first]} lasts {middle} blows more (P10 to P90: {low} to {high})"
 
     @property
     def _any_damage(self) -> bool:

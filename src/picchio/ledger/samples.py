@@ -67,6 +67,17 @@ class Samples:
         return replace(self, stamps=self.stamps[own], values=self.values[own],
                        pose_stamps=self.pose_stamps[pose], poses=self.poses[pose])  # fmt: skip
 
+    def standing_as(self, before: Samples | None) -> Samples:
+        """The stretch with the last pose of the one before it, which holds until its own first.
+
+        Args:
+            before: of the same log, if there is one.
+        """
+        if before is None or (before.pose_stamps[-1:] > self.pose_stamps[:1]).any():
+            return self
+        return replace(self, pose_stamps=np.append(before.pose_stamps[-1:], self.pose_stamps),
+                       poses=np.vstack([before.poses[-1:], self.poses]))  # fmt: skip
+
     @property
     def usual_step(self) -> int:
         """ns, from one sample to the next, to two digits; 0 where it cannot be said."""

@@ -4,12 +4,13 @@ SQLite rather than Parquet with DuckDB: a log is added whole or not at all, also
 killed; readers and a writer may work at once; a log that is counted anew replaces its rows; every
 language reads it, DuckDB included (`ATTACH 'cell4.ledger' (TYPE sqlite)`), and it comes with
 Python. What is kept is a set of samples with stamps, so that no order of logs and no cut between
-them can matter: a union has none. The damage is never stored as a sum; `burst` holds what
-was computed of single bursts, by model, and may be emptied at any time.
+them can matter: a union has none. `shift` holds what each eight hours add up to, by the logs and
+the model that it was computed from, and may be emptied at any time.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator
@@ -31,20 +32,27 @@ CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT) WITHOUT ROWID;
 CREATE TABLE stream (id TEXT PRIMARY KEY, kind TEXT, gap INTEGER, columns INTEGER, settings TEXT)
   WITHOUT ROWID;
 CREATE TABLE log (id TEXT PRIMARY KEY, stream TEXT, mapping TEXT, name TEXT, first INTEGER,
-  last INTEGER, samples INTEGER, detected TEXT) WITHOUT ROWID;
+  last INTEGER, samples INTEGER, detected TEXT, file TEXT) WITHOUT ROWID;
 CREATE TABLE span (log TEXT, first INTEGER, last INTEGER);
-CREATE TABLE run (log TEXT, stamps BLOB, sizes BLOB);
-CREATE TABLE pose (log TEXT, stamps BLOB, sizes BLOB);
+CREATE TABLE run (log TEXT, first INTEGER, last INTEGER, stamps BLOB, sizes BLOB);
+CREATE TABLE pose (log TEXT, first INTEGER, last INTEGER, stamps BLOB, sizes BLOB);
 CREATE TABLE feature (log TEXT, name TEXT, stamp INTEGER, value REAL);
-CREATE TABLE burst (model TEXT, key BLOB, damage BLOB, PRIMARY KEY (model, key)) WITHOUT ROWID;
+CREATE TABLE shift (number INTEGER PRIMARY KEY, key TEXT, told TEXT);
+CREATE INDEX log_file ON log (file);
 CREATE INDEX span_log ON span (log);
-CREATE INDEX run_log ON run (log);
-CREATE INDEX pose_log ON pose (log);
+CREATE INDEX run_log ON run (log, first, last);
+CREATE INDEX pose_log ON pose (log, first, last);
 CREATE INDEX feature_log ON feature (log);
+CREATE INDEX feature_stamp ON feature (stamp);
 """
 _PATIENCE = 60.0  # s that a writer waits for another
 _HELD = 1 << 17  # samples of a stream that are looked at together
 _NEVER = 2**63 - 1  # ns
+SHIFT = 8 * 3600 * 10**9
+"""ns: what happens in the same eight hours (UTC) is added up."""
+MARGIN = 600 * 10**9
+"""ns: what a shift adds up to depends on the samples so long before and after it, and on no other.
+A tool that works on for longer counts from there."""
 
 
 @dataclass(frozen=True)
@@ -116,23 +124,24 @@ def pieces(stamps: IndexArray, gap: int) -> Iterator[slice]:
             yield slice(first, last)
 
 
-def worth_keeping(samples: Samples, stream: Stream) -> tuple[BoolArray, BoolArray]:
-    """Which samples and which poses a ledger must keep so that nothing depends on the log's ends.
+def worth_keeping(samples: Samples, stream: Stream) -> tuple[BoolArray, IndexArray, FloatArray]:
+    """The samples and the poses that a ledger must keep so that nothing depends on the log's ends.
 
     Of each stretch the first and the last sample; every run of samples above the foot that exceeds
     the threshold or touches an end of the stretch, with the sample before and after it. The pose
-    before each run, and the first and last pose.
+    where each run begins, and while it lasts, and the first and last pose.
 
     Args:
         samples: of a log.
         stream: that it belongs to.
 
     Returns:
-        (m,) of the samples, (p,) of the poses.
+        (m,) which samples; (p,) ns, and (p, nv) the poses then.
     """
     size = magnitude(samples.values)
     keep = np.zeros(samples.stamps.size, dtype=bool)
-    begins: list[IndexArray] = []
+    clock = samples.pose_stamps
+    when: list[IndexArray] = [clock[:1], clock[-1:]]
     for piece in pieces(samples.stamps, stream.gap):
         own = size[piece]
         active = own > stream.foot
@@ -141,33 +150,31 @@ def worth_keeping(samples: Samples, stream: Stream) -> tuple[BoolArray, BoolArra
         if start.size:
             tops = np.maximum.reduceat(np.where(active, own, 0.0), start)
             good = (tops > stream.threshold) | (start == 0) | (end == own.size)
-            here = keep[piece]
+            here, stamps = keep[piece], samples.stamps[piece]
             for a, b in zip(start[good], end[good], strict=True):
                 here[max(a - 1, 0) : b + 1] = True
-            begins.append(piece.start + start[good])
+                when.append(np.arange(stamps[a], stamps[b - 1] + 1, MARGIN))
         keep[piece.start] = keep[piece.stop - 1] = True
-    standing = np.zeros(samples.pose_stamps.size, dtype=bool)
-    if standing.size:
-        standing[[0, -1]] = True
-        if begins:
-            when = samples.stamps[np.concatenate(begins)]
-            at = np.searchsorted(samples.pose_stamps, when, side="right") - 1
-            standing[np.maximum(at, 0)] = True
-    return keep, standing
+    told = np.unique(np.concatenate(when))
+    at = np.searchsorted(clock, told, side="right") - 1
+    return keep, told[at >= 0], samples.poses[at[at >= 0]]
 
 
 class _Union:
-    """The samples of all logs of a stream, each stamp once, ascending, read as they are needed."""
+    """The samples of all logs of a stream in an interval of time, both ends included.
 
-    def __init__(self, book: Ledger, table: str, stream: Stream) -> None:
-        self._book, self._table, self._at = book, table, 0
+    Each stamp once, ascending, read as they are needed.
+    """
+
+    def __init__(self, book: Ledger, table: str, stream: Stream, interval: tuple[int, int]) -> None:
+        self._book, self._table, self._interval, self._at = book, table, interval, 0
         with book._told():
             rows = book._base.execute(
-                f"SELECT substr({table}.stamps, 1, 8), {table}.rowid FROM {table} "
-                f"JOIN log ON log.id = {table}.log WHERE log.stream = ?", (stream.id,),
-            ).fetchall()  # fmt: skip
-        found = sorted((int.from_bytes(first, "little", signed=True), row) for first, row in rows)
-        self._rows = np.array([*found, (_NEVER, 0)])
+                f"SELECT {table}.first, {table}.rowid FROM {table} JOIN log ON log.id = "
+                f"{table}.log WHERE log.stream = ? AND {table}.last >= ? AND {table}.first <= ?",
+                (stream.id, *interval),
+            ).fetchall()
+        self._rows = np.array([*sorted(rows), (_NEVER, 0)])
         columns = 0 if table == "pose" else stream.columns
         self.stamps, self.values = np.empty(0, np.int64), np.empty((0, columns))
 
@@ -198,6 +205,7 @@ class _Union:
         order = np.lexsort((*what.T, magnitude(what), when))
         when, what = when[order], what[order]
         once = np.append(np.diff(when) > 0, True)
+        once &= (when >= self._interval[0]) & (when <= self._interval[1])
         self.stamps, self.values = when[once], what[once]
 
     def drop(self, count: int) -> None:
@@ -290,16 +298,17 @@ class Ledger:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def holds(self, log: str, mapping: str) -> bool:
+    def holds(self, log: str, mapping: str, column: str = "id") -> bool:
         """Whether a log has been counted by this mapping.
 
         Args:
-            log: hash of its content.
+            log: hash of its content; or its file.
             mapping: hash of how it is read.
+            column: "id", or "file".
         """
         with self._told():
-            rows = self._base.execute("SELECT mapping FROM log WHERE id = ?", (log,)).fetchall()
-        return rows == [(mapping,)]
+            rows = self._base.execute(f"SELECT mapping FROM log WHERE {column} = ?", (log,))
+            return (mapping,) in rows.fetchall()
 
     def stream(self, wanted: Stream) -> Stream:
         """The stream as the ledger has it: the gap stays what it was when it was new.
@@ -317,6 +326,7 @@ class Ledger:
     def add(
         self, log: str, mapping: str, name: str, stream: Stream, stretches: Iterable[Samples],
         features: Callable[[Samples], Iterable[tuple[str, int, float]]] = lambda _: (),
+        file: str = "",
     ) -> int:  # fmt: skip
         """Keep what matters of a log; one that is held already is replaced.
 
@@ -327,6 +337,7 @@ class Ledger:
             stream: that it belongs to.
             stretches: of the log, in any order.
             features: (name, ns, value) of single numbers that a stretch shows.
+            file: what tells that it is the same without reading it.
 
         Returns:
             how many samples it had.
@@ -342,11 +353,13 @@ class Ledger:
             )
             first, last, count = _NEVER, 0, 0
             detected: tuple[str, ...] = ()
+            stood: Samples | None = None
             for samples in stretches:
                 clock = samples.stamps if samples.stamps.size else samples.pose_stamps
                 if not clock.size:
                     continue
-                keep, standing = worth_keeping(samples, stream)
+                stood = samples.standing_as(stood)
+                keep, when, poses = worth_keeping(stood, stream)
                 detected = detected or samples.detected
                 count += clock.size
                 first, last = min(first, int(clock[0])), max(last, int(clock[-1]))
@@ -355,16 +368,17 @@ class Ledger:
                 base.executemany("INSERT INTO span VALUES (?, ?, ?)", spans)
                 for table, stamps, values in (
                     ("run", samples.stamps[keep], samples.values[keep]),
-                    ("pose", samples.pose_stamps[standing], samples.poses[standing]),
+                    ("pose", when, poses),
                 ):
                     if stamps.size:
-                        row = (log, _packed(stamps, "<i8"), _packed(values, "<f8"))
-                        base.execute(f"INSERT INTO {table} VALUES (?, ?, ?)", row)
+                        row = (log, int(stamps[0]), int(stamps[-1]), _packed(stamps, "<i8"),
+                               _packed(values, "<f8"))  # fmt: skip
+                        base.execute(f"INSERT INTO {table} VALUES (?, ?, ?, ?, ?)", row)
                 base.executemany("INSERT INTO feature VALUES (?, ?, ?, ?)",
                                  [(log, *each) for each in features(samples)])  # fmt: skip
             told = json.dumps(detected)
-            base.execute("INSERT OR REPLACE INTO log VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
-                         (log, stream.id, mapping, name, first, last, count, told))  # fmt: skip
+            about = (log, stream.id, mapping, name, first, last, count, told, file)
+            base.execute("INSERT OR REPLACE INTO log VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", about)
         return count
 
     def logs(self) -> list[tuple[str, str, int, int, int]]:
@@ -397,7 +411,7 @@ class Ledger:
                     found.append((stream, np.array(spans, np.int64)))
         return sorted(found, key=lambda each: (KINDS.index(each[0].kind), each[0].id))
 
-    def kept(self, stream: Stream) -> Iterator[Kept]:
+    def kept(self, stream: Stream, interval: tuple[int, int] = (0, _NEVER)) -> Iterator[Kept]:
         """What is held of a stream, by time, in parts: memory does not grow with the ledger.
 
         A part ends at a gap or at a sample below the foot, which the next one begins with, so that
@@ -405,12 +419,14 @@ class Ledger:
 
         Args:
             stream: as `streams` gives it.
+            interval: ns, first and last sample.
 
         Raises:
             OutputError: another process changed the ledger meanwhile.
         """
-        held, poses = _Union(self, "run", stream), _Union(self, "pose", stream)
-        poses.read(size=1)  # where a run is before every pose, the first counts
+        held, poses = (_Union(self, table, stream, interval) for table in ("run", "pose"))
+        while not poses.stamps.size and poses.begin < _NEVER:
+            poses.read(size=1)  # where a run is before every pose, the first counts
         while True:
             held.read(size=2 * held.stamps.size + _HELD)
             ended = held.begin == _NEVER
@@ -430,43 +446,62 @@ class Ledger:
             at = np.searchsorted(poses.stamps, held.stamps[0], side="right")
             poses.drop(max(int(at) - 1, 0))
 
-    def features(self) -> Iterator[tuple[str, int, float]]:
-        """(name, ns, value), each once, by time, name and value."""
+    def features(self, shift: int) -> Iterator[tuple[str, int, float]]:
+        """(name, ns, value) of a shift, each once, by time, name and value.
+
+        Args:
+            shift: its number.
+        """
         with self._told():
             yield from self._base.execute(
-                "SELECT DISTINCT name, stamp, value FROM feature ORDER BY stamp, name, value"
-            )
+                "SELECT DISTINCT name, stamp, value FROM feature WHERE stamp >= ? AND stamp < ? "
+                "ORDER BY stamp, name, value", (shift * SHIFT, (shift + 1) * SHIFT),
+            )  # fmt: skip
 
-    def computed(self, model: str, keys: Iterable[bytes]) -> dict[bytes, bytes]:
-        """What has been computed of bursts with a model.
-
-        Args:
-            model: its hash.
-            keys: of the bursts.
+    def shifts(self) -> dict[int, str]:
+        """Each shift that was logged, by time.
 
         Returns:
-            {the burst's hash: its numbers} of those that are known.
+            {number: hash of the logs that it depends on}.
         """
-        found = {}
+        logs: dict[int, set[str]] = {}
         with self._told():
-            for key in keys:
-                for (value,) in self._base.execute(
-                    "SELECT damage FROM burst WHERE model = ? AND key = ?", (model, key)
-                ):
-                    found[key] = value
-        return found
+            self._version = self._base.execute("PRAGMA data_version").fetchone()
+            for log, mapping, first, last in self._base.execute(
+                "SELECT log.id, mapping, span.first, span.last FROM span JOIN log ON log.id = log"
+            ):
+                for number in range((first - MARGIN) // SHIFT, (last + MARGIN) // SHIFT + 1):
+                    logs.setdefault(number, set()).add(log + mapping)
+        return {
+            number: hashlib.sha256("".join(sorted(logs[number])).encode()).hexdigest()
+            for number in sorted(logs)
+        }
 
-    def remember(self, model: str, found: dict[bytes, bytes]) -> None:
-        """Keep what was computed of bursts; that of other models goes.
+    def told(self, shift: int, key: str) -> str | None:
+        """What a shift adds up to, if it is known.
 
         Args:
-            model: its hash.
-            found: as `computed` gives it.
+            shift: its number.
+            key: of all that it depends on.
+        """
+        with self._told():
+            rows = self._base.execute(
+                "SELECT told FROM shift WHERE number = ? AND key = ?", (shift, key)
+            ).fetchall()
+        return rows[0][0] if rows else None
+
+    def tell(self, shift: int, key: str, told: str) -> None:
+        """Keep what a shift adds up to, unless another process has changed the ledger meanwhile.
+
+        Args:
+            shift: its number.
+            key: of all that it depends on.
+            told: as text.
         """
         with self.writing():
-            self._base.execute("DELETE FROM burst WHERE model <> ?", (model,))
-            rows = [(model, key, value) for key, value in found.items()]
-            self._base.executemany("INSERT OR REPLACE INTO burst VALUES (?, ?, ?)", rows)
+            if self._base.execute("PRAGMA data_version").fetchone() == self._version:
+                row = (shift, key, told)
+                self._base.execute("INSERT OR REPLACE INTO shift VALUES (?, ?, ?)", row)
 
 
 def _packed(values: FloatArray, kind: str) -> bytes:

@@ -154,13 +154,15 @@ def count(
 
 
 def _show_fleet(found: Fleet) -> None:
+    from picchio.ledger.result import told_share
+
     out = console()
     rows = []
     for row in found.robots:
         left = row["blows_left"] or {}
         rows.append((
             row["name"], str(row["logs"] or 0), str(row["blows"] or 0), row["joint"] or "-",
-            _share(math.nan if row["damage"] is None else row["damage"]),
+            told_share(math.nan if row["damage"] is None else row["damage"]),
             format_count(math.inf if left.get("p50") is None else left["p50"]) if left else "-",
             str(len(row["changes"])),
         ))  # fmt: skip
@@ -183,9 +185,19 @@ def _listing(logs: list[Path]) -> list[tuple[str, int, int]]:
 
 
 def _show(found: Count) -> None:
+    from picchio.ledger.result import told_interval, told_share
+
     out = console()
+    alike: dict[tuple[str, ...], list[str]] = {}
     for name in found.added:
-        out.print(f"counted {name}: {'; '.join(found.detected[name])}")
+        told = [line.partition(", measured")[0] for line in found.detected[name]]
+        own = [line for line in told if not line.startswith(("begins", *"0123456789"))]
+        alike.setdefault(tuple(own), []).append(name)
+    for first, *others in alike.values():
+        out.print(f"counted {first}: {'; '.join(found.detected[first])}")
+        if others:
+            ends = " to ".join(dict.fromkeys([others[0], others[-1]]))
+            out.print(f"counted {ends}: {count_of(len(others), 'log')} like it")
     if found.known:
         out.print(f"{count_of(len(found.known), 'log')} counted before")
     for name, why in found.refused:
@@ -193,7 +205,7 @@ def _show(found: Count) -> None:
     out.print(
         styled(
             found.model.robot.name,
-            f": {found.blows} blows in {count_of(found.logs, 'log')} of {found.hours:.4g} h; "
+            f": {found.blows} blows in {count_of(found.logs, 'log')} of {found.logged}; "
             + (
                 "all of them seen"
                 if found.seen_share == 1.0
@@ -204,29 +216,27 @@ def _show(found: Count) -> None:
     rows = []
     for joint in found.joints():
         left = joint["blows_left"]
-        low, high = joint["damage_interval"] or (math.nan, math.nan)
         rows.append((
-            joint["name"], _share(joint["damage"]),
-            "-" if math.isnan(low) else f"{100 * low:.2g} to {100 * high:.2g}",
+            joint["name"], told_share(joint["damage"]), told_interval(joint["damage_interval"], 2),
             *("-" if left is None else _many(left[p]) for p in ("p10", "p50", "p90")),
             found.reached(left) or "-",
         ))  # fmt: skip
     heads = ("joint", ">life\nused, %", ">90 % interval,\n%", ">blows left,\nP10", ">P50", ">P90",
              ">P50 is\nreached")  # fmt: skip
     out.print(table(heads, rows, title="Life used and left (M: millions of blows)"))
-    first = found.first_to_fail
-    if first is not None:
-        name = found.model.robot.flexible_names[first]
-        gain = float(found.if_force(0.9)[first])
+    end = found.first_to_fail
+    if end is not None:
+        name = found.model.robot.flexible_names[end]
+        gain = float(found.if_force(0.9)[end])
         longer = f" With blows 10 % weaker it would last {gain:.3g} times as long."
         out.print(f"{name} ends the life, at {found.blows_a_day:.4g} blows a day.{longer}")
     elif found.blows:
         out.print("No life has an end: no blow damages a shaft or a drive.")
     places = found.stations()
-    if places and first is not None:
-        places = sorted(places, key=lambda s: -float(s["share"][first]))[:3]
+    if places and end is not None:
+        places = sorted(places, key=lambda s: -float(s["share"][end]))[:3]
         shares = ", ".join(
-            f"{100 * s['share'][first]:.3g} % at ({_angles(s['pose'])})" for s in places
+            f"{100 * s['share'][end]:.3g} % at ({_angles(s['pose'])})" for s in places
         )
         out.print(f"Where it comes from: {shares}.")
     for change in found.changes:
@@ -242,10 +252,7 @@ def _angles(pose: np.ndarray) -> str:
 
 
 def _many(blows: float) -> str:
-    if 1e6 <= blows < math.inf:
-        return f"{float(f'{blows / 1e6:.3g}'):,g} M"
-    return format_count(blows)
+    from picchio.ledger.result import told_blows
 
-
-def _share(value: float) -> str:
-    return "-" if math.isnan(value) else f"{100 * value:.3g}"
+    told = told_blows(blows)
+    return f"{float(f'{blows / 1e6:.3g}'):,g} M" if blows >= 1e6 and told[0].isdigit() else told

@@ -11,18 +11,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cache
-from itertools import groupby
 from typing import Any
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray, IndexArray
 from picchio.ledger.blows import Burst
+from picchio.ledger.store import SHIFT
 from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model
 
-SHIFT = 8 * 3600 * 10**9
-"""ns: blows of the same eight hours (UTC) are one shift."""
 FIRST = 30
 """Shifts that a robot is compared with."""
 ALARMS = 0.02
@@ -33,6 +31,9 @@ _DIM = 2.0  # times the usual standard error
 SMALLEST = 2e-3
 """Relative: smaller changes are not told, nor are those that may be: no life depends on them."""
 _LENGTHS = (1, 4, 8, 16, 32, 64, 128)  # shifts that a change may take
+_OF_BLOWS = {"force": ("force of the blows", "force_drift"),
+             "width": ("width of the blows", "pulse_width"),
+             "gap": ("time between blows", "pulse_rate")}  # fmt: skip
 _DRIVEN = {"friction": ("friction of", "coulomb_friction"),
            "offset": ("torque offset, of gravity's torque, of", "torque_offset"),
            "lost_motion": ("lost motion of", "backlash")}  # fmt: skip
@@ -90,10 +91,11 @@ class Change:
         dates = [date_of(int(when[k])) for k in (self.onset, self.onset_low, self.onset_high)]
         days = (when[-1] - when[self.onset]) / 8.64e13
         moved = "rose" if self.value > 0.0 else "fell"
+        between = f" ({dates[1]} to {dates[2]})" if dates[1] < dates[2] else ""
         words = (
             f"{self.reading.name} {moved} by {100 * abs(self.value):.3g} % "
             f"({100 * self.low:+.3g} to {100 * self.high:+.3g} %) in the {days:.0f} days since "
-            f"{dates[0]} ({dates[1]} to {dates[2]}), {'gradually' if self.ramp else 'at once'}"
+            f"{dates[0]}{between}, {'gradually' if self.ramp else 'at once'}"
         )
         return {
             "effect": self.reading.effect, "target": self.reading.target, "since": dates[0],
@@ -239,111 +241,97 @@ def _told(reading: Reading, table: FloatArray) -> Change:
     )  # fmt: skip
 
 
-class Means:
-    """The mean of each shift of numbers that come a few at a time."""
+class Shown:
+    """What a shift shows: means of what its blows and drives tell, and how the arm rang.
 
-    def __init__(self) -> None:
-        self._sums: dict[int, FloatArray] = {}
+    Args:
+        model: the robot and its effects: where frequencies are compared with.
+    """
 
-    def add(self, when: IndexArray, values: FloatArray) -> None:
-        """Further numbers.
+    def __init__(self, model: Model) -> None:
+        self._model = model
+        self._sums: dict[str, FloatArray] = {}
+        self._rung: dict[str, Any] | None = None
 
-        Args:
-            when: (m,) ns.
-            values: (m,).
-        """
-        shift, at = np.unique(when // SHIFT, return_inverse=True)
-        rows = np.column_stack([np.bincount(at, values), np.bincount(at)]) if at.size else ()
-        for which, row in zip(shift.tolist(), rows, strict=True):
-            self._sums[which] = self._sums.get(which, 0.0) + row
-
-    @property
-    def by_shift(self) -> dict[int, float]:
-        """{shift: its mean}, by time."""
-        return {which: float(row[0] / row[1]) for which, row in sorted(self._sums.items())}
-
-    def reading(self, name: str, effect: str, target: str) -> Reading:
-        """The means as a reading without covariates.
-
-        Args:
-            name: see `Reading`, as the others.
-            effect: likewise.
-            target: likewise.
-        """
-        means = self.by_shift
-        when = np.array([*means], np.int64) * SHIFT + SHIFT // 2
-        return Reading(name, effect, target, when, np.array([*means.values()]),
-                       np.empty((0, when.size)))  # fmt: skip
-
-
-class BlowReadings:
-    """Force, width and rate of the blows that a force shows, of each shift."""
-
-    def __init__(self) -> None:
-        self._force, self._width, self._gap = Means(), Means(), Means()
+    def _more(self, name: str, values: FloatArray) -> None:
+        if values.size:
+            self._sums[name] = self._sums.get(name, 0.0) + np.array([values.sum(), values.size])
 
     def add(self, bursts: Iterable[Burst]) -> None:
-        """Further bursts.
+        """Further bursts: force, width and rate of the blows that a force shows.
 
         Args:
             bursts: by time.
         """
         for burst in bursts:
             seen = [blow for blow in burst.blows if blow.kind == "force" and not blow.cut]
-            onset = np.array([blow.onset for blow in seen], np.int64)
             peak = np.array([blow.peak for blow in seen])
             width = np.array([blow.impulse for blow in seen]) / np.maximum(peak, 1e-300)
-            self._force.add(onset, np.log(peak))
-            self._width.add(onset, np.log(np.maximum(np.abs(width), 1e-9)))
-            gap = np.diff(onset) * 1e-9
+            self._more("force", np.log(peak))
+            self._more("width", np.log(np.maximum(np.abs(width), 1e-9)))
+            gap = np.diff([blow.onset for blow in seen]) * 1e-9
             near = (gap > 0.0) & (gap < 3.0 * np.median(gap)) if gap.size else gap > 0.0
-            self._gap.add(onset[1:][near], np.log(gap[near]))
+            self._more("gap", np.log(gap[near]))
 
-    @property
-    def readings(self) -> list[Reading]:
-        """Those that there are."""
-        found = [
-            self._force.reading("force of the blows", "force_drift", "tool"),
-            self._width.reading("width of the blows", "pulse_width", "tool"),
-            self._gap.reading("time between blows", "pulse_rate", "tool"),
-        ]
-        return [reading for reading in found if reading.values.size]
+    def read(self, features: Iterable[tuple[str, int, float]]) -> None:
+        """What the ledger holds of ring-downs, temperatures and drives.
 
-
-def readings_of(
-    model: Model, blows: BlowReadings, features: Iterable[tuple[str, int, float]]
-) -> list[Reading]:
-    """What each shift shows: force, width and rate of the blows, the joints' stiffness and drives.
-
-    Args:
-        model: the robot and its effects: where frequencies are compared with.
-        blows: what all blows show.
-        features: what the ledger holds of ring-downs, temperatures and drives, by time: see
-            `ring_downs` and `drives`.
-    """
-    rung = _Rung(model)
-    warmth: Means = Means()
-    driven: dict[str, Means] = {}
-    for shift, rows in groupby(features, key=lambda row: row[1] // SHIFT):
+        Args:
+            features: of the shift, by time: see `ring_downs` and `drives`.
+        """
         table: dict[int, dict[str, float]] = {}
-        numbers: dict[str, list[tuple[int, float]]] = {}
-        for name, stamp, value in rows:
+        numbers: dict[str, list[float]] = {}
+        for name, stamp, value in features:
             if name == "temperature" or "." in name:
-                numbers.setdefault(name, []).append((stamp, value))
+                numbers.setdefault(name, []).append(value)
             else:
                 table.setdefault(stamp, {})[name] = value
-        rung.add(shift, [told for told in table.values() if "q0" in told])
-        for name, told in numbers.items():
-            when, size = np.array([t for t, _ in told]), np.array([x for _, x in told])
+        self._rung = _rung(self._model, [told for told in table.values() if "q0" in told])
+        for name, values in numbers.items():
             plain = name.partition(".")[0] in ("temperature", "offset")
-            means = warmth if name == "temperature" else driven.setdefault(name, Means())
-            means.add(when, size if plain else np.log(size))
-    found = [*blows.readings, *rung.readings]
-    for name, means in sorted(driven.items()):
+            self._more(name, np.array(values) if plain else np.log(values))
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """The means by name, and "rung" where anything did."""
+        means = {name: float(row[0] / row[1]) for name, row in self._sums.items()}
+        return means | ({"rung": self._rung} if self._rung else {})
+
+
+def readings_of(names: Sequence[str], shown: Mapping[int, Mapping[str, Any]]) -> list[Reading]:
+    """What the shifts show: force, width and rate of the blows, the joints' stiffness and drives.
+
+    Args:
+        names: of the flexible joints.
+        shown: by shift, see `Shown`.
+    """
+    when: dict[str, list[int]] = {}
+    for shift in sorted(shown):
+        for name in shown[shift]:
+            when.setdefault(name, []).append(shift)
+    told = {name: [shown[shift][name] for shift in own] for name, own in when.items()}
+    found = [
+        _reading(words, effect, "tool", when[name], told[name])
+        for name, (words, effect) in _OF_BLOWS.items()
+        if name in told
+    ]
+    if "rung" in told:
+        found += _ringing(names, when["rung"], told["rung"])
+    for name in sorted(told):
         kind, _, joint = name.partition(".")
-        words, effect = _DRIVEN[kind]
-        found.append(means.reading(f"{words} {joint}", effect, joint))
-    return [_warmed(reading, warmth.by_shift) for reading in found]
+        if joint:
+            words, effect = _DRIVEN[kind]
+            found.append(_reading(f"{words} {joint}", effect, joint, when[name], told[name]))
+    warmth = dict(zip(when.get("temperature", ()), told.get("temperature", ()), strict=True))
+    return [_warmed(reading, warmth) for reading in found]
+
+
+def _reading(
+    name: str, effect: str, target: str, shifts: Sequence[int], values: Sequence[float] | FloatArray
+) -> Reading:
+    """Without covariates."""
+    when = np.array(shifts, np.int64) * SHIFT + SHIFT // 2
+    return Reading(name, effect, target, when, np.array(values), np.empty((0, when.size)))
 
 
 def _warmed(reading: Reading, warmth: Mapping[int, float]) -> Reading:
@@ -354,73 +342,65 @@ def _warmed(reading: Reading, warmth: Mapping[int, float]) -> Reading:
     return replace(reading, covariates=np.array([[warmth[shift] for shift in shifts]]))
 
 
-class _Rung:
-    """Each joint's stiffness, and the damping, of each shift, from the frequencies of ring-downs.
+def _rung(model: Model, rows: Sequence[dict[str, float]]) -> dict[str, Any] | None:
+    """Each joint's stiffness, and the damping, from the frequencies of a shift's ring-downs.
 
     ln f_i moves by half the sum of s_ij d ln k_j, s_ij the share of joint j in the strain energy
     of mode i.
+
+    Returns:
+        ln of each joint's stiffness over the model's, its error, and by mode: the weight of its
+        ring-downs, the sum of their ln z, the middle one; None where the modes do not tell.
     """
+    nv = len(model.robot.joint_names)
+    poses = np.array([[told[f"q{k}"] for k in range(nv)] for told in rows])
+    many = ManyPoses(model, poses) if rows else None
+    if many is None or not many.compiled:
+        return None
+    mass, _ = many.mass_and_jacobian()
+    root = np.linalg.inv(np.linalg.cholesky(mass))
+    squared, vectors = np.linalg.eigh(np.einsum("pij,pj,pkj->pik", root, many.stiffness, root))
+    shapes = np.einsum("pji,pjk->pik", root, vectors)
+    share = many.stiffness[:, :, None] * shapes**2 / squared[:, None, :]
+    frequency = np.sqrt(squared) / (2.0 * np.pi)
+    n = frequency.shape[1]
+    found = [(k, i, told) for k, told in enumerate(rows) for i in range(n) if f"f{i}" in told]
+    pose, mode = (np.array([each[part] for each in found], int) for part in (0, 1))
+    off = np.array([told[f"f{i}"] for _, i, told in found]) / frequency[pose, mode]
+    weight = 1.0 / np.maximum(np.array([told[f"e{i}"] for _, i, told in found]), 1e-4)
+    ratio = np.log([told[f"z{i}"] for _, i, told in found])
+    left = 0.5 * share[pose, :, mode] * weight[:, None]
+    # Of a joint that no mode shows nothing is told: the smallest change that fits.
+    size, *_, values = np.linalg.lstsq(left, np.log(off) * weight, rcond=1e-3)
+    if values.size < n or values[-1] < 1e-3 * values[0]:
+        return None
+    return {
+        "stiffness": size.tolist(),
+        "error": np.sqrt(np.diag(np.linalg.inv(left.T @ left))).tolist(),
+        "damping": [
+            np.bincount(mode, weight**2, n).tolist(),
+            np.bincount(mode, weight**2 * ratio, n).tolist(),
+            [float(np.median(ratio[mode == i])) if (mode == i).any() else None for i in range(n)],
+        ],
+    }
 
-    def __init__(self, model: Model) -> None:
-        self._model = model
-        self._when: list[int] = []
-        self._stiffness: list[FloatArray] = []
-        self._errors: list[FloatArray] = []
-        # By mode: the weight of its ring-downs, the sum of their ln z, the middle one.
-        self._damped: list[FloatArray] = []
 
-    def add(self, shift: int, rows: Sequence[dict[str, float]]) -> None:
-        """The ring-downs of a shift."""
-        nv = len(self._model.robot.joint_names)
-        many = ManyPoses(
-            self._model, np.array([[told[f"q{k}"] for k in range(nv)] for told in rows])
-        ) if rows else None  # fmt: skip
-        if many is None or not many.compiled:
-            return
-        mass, _ = many.mass_and_jacobian()
-        root = np.linalg.inv(np.linalg.cholesky(mass))
-        squared, vectors = np.linalg.eigh(np.einsum("pij,pj,pkj->pik", root, many.stiffness, root))
-        shapes = np.einsum("pji,pjk->pik", root, vectors)
-        share = many.stiffness[:, :, None] * shapes**2 / squared[:, None, :]
-        frequency = np.sqrt(squared) / (2.0 * np.pi)
-        n = frequency.shape[1]
-        found = [(k, i, told) for k, told in enumerate(rows) for i in range(n) if f"f{i}" in told]
-        pose, mode = (np.array([each[part] for each in found], int) for part in (0, 1))
-        off = np.array([told[f"f{i}"] for _, i, told in found]) / frequency[pose, mode]
-        weight = 1.0 / np.maximum(np.array([told[f"e{i}"] for _, i, told in found]), 1e-4)
-        ratio = np.log([told[f"z{i}"] for _, i, told in found])
-        left = 0.5 * share[pose, :, mode] * weight[:, None]
-        # Of a joint that no mode shows nothing is told: the smallest change that fits.
-        size, *_, values = np.linalg.lstsq(left, np.log(off) * weight, rcond=1e-3)
-        if values.size < n or values[-1] < 1e-3 * values[0]:
-            return
-        self._when.append(shift * SHIFT + SHIFT // 2)
-        self._stiffness.append(size)
-        self._errors.append(np.sqrt(np.diag(np.linalg.inv(left.T @ left))))
-        middle = [np.median(ratio[mode == i]) if (mode == i).any() else np.nan for i in range(n)]
-        self._damped.append(np.array([
-            np.bincount(mode, weight**2, n), np.bincount(mode, weight**2 * ratio, n), middle
-        ]))  # fmt: skip
-
-    @property
-    def readings(self) -> list[Reading]:
-        """A reading a joint, and that of the damping; none where nothing rang."""
-        if not self._when:
-            return []
-        clock, nothing = np.array(self._when), np.empty((0, len(self._when)))
-        found = []
-        for name, column, error in zip(
-            self._model.robot.flexible_names, np.array(self._stiffness).T, np.array(self._errors).T,
-            strict=True,
-        ):  # fmt: skip
-            # A shift that hardly shows the joint would be taken for one in which it changed.
-            good = error < _DIM * np.median(error)
-            found.append(Reading(f"stiffness of {name}", "stiffness_drift", name, clock[good],
-                                 column[good], np.empty((0, int(good.sum())))))  # fmt: skip
-        # Modes differ in damping, and a mode that hardly rings tells little of it: what each
-        # usually has is taken out, and their mean put back, by which robots differ.
-        weight, ratio, middle = np.array(self._damped).transpose(1, 0, 2)
-        usual = np.nanmedian(middle, axis=0)
-        damping = (ratio - weight * np.nan_to_num(usual)).sum(axis=1) / weight.sum(axis=1)
-        damping += np.nanmean(usual)
-        return [*found, Reading("damping", "modal_damping", "robot", clock, damping, nothing)]
+def _ringing(
+    names: Sequence[str], shifts: Sequence[int], rung: Sequence[Mapping[str, Any]]
+) -> list[Reading]:
+    """A reading a joint, and that of the damping."""
+    stiffness, errors = (np.array([told[key] for told in rung]).T for key in ("stiffness", "error"))
+    found = []
+    for name, column, error in zip(names, stiffness, errors, strict=True):
+        # A shift that hardly shows the joint would be taken for one in which it changed.
+        good = error < _DIM * np.median(error)
+        own = np.array(shifts)[good].tolist()
+        found.append(_reading(f"stiffness of {name}", "stiffness_drift", name, own, column[good]))
+    # Modes differ in damping, and a mode that hardly rings tells little of it: what each
+    # usually has is taken out, and their mean put back, by which robots differ.
+    table = np.array([told["damping"] for told in rung], float)
+    weight, ratio, middle = table.transpose(1, 0, 2)
+    usual = np.nanmedian(middle, axis=0)
+    damping = (ratio - weight * np.nan_to_num(usual)).sum(axis=1) / weight.sum(axis=1)
+    damping += np.nanmean(usual)
+    return [*found, _reading("damping", "modal_damping", "robot", shifts, damping)]

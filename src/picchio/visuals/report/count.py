@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from picchio.fatigue.miner import format_count
-from picchio.ledger.result import Count
+from picchio.ledger.result import Count, told_blows, told_interval, told_share
 from picchio.visuals.plots.style import blank_figure, look, styled
 from picchio.visuals.report.page import Picture, Pictures, number, render
 
@@ -35,21 +33,17 @@ def count_page(found: Count, *, command: str | None = None, warnings: Sequence[s
     joints = found.joints()
     rows = []
     for joint in joints:
-        low, high = joint["damage_interval"] or (math.nan, math.nan)
         left = joint["blows_left"]
-        cells = (
-            ["–"] * 3 if left is None else [format_count(left[p]) for p in ("p10", "p50", "p90")]
-        )
         rows.append([
-            joint["name"], _share(joint["damage"]),
-            "–" if math.isnan(low) else f"{_share(low)} to {_share(high)}", *cells,
-            found.reached(left) or "–",
+            joint["name"], told_share(joint["damage"]), told_interval(joint["damage_interval"]),
+            *("-" if left is None else told_blows(left[p]) for p in ("p10", "p50", "p90")),
+            found.reached(left) or "-",
         ])  # fmt: skip
     first = found.first_to_fail
     places = [
         [", ".join(f"{v:.3f}" for v in s["pose"]),
          ", ".join(f"{v:.2f}" for v in np.round(s["direction"], 2) + 0.0),
-         s["blows"], *(_share(v) for v in s["share"])]
+         s["blows"], *(told_share(v) for v in s["share"])]
         for s in found.stations()
     ]  # fmt: skip
     facts: list[list[Any]] = [
@@ -57,8 +51,8 @@ def count_page(found: Count, *, command: str | None = None, warnings: Sequence[s
         ["Blows", f"{found.blows:,}"],
         ["Seen, the others assumed", f"{100 * found.seen_share:.4g} %"],
         ["Blows a day, lately", number(found.blows_a_day)],
+        ["Logged", found.logged],
     ]
-    facts.append(["Hours logged", number(found.hours)])
     if first is not None:
         gain = float(found.if_force(0.9)[first])
         facts.append(["Ends the life", names[first]])
@@ -73,10 +67,6 @@ def count_page(found: Count, *, command: str | None = None, warnings: Sequence[s
         refused=[list(pair) for pair in found.refused], notes=found.notes, command=command,
         warnings=list(warnings), provenance=found.origin,
     )  # fmt: skip
-
-
-def _share(value: float) -> str:
-    return "–" if math.isnan(value) else f"{100 * value:.3g}"
 
 
 def _pictures(found: Count) -> list[Picture]:
