@@ -119,8 +119,14 @@ def on_threads(kernel: Callable[..., None], count: int, span: int, *arguments: A
     if threads == 1:
         kernel(0, count, *arguments)
         return
+    left = iter(parts)  # of which each thread takes the next
+
+    def work() -> None:
+        for part in left:
+            kernel(*part, *arguments)
+
     with ThreadPoolExecutor(threads) as pool:
-        for done in [pool.submit(kernel, *part, *arguments) for part in parts]:
+        for done in [pool.submit(work) for _ in range(threads)]:
             done.result()
 
 

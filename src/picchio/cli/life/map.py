@@ -113,7 +113,7 @@ def map_(
         typer.Option(
             metavar="N",
             min=1,
-            help="Places computed and kept at a time; 4096 if not given, fewer for slow ones.",
+            help="Places computed and kept at a time; if not given, 64 to 16384 by what one takes.",
         ),
     ] = None,
     restart: Annotated[

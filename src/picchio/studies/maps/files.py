@@ -6,12 +6,14 @@ import io
 import shutil
 import warnings
 from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
+from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.core.files import swap_in, writing
 from picchio.studies.maps.chunk import Columns
@@ -19,6 +21,11 @@ from picchio.studies.maps.chunk import Columns
 # Rows written at a time, and of a piece of a Zarr store: a piece is then written once, not again
 # and again with every chunk of the map that falls into it.
 _ROWS = 65536
+# Of a piece of a netCDF file: what it comes in of itself is written in tens of thousands of pieces.
+_CHUNK = 4096
+# How pieces of a Zarr store are packed: bits of one place beside each other, as numbers of a map
+# differ in the last ones only. Zarr's own choice takes several times as long, and more room.
+_PACKED: dict[str, Any] = {"cname": "lz4", "clevel": 1}
 
 # Variable: (dimensions, unit, what it is).
 VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
@@ -146,7 +153,8 @@ class _NetcdfWriter:
             label[:] = values
         for name, values in columns.items():
             dims, unit, meaning = VARIABLES[name]
-            variable = file.create_variable(name, dims, values.dtype)
+            chunks = (min(_CHUNK, len(values)), *values.shape[1:])
+            variable = file.create_variable(name, dims, values.dtype, chunks=chunks)
             variable.attrs["units"] = unit
             variable.attrs["long_name"] = meaning
         file.attrs.update(self._attributes)
@@ -203,41 +211,66 @@ class _KeptError(io.FileIO):
 
 
 class _ZarrWriter:
+    """A store that xarray lays out; its pieces are written as the files that they are.
+
+    By way of Zarr, each waits many times for a thread to run, which takes three times as long where
+    the cores are busy.
+    """
+
     def __init__(self, path: Path, labels: Columns, attributes: dict[str, Any]) -> None:
-        self._path, self._labels, self._attributes, self._mode = path, labels, attributes, "w"
+        self._path, self._labels, self._attributes = path, labels, attributes
+        self._arrays: dict[str, Any] = {}
+        self._rows = 0
 
     def append(self, columns: Columns) -> None:
+        if not self._arrays:
+            self._prepare(columns)
+        with ThreadPoolExecutor() as pool:
+            for done in [pool.submit(self._piece, *column) for column in columns.items()]:
+                done.result()
+        self._rows += len(columns["place"])
+
+    def _prepare(self, columns: Columns) -> None:
+        """Without any row."""
         import xarray
+        import zarr
         from zarr.codecs import BloscCodec
 
         data = {}
         for name, values in columns.items():
             dims, unit, meaning = VARIABLES[name]
-            data[name] = (dims, values, {"units": unit, "long_name": meaning})
-        if self._mode == "w":
-            chunk = xarray.Dataset(data, coords=self._labels, attrs=self._attributes)
-            # Bytes of one place beside each other: numbers of a map differ in the last ones only.
-            # Zarr's own choice takes three times as long and makes larger files.
-            packed = BloscCodec(cname="zstd", clevel=1, shuffle="shuffle")
-            rows = {
-                name: {"chunks": (_ROWS, *(columns[name].shape[1:])), "compressors": (packed,)}
-                for name in data
-            }
-            chunk.to_zarr(self._path, mode="w", consolidated=False, encoding=rows)
-            self._mode = "a"
-        else:
-            # An append writes the attributes anew: without them they, and provenance, are gone.
-            xarray.Dataset(data, attrs=self._attributes).to_zarr(
-                self._path, mode="a", append_dim="point", consolidated=False
-            )
+            data[name] = (dims, values[:0], {"units": unit, "long_name": meaning})
+        codec = BloscCodec(**_PACKED, shuffle="bitshuffle")
+        pieces = {
+            name: {"chunks": (_ROWS, *(columns[name].shape[1:])), "compressors": (codec,)}
+            for name in data
+        }
+        empty = xarray.Dataset(data, coords=self._labels, attrs=self._attributes)
+        empty.to_zarr(self._path, mode="w", consolidated=False, encoding=pieces)
+        group = zarr.open_group(self._path, mode="r+")
+        self._arrays = {name: group[name] for name in data}
+
+    def _piece(self, name: str, values: FloatArray) -> None:
+        from numcodecs import Blosc
+
+        one = (self._rows // _ROWS, *(0 for _ in values.shape[1:]))
+        file = self._path / name / self._arrays[name].metadata.encode_chunk_key(one)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        # A piece is whole, though nothing of it is read beyond the last row.
+        beyond = np.zeros((_ROWS - len(values), *values.shape[1:]), values.dtype)
+        whole = np.concatenate([values, beyond]) if len(beyond) else values
+        plain = np.ascontiguousarray(whole, values.dtype.newbyteorder("<"))
+        file.write_bytes(Blosc(**_PACKED, shuffle=Blosc.BITSHUFFLE).encode(plain))
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None and self._mode == "a":
+        if kind is None and self._arrays:
             import zarr
 
+            for array in self._arrays.values():
+                array.resize((self._rows, *array.shape[1:]))
             with warnings.catch_warnings():
                 # Zarr 3 has consolidated metadata ahead of its own specification.
                 warnings.simplefilter("ignore")

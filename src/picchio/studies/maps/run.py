@@ -37,7 +37,7 @@ from picchio.studies.maps.stored import open_map
 from picchio.studies.rivet.pose import need_springs
 from picchio.vibration.closed_form.response import described, unit_vector
 
-CHUNK, SMALL_CHUNK = 4096, 64
+SMALL_CHUNK, CHUNK, FAST_CHUNK = 64, 4096, 16384
 # A burst of so many hits at as many poses takes about a second.
 _HITS = 200_000
 MOST_PLACES = 10**10
@@ -46,8 +46,11 @@ ENDINGS = (".nc", ".zarr")
 # microseconds a place: to start two workers takes as long as two million places.
 _WORTH_WORKERS, _WORTH_WORKERS_FAST = 50_000, 4_000_000
 MOST_WORKERS = 1024
-# Chunks that are computed while others are written.
-_AHEAD = 16
+# Chunks that are computed, and held in memory, while others are written.
+_AHEAD = 8
+
+# What has been computed, with its rows where this process has them.
+_Running = Generator[tuple[tuple[int, int], Columns | None]]
 
 
 @one_thread()
@@ -80,8 +83,8 @@ def workspace_map(
         hits: of a burst from rest; None for the steady state.
         damage: count the damage of a rivet of so many hits, too, from rest with its ring-down; for
             the worst direction it is searched, which takes many times as long.
-        chunk: places at a time; 4096 if not given, down to 64 where a place takes long: with
-            damage, many hits, or a model that is integrated in time.
+        chunk: places at a time; 4096 if not given, 16384 where a place takes microseconds, down to
+            64 where it takes long: with damage, many hits, or a model that is integrated in time.
         workers: processes; up to one, this process does the work itself. As many as cores, and
             none for small maps, if not given.
         scheduler: address of a dask scheduler to use instead.
@@ -111,10 +114,7 @@ def workspace_map(
         from picchio.robot.ik.branch import branch_words
 
         branch_words(robot, branch)
-    if chunk is None:
-        slow = damage is not None or model.nonlinear
-        chunk = SMALL_CHUNK if slow else min(CHUNK, max(SMALL_CHUNK, _HITS // (hits or 1)))
-    if chunk < 1:
+    if chunk is not None and chunk < 1:
         raise InputError("must be at least 1", key="chunk", value=chunk)
     if workers is not None and not 0 <= workers <= MOST_WORKERS:
         raise InputError(f"must lie between 0 and {MOST_WORKERS}", key="workers", value=workers)
@@ -144,6 +144,10 @@ def workspace_map(
             hint="give shafts in a sidecar",
         )
     job = MapJob(model, excitation, places, direction, branch, hits, damage)
+    if chunk is None:
+        slow = damage is not None or model.nonlinear
+        most = SMALL_CHUNK if slow else FAST_CHUNK if job.fast else CHUNK
+        chunk = min(most, max(SMALL_CHUNK, _HITS // (hits or 1)))
     if scheduler is not None:
         require_scheduler(scheduler)
     with locked(target):
@@ -158,14 +162,18 @@ def workspace_map(
         def finished() -> Iterator[Columns]:
             """The chunks in order; they are joined while workers compute those that follow."""
             nonlocal done
+            fresh: dict[tuple[int, int], Columns | None] = {}
+            lacking = set(missing)
             running = _run(job, folder, missing, workers, scheduler)
             with closing(running):
                 for span in spans:
-                    while not _file(folder, span).exists():
-                        first, last = next(running)
+                    while span in lacking:
+                        (first, last), columns = next(running)
+                        fresh[first, last] = columns
+                        lacking.discard((first, last))
                         done += last - first
                         tell(done, len(places))
-                    yield _read(_file(folder, span))
+                    yield fresh.pop(span, None) or _read(_file(folder, span))
 
         join_chunks(target, finished(), _attributes(job))
         shutil.rmtree(folder)
@@ -211,33 +219,39 @@ def _read(path: Path) -> Columns:
         return {name: stored[name] for name in stored.files}
 
 
-def compute_chunk(work: tuple[MapJob, Path], span: tuple[int, int]) -> tuple[int, int]:
-    """Compute one chunk and write its file, into a folder; what a worker does."""
-    job, folder = work
+def _kept(job: MapJob, folder: Path, span: tuple[int, int]) -> Columns:
+    """Compute one chunk and write its file, into a folder."""
     columns = job.compute(*span)
     with atomic_write(_file(folder, span), "wb") as stream:
         np.savez(stream, **columns)  # type: ignore[arg-type]
+    return columns
+
+
+def compute_chunk(work: tuple[MapJob, Path], span: tuple[int, int]) -> tuple[int, int]:
+    """What a worker does: it hands over no more than the file."""
+    _kept(*work, span)
     return span
 
 
-def _here(job: MapJob, folder: Path, missing: list[tuple[int, int]]) -> Generator[tuple[int, int]]:
+def _here(job: MapJob, folder: Path, missing: list[tuple[int, int]]) -> _Running:
     """Compute in this process; the next chunks of a fast map while those before are written."""
     if not job.fast:
         for span in missing:
-            yield compute_chunk((job, folder), span)
+            yield span, _kept(job, folder, span)
         return
     from numba import get_num_threads, set_num_threads
 
-    waiting: deque[Future[tuple[int, int]]] = deque()
+    waiting: deque[tuple[tuple[int, int], Future[Columns]]] = deque()
     # A thread a core, each with chunks of its own; this one joins what they have done.
     pool = ThreadPoolExecutor(get_num_threads(), initializer=set_num_threads, initargs=(1,))
     try:
         for span in missing:
-            waiting.append(pool.submit(compute_chunk, (job, folder), span))
+            waiting.append((span, pool.submit(_kept, job, folder, span)))
             if len(waiting) > _AHEAD:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
+                span, future = waiting.popleft()
+                yield span, future.result()
+        for span, future in waiting:
+            yield span, future.result()
     finally:
         pool.shutdown(cancel_futures=True)
 
@@ -248,14 +262,15 @@ def _run(
     missing: list[tuple[int, int]],
     workers: int | None,
     scheduler: str | None,
-) -> Generator[tuple[int, int]]:
+) -> _Running:
     places = sum(last - first for first, last in missing)
     worth = _WORTH_WORKERS_FAST if job.fast else _WORTH_WORKERS
     alone = places < worth if workers is None else workers <= 1
     if not missing or (scheduler is None and alone):
         yield from _here(job, folder, missing)
         return
-    yield from spread(compute_chunk, (job, folder), missing, workers=workers, scheduler=scheduler)
+    for span in spread(compute_chunk, (job, folder), missing, workers=workers, scheduler=scheduler):
+        yield span, None
 
 
 def _attributes(job: MapJob) -> dict[str, Any]:

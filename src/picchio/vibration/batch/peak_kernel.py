@@ -14,7 +14,6 @@ from picchio.vibration.batch.modal_kernel import (
 )
 from picchio.vibration.batch.top_kernel import (
     TERMS,
-    TILE,
     highest,
     joint_norms,
     power_series,
@@ -109,7 +108,7 @@ def _block_peaks(  # type: ignore[no-untyped-def]
         np.empty((n, 2)),
         np.empty((TERMS, n, 2)),
     )
-    room = room_for(n, 32 * TILE)
+    room = room_for(n, 256)
     poles = np.empty(n, dtype=np.complex128)
     rows = np.empty((n, duration.shape[0], 7), dtype=np.complex128)
     endless, length, nothing = np.isinf(duration[-1]), duration.copy(), np.empty(0)

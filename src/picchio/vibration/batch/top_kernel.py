@@ -12,15 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.core.arrays import ComplexArray, FloatArray, IndexArray
 from picchio.vibration.batch.modal_kernel import KERNEL, exponential
 
 # Samples a cycle of the fastest mode. |g|^2 swings twice as fast: a top between two samples is
 # at most 10 % above both, unless modes nearly cancel (see `_MISSED`).
 _PER_CYCLE = 10.0
-# Samples whose largest |g|^2 is kept: what lies below the search is passed over at once.
-TILE = 8
+# Samples whose marks are read as one number.
+_WORD = 8
 # Of the largest |g|^2 on the samples: no top beside a sample below this is the largest.
 _CANDIDATE = 0.5
 # How much higher than a cubic through values and slopes a top can be: of |g|, the modes'
@@ -50,8 +51,9 @@ class Samples(NamedTuple):
         eta: (n, k) deflections of the modes.
         rate: (n, k) real parts of their states.
         norm: (n, k) |g|^2 of every joint.
-        tiles: (n, k / 8, 8) the same.
-        tops: (n, k / 8) the largest of each eight.
+        marks: (k,) of one joint: whether a sample is higher than those beside it.
+        words: (k / 8,) the same.
+        found: (k,) which are.
         scratch: (3, k).
     """
 
@@ -59,8 +61,9 @@ class Samples(NamedTuple):
     eta: FloatArray
     rate: FloatArray
     norm: FloatArray
-    tiles: FloatArray
-    tops: FloatArray
+    marks: NDArray[np.uint8]
+    words: IndexArray
+    found: IndexArray
     scratch: FloatArray
 
 
@@ -72,12 +75,11 @@ def room_for(n: int, count: int) -> Samples:
         n: how many modes there are, and joints.
         count: of the samples.
     """
-    tiles = (count + TILE - 1) // TILE
-    count = tiles * TILE
-    norm = np.empty((n, count))
+    words = np.zeros((count + _WORD - 1) // _WORD, dtype=np.int64)
+    count = len(words) * _WORD
     return Samples(
-        np.empty(count), np.empty((n, count)), np.empty((n, count)), norm,
-        norm.reshape((n, tiles, TILE)), np.empty((n, tiles)), np.empty((3, count)),
+        np.empty(count), np.empty((n, count)), np.empty((n, count)), np.empty((n, count)),
+        words.view(np.uint8), words, np.empty(count, dtype=np.int64), np.empty((3, count)),
     )  # fmt: skip
 
 
@@ -201,7 +203,7 @@ def _project(count, eta, pull, first, g, norm):  # type: ignore[no-untyped-def]
 
 @njit(**KERNEL)
 def joint_norms(joint: int, count: int, pull: FloatArray, room: Samples) -> float:
-    """The largest |g|^2 of a joint on the samples; all into its row of `norm`, with `tops`.
+    """The largest |g|^2 of a joint on the samples; all into its row of `norm`.
 
     Args:
         joint: which row.
@@ -209,20 +211,45 @@ def joint_norms(joint: int, count: int, pull: FloatArray, room: Samples) -> floa
         pull: (n, 4), its deflection by each mode's, for each axis of the force; and their length.
         room: the samples.
     """
-    g, norm = room.scratch, room.norm[joint]
+    norm = room.norm[joint]
     for first in range(0, pull.shape[0], 3):
-        _project(count, room.eta, pull, first, g, norm)
-    largest = 0.0
-    tiles = (count + TILE - 1) // TILE
-    for k in range(count, tiles * TILE):
+        _project(count, room.eta, pull, first, room.scratch, norm)
+    for k in range(count, min(count + 3, norm.shape[0])):
         norm[k] = 0.0
-    for tile in range(tiles):
-        top = 0.0
-        for k in range(TILE):
-            top = max(top, room.tiles[joint, tile, k])
-        room.tops[joint, tile] = top
-        largest = max(largest, top)
-    return largest
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    for k in range(0, count, 4):  # four at a time: each waits for itself alone
+        a, b = max(a, norm[k]), max(b, norm[k + 1])
+        c, d = max(c, norm[k + 2]), max(d, norm[k + 3])
+    return max(max(a, b), max(c, d))
+
+
+@njit(**KERNEL)
+def _beside(k: int, count: int, periodic: bool) -> tuple[int, int]:
+    """The samples before and after one: at the ends those at the other end, or itself."""
+    before = k - 1 if k > 0 else (count - 1 if periodic else 0)
+    return before, k + 1 if k + 1 < count else (0 if periodic else k)
+
+
+@njit(**KERNEL)
+def _tops(count: int, periodic: bool, largest: float, norm: FloatArray, room: Samples) -> int:
+    """How many samples the highest top may be beside; they go into `found`, the largest first."""
+    marks, found, floor = room.marks, room.found, _CANDIDATE * largest
+    for k in range(1, count - 1):
+        marks[k] = (norm[k] >= floor) & (norm[k] >= norm[k - 1]) & (norm[k] >= norm[k + 1])
+    for k in (0, count - 1):
+        before, after = _beside(k, count, periodic)
+        marks[k] = (norm[k] >= floor) & (norm[k] >= norm[before]) & (norm[k] >= norm[after])
+    many = 0
+    for word in range((count + _WORD - 1) // _WORD):
+        if room.words[word] == 0:
+            continue
+        for k in range(word * _WORD, min(count, word * _WORD + _WORD)):
+            if marks[k] != 0:
+                found[many] = k
+                if norm[k] == largest:
+                    found[many], found[0] = found[0], k
+                many += 1
+    return many
 
 
 @njit(**KERNEL)
@@ -505,27 +532,28 @@ def highest(
     direction: FloatArray,
 ) -> float:
     """The largest |g| of a joint, from that of |g|^2 on the samples; its way into `direction`."""
-    best, floor = -1.0, _CANDIDATE * largest
+    best = -1.0
     time, norm, eta, rate = room.time, room.norm[joint], room.eta, room.rate
-    for tile in range((count + TILE - 1) // TILE):
-        if room.tops[joint, tile] < floor:
-            continue
-        for k in range(tile * TILE, min(count, tile * TILE + TILE)):
-            before = k - 1 if k > 0 else (count - 1 if periodic else 0)
-            after = k + 1 if k + 1 < count else (0 if periodic else count - 1)
-            here = norm[k]
-            if here < floor or here < norm[before] or here < norm[after]:
-                continue
-            a, t, b = time[before], time[k], time[after]
-            if a > t:
-                a -= total
-            if b < t:
-                b += total
-            p = piece_at(t, start)
+    for candidate in range(_tops(count, periodic, largest, norm, room)):
+        k = room.found[candidate]
+        before, after = _beside(k, count, periodic)
+        a, t, b = time[before], time[k], time[after]
+        if a > t:
+            a -= total
+        if b < t:
+            b += total
+        p = piece_at(t, start)
+        # A parabola's top; of a wave, and where there is a top to compare with, a cubic's.
+        here, guess = norm[k], t
+        above, below = here - norm[before], here - norm[after]
+        if above + below > 0.0:
+            side = b - t if above > below else t - a
+            guess += 0.5 * side * (above - below) / (above + below)
+        if best >= 0.0 or wave[p] != 0.0:
             force = _force(p, t - start[p], constant, slope, amplitude, wave)
             climb, bound = _moving(k, force, poles, eta, rate, pull)
             beside, length = (after, b - t) if climb >= 0.0 else (before, t - a)
-            guess, top = t, here
+            top = here
             if length > 0.0:
                 # Where a piece ends the force may jump, but no slope does: any piece's will do.
                 descent = _moving(beside, 0.0, poles, eta, rate, pull)[0]
@@ -536,21 +564,21 @@ def highest(
                 guess = t + sign * move
             if top + _MISSED * np.sqrt(here) * bound * length * length < best:
                 continue
-            value = -1.0
-            if wave[p] == 0.0:
-                stop = start[p + 1] if p + 1 < start.shape[0] else total
-                value = series_top(
-                    k, guess - t, start[p] - t, stop - t, p, poles, rows, powers, eta, rate, pull,
-                    free, terms, g,
-                )  # fmt: skip
-            if value < 0.0:  # the top is in another piece, or not near
-                value = refine(
-                    a, guess, b, total if periodic else np.inf, start, poles, rows, constant,
-                    slope, amplitude, wave, pull, g,
-                )  # fmt: skip
-            if value > best:
-                best = value
-                size = np.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
-                for d in range(3):
-                    direction[joint, d] = g[d] / size
+        value = -1.0
+        if wave[p] == 0.0:
+            stop = start[p + 1] if p + 1 < start.shape[0] else total
+            value = series_top(
+                k, guess - t, start[p] - t, stop - t, p, poles, rows, powers, eta, rate, pull,
+                free, terms, g,
+            )  # fmt: skip
+        if value < 0.0:  # the top is in another piece, or not near
+            value = refine(
+                a, guess, b, total if periodic else np.inf, start, poles, rows, constant,
+                slope, amplitude, wave, pull, g,
+            )  # fmt: skip
+        if value > best:
+            best = value
+            size = np.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+            for d in range(3):
+                direction[joint, d] = g[d] / size
     return float(np.sqrt(best))
