@@ -22,7 +22,8 @@ import resource
 import tempfile
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -239,13 +240,17 @@ def on_cores(count: int, work: Callable[[], object]) -> float:
     cores = sorted(os.sched_getaffinity(0))
     numba.set_num_threads(count)
     try:
-        for thread in os.listdir("/proc/self/task"):
-            os.sched_setaffinity(int(thread), cores[:count])
+        _hold_threads(cores[:count])
         return clock(work, time.perf_counter)
     finally:
-        for thread in os.listdir("/proc/self/task"):
-            os.sched_setaffinity(int(thread), cores)
+        _hold_threads(cores)
         numba.set_num_threads(1)
+
+
+def _hold_threads(cores: Sequence[int]) -> None:
+    for thread in os.listdir("/proc/self/task"):
+        with suppress(ProcessLookupError):  # it has ended since
+            os.sched_setaffinity(int(thread), cores)
 
 
 def go_cores() -> None:

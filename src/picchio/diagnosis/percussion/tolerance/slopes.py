@@ -62,6 +62,9 @@ class Slopes:
             what: the numbers, as in the attributes.
             own: as there.
             columns: as there.
+
+        Returns:
+            the slopes.
         """
         return cls(tuple(what), own, columns, np.sqrt((columns**2).sum(axis=(0, 1), dtype=float)))
 
