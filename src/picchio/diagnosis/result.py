@@ -26,6 +26,9 @@ BEYOND_DOUBT = 0.99
 MOSTLY = 0.8
 """The least share of the held-out excess that the causes of a `partial` verdict explain.
 
+Of motion records, and where one kind of records is unexplained; of blows, where all but the causes
+is exact, more is asked for (`percussion/conclude/verdict.py`).
+
 "Most of it" in the verdict's words. Four fifths, not a half: a wrong cause that is merely like the
 true one takes away half of its power as soon as the two are correlated by 0.71 (the share is the
 correlation squared), which stiffness, inertia and friction of one joint often are; by 0.89 they
