@@ -4,13 +4,15 @@
     python benchmarks/stiffness.py --frf 200 [--first 2000] [--json FILE]
     python benchmarks/stiffness.py --taps 60 [--unknown] [--first 3000] [--json FILE]
     python benchmarks/stiffness.py --clamped 90 [--first 4000] [--json FILE]
+    python benchmarks/stiffness.py --trains 30 [--first 5000] [--json FILE]
     python benchmarks/stiffness.py --real DATA [--repeats 5] [--json FILE]
 
 Blind: campaigns of `tests/worlds/loads.py`, arms with 3, 6 and 7 joints in turn, stiffness off by
 up to a factor of four, everything slightly wrong; with --frf those of `tests/worlds/frfs.py`, 18
 frequency response functions each; with --taps those of `tests/worlds/taps.py`, six blows in time,
 with --unknown without their force; with --clamped those of `tests/worlds/presses.py`, whose motors
-press while the tool is held. Real: DATA is the folder of measured data; 43
+press while the tool is held; with --trains twelve records of usual blows each, of which every
+other campaign has no deflections. Real: DATA is the folder of measured data; 43
 loadings of a FANUC R-2000iC (`r2000ic-static`), published stiffness against plain least squares
 and against `picchio identify`; then each cause that may leave a fifth of the signal unexplained,
 judged on loadings left out: ten folds, so many times as `--repeats` says.
@@ -181,6 +183,7 @@ def main() -> None:
     parser.add_argument("--frf", type=int, default=0)
     parser.add_argument("--taps", type=int, default=0)
     parser.add_argument("--clamped", type=int, default=0)
+    parser.add_argument("--trains", type=int, default=0)
     parser.add_argument("--unknown", action="store_true")
     parser.add_argument("--first", type=int, default=1000)
     parser.add_argument("--real", type=Path)
@@ -198,6 +201,8 @@ def main() -> None:
     if given.taps:
         trial = partial(blind_stiffness.tap_trial, taps, known=not given.unknown)
         found["taps"] = responses(trial, given.taps, given.first)
+    if given.trains:
+        found["trains"] = responses(blind_stiffness.train_trial, given.trains, given.first)
     if given.clamped:
         found["clamped"] = responses(
             partial(blind_stiffness.press_trial, presses), given.clamped, given.first

@@ -132,6 +132,50 @@ def tap_trial(worlds, count: int, first: int = 0, sizes=SIZES, known=True) -> tu
     return _trial(partial(worlds.draw, known=known), tap_campaign, count, first, sizes)
 
 
+ARMS = {3: "fanuc_like_3dof", 6: "fanuc_r2000ic", 7: "kinova_gen3"}
+FAR, NEAR = math.log(4.0), 0.3
+
+
+@dataclass(frozen=True)
+class Train:
+    """A campaign of usual blows on an arm whose springs are far from stated, in a wrong world."""
+
+    robot: str
+    campaign: Campaign
+    truth: np.ndarray
+    damping: np.ndarray
+
+
+def trains(size: int, seed: int, mismatch: float = 1.0, records: int = 12) -> Train:
+    """Stiffness drawn up to a factor of four off, damping up to two; every other one without
+    deflections."""
+    from worlds import campaign as worlds
+    from worlds import robots
+
+    name, rng = ARMS[size], np.random.default_rng([seed, 77])
+    nominal = robots.load(name)
+    far = rng.choice([-1.0, 1.0], size) * rng.uniform(NEAR, FAR, size)
+    damped = rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 0.7)
+    causes = [
+        ("joint_stiffness", joint, {"scale": math.exp(off)})
+        for joint, off in zip(nominal.joints, far, strict=True)
+    ]
+    causes.append(("modal_damping", "robot", {"scale": math.exp(damped)}))
+    sensors = (f"accelerometer.{nominal.tool}", *(("deflection",) if seed % 2 else ()))
+    made, truth = worlds.make(robot=name, seed=seed, causes=causes, sensors=sensors,
+                              records=records, mismatch=mismatch)  # fmt: skip
+    own, stated = truth["nuisances"], picchio.load_robot(name)
+    stiffness = np.array([own["stiffness"][joint] for joint in nominal.joints])
+    springs = np.array([joint.stiffness for joint in stated.flexible_joints])
+    ratio = own["damping_ratio"] * math.exp(damped) * stated.damping_ratio
+    return Train(name, made, np.exp(far) * stiffness * springs, ratio)
+
+
+def train_trial(count: int, first: int = 0, sizes=SIZES) -> tuple[list, list]:
+    """So many campaigns of usual blows."""
+    return _trial(trains, lambda train: train.campaign, count, first, sizes)
+
+
 def _trial(draw, campaign_of, count, first, sizes) -> tuple[list, list]:
     stiffness, damping = [], []
     for seed in range(first, first + count):

@@ -180,6 +180,14 @@ class Tolerance(StrictModel):
         """Everything exact."""
         return cls(**dict.fromkeys(cls.model_fields, 0.0))
 
+    def unsaid(self, *keys: str) -> Tolerance:
+        """The same with nothing said of some keys.
+
+        Args:
+            keys: left out.
+        """
+        return Tolerance(**self.model_dump(include=self.model_fields_set - set(keys)))
+
 
 class RecordTable(StrictModel):
     """One `[[record]]`.

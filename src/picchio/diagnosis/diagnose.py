@@ -120,7 +120,7 @@ def diagnose(
             hit = diagnose_percussion(loaded, records, **options)
             answer = replace(hit.diagnosis, details={"percussion": hit})
         effects = hit.extended.hypothesis.effects
-        known = fitted_correlation(hit.extended) if answer.causes else None
+        known = fitted_correlation(hit.extended) if answer.verdict != "unexplained" else None
         moves = answer.details.get("motion")
         if known is not None and moves is not None:
             known = known.beside(moves.correlation)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from picchio.core.errors import InputError
 from picchio.core.processes import one_thread
 from picchio.core.registry import classes_in, is_concrete, with_entry_points
 from picchio.core.toml import validate
+from picchio.diagnosis.begin import Begun, begin
 from picchio.diagnosis.diagnose import diagnose
 from picchio.diagnosis.entries import joint_entry, standing_entries, tool_entry
 from picchio.diagnosis.identified import FORMAT, Identification, Identified, IdentifiedJoint, Method
@@ -45,22 +46,26 @@ class Diagnosed(Identification):
     Attributes:
         diagnosis: what the numbers are from.
         tolerance: how well the campaign takes the nominal values to be known.
+        begun: where stiffness is far from what was stated: from where the diagnosis began.
     """
 
     diagnosis: Diagnosis
     tolerance: Tolerance
+    begun: Begun | None = None
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """How many causes were found."""
         count = len(self.diagnosis.causes)
-        return (f"{count} cause{'' if count == 1 else 's'} found.",)
+        said = f"{count} cause{'' if count == 1 else 's'} found."
+        return (said,) if self.begun is None else (self.begun.said(self.robot), said)
 
     @property
     def doubt(self) -> str:
         """That the diagnosis has an answer, and it is not one."""
         verdict = self.diagnosis.verdict
         partly = verdict in ("partial", "ambiguous")
+        partly = partly or (self.begun is not None and verdict == "unexplained")
         return f"the diagnosis is {verdict!r}: look at picchio diagnose, too" if partly else ""
 
     def sidecar_text(self) -> str:
@@ -76,7 +81,9 @@ class Diagnosed(Identification):
         """
         import tomlkit
 
-        table, remarks = _sidecar(self.robot, self.diagnosis, self.source, self.tolerance)
+        begun = self.begun is not None
+        robot = self.begun.robot if self.begun is not None else self.robot
+        table, remarks = _sidecar(robot, self.diagnosis, self.source, self.tolerance, begun)
         made = self.diagnosis.extra["provenance"]
         document = tomlkit.document()
         said = f"Written by picchio {made['picchio']}; verdict: {self.diagnosis.verdict}."
@@ -124,9 +131,30 @@ class ByDiagnosis(Method):
         workers: int | None = None,
         progress: Callable[[str], None] | None = None,
     ) -> Identification:
-        """As `diagnose`."""
-        found = diagnose(robot, campaign, workers=workers, progress=progress)
-        return identification(campaign, found)
+        """As `diagnose`, from where the records have stiffness that is far from stated."""
+        begun = begin(robot, campaign) if any(r.kind == "percussion" for r in campaign) else None
+        if begun is None:
+            found = diagnose(robot, campaign, workers=workers, progress=progress)
+            return identification(campaign, found)
+        # How well the stated values are known is not said of those found.
+        left = campaign.tolerance.unsaid("stiffness", "damping_ratio")
+        table = campaign.table.model_copy(update={"tolerance": left})
+        campaign = replace(campaign, table=table)
+        found = diagnose(begun.robot, campaign, workers=workers, progress=progress)
+        return _from_nothing(robot, identification(campaign, found), begun)
+
+
+def _from_nothing(robot: FlexibleRobot, told: Diagnosed, begun: Begun) -> Diagnosed:
+    """The answer of a diagnosis that began elsewhere than at the stated values."""
+    stands = told.diagnosis.verdict != "unexplained"
+    why = "far from stated: found from nothing, then fitted to the records" if stands else (
+        "fitted from nothing, but more than noise and tolerance is left: it may make up for that"
+    )  # fmt: skip
+    joints = tuple(
+        replace(joint, stiffness=replace(joint.stiffness, told=stands, why=why))
+        if joint.stiffness.told else joint for joint in told.joints
+    )  # fmt: skip
+    return replace(told, robot=robot, joints=joints, begun=begun)
 
 
 @cache
@@ -292,10 +320,14 @@ def _tells(value: Value, tolerance: float) -> bool:
 
 
 def _sidecar(
-    robot: FlexibleRobot, diagnosis: Diagnosis, source: str, tolerance: Tolerance
+    robot: FlexibleRobot,
+    diagnosis: Diagnosis,
+    source: str,
+    tolerance: Tolerance,
+    begun: bool = False,
 ) -> tuple[dict[str, Any], list[str]]:
     """The sidecar with the values found, and remarks on what has no place in it."""
-    if not diagnosis.causes:
+    if not diagnosis.causes and not (begun and diagnosis.verdict == "nothing-wrong"):
         stand = diagnosis.verdict == "nothing-wrong"
         raise InputError(f"the diagnosis is {diagnosis.verdict!r}: there is nothing to write",
                          hint="the stated stiffness and damping stand" * stand)  # fmt: skip
@@ -336,7 +368,9 @@ def _sidecar(
         kept = name in robot.spreads and not _tells(value, tolerance.stiffness)
         if name.startswith("stiffness.") and owner in joints and not kept:
             entry = joints[owner]
-            if "stiffness" in entry:
+            if begun:  # a curve is not what was found
+                entry.pop("stiffness_curve", None)
+            if "stiffness" in entry or begun:
                 entry |= {"source": _said(source, "stiffness", value)}
                 _tell(entry, "stiffness", value)
                 told[name] = (JointStiffness.name, owner, "scale")

@@ -50,6 +50,7 @@ from picchio.diagnosis.percussion.search.candidates import (
     finer_candidates,
     warm_up,
 )
+from picchio.diagnosis.percussion.search.far import start_far
 from picchio.diagnosis.percussion.search.select import (
     begin_search,
     run_search,
@@ -162,6 +163,7 @@ def _searched(
     def searched(split: Split) -> Search:
         search = begin_search(problem, candidates, split, say, finer)
         start_from(search, known)
+        start_far(search)
         run_search(search)
         return search
 

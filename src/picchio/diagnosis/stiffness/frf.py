@@ -27,7 +27,7 @@ from picchio.diagnosis.stiffness.fit import Fit, climb, score
 from picchio.diagnosis.stiffness.joints import MOST_HALF, Told, stiffness_of
 from picchio.diagnosis.stiffness.modes import paired, starts
 from picchio.diagnosis.stiffness.prior import prior_of
-from picchio.diagnosis.stiffness.responses import Damping, FrfProblem, make_problem
+from picchio.diagnosis.stiffness.responses import Damping, FrfProblem, left_over, make_problem
 from picchio.diagnosis.stiffness.written import sidecar
 from picchio.prediction.percussion import pose_of
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -241,8 +241,8 @@ def identify_frf(
     source = "memory" if campaign.folder is None else campaign.folder.resolve().name
     return FrfIdentification(
         robot, source, joints, campaign, fit, fit.half(), covariance,
-        _left(fit.problem, fit.mean),
-        _left(problem, stated), convention,
+        left_over(fit.problem, fit.mean),
+        left_over(problem, stated), convention,
         gain if convention == "modal" else -gain,
     )  # fmt: skip
 
@@ -315,15 +315,6 @@ def _elsewhere(problem: FrfProblem, fit: Fit) -> Fit | None:
             if other.evidence > fit.evidence + _GAIN:
                 return other
     return None
-
-
-def _left(problem: FrfProblem, at: FloatArray) -> float:
-    """The residual of all functions over themselves, each function alike."""
-    shares = []
-    for part, table in zip(problem.predict(at), problem.tables, strict=True):
-        left = np.linalg.norm(part.residual * table.scale[:, None])
-        shares.append(float(left / np.linalg.norm(table.measured)))
-    return math.sqrt(float(np.mean(np.square(shares))))
 
 
 def _joints(

@@ -471,16 +471,35 @@ def make_problem(
             response for one in own
             for response in _responses_of(robot, one, pose, tolerance, index)
         )  # fmt: skip
-        standings.append(Standing(
-            mass, robot.gravity_stiffness(pose), masses,
-            np.array(products).reshape(-1, *mass.shape),
-            np.array([(index[a], index[b]) for a, b, _ in bodies.double], np.intp).reshape(-1, 2),
-            robot.state(pose).stiffness, responses, np.ones(len(flex)),
+        standings.append(replace(
+            standing_at(robot, pose, responses), masses=masses,
+            products=np.array(products).reshape(-1, *mass.shape),
+            pairs=np.array([(index[a], index[b]) for a, b, _ in bodies.double],
+                           np.intp).reshape(-1, 2),
         ))  # fmt: skip
     return FrfProblem(
         tuple(standings), prior, np.maximum(robot.damping_ratio, 1e-3), damping_std(robot),
         tuple(steps),
         tolerance.damping_by_mode, tolerance.gravity_stiffness,
+    )  # fmt: skip
+
+
+def standing_at(
+    robot: FlexibleRobot, pose: FloatArray, responses: tuple[Response, ...]
+) -> Standing:
+    """The arm at a pose, its masses exact.
+
+    Args:
+        robot: flexible.
+        pose: (nv,) rad or m.
+        responses: measured there.
+    """
+    flex = robot.flexible_index
+    mass = robot.rigid.mass_matrix(pose)[np.ix_(flex, flex)]
+    return Standing(
+        mass, robot.gravity_stiffness(pose), np.zeros((0, *mass.shape)),
+        np.zeros((0, *mass.shape)), np.zeros((0, 2), dtype=np.intp),
+        robot.state(pose).stiffness, responses, np.ones(len(flex)),
     )  # fmt: skip
 
 
@@ -555,7 +574,7 @@ def _responses_of(
         if not one.known:
             for numbers, (name, size) in zip((gains, delays, widths), UNKNOWN_BLOW, strict=True):
                 numbers[index[f"{name}.{record.file}"]] = size
-        made = _made(robot, record.file, one.seen, pose, tolerance, index)
+        made = response_to(robot, record.file, one.seen, pose, tolerance, index)
         bends = np.zeros((len(index), len(one.omega)), dtype=complex)
         bends[[index[f"{name}.{record.file}"] for name in SAMPLING]] = one.bends
         found.append(replace(
@@ -596,16 +615,25 @@ def _response_of(
         quantity == "accelerance", table.force_frame, table.force_point, table.response_frame,
         table.response_point,
     )  # fmt: skip
-    made = _made(robot, record.file, seen, pose, tolerance, index)
+    made = response_to(robot, record.file, seen, pose, tolerance, index)
     return replace(made, omega=2.0 * np.pi * frequency[thin], measured=measured[thin],
                    scale=scale[thin], bends=np.zeros((len(index), len(thin))))  # fmt: skip
 
 
-def _made(
+def response_to(
     robot: FlexibleRobot, file: str, seen: Seen, pose: FloatArray, tolerance: Tolerance,
     index: dict[str, int],
 ) -> Response:  # fmt: skip
-    """A function without its lines."""
+    """A function without its lines.
+
+    Args:
+        robot: flexible.
+        file: the record's name.
+        seen: how the function is taken.
+        pose: (nv,) rad or m.
+        tolerance: how exact poses and places are.
+        index: number of each name that is never exact.
+    """
     way, along = seen.way, seen.along
     down = np.array(robot.mounting.gravity, dtype=float)
 
@@ -620,8 +648,10 @@ def _made(
         both: tuple[FloatArray, FloatArray], d: FloatArray, e: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """J_f^T d, J_s^T e and what turning in gravity reads: (w x g) . e."""
+        n = both[0].shape[1]
         turned = both[1][3:].T @ np.cross(down, e) if seen.tilts else 0.0
-        return both[0][:3].T @ d, both[1][:3].T @ e, turned * np.ones(both[0].shape[1])
+        sight = both[1][:3].T @ e if seen.joint is None else np.eye(n)[seen.joint]
+        return both[0][:3].T @ d, sight, turned * np.ones(n)
 
     nothing = np.zeros(3)
     here = stand(pose, nothing, nothing)
@@ -671,6 +701,20 @@ def _point(robot: FlexibleRobot, pose: FloatArray, frame: str | None,
     jacobian = robot.rigid.jacobian(pose, at)[:, robot.flexible_index]
     turn = robot.rigid.placement(pose, at)[1]
     return moved(jacobian, turn @ (np.array(point or (0.0, 0.0, 0.0)) + shift))
+
+
+def left_over(problem: FrfProblem, at: FloatArray) -> float:
+    """The residual of all functions over themselves, each function alike.
+
+    Args:
+        problem: the functions.
+        at: (p,) the numbers.
+    """
+    shares = []
+    for part, table in zip(problem.predict(at), problem.tables, strict=True):
+        left = np.linalg.norm(part.residual * table.scale[:, None])
+        shares.append(float(left / np.linalg.norm(table.measured)))
+    return float(np.sqrt(np.mean(np.square(shares))))
 
 
 def natural(

@@ -20,9 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from picchio.campaign.channels import AXES
+from picchio.campaign.channels import AXES, Channel
 from picchio.campaign.record import Record
-from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.core.arrays import BoolArray, ComplexArray, FloatArray
 from picchio.diagnosis.stiffness.prior import prior_of
 from picchio.robot.flexible_robot import FlexibleRobot
 
@@ -43,7 +43,9 @@ _WIDTH = 3.0  # samples that a measured blow must last
 _QUIET = 20  # samples, at least, that tell a channel's noise
 _LIKELY = 1.645  # standard deviations of what is known of a joint
 _REACH = 250.0  # Hz, to which a hammer's blow of 4 ms shakes an arm
-_POWER = {"accelerometer": 2, "acceleration": 2, "velocity": 1, "displacement": 0}
+POWER = {"accelerometer": 2, "acceleration": 2, "velocity": 1, "displacement": 0, "deflection": 0}
+"""Of s, from a motion to what a kind of channel reads."""
+_READ = [name for name in POWER if name != "deflection"]  # of a tap
 
 
 class Seen(NamedTuple):
@@ -56,6 +58,7 @@ class Seen(NamedTuple):
         tilts: whether the sensor also reads that it turns in gravity.
         force_frame, force_point: where the force acts; see `RecordTable`.
         response_frame, response_point: where the sensor is.
+        joint: number of the joint whose turn is read; None of a sensor in space.
     """
 
     way: FloatArray
@@ -66,6 +69,26 @@ class Seen(NamedTuple):
     force_point: tuple[float, float, float] | None = None
     response_frame: str | None = None
     response_point: tuple[float, float, float] | None = None
+    joint: int | None = None
+
+    @classmethod
+    def by(cls, channel: Channel, way: FloatArray, robot: FlexibleRobot, pose: FloatArray) -> Seen:
+        """What a channel of a record in time reads.
+
+        Args:
+            channel: of a kind in `POWER`.
+            way: (3,) unit, world, of the force.
+            robot: flexible.
+            pose: (nv,) rad or m.
+        """
+        power, subject = POWER[channel.kind.name], channel.subject or ""
+        if channel.kind.name == "deflection":
+            joint = robot.flexible_names.index(subject)
+            return cls(way, np.zeros(3), power, False, joint=joint)
+        axis, turns = np.eye(3)[AXES.index(channel.axis or "x")], False
+        if channel.kind.name == "accelerometer":
+            axis, turns = robot.frame_placement(pose, subject)[1] @ axis, True
+        return cls(way, axis, power, turns, response_frame=channel.subject)
 
 
 class Spectrum(NamedTuple):
@@ -88,6 +111,41 @@ class Spectrum(NamedTuple):
     scale: FloatArray
     known: bool
     bends: ComplexArray
+
+
+class Window:
+    """An exponential window on what a record reads, over the blow.
+
+    Args:
+        time: (count,) s, the blow from 0 on.
+        line: (m,) rad/s, in the Laplace plane.
+        blow: (m,) N s there.
+    """
+
+    def __init__(self, time: FloatArray, line: ComplexArray, blow: ComplexArray) -> None:
+        self._after = time >= 0.0
+        step = float(np.median(np.diff(time)))
+        self._kernel = np.exp(-np.outer(line, time[self._after])) * step / blow[:, None]
+
+    def over_blow(
+        self, values: FloatArray, noise: float, kept: BoolArray
+    ) -> tuple[ComplexArray, FloatArray]:
+        """The function of a channel and its standard deviation, both SI per newton.
+
+        Args:
+            values: (count,) SI; before the blow their mean is nothing.
+            noise: their standard deviation.
+            kept: (m,) lines.
+
+        Returns:
+            (kept,) each.
+        """
+        before = values[~self._after]
+        rest = float(np.mean(before)) if len(before) >= _QUIET else 0.0
+        value = (self._kernel @ (values - rest)[self._after])[kept]
+        size = noise * np.sqrt(np.sum(np.abs(self._kernel[kept]) ** 2, axis=1))
+        floor = _MODEL * np.hypot(np.abs(value), 0.01 * np.abs(value).max())
+        return value, np.hypot(size, floor)
 
 
 def spectra(robot: FlexibleRobot, record: Record, pose: FloatArray) -> list[Spectrum]:
@@ -114,10 +172,10 @@ def spectra(robot: FlexibleRobot, record: Record, pose: FloatArray) -> list[Spec
         raise record.source.error("a tap needs 64 samples or more from t = 0 on", channel="time")
     shift = _DECAY / length
     force = columns.pop("force", None)
-    used = [name for name in columns if record.channel(name).kind.name in _POWER]
+    used = [name for name in columns if record.channel(name).kind.name in _READ]
     if not used:
         raise record.source.error("no channel of this tap tells the stiffness",
-                                  choices=[f"{name}.<frame>.x" for name in _POWER])  # fmt: skip
+                                  choices=[f"{name}.<frame>.x" for name in _READ])  # fmt: skip
     highest = _SAMPLED / step
     _sampled_well(robot, record, pose, step)
     if force is not None:
@@ -135,13 +193,8 @@ def spectra(robot: FlexibleRobot, record: Record, pose: FloatArray) -> list[Spec
     spacing = max(2.0 / length, highest / _MOST_LINES)
     omega = 2.0 * np.pi * np.arange(spacing, highest, spacing)
     line = shift + 1j * omega
-    kernel = np.exp(-np.outer(line, time[after])) * step
-
-    def transformed(values: FloatArray) -> ComplexArray:
-        return np.asarray(kernel @ values[after])
-
     if force is not None:
-        blow = transformed(force)
+        blow = np.asarray(np.exp(-np.outer(line, time[after])) * step @ force[after])
         kept = np.abs(blow) > _SHAKEN * np.abs(blow).max()
         kept &= np.cumprod(kept).astype(bool)  # beyond the first gap nothing
         ends = time[np.flatnonzero(struck)[[0, -1]]] + np.array([-0.5, 0.5]) * step
@@ -152,26 +205,15 @@ def spectra(robot: FlexibleRobot, record: Record, pose: FloatArray) -> list[Spec
         ends = np.array([0.0, _USUAL[0]])
         bend = _USUAL[1] * _IMPULSE / _USUAL[0] ** 2
     bends = _BENDS * step**2 * bend * np.exp(-np.outer(ends, line)) / blow
+    window = Window(time, line, blow)
     found = []
     for name in used:
-        channel = record.channel(name)
         values = columns[name]
         quiet = values[~after] if (~after).sum() >= _QUIET else values[-max(len(values) // 10, 2) :]
-        noise = float(np.std(quiet))
-        if (~after).sum() >= _QUIET:
-            values = values - float(np.mean(quiet))
-        value = transformed(values) / blow
-        size = noise * step * np.sqrt(np.sum(np.exp(-2.0 * shift * time[after]))) / np.abs(blow)
-        axis = np.eye(3)[AXES.index(channel.axis or "x")]
-        own = channel.kind.name == "accelerometer"
-        if own:
-            axis = robot.frame_placement(pose, channel.subject or "")[1] @ axis
+        value, size = window.over_blow(values, float(np.std(quiet)), kept)
         assert record.direction is not None
-        seen = Seen(record.direction, axis, _POWER[channel.kind.name], own,
-                    response_frame=channel.subject)  # fmt: skip
-        floor = _MODEL * np.hypot(np.abs(value), 0.01 * np.abs(value[kept]).max())
-        size = np.hypot(size, floor)
-        found.append(Spectrum(seen, omega[kept], shift, value[kept], size[kept],
+        seen = Seen.by(record.channel(name), record.direction, robot, pose)
+        found.append(Spectrum(seen, omega[kept], shift, value, size,
                               force is not None, bends[:, kept]))  # fmt: skip
     return found
 

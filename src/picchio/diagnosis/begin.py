@@ -1,0 +1,82 @@
+"""Where an identification from records of blows begins, if stiffness is far from what is stated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from picchio.campaign.campaign import Campaign
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.search.far import far_from_stated
+from picchio.diagnosis.stiffness.blows import Rough
+from picchio.diagnosis.stiffness.mixed import with_stiffness
+from picchio.diagnosis.stiffness.prior import UNKNOWN
+from picchio.robot.flexible_robot import FlexibleRobot
+from picchio.robot.spread import Spread
+from picchio.robot.varied import robot_with
+
+# Logarithms: how far what is found from nothing may be off, at least.
+_STIFFNESS, _DAMPING = 0.05, 0.3
+_SURER = 3.0  # times the deviation that the lines' noise alone has
+
+
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """A robot with stiffness and damping found from nothing.
+
+    Attributes:
+        robot: with these values and how far they may be off.
+        found: the same over the stated.
+    """
+
+    robot: FlexibleRobot
+    found: Rough
+
+    def said(self, stated: FlexibleRobot) -> str:
+        """What was far from stated, in a sentence.
+
+        Args:
+            stated: the robot as its files have it.
+        """
+        factors = ", ".join(
+            f"{name} {factor:.3g}"
+            for name, factor in zip(stated.flexible_names, self.found.stiffness, strict=True)
+        )
+        return (
+            "The stated stiffness is far off, so the springs were looked for from nothing, and the "
+            f"records were fitted from there. About, over the stated: {factors}; damping "
+            f"{self.found.damping:.2g}. The stated values leave {100.0 * self.found.before:.3g} % "
+            f"of what was read over the blows, these {100.0 * self.found.left:.2g} %."
+        )
+
+
+def begin(robot: FlexibleRobot, campaign: Campaign) -> Begun | None:
+    """The robot with stiffness and damping as the records have them.
+
+    Args:
+        robot: as its files have it.
+        campaign: with records of blows.
+
+    Returns:
+        None where its stated stiffness will do.
+
+    Raises:
+        InputError: records that can't be predicted for this robot.
+    """
+    problem = Problem(robot, campaign)
+    found = far_from_stated(problem, problem.records)
+    if found is None:
+        return None
+    factor = {joint.name: found.damping for joint in robot.flexible_joints}
+    ratios = [
+        Spread("joint", joint.name, ("damping_ratio",), joint.damping_ratio * factor[joint.name],
+               _DAMPING, True)
+        for joint in robot.flexible_joints
+    ]  # fmt: skip
+    damped = replace(
+        robot_with(robot, [(one, one.value) for one in ratios]),
+        spreads=dict(robot.spreads) | {one.name: one for one in ratios},
+    )
+    size = np.clip(_SURER * found.stiffness_std, _STIFFNESS, UNKNOWN)
+    return Begun(with_stiffness(damped, np.log(found.stiffness), np.diag(size**2)), found)

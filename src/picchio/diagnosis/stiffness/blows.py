@@ -1,0 +1,145 @@
+"""Where a fit of percussion records may begin if hardly anything is known of the stiffness.
+
+A fit in time that begins far off ends in the nearest basin: a cycle too many or too few. What a
+record reads over its blows, along a line in the Laplace plane (see `taps`), is a function of the
+arm alone; matched by modes first it tells springs and damping from anywhere within the prior.
+Masses and places are taken as stated, which is near enough to begin with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from picchio.campaign.channels import Channel
+from picchio.campaign.tables import Tolerance
+from picchio.core.arrays import FloatArray
+from picchio.diagnosis.stiffness.fit import climb
+from picchio.diagnosis.stiffness.modes import starts
+from picchio.diagnosis.stiffness.prior import UNKNOWN, Prior
+from picchio.diagnosis.stiffness.responses import (
+    FrfProblem,
+    Response,
+    left_over,
+    response_to,
+    standing_at,
+)
+from picchio.diagnosis.stiffness.taps import POWER, Seen, Window
+from picchio.robot.flexible_robot import FlexibleRobot
+
+_DECAY = 6.0  # of the window, over the record's length
+_SAMPLED, _HIGHEST = 0.4, 150.0  # highest line: over the sample rate; Hz
+_MOST_LINES = 240
+_SHAKEN = 0.1  # least force over the largest, of a line
+_FINER = 16  # steps of a blow's transform in one of the record's
+_TAILS = 6.0  # degrees of freedom of the lines' errors
+# How hard all blows are, over what is stated: the one number beside springs and damping.
+_INDEX, _HARD = {"force": 0}, 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Blown:
+    """A record of blows whose force is known.
+
+    Attributes:
+        name: of the record.
+        pose: (nv,) rad or m.
+        way: (3,) unit, world, of the force.
+        time: (count,) s.
+        force: N, at times in s.
+        channels: what is read, with (count,) SI and the standard deviation of its noise.
+    """
+
+    name: str
+    pose: FloatArray
+    way: FloatArray
+    time: FloatArray
+    force: Callable[[FloatArray], FloatArray]
+    channels: Sequence[tuple[Channel, FloatArray, float]]
+
+
+@dataclass(frozen=True)
+class Rough:
+    """Springs and damping as records of blows have them, everything else as stated.
+
+    Attributes:
+        stiffness: (n,) over the stated.
+        stiffness_std: (n,) of the logarithms; of the lines' noise alone.
+        damping: of all ratios, over the stated.
+        left: residual over the functions.
+        before: the same with the stated values.
+    """
+
+    stiffness: FloatArray
+    stiffness_std: FloatArray
+    damping: float
+    left: float
+    before: float
+
+
+def rough(robot: FlexibleRobot, records: Sequence[Blown]) -> Rough | None:
+    """Springs and damping from nothing.
+
+    Args:
+        robot: flexible.
+        records: of blows.
+
+    Returns:
+        None where no channel tells a motion.
+    """
+    by_pose: dict[bytes, list[Response]] = {}
+    poses: dict[bytes, FloatArray] = {}
+    for record in records:
+        poses.setdefault(record.pose.tobytes(), record.pose)
+        by_pose.setdefault(record.pose.tobytes(), []).extend(_functions(robot, record))
+    n = len(robot.flexible_index)
+    standings = tuple(
+        replace(standing_at(robot, pose, tuple(by_pose[key])), masses=np.zeros((1, n, n)))
+        for key, pose in poses.items()
+        if by_pose[key]
+    )
+    if not standings:
+        return None
+    prior = Prior(UNKNOWN**2 * np.eye(n), (False,) * n)
+    ratio = np.maximum(robot.damping_ratio, 1e-3)
+    problem = FrfProblem(standings, prior, ratio, np.full(n, UNKNOWN), tuple(_INDEX), 0.0, 0.0)
+    found = max(
+        (climb(problem, at, _TAILS) for at in starts(problem)), key=lambda one: one.evidence
+    )
+    damping, size = found.mean[n : 2 * n], found.std[n : 2 * n]
+    return Rough(
+        np.exp(found.mean[:n]), found.std[:n], float(np.exp(np.average(damping, weights=size**-2))),
+        left_over(problem, found.mean), left_over(problem, np.zeros(2 * n + 1)),
+    )  # fmt: skip
+
+
+def _functions(robot: FlexibleRobot, record: Blown) -> list[Response]:
+    """What each channel reads over the blows."""
+    time = record.time
+    step, length = float(np.median(np.diff(time))), float(time[-1])
+    shift, highest = _DECAY / length, min(_SAMPLED / step, _HIGHEST)
+    spacing = max(2.0 / length, highest / _MOST_LINES)
+    omega = 2.0 * np.pi * np.arange(spacing, highest, spacing)
+    line = shift + 1j * omega
+    fine = step / _FINER
+    within = np.arange(0.5 * fine, length, fine)
+    force = record.force(within)
+    struck = force != 0.0
+    blow = fine * (np.exp(-np.outer(line, within[struck])) @ force[struck])
+    if not len(line) or not np.abs(blow).max() > 0.0:
+        return []
+    kept = np.abs(blow) > _SHAKEN * np.abs(blow).max()
+    window, found = Window(time, line, blow), []
+    for channel, values, noise in record.channels:
+        if channel.kind.name not in POWER:
+            continue
+        seen = Seen.by(channel, record.way, robot, record.pose)
+        made = response_to(robot, record.name, seen, record.pose, Tolerance.zero(), _INDEX)
+        value, size = window.over_blow(values, noise, kept)
+        if np.abs(value).max() > 0.0:
+            found.append(replace(made, omega=omega[kept], measured=value, scale=size, shift=shift,
+                                 gains=np.array([_HARD]),
+                                 bends=np.zeros((1, int(kept.sum())))))  # fmt: skip
+    return found
