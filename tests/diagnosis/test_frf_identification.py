@@ -215,3 +215,11 @@ def test_bad_functions_are_named(frfs):
     world.records[0] = (columns, {**table, "response_frame": "hand"})
     with pytest.raises(picchio.InputError, match="no such frame"):
         picchio.identify(world.robot, blind_stiffness.frf_campaign(world))
+
+
+@pytest.mark.slow
+def test_a_step_to_masses_that_no_arm_has_is_shortened(frfs):
+    """Met blind: it ended with a matrix that is not positive definite."""
+    world = frfs.draw(7, 92075)
+    found = picchio.identify(world.robot, blind_stiffness.frf_campaign(world))
+    assert found.joints[0].stiffness.told

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -488,8 +489,10 @@ def _newton(
         # No spring changes by more than a factor of e at once.
         share = min(1.0, 1.0 / max(float(np.abs(step[: problem.springs]).max()), 1e-300))
         while share > 1e-4:
-            other = _State(problem, state.at + share * step, tail, keep, state)
-            tried = other.weigh(size)
+            tried = math.inf
+            with suppress(np.linalg.LinAlgError):  # masses that no arm has: too long a step
+                other = _State(problem, state.at + share * step, tail, keep, state)
+                tried = other.weigh(size)
             if tried < score - 1e-4 * share * gain:
                 break
             share *= 0.4

@@ -36,6 +36,7 @@ from picchio.robot.joint import is_drive
 _TAILS = 6.0  # degrees of freedom of the lines' errors
 _FAR = 0.3  # residual over the functions beyond which the answer is doubted
 _LOOKS, _BASINS, _STRIDE, _GAIN = 3, 4, 0.12, 2.0  # at other basins; ln of stiffness; ln evidence
+_WEAK, _MOVED = 0.04, 1.0  # deviation and move of the logarithm
 _STRAY, _INCREDIBLE = 1.5, 3.0  # standard deviations before the tests
 _DECISIVE = 5.0  # in log evidence, for a convention of the damping
 _READ = ("m/N", "m/s/N", "m/s²/N")
@@ -314,6 +315,15 @@ def _elsewhere(problem: FrfProblem, fit: Fit) -> Fit | None:
             other = climb(problem, np.concatenate([found.mean, fit.mean[2 * n :]]), fit.tails)
             if other.evidence > fit.evidence + _GAIN:
                 return other
+    # Masses and places may have followed a false mode: with them free, what is told but not well.
+    for k in np.flatnonzero((fit.std[:n] > _WEAK) & (fit.std[:n] < 0.5 * problem.prior.std)):
+        for move in (-_MOVED, _MOVED):
+            at = fit.mean.copy()
+            at[k] += move
+            if abs(at[k]) < 2.5 * problem.prior.std[k]:
+                other = climb(problem, at, fit.tails)
+                if other.evidence > fit.evidence + _GAIN:
+                    return other
     return None
 
 
