@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from picchio.robot.varied import robot_with
 
 # Logarithms: how far what is found from nothing may be off, at least.
 _STIFFNESS, _DAMPING = 0.05, 0.3
+_APART = 2.0  # times that, beyond which a fit in time is in another basin
 _SURER = 3.0  # times the deviation that the lines' noise alone has
 
 
@@ -32,6 +34,17 @@ class Begun:
 
     robot: FlexibleRobot
     found: Rough
+
+    def contradicts(self, joint: str, stiffness: float) -> bool:
+        """Whether a stiffness is farther from what was found than that may be off.
+
+        Args:
+            joint: its name.
+            stiffness: N m/rad or N/m.
+        """
+        known = self.robot.spreads[f"stiffness.{joint}"]
+        off = math.log(max(stiffness, 1e-300) / float(known.value))  # type: ignore[arg-type]
+        return abs(off) > _APART * known.size
 
     def said(self, stated: FlexibleRobot) -> str:
         """What was far from stated, in a sentence.

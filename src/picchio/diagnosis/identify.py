@@ -146,15 +146,21 @@ class ByDiagnosis(Method):
 
 def _from_nothing(robot: FlexibleRobot, told: Diagnosed, begun: Begun) -> Diagnosed:
     """The answer of a diagnosis that began elsewhere than at the stated values."""
-    stands = told.diagnosis.verdict != "unexplained"
-    why = "far from stated: found from nothing, then fitted to the records" if stands else (
-        "fitted from nothing, but more than noise and tolerance is left: it may make up for that"
-    )  # fmt: skip
-    joints = tuple(
-        replace(joint, stiffness=replace(joint.stiffness, told=stands, why=why))
-        if joint.stiffness.told else joint for joint in told.joints
-    )  # fmt: skip
-    return replace(told, robot=robot, joints=joints, begun=begun)
+    explained, joints = told.diagnosis.verdict != "unexplained", []
+    for joint in told.joints:
+        one = joint.stiffness
+        if one.told:
+            stands, why = True, "far from stated: found from nothing, then fitted to the records"
+            if not explained:
+                stands, why = (
+                    False,
+                    "fitted from nothing, but more than noise and tolerance is left",
+                )
+            elif begun.contradicts(joint.name, one.value):
+                stands, why = False, "the fit in time and the springs found from nothing disagree"
+            one = replace(one, told=stands, why=why)
+        joints.append(replace(joint, stiffness=one))
+    return replace(told, robot=robot, joints=tuple(joints), begun=begun)
 
 
 @cache

@@ -3,11 +3,12 @@
 A fit in time that begins far off ends in the nearest basin: a cycle too many or too few. What a
 record reads over its blows, along a line in the Laplace plane (see `taps`), is a function of the
 arm alone; matched by modes first it tells springs and damping from anywhere within the prior.
-Masses and places are taken as stated, which is near enough to begin with.
+Masses and places are taken as stated first, which is near enough to begin with.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -17,14 +18,15 @@ from picchio.campaign.channels import Channel
 from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.stiffness.fit import climb
+from picchio.diagnosis.stiffness.frf import settled_elsewhere
 from picchio.diagnosis.stiffness.modes import starts
 from picchio.diagnosis.stiffness.prior import UNKNOWN, Prior
 from picchio.diagnosis.stiffness.responses import (
-    FrfProblem,
     Response,
+    assembled,
     left_over,
+    never_exact,
     response_to,
-    standing_at,
 )
 from picchio.diagnosis.stiffness.taps import POWER, Seen, Window
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -35,8 +37,8 @@ _MOST_LINES = 240
 _SHAKEN = 0.1  # least force over the largest, of a line
 _FINER = 16  # steps of a blow's transform in one of the record's
 _TAILS = 6.0  # degrees of freedom of the lines' errors
-# How hard all blows are, over what is stated: the one number beside springs and damping.
-_INDEX, _HARD = {"force": 0}, 0.1
+# How hard all blows are, and how far that may be off.
+_HARD, _HARDER = "force", 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,43 +81,60 @@ class Rough:
     before: float
 
 
-def rough(robot: FlexibleRobot, records: Sequence[Blown]) -> Rough | None:
+def rough(
+    robot: FlexibleRobot,
+    records: Sequence[Blown],
+    tolerance: Tolerance | None = None,
+    begin: Rough | None = None,
+) -> Rough | None:
     """Springs and damping from nothing.
 
     Args:
         robot: flexible.
         records: of blows.
+        tolerance: how exact masses, poses and places are; None to take them as stated, which is
+            many times faster.
+        begin: what was found so, to begin with; None to match modes first.
 
     Returns:
         None where no channel tells a motion.
     """
-    by_pose: dict[bytes, list[Response]] = {}
-    poses: dict[bytes, FloatArray] = {}
+    exact = tolerance or Tolerance.zero()
+    names = [*never_exact(robot, exact, [record.name for record in records]), _HARD]
+    index = {name: k for k, name in enumerate(names)}
+    stands: dict[bytes, tuple[FloatArray, tuple[Response, ...]]] = {}
     for record in records:
-        poses.setdefault(record.pose.tobytes(), record.pose)
-        by_pose.setdefault(record.pose.tobytes(), []).extend(_functions(robot, record))
-    n = len(robot.flexible_index)
-    standings = tuple(
-        replace(standing_at(robot, pose, tuple(by_pose[key])), masses=np.zeros((1, n, n)))
-        for key, pose in poses.items()
-        if by_pose[key]
-    )
-    if not standings:
+        key = record.pose.tobytes()
+        before = stands.get(key, (record.pose, ()))[1]
+        stands[key] = record.pose, (*before, *_functions(robot, record, exact, index))
+    if not any(own for _, own in stands.values()):
         return None
+    n = len(robot.flexible_index)
     prior = Prior(UNKNOWN**2 * np.eye(n), (False,) * n)
-    ratio = np.maximum(robot.damping_ratio, 1e-3)
-    problem = FrfProblem(standings, prior, ratio, np.full(n, UNKNOWN), tuple(_INDEX), 0.0, 0.0)
-    found = max(
-        (climb(problem, at, _TAILS) for at in starts(problem)), key=lambda one: one.evidence
+    problem = replace(
+        assembled(robot, [one for one in stands.values() if one[1]], exact, prior, index),
+        damping_std=np.full(n, UNKNOWN),
     )
+    stated = np.zeros(len(problem.precision))
+    if begin is None:
+        places = starts(problem)
+    else:
+        at = stated.copy()
+        at[:n], at[n : 2 * n] = np.log(begin.stiffness), math.log(begin.damping)
+        places = [at]
+    found = max((climb(problem, at, _TAILS) for at in places), key=lambda one: one.evidence)
+    if begin is not None:
+        found = settled_elsewhere(problem, found)
     damping, size = found.mean[n : 2 * n], found.std[n : 2 * n]
     return Rough(
         np.exp(found.mean[:n]), found.std[:n], float(np.exp(np.average(damping, weights=size**-2))),
-        left_over(problem, found.mean), left_over(problem, np.zeros(2 * n + 1)),
+        left_over(problem, found.mean), left_over(problem, stated),
     )  # fmt: skip
 
 
-def _functions(robot: FlexibleRobot, record: Blown) -> list[Response]:
+def _functions(
+    robot: FlexibleRobot, record: Blown, tolerance: Tolerance, index: dict[str, int]
+) -> list[Response]:
     """What each channel reads over the blows."""
     time = record.time
     step, length = float(np.median(np.diff(time))), float(time[-1])
@@ -136,10 +155,12 @@ def _functions(robot: FlexibleRobot, record: Blown) -> list[Response]:
         if channel.kind.name not in POWER:
             continue
         seen = Seen.by(channel, record.way, robot, record.pose)
-        made = response_to(robot, record.name, seen, record.pose, Tolerance.zero(), _INDEX)
+        made = response_to(robot, record.name, seen, record.pose, tolerance, index)
         value, size = window.over_blow(values, noise, kept)
+        gains = made.gains.copy()
+        gains[index[_HARD]] = _HARDER
         if np.abs(value).max() > 0.0:
+            bends = np.zeros((len(index), len(value)))
             found.append(replace(made, omega=omega[kept], measured=value, scale=size, shift=shift,
-                                 gains=np.array([_HARD]),
-                                 bends=np.zeros((1, int(kept.sum())))))  # fmt: skip
+                                 gains=gains, bends=bends))  # fmt: skip
     return found

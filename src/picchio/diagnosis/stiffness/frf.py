@@ -225,7 +225,7 @@ def identify_frf(
         (climb(plain, at[: problem.springs], _TAILS) for at in begin),
         key=lambda found: found.evidence,
     )  # fmt: skip
-    bare = _settled(plain, bare)
+    bare = settled_elsewhere(plain, bare)
     other = climb(problem.bare(convention="joint"), bare.mean, _TAILS)
     say("frequency responses: with all that is never exact")
     # Which convention holds shows only where modes may differ from it, as they always do a little.
@@ -233,7 +233,9 @@ def identify_frf(
     joint = _whole(replace(problem, convention="joint"), other.mean)
     gain = modal.evidence - joint.evidence
     convention: Damping = "modal" if gain >= -_DECISIVE else "joint"
-    fit = _settled(*((modal.problem, modal) if convention == "modal" else (joint.problem, joint)))
+    fit = settled_elsewhere(
+        *((modal.problem, modal) if convention == "modal" else (joint.problem, joint))
+    )
     if convention == "modal":
         modal = fit
     covariance = fit.covariance[: problem.springs, : problem.springs]
@@ -278,8 +280,13 @@ def _by_modes(fit: Fit) -> FloatArray:
     return found
 
 
-def _settled(problem: FrfProblem, fit: Fit) -> Fit:
-    """The fit, or a better one far from it."""
+def settled_elsewhere(problem: FrfProblem, fit: Fit) -> Fit:
+    """The fit, or a better one far from it.
+
+    Args:
+        problem: what is fitted.
+        fit: its best so far.
+    """
     for _ in range(_LOOKS):
         better = _elsewhere(problem, fit)
         if better is None:
@@ -316,7 +323,8 @@ def _elsewhere(problem: FrfProblem, fit: Fit) -> Fit | None:
             if other.evidence > fit.evidence + _GAIN:
                 return other
     # Masses and places may have followed a false mode: with them free, what is told but not well.
-    for k in np.flatnonzero((fit.std[:n] > _WEAK) & (fit.std[:n] < 0.5 * problem.prior.std)):
+    weak = (fit.std[:n] > _WEAK) & (fit.std[:n] < 0.5 * problem.prior.std)
+    for k in np.flatnonzero(weak).tolist():
         for move in (-_MOVED, _MOVED):
             at = fit.mean.copy()
             at[k] += move

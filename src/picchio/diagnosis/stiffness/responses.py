@@ -429,9 +429,31 @@ def make_problem(
     Raises:
         InputError: a frame that is not there; a function that cannot be one.
     """
-    steps: dict[str, None] = {}
-    bodies = _bodies(robot, tolerance)
-    names = [name for name, _ in bodies.single]
+    names = never_exact(robot, tolerance, [record.file for record in records])
+    for record in records:
+        if record.test == "tap":
+            names += [f"{name}.{record.file}" for name in SAMPLING]
+            if "force" not in record.channels:
+                names += [f"{name}.{record.file}" for name, _ in UNKNOWN_BLOW]
+    index = {name: k for k, name in enumerate(names)}
+    poses: dict[tuple[float, ...], list[Response]] = {}
+    for record in records:
+        pose = pose_of(robot, record)
+        own = _responses_of(robot, record, pose, tolerance, index)
+        poses.setdefault(tuple(pose.tolist()), []).extend(own)
+    stands = [(np.array(pose), tuple(own)) for pose, own in poses.items()]
+    return assembled(robot, stands, tolerance, prior, index)
+
+
+def never_exact(robot: FlexibleRobot, tolerance: Tolerance, files: Sequence[str]) -> list[str]:
+    """The names of the numbers that are never exact of any function.
+
+    Args:
+        robot: flexible.
+        tolerance: how exact masses, poses and places are.
+        files: names of the records, each with a direction of its own.
+    """
+    names = [name for name, _ in _bodies(robot, tolerance).single]
     names += [f"pose.{name}" for name in robot.joint_names if tolerance.pose > 0.0]
     names += [f"tool_point.{axis}" for axis in "xyz" if tolerance.tool_point > 0.0]
     names += [f"sensor_position.{axis}" for axis in "xyz" if tolerance.sensor_position > 0.0]
@@ -439,23 +461,29 @@ def make_problem(
     names += ["sensor_gain"] if tolerance.sensor_gain > 0.0 else []
     names += ["gravity_stiffness"] if tolerance.gravity_stiffness > 0.0 else []
     if tolerance.direction > 0.0:
-        names += [f"direction.{record.file}.{axis}" for record in records for axis in "xyz"]
-    for record in records:
-        if record.test == "tap":
-            names += [f"{name}.{record.file}" for name in SAMPLING]
-            if "force" not in record.channels:
-                names += [f"{name}.{record.file}" for name, _ in UNKNOWN_BLOW]
-    steps = dict.fromkeys(names)
-    index = {name: k for k, name in enumerate(steps)}
-    poses: dict[tuple[float, ...], list[Record]] = {}
-    for record in records:
-        pose = pose_of(robot, record)
-        poses.setdefault(tuple(pose.tolist()), []).append(record)
-    standings = []
-    for key, own in poses.items():
-        pose = np.array(key)
-        flex = robot.flexible_index
-        square = np.ix_(flex, flex)
+        names += [f"direction.{file}.{axis}" for file in files for axis in "xyz"]
+    return names
+
+
+def assembled(
+    robot: FlexibleRobot,
+    stands: Sequence[tuple[FloatArray, tuple[Response, ...]]],
+    tolerance: Tolerance,
+    prior: Prior,
+    index: Mapping[str, int],
+) -> FrfProblem:
+    """Functions by pose, and what masses and poses that are off do to the arm there.
+
+    Args:
+        robot: flexible.
+        stands: (nv,) rad or m each, and what was measured there.
+        tolerance: how exact masses and poses are.
+        prior: of the stiffness.
+        index: number of each name that is never exact.
+    """
+    bodies, flex = _bodies(robot, tolerance), robot.flexible_index
+    square, standings = np.ix_(flex, flex), []
+    for pose, responses in stands:
         mass = robot.rigid.mass_matrix(pose)[square]
         masses, products = np.zeros((len(index), *mass.shape)), []
         for name, added in bodies.single:
@@ -467,39 +495,15 @@ def make_problem(
                 other = pose + _TURN * np.eye(len(pose))[k]
                 change = robot.rigid.mass_matrix(other)[square] - mass
                 masses[index[f"pose.{joint}"]] = tolerance.pose / _TURN * change
-        responses = tuple(
-            response for one in own
-            for response in _responses_of(robot, one, pose, tolerance, index)
-        )  # fmt: skip
-        standings.append(replace(
-            standing_at(robot, pose, responses), masses=masses,
-            products=np.array(products).reshape(-1, *mass.shape),
-            pairs=np.array([(index[a], index[b]) for a, b, _ in bodies.double],
-                           np.intp).reshape(-1, 2),
+        standings.append(Standing(
+            mass, robot.gravity_stiffness(pose), masses,
+            np.array(products).reshape(-1, *mass.shape),
+            np.array([(index[a], index[b]) for a, b, _ in bodies.double], np.intp).reshape(-1, 2),
+            robot.state(pose).stiffness, responses, np.ones(len(flex)),
         ))  # fmt: skip
     return FrfProblem(
         tuple(standings), prior, np.maximum(robot.damping_ratio, 1e-3), damping_std(robot),
-        tuple(steps),
-        tolerance.damping_by_mode, tolerance.gravity_stiffness,
-    )  # fmt: skip
-
-
-def standing_at(
-    robot: FlexibleRobot, pose: FloatArray, responses: tuple[Response, ...]
-) -> Standing:
-    """The arm at a pose, its masses exact.
-
-    Args:
-        robot: flexible.
-        pose: (nv,) rad or m.
-        responses: measured there.
-    """
-    flex = robot.flexible_index
-    mass = robot.rigid.mass_matrix(pose)[np.ix_(flex, flex)]
-    return Standing(
-        mass, robot.gravity_stiffness(pose), np.zeros((0, *mass.shape)),
-        np.zeros((0, *mass.shape)), np.zeros((0, 2), dtype=np.intp),
-        robot.state(pose).stiffness, responses, np.ones(len(flex)),
+        tuple(index), tolerance.damping_by_mode, tolerance.gravity_stiffness,
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.attempt import attempt
+from picchio.diagnosis.percussion.criteria.remainder import allowed
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, signal_power
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
@@ -30,6 +31,7 @@ from picchio.model.effects.structure.modal_damping import ModalDamping
 _MUCH = 0.02
 # What springs and damping alone leave of the functions, at most, and of what is left without.
 _LITTLE, _LESS = 0.35, 0.4
+_HALF = 0.5  # likewise, while masses and places are taken as stated
 # Logarithms: a joint that is off by this is found by itself, one that is off by more is not.
 _OFF, _FAR = math.log(1.2), math.log(1.6)
 _SURE = 0.15  # standard deviation of the logarithm
@@ -84,11 +86,20 @@ def far_from_stated(problem: Problem, records: Sequence[MeasuredRecord]) -> Roug
     Returns:
         None where they are not, or where springs and damping explain little.
     """
-    found = rough(problem.robot, list(_blown(problem, records)))
+    blown, tolerance = list(_blown(problem, records)), problem.campaign.tolerance
+    found = rough(problem.robot, blown)
+    if found is None or not _is_far(found) or found.left > _HALF * found.before:
+        return None
+    if allowed(problem):
+        found = rough(problem.robot, blown, tolerance, found)
     if found is None or found.left > min(_LITTLE, _LESS * found.before):
         return None
+    return found if _is_far(found) else None
+
+
+def _is_far(found: Rough) -> bool:
     away = _away(found)
-    return found if (away > _OFF).sum() > 1 or away.max() > _FAR else None
+    return bool((away > _OFF).sum() > 1 or away.max() > _FAR)
 
 
 def _away(found: Rough) -> FloatArray:
