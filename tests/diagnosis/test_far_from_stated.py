@@ -82,6 +82,9 @@ def test_three_stiffnesses_and_the_damping_are_identified(worlds, sensors, tmp_p
         assert joint.stiffness.value == pytest.approx(factor * own.stiffness, rel=0.01)
         assert joint.damping_ratio.value == pytest.approx(damping * own.damping_ratio, rel=0.01)
     assert found.robot is not found.begun.robot and "from nothing" in found.remarks[0]
+    told, left = (found.to_dict()[key] for key in ("from_nothing", "residual"))
+    assert left["before"] > 0.3 > 0.02 > left["after"]
+    assert list(told["stiffness_over_stated"].values()) == pytest.approx(stiffness, rel=0.02)
     # What is written is what later work begins with: another campaign finds nothing wrong.
     sidecar = tmp_path / "flex.toml"
     sidecar.write_text(found.sidecar_text())

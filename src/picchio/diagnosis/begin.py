@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from picchio.campaign.campaign import Campaign
-from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.conclude.holdout import holdout_gain
+from picchio.diagnosis.percussion.data.problem import Problem, held_out
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.far import far_from_stated
 from picchio.diagnosis.stiffness.blows import Rough
 from picchio.diagnosis.stiffness.mixed import with_stiffness
@@ -30,10 +33,12 @@ class Begun:
     Attributes:
         robot: with these values and how far they may be off.
         found: the same over the stated.
+        nrmse: what the stated values leave of the records that a diagnosis holds out.
     """
 
     robot: FlexibleRobot
     found: Rough
+    nrmse: float
 
     def contradicts(self, joint: str, stiffness: float) -> bool:
         """Whether a stiffness is farther from what was found than that may be off.
@@ -45,6 +50,19 @@ class Begun:
         known = self.robot.spreads[f"stiffness.{joint}"]
         off = math.log(max(stiffness, 1e-300) / float(known.value))  # type: ignore[arg-type]
         return abs(off) > _APART * known.size
+
+    def to_dict(self, stated: FlexibleRobot) -> dict[str, Any]:
+        """What was found over the stated values, for JSON.
+
+        Args:
+            stated: the robot as its files have it.
+        """
+        names, found = stated.flexible_names, self.found
+        return {
+            "stiffness_over_stated": dict(zip(names, found.stiffness.tolist(), strict=True)),
+            "damping_over_stated": found.damping,
+            "left": {"before": found.before, "after": found.left},
+        }
 
     def said(self, stated: FlexibleRobot) -> str:
         """What was far from stated, in a sentence.
@@ -92,4 +110,6 @@ def begin(robot: FlexibleRobot, campaign: Campaign) -> Begun | None:
         spreads=dict(robot.spreads) | {one.name: one for one in ratios},
     )
     size = np.clip(_SURER * found.stiffness_std, _STIFFNESS, UNKNOWN)
-    return Begun(with_stiffness(damped, np.log(found.stiffness), np.diag(size**2)), found)
+    stated = Hypothesis.baseline(robot, campaign.tolerance)
+    nrmse = holdout_gain(problem, stated, stated, *held_out(problem)[0]).baseline_nrmse
+    return Begun(with_stiffness(damped, np.log(found.stiffness), np.diag(size**2)), found, nrmse)

@@ -58,7 +58,11 @@ class Diagnosed(Identification):
         """How many causes were found."""
         count = len(self.diagnosis.causes)
         said = f"{count} cause{'' if count == 1 else 's'} found."
-        return (said,) if self.begun is None else (self.begun.said(self.robot), said)
+        if self.begun is None:
+            return (said,)
+        if self.diagnosis.verdict == "nothing-wrong":
+            said = "From there the diagnosis finds nothing wrong."
+        return self.begun.said(self.robot), said
 
     @property
     def doubt(self) -> str:
@@ -106,10 +110,11 @@ class Diagnosed(Identification):
             "joints": [asdict(joint) for joint in self.joints],
             "also": [c.to_dict() for c in self.diagnosis.causes if not _is_of(c, "stiffness")],
             "residual": {
-                "before": gain.baseline_nrmse if gain else None,
+                "before": self.begun.nrmse if self.begun else gain.baseline_nrmse if gain else None,
                 "after": gain.extended_nrmse if gain else None,
                 "held_out": list(gain.held_out_records) if gain else [],
             },
+            "from_nothing": None if self.begun is None else self.begun.to_dict(self.robot),
         }
 
     def _headline(self) -> str:
@@ -159,7 +164,12 @@ def _from_nothing(robot: FlexibleRobot, told: Diagnosed, begun: Begun) -> Diagno
             elif begun.contradicts(joint.name, one.value):
                 stands, why = False, "the fit in time and the springs found from nothing disagree"
             one = replace(one, told=stands, why=why)
-        joints.append(replace(joint, stiffness=one))
+        ratio = joint.damping_ratio
+        if ratio.told:
+            ratio = replace(
+                ratio, told=explained, why="one factor for all modes, as for the springs"
+            )
+        joints.append(replace(joint, stiffness=one, damping_ratio=ratio))
     return replace(told, robot=robot, joints=tuple(joints), begun=begun)
 
 
