@@ -69,7 +69,7 @@ class Diagnosed(Identification):
         """That the diagnosis has an answer, and it is not one."""
         verdict = self.diagnosis.verdict
         partly = verdict in ("partial", "ambiguous")
-        partly = partly or (self.begun is not None and verdict == "unexplained")
+        partly |= self.begun is not None and verdict == "unexplained"
         return f"the diagnosis is {verdict!r}: look at picchio diagnose, too" if partly else ""
 
     def sidecar_text(self) -> str:
@@ -151,7 +151,7 @@ class ByDiagnosis(Method):
 
 def _from_nothing(robot: FlexibleRobot, told: Diagnosed, begun: Begun) -> Diagnosed:
     """The answer of a diagnosis that began elsewhere than at the stated values."""
-    explained, joints = told.diagnosis.verdict != "unexplained", []
+    explained, joints = told.diagnosis.verdict in ("nothing-wrong", "named"), []
     for joint in told.joints:
         one = joint.stiffness
         if one.told:

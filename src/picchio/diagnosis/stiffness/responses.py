@@ -480,6 +480,9 @@ def assembled(
         tolerance: how exact masses and poses are.
         prior: of the stiffness.
         index: number of each name that is never exact.
+
+    Returns:
+        the problem, its damping from the robot's files.
     """
     bodies, flex = _bodies(robot, tolerance), robot.flexible_index
     square, standings = np.ix_(flex, flex), []

@@ -36,7 +36,7 @@ _MOVES = 3
 _TRUSTED = 0.5
 _SETTLED = 0.002
 # Chi-square per sample above which more is wrong than what is not exact.
-_ELSE = 3.0
+ELSE = 3.0
 # What is not exact explains little where it leaves more than this share of chi-square.
 _LITTLE = 0.5
 # How far numbers are moved towards where slopes have them, until that is for the better.
@@ -160,6 +160,7 @@ def settled(
     rounds: int = _ROUNDS,
     *,
     anew: bool = True,
+    patient: bool = False,
 ) -> Fit:
     """A hypothesis fitted together with what is not exact, linearised where it comes to stand.
 
@@ -174,7 +175,9 @@ def settled(
         rounds: how often slopes are taken at most, of the first stretch and of all.
         anew: begin where everything is as stated; else where it is taken to be now. Without the
             right cause it was pulled to wherever it made up for that.
+        patient: go on however much is left on the way: nothing else is wrong.
     """
+    else_wrong = math.inf if patient else ELSE
     if not any(inexact(problem, problem.records[0], problem.campaign.tolerance)):
         return start
     if anew:
@@ -182,9 +185,9 @@ def settled(
         problem.idle = frozenset()  # a cause may set free what stood still without it
     here = start.hypothesis
     for end in _KINKED if is_nonsmooth(here) else (_SHORT, None):
-        here = _settled_up_to(problem, here, records, end, rounds)
+        here = _settled_up_to(problem, here, records, end, rounds, else_wrong)
     found = fit(problem, here, records, None, with_jacobian=True)
-    if found.chi_square > _ELSE * found.samples:
+    if found.chi_square > else_wrong * found.samples:
         return _unless_little(problem, found)
     return found
 
@@ -195,6 +198,7 @@ def _settled_up_to(
     records: Sequence[MeasuredRecord],
     end: float | None,
     rounds: int,
+    else_wrong: float,
 ) -> Hypothesis:
     """As `settled`, of a first part of the records; slopes serve as long as they lead on."""
     before = math.inf
@@ -203,7 +207,7 @@ def _settled_up_to(
         moves = 0
         while moves < _MOVES:
             found = fit(problem, here, records, end, iterations=4)
-            if found.chi_square > _ELSE * max(found.samples, 1):
+            if found.chi_square > else_wrong * max(found.samples, 1):
                 return _at_stated(problem, found, end)
             here, cost, kept = _moved_on(problem, here, found)
             little = before - cost < _SETTLED * cost
