@@ -85,9 +85,11 @@ class Diagnosed(Identification):
         """
         import tomlkit
 
-        begun = self.begun is not None
-        robot = self.begun.robot if self.begun is not None else self.robot
-        table, remarks = _sidecar(robot, self.diagnosis, self.source, self.tolerance, begun)
+        robot, only = self.robot, None
+        if self.begun is not None:
+            robot = self.begun.robot
+            only = {joint.name for joint in self.joints if joint.stiffness.told}
+        table, remarks = _sidecar(robot, self.diagnosis, self.source, self.tolerance, only)
         made = self.diagnosis.extra["provenance"]
         document = tomlkit.document()
         said = f"Written by picchio {made['picchio']}; verdict: {self.diagnosis.verdict}."
@@ -151,24 +153,21 @@ class ByDiagnosis(Method):
 
 def _from_nothing(robot: FlexibleRobot, told: Diagnosed, begun: Begun) -> Diagnosed:
     """The answer of a diagnosis that began elsewhere than at the stated values."""
-    explained, joints = told.diagnosis.verdict in ("nothing-wrong", "named"), []
+    clear = told.diagnosis.verdict in ("nothing-wrong", "named")
+    why = "far from stated: found from nothing, then fitted to the records"
+    if not clear:
+        why = "found from nothing, but what else is wrong is not clear"
+    joints = []
     for joint in told.joints:
-        one = joint.stiffness
-        if one.told:
-            stands, why = True, "far from stated: found from nothing, then fitted to the records"
-            if not explained:
-                stands, why = (
-                    False,
-                    "fitted from nothing, but more than noise and tolerance is left",
-                )
-            elif begun.contradicts(joint.name, one.value):
-                stands, why = False, "the fit in time and the springs found from nothing disagree"
-            one = replace(one, told=stands, why=why)
-        ratio = joint.damping_ratio
+        one, ratio = joint.stiffness, joint.damping_ratio
+        if one.told and clear and begun.contradicts(joint.name, one.value):
+            apart = "the fit in time and the springs found from nothing disagree"
+            one = replace(one, told=False, why=apart)
+        elif one.told:
+            one = replace(one, told=clear, why=why)
         if ratio.told:
-            ratio = replace(
-                ratio, told=explained, why="one factor for all modes, as for the springs"
-            )
+            factor = "one factor for all modes, as for the springs"
+            ratio = replace(ratio, told=clear, why=factor)
         joints.append(replace(joint, stiffness=one, damping_ratio=ratio))
     return replace(told, robot=robot, joints=tuple(joints), begun=begun)
 
@@ -340,10 +339,14 @@ def _sidecar(
     diagnosis: Diagnosis,
     source: str,
     tolerance: Tolerance,
-    begun: bool = False,
+    only: Collection[str] | None = None,
 ) -> tuple[dict[str, Any], list[str]]:
-    """The sidecar with the values found, and remarks on what has no place in it."""
-    if not diagnosis.causes and not (begun and diagnosis.verdict == "nothing-wrong"):
+    """The sidecar with the values found, and remarks on what has no place in it.
+
+    Of a robot that was begun elsewhere than stated, only these joints' stiffness is that of the
+    fit: of the others what was found before, and how far it may be off.
+    """
+    if not diagnosis.causes and not (only and diagnosis.verdict == "nothing-wrong"):
         stand = diagnosis.verdict == "nothing-wrong"
         raise InputError(f"the diagnosis is {diagnosis.verdict!r}: there is nothing to write",
                          hint="the stated stiffness and damping stand" * stand)  # fmt: skip
@@ -357,13 +360,9 @@ def _sidecar(
     for cause in diagnosis.causes:
         key = effect_class(cause.effect).sidecar
         if key == "stiffness" and cause.target in joints:
-            value = _stiffness(robot, cause)
-            entry = joints[cause.target]
-            entry.pop("stiffness_curve", None)
-            if entry.pop("estimated", False):  # the damping still is
-                entry.setdefault("damping_ratio_spread", ESTIMATED)
-            entry |= {"source": _said(source, "stiffness", value)}
-            _tell(entry, "stiffness", value)
+            if only is not None and cause.target not in only:
+                continue
+            _tell_stiffness(joints[cause.target], source, _stiffness(robot, cause))
             told[f"stiffness.{cause.target}"] = (cause.effect, cause.target, "scale")
         elif key == "rotor_inertia" and (ratio := ratios.get(cause.target)):
             value = cause.parameters["inertia"]
@@ -382,13 +381,15 @@ def _sidecar(
         owner = name.partition(".")[2]
         # What was said of a value is not replaced by the tolerance.
         kept = name in robot.spreads and not _tells(value, tolerance.stiffness)
+        kept = owner not in only if only is not None else kept
         if name.startswith("stiffness.") and owner in joints and not kept:
             entry = joints[owner]
-            if begun:  # a curve is not what was found
-                entry.pop("stiffness_curve", None)
-            if "stiffness" in entry or begun:
+            if only is not None:
+                _tell_stiffness(entry, source, value)
+            elif "stiffness" in entry:
                 entry |= {"source": _said(source, "stiffness", value)}
                 _tell(entry, "stiffness", value)
+            if "stiffness" in entry:
                 told[name] = (JointStiffness.name, owner, "scale")
         elif name != "damping_ratio":
             remarks.append(f"{name} = {_number(value)}")
@@ -436,6 +437,15 @@ def _stiffness(robot: FlexibleRobot, cause: Cause) -> Value:
     nominal = {j.name: j.stiffness for j in robot.flexible_joints}[cause.target]
     unit = unit_of(robot, cause.target, "N*m/rad")
     return Value(scale.value * nominal, scale.std * nominal, unit)
+
+
+def _tell_stiffness(entry: dict[str, Any], source: str, value: Value) -> None:
+    """A joint's stiffness that is another than stated: neither a curve nor an estimate."""
+    entry.pop("stiffness_curve", None)
+    if entry.pop("estimated", False):  # the damping still is
+        entry.setdefault("damping_ratio_spread", ESTIMATED)
+    entry |= {"source": _said(source, "stiffness", value)}
+    _tell(entry, "stiffness", value)
 
 
 def _tell(table: dict[str, Any], key: str, value: Value) -> None:

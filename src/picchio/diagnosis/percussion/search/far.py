@@ -84,8 +84,11 @@ def far_from_stated(problem: Problem, records: Sequence[MeasuredRecord]) -> Roug
         records: to look at.
 
     Returns:
-        None where they are not, or where springs and damping explain little.
+        None where they are not, where springs and damping explain little, or of a saved model with
+        effects, which is no robot of unknown stiffness.
     """
+    if problem.robot.effect_tables:  # whose springs and masses are not the files'
+        return None
     blown, tolerance = list(_blown(problem, records)), problem.campaign.tolerance
     found = rough(problem.robot, blown)
     if found is None or not _is_far(found) or found.left > _HALF * found.before:
