@@ -5,16 +5,27 @@ they draw within their tolerances included.
 """
 
 import tomllib
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import tomlkit
+import trial
 
 import picchio
 from picchio.campaign.tables import Tolerance
+from picchio.core.errors import PicchioWarning
 from picchio.diagnosis.begin import begin
+from picchio.diagnosis.identify import _sidecar
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.search.far import far_from_stated
+from picchio.diagnosis.result import Value
+from picchio.diagnosis.stiffness.taps import lines, transform
 from picchio.robot.loading.load import load_robot
+
+ROBOTS = Path(__file__).resolve().parents[2] / "robots"
 
 FACTORS = (0.40, 1.9, 0.55)
 DAMPING = 0.4
@@ -63,6 +74,42 @@ def test_a_robot_as_stated_is_left_alone(worlds):
         assert begin(robot, campaign) is None
 
 
+def test_a_transform_by_blocks_is_that_of_all_samples():
+    rng = np.random.default_rng(0)
+    time, values = np.arange(10_000) * 1e-4, rng.standard_normal(10_000)
+    line = lines(1.0, 100.0)
+    whole = np.exp(-np.outer(line, time)) @ values
+    np.testing.assert_allclose(transform(line, time, values), whole, rtol=1e-10)
+
+
+def test_springs_are_those_of_the_files_where_a_model_has_effects(worlds):
+    campaign, *_ = far(worlds, seed=11, records=3)
+    robot = load_robot("fanuc_like_3dof")
+    table = {"effect": "payload", "target": "tool", "mass": 1.0}
+    problem = Problem(replace(robot, effect_tables=(table,)), campaign)
+    assert far_from_stated(problem, problem.records) is None
+
+
+def test_what_is_not_told_is_written_as_it_was_before_the_fit(worlds, tmp_path):
+    """A fit in time that ended in another basin must not leave its narrow spread in the sidecar."""
+    campaign, *_ = far(worlds, seed=11, records=3)
+    robot = load_robot("fanuc_like_3dof")
+    begun = begin(robot, campaign)
+    found = SimpleNamespace(
+        causes=(), verdict="nothing-wrong", correlation=None,
+        nuisances={f"stiffness.joint_{k}": Value(5e4, 10.0, "N*m/rad") for k in (1, 2, 3)},
+    )  # fmt: skip
+    table, _ = _sidecar(begun.robot, found, "bench", Tolerance(), {"joint_1", "joint_3"})
+    file = tmp_path / "flex.toml"
+    file.write_text(tomlkit.dumps(table))
+    known = load_robot("fanuc_like_3dof", flex=file).spreads
+    before = begun.robot.spreads["stiffness.joint_2"]
+    assert known["stiffness.joint_1"].value == 5e4 and known["stiffness.joint_1"].size < 1e-3
+    assert known["stiffness.joint_2"].value == pytest.approx(before.value)
+    assert known["stiffness.joint_2"].size == pytest.approx(before.size)
+    assert before.size >= 0.05
+
+
 def test_what_is_not_said_of_a_tolerance_is_as_usual():
     said = Tolerance(stiffness=0.2, pose=0.0)
     left = said.unsaid("stiffness")
@@ -73,14 +120,14 @@ def test_what_is_not_said_of_a_tolerance_is_as_usual():
 @pytest.mark.slow
 @pytest.mark.parametrize("sensors", SENSORS)
 def test_three_stiffnesses_and_the_damping_are_identified(worlds, sensors, tmp_path):
-    """0.40, 1.9 and 0.55 of the stated stiffness, 0.4 of the damping: within 1 %."""
+    """0.40, 1.9 and 0.55 of the stated stiffness, 0.4 of the damping: within 0.1 %."""
     campaign, stiffness, damping = far(worlds, seed=13, sensors=sensors)
     found = picchio.identify("fanuc_like_3dof", campaign)
     stated = load_robot("fanuc_like_3dof")
     for joint, own, factor in zip(found.joints, stated.flexible_joints, stiffness, strict=True):
         assert joint.stiffness.told
-        assert joint.stiffness.value == pytest.approx(factor * own.stiffness, rel=0.01)
-        assert joint.damping_ratio.value == pytest.approx(damping * own.damping_ratio, rel=0.01)
+        assert joint.stiffness.value == pytest.approx(factor * own.stiffness, rel=0.001)
+        assert joint.damping_ratio.value == pytest.approx(damping * own.damping_ratio, rel=0.001)
     assert found.robot is not found.begun.robot and "from nothing" in found.remarks[0]
     told, left = (found.to_dict()[key] for key in ("from_nothing", "residual"))
     assert left["before"] > 0.3 > 0.02 > left["after"]
@@ -91,6 +138,37 @@ def test_three_stiffnesses_and_the_damping_are_identified(worlds, sensors, tmp_p
     world = worlds.Nuisances(stiffness / np.array(FACTORS), damping / DAMPING, 1.0)
     later, *_ = far(worlds, seed=113, sensors=sensors, records=9, nuisances=world)
     assert picchio.diagnose(stated.name, later, flex=sidecar).verdict == "nothing-wrong"
+
+
+@pytest.mark.slow
+def test_a_rotor_that_turns_along_is_not_two_soft_joints(worlds):
+    """Met in trials: two springs at 0.8 explained all but a fifth of what such a rotor does."""
+    case = {"robot": "fanuc_like_3dof", "kind": "single", "effect": "joint_inertia", "snr": 40,
+            "draw": 61000, "mismatch": 0.0}  # fmt: skip
+    campaign, _ = trial.make(case, 1)
+    assert begin(load_robot("fanuc_like_3dof"), campaign) is None
+
+
+@pytest.mark.slow
+def test_a_bare_urdf_and_its_usual_blows_are_a_flexible_robot(worlds, tmp_path):
+    """Drives estimated from a URDF, off by factors up to six; 600 N blows at four poses."""
+    shipped = load_robot("fanuc_r2000ic")
+    campaign, truth = worlds.make(
+        robot=shipped.name, seed=18, causes=[], sensors=("accelerometer", "deflection"), records=12
+    )
+    bare = tmp_path / "arm.urdf"
+    bare.write_text((ROBOTS / "fanuc_r2000ic" / "robot.urdf").read_text())
+    with pytest.warns(PicchioWarning, match="Estimated"):
+        robot = load_robot(bare, tool=shipped.tool_frame)
+    found = picchio.identify(robot, campaign)
+    factors = truth["nuisances"]["stiffness"]
+    for joint, own in zip(found.joints, shipped.flexible_joints, strict=True):
+        assert joint.stiffness.told
+        assert joint.stiffness.value == pytest.approx(factors[own.name] * own.stiffness, rel=0.001)
+    sidecar = tmp_path / "flex.toml"
+    sidecar.write_text(found.sidecar_text())
+    known = load_robot(bare, flex=sidecar, tool=shipped.tool_frame)
+    assert not any(joint.estimated for joint in known.flexible_joints)
 
 
 @pytest.mark.slow

@@ -18,8 +18,7 @@ from picchio.campaign.channels import Channel
 from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.stiffness.fit import climb
-from picchio.diagnosis.stiffness.frf import settled_elsewhere
-from picchio.diagnosis.stiffness.modes import starts
+from picchio.diagnosis.stiffness.modes import TAILS, settled_elsewhere, starts
 from picchio.diagnosis.stiffness.prior import UNKNOWN, Prior
 from picchio.diagnosis.stiffness.responses import (
     Response,
@@ -28,27 +27,25 @@ from picchio.diagnosis.stiffness.responses import (
     never_exact,
     response_to,
 )
-from picchio.diagnosis.stiffness.taps import POWER, Seen, Window
+from picchio.diagnosis.stiffness.taps import POWER, SAMPLED, Seen, Window, lines, transform
 from picchio.robot.flexible_robot import FlexibleRobot
 
-_DECAY = 6.0  # of the window, over the record's length
-_SAMPLED, _HIGHEST = 0.4, 150.0  # highest line: over the sample rate; Hz
-_MOST_LINES = 240
+_LONGEST = 3.0  # s of a record that are looked at: what rings longer hardly tells more
+_HIGHEST = 150.0  # Hz, of a line
 _SHAKEN = 0.1  # least force over the largest, of a line
 _FINER = 16  # steps of a blow's transform in one of the record's
-_TAILS = 6.0  # degrees of freedom of the lines' errors
 # How hard all blows are, and how far that may be off.
 _HARD, _HARDER = "force", 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Blown:
+class BlowRecord:
     """A record of blows whose force is known.
 
     Attributes:
         name: of the record.
         pose: (nv,) rad or m.
-        way: (3,) unit, world, of the force.
+        direction: (3,) unit, world, of the force.
         time: (count,) s.
         force: N, at times in s.
         channels: what is read, with (count,) SI and the standard deviation of its noise.
@@ -56,7 +53,7 @@ class Blown:
 
     name: str
     pose: FloatArray
-    way: FloatArray
+    direction: FloatArray
     time: FloatArray
     force: Callable[[FloatArray], FloatArray]
     channels: Sequence[tuple[Channel, FloatArray, float]]
@@ -64,11 +61,11 @@ class Blown:
 
 @dataclass(frozen=True)
 class Rough:
-    """Springs and damping as records of blows have them, everything else as stated.
+    """Springs and damping as records of blows have them.
 
     Attributes:
         stiffness: (n,) over the stated.
-        stiffness_std: (n,) of the logarithms; of the lines' noise alone.
+        stiffness_std: (n,) of the logarithms.
         damping: of all ratios, over the stated.
         left: residual over the functions.
         before: the same with the stated values.
@@ -83,7 +80,7 @@ class Rough:
 
 def rough(
     robot: FlexibleRobot,
-    records: Sequence[Blown],
+    records: Sequence[BlowRecord],
     tolerance: Tolerance | None = None,
     begin: Rough | None = None,
 ) -> Rough | None:
@@ -122,7 +119,7 @@ def rough(
         at = stated.copy()
         at[:n], at[n : 2 * n] = np.log(begin.stiffness), math.log(begin.damping)
         places = [at]
-    found = max((climb(problem, at, _TAILS) for at in places), key=lambda one: one.evidence)
+    found = max((climb(problem, at, TAILS) for at in places), key=lambda one: one.evidence)
     if begin is not None:
         found = settled_elsewhere(problem, found)
     damping, size = found.mean[n : 2 * n], found.std[n : 2 * n]
@@ -133,34 +130,30 @@ def rough(
 
 
 def _functions(
-    robot: FlexibleRobot, record: Blown, tolerance: Tolerance, index: dict[str, int]
+    robot: FlexibleRobot, record: BlowRecord, tolerance: Tolerance, index: dict[str, int]
 ) -> list[Response]:
     """What each channel reads over the blows."""
     time = record.time
-    step, length = float(np.median(np.diff(time))), float(time[-1])
-    shift, highest = _DECAY / length, min(_SAMPLED / step, _HIGHEST)
-    spacing = max(2.0 / length, highest / _MOST_LINES)
-    omega = 2.0 * np.pi * np.arange(spacing, highest, spacing)
-    line = shift + 1j * omega
-    fine = step / _FINER
-    within = np.arange(0.5 * fine, length, fine)
+    step, end = float(np.median(np.diff(time))), min(float(time[-1]), _LONGEST)
+    line, fine = lines(end, min(SAMPLED / step, _HIGHEST)), step / _FINER
+    within = np.arange(0.5 * fine, end, fine)
     force = record.force(within)
     struck = force != 0.0
-    blow = fine * (np.exp(-np.outer(line, within[struck])) @ force[struck])
+    blow = fine * transform(line, within[struck], force[struck])
     if not len(line) or not np.abs(blow).max() > 0.0:
         return []
     kept = np.abs(blow) > _SHAKEN * np.abs(blow).max()
-    window, found = Window(time, line, blow), []
+    window, found = Window(time, line, blow, end), []
     for channel, values, noise in record.channels:
         if channel.kind.name not in POWER:
             continue
-        seen = Seen.by(channel, record.way, robot, record.pose)
+        seen = Seen.by(channel, record.direction, robot, record.pose)
         made = response_to(robot, record.name, seen, record.pose, tolerance, index)
         value, size = window.over_blow(values, noise, kept)
         gains = made.gains.copy()
         gains[index[_HARD]] = _HARDER
         if np.abs(value).max() > 0.0:
             bends = np.zeros((len(index), len(value)))
-            found.append(replace(made, omega=omega[kept], measured=value, scale=size, shift=shift,
-                                 gains=gains, bends=bends))  # fmt: skip
+            found.append(replace(made, omega=line.imag[kept], measured=value, scale=size,
+                                 shift=line[0].real, gains=gains, bends=bends))  # fmt: skip
     return found

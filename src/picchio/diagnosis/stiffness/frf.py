@@ -23,9 +23,9 @@ from picchio.diagnosis.identified import (
     ModeSeen,
     PoseLeft,
 )
-from picchio.diagnosis.stiffness.fit import Fit, climb, score
+from picchio.diagnosis.stiffness.fit import Fit, climb
 from picchio.diagnosis.stiffness.joints import MOST_HALF, Told, stiffness_of
-from picchio.diagnosis.stiffness.modes import paired, starts
+from picchio.diagnosis.stiffness.modes import TAILS, paired, settled_elsewhere, starts
 from picchio.diagnosis.stiffness.prior import prior_of
 from picchio.diagnosis.stiffness.responses import Damping, FrfProblem, left_over, make_problem
 from picchio.diagnosis.stiffness.written import sidecar
@@ -33,10 +33,7 @@ from picchio.prediction.percussion import pose_of
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.robot.joint import is_drive
 
-_TAILS = 6.0  # degrees of freedom of the lines' errors
 _FAR = 0.3  # residual over the functions beyond which the answer is doubted
-_LOOKS, _BASINS, _STRIDE, _GAIN = 3, 4, 0.12, 2.0  # at other basins; ln of stiffness; ln evidence
-_WEAK, _MOVED = 0.04, 1.0  # deviation and move of the logarithm
 _STRAY, _INCREDIBLE = 1.5, 3.0  # standard deviations before the tests
 _DECISIVE = 5.0  # in log evidence, for a convention of the damping
 _READ = ("m/N", "m/s/N", "m/s²/N")
@@ -222,11 +219,11 @@ def identify_frf(
     say("frequency responses: springs and damping")
     plain = problem.bare()
     bare = max(
-        (climb(plain, at[: problem.springs], _TAILS) for at in begin),
+        (climb(plain, at[: problem.springs], TAILS) for at in begin),
         key=lambda found: found.evidence,
     )  # fmt: skip
     bare = settled_elsewhere(plain, bare)
-    other = climb(problem.bare(convention="joint"), bare.mean, _TAILS)
+    other = climb(problem.bare(convention="joint"), bare.mean, TAILS)
     say("frequency responses: with all that is never exact")
     # Which convention holds shows only where modes may differ from it, as they always do a little.
     modal = _whole(problem, bare.mean)
@@ -254,13 +251,13 @@ def _whole(problem: FrfProblem, begin: FloatArray) -> Fit:
     """The fit of everything, begun at springs and damping (2 n,) fitted alone."""
     at = np.zeros(len(problem.precision))
     at[: problem.springs] = begin
-    fit = climb(problem, at, _TAILS)
+    fit = climb(problem, at, TAILS)
     # Without nuisances a joint hardly seen makes up for what masses and places are off by.
     known = np.concatenate([problem.prior.std, problem.damping_std])
     strays = np.abs(begin) > _STRAY * known
     if strays.any():
         at[: problem.springs][strays] = 0.0
-        fit = max(fit, climb(problem, at, _TAILS), key=lambda found: found.evidence)
+        fit = max(fit, climb(problem, at, TAILS), key=lambda found: found.evidence)
     return fit
 
 
@@ -278,61 +275,6 @@ def _by_modes(fit: Fit) -> FloatArray:
     own = fit.mean[-count:] ** 2 + np.diag(fit.covariance)[-count:]
     found[problem.joints :, problem.joints :] *= max(1.0, float(own.mean()))
     return found
-
-
-def settled_elsewhere(problem: FrfProblem, fit: Fit) -> Fit:
-    """The fit, or a better one far from it.
-
-    Args:
-        problem: what is fitted.
-        fit: its best so far.
-    """
-    for _ in range(_LOOKS):
-        better = _elsewhere(problem, fit)
-        if better is None:
-            break
-        fit = better
-    return fit
-
-
-def _elsewhere(problem: FrfProblem, fit: Fit) -> Fit | None:
-    """A better fit with one joint far from where it is; None where there is none.
-
-    A joint that the functions hardly show may have ended at a false mode. Everything else held, its
-    stiffness is tried over the whole prior; what looks better is fitted anew.
-    """
-    n = problem.joints
-    held = problem.bare(fit.mean, problem.convention)
-    here = fit.mean[: 2 * n]
-    now = score(held, here, fit)
-    tried: list[tuple[float, FloatArray]] = []
-    for k in range(n):
-        reach = 2.5 * problem.prior.std[k]
-        grid = np.arange(-reach, reach + 1e-9, _STRIDE)
-        places = np.tile(here, (len(grid), 1))
-        places[:, k] = grid
-        scores = np.array([score(held, place, fit) for place in places])
-        inner = np.r_[False, (scores[1:-1] < scores[:-2]) & (scores[1:-1] <= scores[2:]), False]
-        far = np.abs(grid - here[k]) > 2.0 * _STRIDE
-        tried += [(float(scores[i]), places[i]) for i in np.flatnonzero(inner & far)]
-    tried.sort(key=lambda pair: pair[0])
-    for _, place in tried[:_BASINS]:
-        found = climb(held, place, fit.tails)
-        if score(held, found.mean, fit) < now - _GAIN:
-            other = climb(problem, np.concatenate([found.mean, fit.mean[2 * n :]]), fit.tails)
-            if other.evidence > fit.evidence + _GAIN:
-                return other
-    # Masses and places may have followed a false mode: with them free, what is told but not well.
-    weak = (fit.std[:n] > _WEAK) & (fit.std[:n] < 0.5 * problem.prior.std)
-    for k in np.flatnonzero(weak).tolist():
-        for move in (-_MOVED, _MOVED):
-            at = fit.mean.copy()
-            at[k] += move
-            if abs(at[k]) < 2.5 * problem.prior.std[k]:
-                other = climb(problem, at, fit.tails)
-                if other.evidence > fit.evidence + _GAIN:
-                    return other
-    return None
 
 
 def _joints(

@@ -1,6 +1,7 @@
-"""Where to begin with frequency response functions: their modes, matched by frequency and shape.
+"""Where to begin with frequency response functions, and whether another place is better.
 
-A fit of the functions alone ends in the nearest basin. So the measured peaks of each pose are first
+A fit of the functions alone ends in the nearest basin. So modes are matched by frequency and shape
+first: the measured peaks of each pose are first
 matched with the modes of many springs drawn from the prior (Kuhn's assignment; shapes by the modal
 assurance criterion, Allemang, Sound and Vibration 37 (2003) 14), and the best are improved by
 Gauss-Newton on the logarithms of the frequencies, matched anew at every step.
@@ -18,8 +19,13 @@ from scipy.signal import find_peaks
 from scipy.stats import qmc
 
 from picchio.core.arrays import ComplexArray, FloatArray
+from picchio.diagnosis.stiffness.fit import Fit, climb, score
 from picchio.diagnosis.stiffness.responses import FrfProblem, Standing, natural
 
+TAILS = 6.0
+"""Degrees of freedom of the lines' errors."""
+_LOOKS, _BASINS, _STRIDE, _GAIN = 3, 4, 0.12, 2.0  # at other basins; ln of stiffness; ln evidence
+_WEAK, _MOVED = 0.04, 1.0  # deviation and move of the logarithm
 _DRAWS = 2048
 _REFINED, _KEPT = 12, 4
 _OFF = 0.03  # of a measured frequency, by masses, damping and the grid of lines
@@ -124,6 +130,61 @@ def starts(problem: FrfProblem, seed: int = 0) -> list[FloatArray]:
             at[n : 2 * n] = damping
             kept.append(at)
     return kept[:_KEPT]
+
+
+def settled_elsewhere(problem: FrfProblem, fit: Fit) -> Fit:
+    """The fit, or a better one far from it.
+
+    Args:
+        problem: what is fitted.
+        fit: its best so far.
+    """
+    for _ in range(_LOOKS):
+        better = _elsewhere(problem, fit)
+        if better is None:
+            break
+        fit = better
+    return fit
+
+
+def _elsewhere(problem: FrfProblem, fit: Fit) -> Fit | None:
+    """A better fit with one joint far from where it is; None where there is none.
+
+    A joint that the functions hardly show may have ended at a false mode. Everything else held, its
+    stiffness is tried over the whole prior; what looks better is fitted anew.
+    """
+    n = problem.joints
+    held = problem.bare(fit.mean, problem.convention)
+    here = fit.mean[: 2 * n]
+    now = score(held, here, fit)
+    tried: list[tuple[float, FloatArray]] = []
+    for k in range(n):
+        reach = 2.5 * problem.prior.std[k]
+        grid = np.arange(-reach, reach + 1e-9, _STRIDE)
+        places = np.tile(here, (len(grid), 1))
+        places[:, k] = grid
+        scores = np.array([score(held, place, fit) for place in places])
+        inner = np.r_[False, (scores[1:-1] < scores[:-2]) & (scores[1:-1] <= scores[2:]), False]
+        far = np.abs(grid - here[k]) > 2.0 * _STRIDE
+        tried += [(float(scores[i]), places[i]) for i in np.flatnonzero(inner & far)]
+    tried.sort(key=lambda pair: pair[0])
+    for _, place in tried[:_BASINS]:
+        found = climb(held, place, fit.tails)
+        if score(held, found.mean, fit) < now - _GAIN:
+            other = climb(problem, np.concatenate([found.mean, fit.mean[2 * n :]]), fit.tails)
+            if other.evidence > fit.evidence + _GAIN:
+                return other
+    # Masses and places may have followed a false mode: with them free, what is told but not well.
+    weak = (fit.std[:n] > _WEAK) & (fit.std[:n] < 0.5 * problem.prior.std)
+    for k in np.flatnonzero(weak).tolist():
+        for move in (-_MOVED, _MOVED):
+            at = fit.mean.copy()
+            at[k] += move
+            if abs(at[k]) < 2.5 * problem.prior.std[k]:
+                other = climb(problem, at, fit.tails)
+                if other.evidence > fit.evidence + _GAIN:
+                    return other
+    return None
 
 
 class Pair(NamedTuple):

@@ -16,6 +16,7 @@ that is more than what it answers. Both are numbers of their own, each of a blow
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +35,9 @@ _IMPULSE, _DELAY, _VARIANCE = 1.0, 1.5e-3, 4e-7  # N s, s, s^2: a hammer's, abou
 _USUAL = 4e-3, 0.5 * math.pi**2  # s, a blow; how much its force bends there, over impulse / s^2
 _BENDS = 1.0 / math.sqrt(720.0)  # of T^2 times the bend: B_2 / 2 of what may lie anywhere
 _DECAY = 6.0  # of the window, over the record's length
-_SAMPLED = 0.4  # highest line, over the sample rate
+SAMPLED = 0.4
+"""Highest line, over the sample rate."""
+_BLOCK = 4096  # samples
 _SHAKEN, _STRUCK = 0.3, 0.1  # least force over the largest, of a line and of a sample
 _MOST_UNKNOWN = 120.0  # Hz, to which a blow of unknown shape is nearly an impulse
 _MOST_LINES = 240
@@ -113,19 +116,50 @@ class Spectrum(NamedTuple):
     bends: ComplexArray
 
 
+def lines(length: float, highest: float) -> ComplexArray:
+    """Where a record of blows is looked at in the Laplace plane, (m,) rad/s.
+
+    Args:
+        length: s, over which the window decays.
+        highest: Hz.
+    """
+    spacing = max(2.0 / length, highest / _MOST_LINES)
+    return _DECAY / length + 2j * np.pi * np.arange(spacing, highest, spacing)
+
+
+def transform(line: ComplexArray, time: FloatArray, values: FloatArray) -> ComplexArray:
+    """The sum of exp(-s t) times values over samples, block by block.
+
+    Args:
+        line: (m,) s, rad/s.
+        time: (count,) s.
+        values: (count,) or (count, k).
+
+    Returns:
+        (m,) or (m, k).
+    """
+    found = np.zeros((len(line), *values.shape[1:]), dtype=complex)
+    for first in range(0, len(time), _BLOCK):
+        part = slice(first, first + _BLOCK)
+        found += np.exp(-np.outer(line, time[part])) @ values[part]
+    return found
+
+
+@dataclass(frozen=True, eq=False)
 class Window:
     """An exponential window on what a record reads, over the blow.
 
-    Args:
+    Attributes:
         time: (count,) s, the blow from 0 on.
-        line: (m,) rad/s, in the Laplace plane.
+        line: (m,) rad/s, in the Laplace plane, on a line parallel to the imaginary axis.
         blow: (m,) N s there.
+        end: s, how far the record is looked at.
     """
 
-    def __init__(self, time: FloatArray, line: ComplexArray, blow: ComplexArray) -> None:
-        self._after = time >= 0.0
-        step = float(np.median(np.diff(time)))
-        self._kernel = np.exp(-np.outer(line, time[self._after])) * step / blow[:, None]
+    time: FloatArray
+    line: ComplexArray
+    blow: ComplexArray
+    end: float = math.inf
 
     def over_blow(
         self, values: FloatArray, noise: float, kept: BoolArray
@@ -140,12 +174,14 @@ class Window:
         Returns:
             (kept,) each.
         """
-        before = values[~self._after]
+        within = (self.time >= 0.0) & (self.time <= self.end)
+        step, before = float(np.median(np.diff(self.time))), values[self.time < 0.0]
         rest = float(np.mean(before)) if len(before) >= _QUIET else 0.0
-        value = (self._kernel @ (values - rest)[self._after])[kept]
-        size = noise * np.sqrt(np.sum(np.abs(self._kernel[kept]) ** 2, axis=1))
+        time, blow = self.time[within], self.blow[kept]
+        value = step * transform(self.line[kept], time, values[within] - rest) / blow
+        weight = np.sqrt(np.sum(np.exp(-2.0 * self.line[0].real * time)))
         floor = _MODEL * np.hypot(np.abs(value), 0.01 * np.abs(value).max())
-        return value, np.hypot(size, floor)
+        return value, np.hypot(noise * step * weight / np.abs(blow), floor)
 
 
 def spectra(robot: FlexibleRobot, record: Record, pose: FloatArray) -> list[Spectrum]:
@@ -170,13 +206,12 @@ def spectra(robot: FlexibleRobot, record: Record, pose: FloatArray) -> list[Spec
     length = float(time[-1])
     if after.sum() < 64 or length <= 0.0:
         raise record.source.error("a tap needs 64 samples or more from t = 0 on", channel="time")
-    shift = _DECAY / length
     force = columns.pop("force", None)
     used = [name for name in columns if record.channel(name).kind.name in _READ]
     if not used:
         raise record.source.error("no channel of this tap tells the stiffness",
                                   choices=[f"{name}.<frame>.x" for name in _READ])  # fmt: skip
-    highest = _SAMPLED / step
+    highest = SAMPLED / step
     _sampled_well(robot, record, pose, step)
     if force is not None:
         struck = np.abs(force) > _STRUCK * np.abs(force).max()
@@ -190,11 +225,9 @@ def spectra(robot: FlexibleRobot, record: Record, pose: FloatArray) -> list[Spec
             )  # fmt: skip
     else:
         highest = min(highest, _MOST_UNKNOWN)
-    spacing = max(2.0 / length, highest / _MOST_LINES)
-    omega = 2.0 * np.pi * np.arange(spacing, highest, spacing)
-    line = shift + 1j * omega
+    line = lines(length, highest)
     if force is not None:
-        blow = np.asarray(np.exp(-np.outer(line, time[after])) * step @ force[after])
+        blow = step * transform(line, time[after], force[after])
         kept = np.abs(blow) > _SHAKEN * np.abs(blow).max()
         kept &= np.cumprod(kept).astype(bool)  # beyond the first gap nothing
         ends = time[np.flatnonzero(struck)[[0, -1]]] + np.array([-0.5, 0.5]) * step
@@ -213,7 +246,7 @@ def spectra(robot: FlexibleRobot, record: Record, pose: FloatArray) -> list[Spec
         value, size = window.over_blow(values, float(np.std(quiet)), kept)
         assert record.direction is not None
         seen = Seen.by(record.channel(name), record.direction, robot, pose)
-        found.append(Spectrum(seen, omega[kept], shift, value, size,
+        found.append(Spectrum(seen, line.imag[kept], line[0].real, value, size,
                               force is not None, bends[:, kept]))  # fmt: skip
     return found
 

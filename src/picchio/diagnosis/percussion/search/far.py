@@ -22,7 +22,7 @@ from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.exchange import prune
 from picchio.diagnosis.percussion.search.state import Search
 from picchio.diagnosis.percussion.tolerance.linearise import About, settled
-from picchio.diagnosis.stiffness.blows import Blown, Rough, rough
+from picchio.diagnosis.stiffness.blows import BlowRecord, Rough, rough
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.structure.joint_stiffness import JointStiffness
 from picchio.model.effects.structure.modal_damping import ModalDamping
@@ -109,11 +109,11 @@ def _away(found: Rough) -> FloatArray:
     return np.abs(np.log(found.stiffness)) * (found.stiffness_std < _SURE)
 
 
-def _blown(problem: Problem, records: Sequence[MeasuredRecord]) -> Iterator[Blown]:
+def _blown(problem: Problem, records: Sequence[MeasuredRecord]) -> Iterator[BlowRecord]:
     for record in records:
         setup = record.setup
-        way = problem.campaign[record.name].direction
-        if setup.steady or way is None:
+        direction = problem.campaign[record.name].direction
+        if setup.steady or direction is None:
             continue
         rate = 1.0 / setup.samples.step
         channels = [
@@ -121,7 +121,9 @@ def _blown(problem: Problem, records: Sequence[MeasuredRecord]) -> Iterator[Blow
             for channel in record.channels
         ]
         force = setup.struck(problem.model).force
-        yield Blown(record.name, setup.geometry.pose, way, setup.samples.times, force, channels)
+        yield BlowRecord(
+            record.name, setup.geometry.pose, direction, setup.samples.times, force, channels
+        )
 
 
 def _fitted(search: Search, causes: list[Effect]) -> Fit:
