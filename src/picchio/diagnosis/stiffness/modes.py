@@ -1,10 +1,10 @@
 """Where to begin with frequency response functions, and whether another place is better.
 
-A fit of the functions alone ends in the nearest basin. So modes are matched by frequency and shape
-first: the measured peaks of each pose are first
-matched with the modes of many springs drawn from the prior (Kuhn's assignment; shapes by the modal
-assurance criterion, Allemang, Sound and Vibration 37 (2003) 14), and the best are improved by
-Gauss-Newton on the logarithms of the frequencies, matched anew at every step.
+A fit of the functions alone ends in the nearest basin. So the measured peaks of each pose are first
+matched, by frequency and shape, with the modes of many springs drawn from the prior (Kuhn's
+assignment; shapes by the modal assurance criterion, Allemang, Sound and Vibration 37 (2003) 14),
+and the best are improved by Gauss-Newton on the logarithms of the frequencies, matched anew at
+every step. A fit that stands is tried once more with each joint far from where it is.
 """
 
 from __future__ import annotations
