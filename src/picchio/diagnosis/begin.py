@@ -75,10 +75,11 @@ class Begun:
             for name, factor in zip(stated.flexible_names, self.found.stiffness, strict=True)
         )
         return (
-            "The stated stiffness is far off, so the springs were looked for from nothing, and the "
-            f"records were fitted from there. About, over the stated: {factors}; damping "
-            f"{self.found.damping:.2g}. The stated values leave {100.0 * self.found.before:.3g} % "
-            f"of what was read over the blows, these {100.0 * self.found.left:.2g} %."
+            "The stated stiffness is far off. So the springs were first found from the blows "
+            "alone, and the records were then fitted from there. Roughly, as a factor of what was "
+            f"stated: {factors}; damping {self.found.damping:.2g}. The stated values leave "
+            f"{100.0 * self.found.before:.3g} % of the response unexplained, these "
+            f"{100.0 * self.found.left:.2g} %."
         )
 
 

@@ -22,6 +22,7 @@ from picchio.diagnosis.begin import Begun, begin
 from picchio.diagnosis.diagnose import diagnose
 from picchio.diagnosis.entries import joint_entry, standing_entries, tool_entry
 from picchio.diagnosis.identified import FORMAT, Identification, Identified, IdentifiedJoint, Method
+from picchio.diagnosis.percussion.search.state import EXACT
 from picchio.diagnosis.result import Cause, Diagnosis, Value, unit_of
 from picchio.model.effects.registry import effect_class
 from picchio.model.effects.structure.joint_stiffness import JointStiffness
@@ -61,7 +62,7 @@ class Diagnosed(Identification):
         if self.begun is None:
             return (said,)
         if self.diagnosis.verdict == "nothing-wrong":
-            said = "From there the diagnosis finds nothing wrong."
+            said = "Beside that the diagnosis finds nothing wrong."
         return self.begun.said(self.robot), said
 
     @property
@@ -120,6 +121,8 @@ class Diagnosed(Identification):
         }
 
     def _headline(self) -> str:
+        if self.begun is not None and self.diagnosis.verdict == "nothing-wrong":
+            return f"{self._told()}, far from what was stated; nothing else is wrong"
         return f"{self._told()}; {self.diagnosis._headline()}"
 
 
@@ -147,21 +150,32 @@ class ByDiagnosis(Method):
         left = campaign.tolerance.unsaid("stiffness", "damping_ratio")
         table = campaign.table.model_copy(update={"tolerance": left})
         campaign = replace(campaign, table=table)
-        found = diagnose(begun.robot, campaign, workers=workers, progress=progress)
+        found = _no_surer_than_the_model(
+            diagnose(begun.robot, campaign, workers=workers, progress=progress)
+        )
         return _from_nothing(robot, identification(campaign, found), begun)
+
+
+def _no_surer_than_the_model(found: Diagnosis) -> Diagnosis:
+    """Fitted values far from stated, as exact as the forward model at best, as causes are."""
+    fitted = {
+        name: Value(one.value, float(np.hypot(one.std, EXACT * one.value)), one.unit)
+        for name, one in found.nuisances.items()
+    }
+    return replace(found, nuisances=fitted)
 
 
 def _from_nothing(robot: FlexibleRobot, told: Diagnosed, begun: Begun) -> Diagnosed:
     """The answer of a diagnosis that began elsewhere than at the stated values."""
     clear = told.diagnosis.verdict in ("nothing-wrong", "named")
-    why = "far from stated: found from nothing, then fitted to the records"
+    why = "far from the stated value: found from the blows alone, then fitted to the records"
     if not clear:
-        why = "found from nothing, but what else is wrong is not clear"
+        why = "found from the blows alone, but what else is wrong is not clear"
     joints = []
     for joint in told.joints:
         one, ratio = joint.stiffness, joint.damping_ratio
         if one.told and clear and begun.contradicts(joint.name, one.value):
-            apart = "the fit in time and the springs found from nothing disagree"
+            apart = "the fit to the records and what the blows alone tell disagree"
             one = replace(one, told=False, why=apart)
         elif one.told:
             one = replace(one, told=clear, why=why)
