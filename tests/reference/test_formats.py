@@ -7,12 +7,15 @@ import re
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import picchio
 from picchio.campaign.tables import Tolerance
 from picchio.cli.main import run
 from picchio.core.errors import InputError
+from picchio.diagnosis.begin import Begun
+from picchio.diagnosis.stiffness.blows import Rough
 from picchio.reference.formats import formats
 
 ALL = {entry.name: entry for entry in formats().formats}
@@ -178,6 +181,15 @@ def test_what_is_served_is_described(name):
         assert_described(json.loads(json.dumps(live.to_dict())), name)
     finally:
         live.close()
+
+
+def test_what_an_identification_began_from_is_described():
+    robot = picchio.load_robot("fanuc_like_3dof")
+    found = Rough(np.array([0.4, 1.9, 0.6]), np.full(3, 0.02), 0.4, left=0.01, before=0.8)
+    began = Begun(robot, found, nrmse=0.9).to_dict(robot)
+    told = {key.path for key in ALL["identification"].keys if key.path.startswith("from_nothing")}
+    within = {path.replace("joint_1", "<joint>") for path in paths({"from_nothing": began})}
+    assert {path for path in within if "joint_" not in path} == told
 
 
 def test_every_json_output_is_held_against_a_command():

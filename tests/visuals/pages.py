@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+import time
 import zlib
 from typing import Any
 
@@ -48,3 +49,15 @@ def until_drawn(page: Any) -> None:
     page.evaluate("""async () => {
       for (let i = 0; i < 3; i++) await new Promise(requestAnimationFrame);
     }""")
+
+
+def photograph(seen: Any, **options: Any) -> bytes:
+    """A screenshot of a page or of a part of it: a busy browser may first be unable to take one."""
+    for attempt in range(3):
+        try:
+            return bytes(seen.screenshot(**options))
+        except Exception as error:
+            if attempt == 2 or "Unable to capture" not in str(error):
+                raise
+            time.sleep(1.0)
+    raise AssertionError

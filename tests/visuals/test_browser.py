@@ -24,7 +24,7 @@ from picchio.visuals.report.page import plain_page
 from picchio.visuals.scene.build import build_scene
 from picchio.visuals.scene.compare import compare_scene
 
-from .pages import until_drawn
+from .pages import photograph, until_drawn
 
 pytestmark = pytest.mark.slow
 
@@ -37,9 +37,9 @@ def picture(page: Any, keep: Path | None = None) -> np.ndarray:
     """The 3-D pane's pixels."""
     until_drawn(page)
     page.wait_for_timeout(150)
-    content = page.locator("#pane").screenshot()
+    content = photograph(page.locator("#pane"))
     if keep is not None:
-        page.screenshot(path=str(keep))
+        photograph(page, path=str(keep))
     return np.asarray(Image.open(io.BytesIO(content)).convert("RGB")).astype(int)
 
 
@@ -260,7 +260,7 @@ def test_report_opens_unfolds_and_its_links_work(
                                       scene=arm_scene.read_text()))  # fmt: skip
     page = open_page(path, color_scheme=theme)
     assert "joint_2" in page.locator("#verdict").inner_text()
-    page.screenshot(path=str(pictures / f"report-{theme}.png"), full_page=True)
+    photograph(page, path=str(pictures / f"report-{theme}.png"), full_page=True)
     for link in page.locator("nav a").all():
         link.click()
         assert page.evaluate("location.hash") == link.get_attribute("href")
@@ -307,7 +307,7 @@ def test_pages_on_a_telephone(open_page, pages, pictures) -> None:
         for width in (390, 1280):
             page = open_page(path, viewport={"width": width, "height": 800})
             page.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true })")
-            page.screenshot(path=str(pictures / f"{name}-{width}.png"), full_page=True)
+            photograph(page, path=str(pictures / f"{name}-{width}.png"), full_page=True)
             assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), name
             page.close()  # eight long pages at once were too much for a busy machine
 
@@ -464,7 +464,7 @@ def test_a_live_viewer_has_sliders(chromium, hostile_urdf, pictures) -> None:
 
     def look(keep: str = "live.png") -> np.ndarray:
         page.wait_for_timeout(500)
-        content = page.screenshot(path=str(pictures / keep))
+        content = photograph(page, path=str(pictures / keep))
         return np.asarray(Image.open(io.BytesIO(content)).convert("RGB")).astype(int)
 
     try:

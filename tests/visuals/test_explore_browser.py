@@ -15,6 +15,7 @@ from PIL import Image
 import picchio
 
 from .explore_page import drag, opened, settled, until
+from .pages import photograph
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::picchio.PicchioWarning")]
 
@@ -83,7 +84,7 @@ def test_drag_slide_click_and_export(page_of, pictures, tmp_path) -> None:
     written = picchio.load_task(tmp_path / "kept.toml", live.session.robot).operations[0]
     np.testing.assert_allclose(written.poses[0], worst["pose"], atol=1e-8)
     page.wait_for_timeout(1500)
-    page.screenshot(path=str(pictures / "explore-ur10.png"))
+    photograph(page, path=str(pictures / "explore-ur10.png"))
     files = {}
     for name in ("png", "svg", "csv", "toml"):
         with page.expect_download() as download:
@@ -119,7 +120,7 @@ def test_limits_are_told_and_a_phone_has_room(page_of, pictures) -> None:
     width = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
     assert width[0] <= width[1]
     page.wait_for_timeout(1500)
-    page.screenshot(path=str(pictures / "explore-phone.png"))
+    photograph(page, path=str(pictures / "explore-phone.png"))
     live.close()
     until(page, "document.getElementById('state').textContent.includes('has ended')")
 
@@ -145,5 +146,5 @@ def test_a_cell_whose_kernel_has_ended_shows_the_robot_and_why(
     assert page.locator("object a").get_attribute("href") == live.url
     assert page.evaluate("document.querySelector('img').naturalWidth") > 300
     assert page.evaluate("document.documentElement.scrollWidth") <= width
-    page.screenshot(path=pictures / f"explore-cell-ended-{width}.png")
+    photograph(page, path=pictures / f"explore-cell-ended-{width}.png")
     page.close()

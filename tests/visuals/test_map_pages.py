@@ -11,7 +11,7 @@ from PIL import Image
 
 from picchio.cli.main import run
 
-from .pages import until_drawn
+from .pages import photograph, until_drawn
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def test_a_map_can_be_turned_and_cut(open_page, drawn: Path, pictures) -> None:
     def coloured() -> int:
         until_drawn(page)
         page.wait_for_timeout(150)
-        image = Image.open(io.BytesIO(page.locator("#pane").screenshot())).convert("RGB")
+        image = Image.open(io.BytesIO(photograph(page.locator("#pane")))).convert("RGB")
         return int((np.ptp(np.asarray(image).astype(int), axis=2) > 60).sum())
 
     whole = coloured()
@@ -59,7 +59,7 @@ def test_a_map_can_be_turned_and_cut(open_page, drawn: Path, pictures) -> None:
             "(e, v) => { e.value = v; e.dispatchEvent(new Event('input')); }", value,
         )  # fmt: skip
     part = coloured()
-    page.screenshot(path=str(pictures / "map-cut.png"))
+    photograph(page, path=str(pictures / "map-cut.png"))
     assert 0 < part < 0.6 * whole
     page.eval_on_selector(
         "#cut-x-min", "e => { e.value = 0; e.dispatchEvent(new Event('input')); }"

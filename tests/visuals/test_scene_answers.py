@@ -14,7 +14,7 @@ from PIL import Image
 
 from picchio.visuals.scene.build import build_scene
 
-from .pages import until_drawn
+from .pages import photograph, until_drawn
 
 MOST = 3e6  # bytes
 
@@ -104,7 +104,7 @@ def test_clicks_and_hovers_are_answered(open_page, scene, tmp_path: Path, pictur
     assert "robot.urdf" in page.locator("#card-rows").inner_text()
     points = page.locator("#card-plot polyline").get_attribute("points").split()
     assert len(points) == scene.motion["samples"].shape[2]
-    page.screenshot(path=str(pictures / "scene-card.png"))
+    photograph(page, path=str(pictures / "scene-card.png"))
     page.locator("#layer-envelope").set_checked(True)
     page.locator("#joint").select_option(label="joint_2")
     page.locator("[data-view=x]").click()

@@ -18,7 +18,7 @@ import picchio
 from picchio.visuals.report.assessment import assessment_report
 from picchio.visuals.report.trace import Trace, traces_html
 
-from .pages import traces_in, without_traces
+from .pages import photograph, traces_in, without_traces
 
 
 def test_what_a_page_holds_is_what_was_given_and_what_did_not_fit_is_told() -> None:
@@ -81,7 +81,7 @@ def test_zoom_hover_choice_and_download(open_page, arm, tmp_path: Path, pictures
     page.wait_for_selector(".trace[data-ready]", timeout=60_000)
     plot = page.locator(".trace .drawn > svg")
     plot.scroll_into_view_if_needed()
-    page.screenshot(path=str(pictures / "trace.png"))
+    photograph(page, path=str(pictures / "trace.png"))
     label = plot.get_attribute("aria-label")
     box = plot.bounding_box()
     page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 100)
