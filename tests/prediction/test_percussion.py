@@ -125,6 +125,26 @@ def test_changes_of_the_blows_are_those_between_two_predictions(
         assert np.isnan(told).all()
 
 
+def test_blows_are_known_by_modes_after_however_many_changes_of_the_structure(small):
+    campaign, _, _ = small
+    robot = load_robot("fanuc_like_3dof")
+    setup = percussion_setups(robot, campaign)[1]
+    plain = Model(robot, True)
+
+    def pair(name, low, high, where="tool"):
+        return tuple(
+            plain.with_effects([effect_class(name)(where, **{key: value})])
+            for key, value in (low, high)
+        )
+
+    heavier = [pair("payload", ("mass", 0.0), ("mass", 0.01 * k)) for k in range(1, 12)]
+    wider = pair("pulse_width", ("scale", 0.999), ("scale", 1.001))
+    alone = setup.changes(plain, [wider], each_blow=True)
+    among = setup.changes(plain, [*heavier, wider], each_blow=True)
+    for channel in setup.channels:
+        np.testing.assert_array_equal(among[channel.name][-1], alone[channel.name][0])
+
+
 def test_a_pose_the_robot_cannot_have_is_told_with_its_file_and_record(tmp_path):
     arm = picchio.load_robot("fanuc_like_3dof")
     campaign = _campaign({"joint_1": 0.1, "joint_9": 0.2})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
@@ -278,7 +278,7 @@ class PercussionSetup:
         if self.steady or any(np.isfinite(chain.limit) for chain in chains.values()):
             return None
         struck = self.struck(model)
-        system = self._system(model, struck.blows)
+        system, same = self._system(model, struck.blows), self._system_key(model, struck.blows)
         blows = [(self.struck(one), self.struck(other)) for one, other in pairs]
         around = [
             (self._system(one, ours.blows), self._system(other, theirs.blows))
@@ -286,7 +286,11 @@ class PercussionSetup:
         ]
         alone = [
             k for k, (ours, theirs) in enumerate(blows)
-            if each_blow and not ours.alike(theirs) and all(s is system for s in around[k])
+            if each_blow and not ours.alike(theirs)
+            and all(
+                self._system_key(m, b.blows) == same
+                for m, b in zip(pairs[k], (ours, theirs), strict=True)
+            )
         ]  # fmt: skip
         together = [k for k in range(len(pairs)) if k not in alone]
         louder = np.array([
@@ -336,19 +340,22 @@ class PercussionSetup:
 
         return self._struck.get(model.key("blows"), make)
 
-    def _system(self, model: Model, blows: Blows) -> VibratingSystem:
+    @staticmethod
+    def _system_key(model: Model, blows: Blows) -> tuple[Hashable, ...]:
         moving = model.key("structure", "over-time", "nonlinear")
+        return moving, model.gravity_stiffness, blows.direction.tobytes()
+
+    def _system(self, model: Model, blows: Blows) -> VibratingSystem:
 
         def make() -> VibratingSystem:
             # Only what drifts asks for more than the pose.
             when = self.conditions if model.key("over-time") else None
             plant = self.geometry.plants.get(
-                (moving, model.gravity_stiffness, when),
-                lambda: model.plant(self.geometry, self.conditions),
+                (*key[:2], when), lambda: model.plant(self.geometry, self.conditions)
             )
             return plant.build(blows.direction)
 
-        key = (moving, model.gravity_stiffness, blows.direction.tobytes())
+        key = self._system_key(model, blows)
         return self._systems.get(key, make)
 
     def _shifted(self, chain: SensorChain) -> Samples:
