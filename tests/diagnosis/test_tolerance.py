@@ -287,6 +287,25 @@ def test_a_world_of_six_joints_leaves_noise():
     assert evidence.is_noise, (evidence.worst_band, evidence.worst_pose)
 
 
+@pytest.mark.slow
+def test_a_blow_that_rises_slowly_is_one_that_rises_slowly():
+    """Fast modes tell a rise from a delay: as a delay, half a millisecond passed for a rebound."""
+    campaign, truth = worlds.make("ur10", seed=306784578, records=9, mismatch=1.0,
+                                  only=["rise_time"])  # fmt: skip
+    (rise,) = truth["errors"]["rise_time"].values()
+    tolerance = campaign.tolerance.rise_time
+    assert rise > 2.5 * tolerance
+    problem = Problem(picchio.load_robot("ur10"), campaign)
+    with one_thread():
+        raw = fit_growing(problem, Hypothesis.baseline(problem.robot, campaign.tolerance))
+        found = settled(problem, raw, problem.records)
+    name = problem.records[0].name
+    moved = problem.marginal.slopes[name].moved(problem.sizes[name])
+    (size,) = next(size for one, size in moved if one.name == "rise_time")
+    assert size * tolerance == pytest.approx(rise, rel=0.02)
+    assert found.chi_square / found.samples == pytest.approx(1.0, abs=0.015)
+
+
 def test_where_everything_is_exact_nothing_is_integrated_out():
     robot = picchio.load_robot(ARM)
     campaign, _ = worlds.make(ARM, seed=4, records=3)

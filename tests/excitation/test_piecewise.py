@@ -22,6 +22,31 @@ def test_a_pulse_has_its_value_just_after_a_jump():
     assert force([-0.001, 0.04]).tolist() == [0.0, 0.0]
 
 
+def test_a_blow_that_rises_keeps_its_impulse_and_its_middle():
+    force = PulseTrain(1.0, 0.04, 0.004).unit_blows[0].ramped(0.001)
+    t = np.linspace(0.0, 0.00499, 500)
+    expected = np.interp(t, [0.0, 0.001, 0.004, 0.005], [0.0, 1.0, 1.0, 0.0])
+    np.testing.assert_allclose(force(t), expected, atol=1e-12)
+    assert force.mean() * force.end == pytest.approx(0.004)
+
+
+@pytest.mark.parametrize("step", [1.3e-4, 1e-3])
+def test_stairs_in_place_of_a_ramp_push_alike_up_to_the_third_moment(step):
+    force = PulseTrain(1.0, 0.04, 0.004).unit_blows[0].ramped(7e-4).scaled(300.0)
+    stairs = force.stepped(step)
+    assert not stairs.slope.any() and stairs.start.size > force.start.size
+    for power in range(3):  # of the force; of its jumps one more
+        one, other = (
+            sum(quad(lambda t, f=f, power=power: f(t) * t**power, a, b)[0] for a, b in
+                zip(f.start, [*f.start[1:], f.end], strict=True))
+            for f in (force, stairs)
+        )  # fmt: skip
+        assert other == pytest.approx(one, rel=1e-9)
+    assert force.stepped(5e-5) is force
+    measured = MEASURED.one_period()
+    assert measured.stepped(0.01) is measured
+
+
 def test_a_half_sine_is_a_half_sine():
     force = HalfSineTrain(300.0, 0.04, 0.004).one_period()
     t = np.linspace(0, 0.0039, 40)

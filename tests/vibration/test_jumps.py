@@ -9,6 +9,7 @@ from scipy.signal import cont2discrete, lfilter
 import picchio
 from picchio.campaign.campaign import Campaign
 from picchio.campaign.record import Record
+from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import effect_class
 from picchio.prediction import percussion as percussion_setup
 from picchio.prediction.percussion import predict
@@ -75,7 +76,21 @@ def test_area_and_moment_hold_where_nothing_stands_on_the_left(jump):
     assert moment == pytest.approx(2.0 * (time[-1] ** 2 - jump**2))
 
 
-def _read(width, effect, monkeypatch, fine=1e-4, offset=0.0005):
+class Rise(Effect):
+    """Blows that take so many seconds to rise; not in the catalogue."""
+
+    name, where, target_kind, parameters, meaning = "rise", "blows", "tool", (), ""
+
+    def __init__(self, rise):
+        super().__init__("tool")
+        self.rise = rise
+        self.__dict__["key"] = ("rise", rise)
+
+    def blows(self, blows, conditions):
+        return blows.change(shape=blows.shape.ramped(self.rise))
+
+
+def _read(width, effect, monkeypatch, fine=1e-4, offset=0.0005, rise=0.0):
     monkeypatch.setattr(percussion_setup, "_FILTER_STEP", fine)
     arm = picchio.load_robot("fanuc_like_3dof")
     time = np.arange(-40, 500) * 1e-3 + offset
@@ -86,7 +101,8 @@ def _read(width, effect, monkeypatch, fine=1e-4, offset=0.0005):
     )  # fmt: skip
     blows = {"kind": "pulse_train", "force": 300.0, "period": 0.04, "width": width, "hits": 6}
     campaign = Campaign.from_records([record], robot="fanuc_like_3dof", excitation=blows)
-    read = predict(arm, campaign, [effect])["r01.csv"]
+    effects = [effect, Rise(rise)] if rise else [effect]
+    read = predict(arm, campaign, effects)["r01.csv"]
     return np.stack([read[name] for name in names])
 
 
@@ -99,6 +115,18 @@ def test_a_mounted_accelerometer_reads_what_a_finer_filter_reads(width, offset, 
     fine = _read(width, effect, monkeypatch, 2e-6, offset)
     # Samples a step of the filter after the very first edge cannot know all of it.
     assert np.abs(coarse - fine).max() < (3e-5 if offset == 0.0005 else 2e-4) * np.abs(fine).max()
+
+
+@pytest.mark.parametrize("rise", [1e-5, 6.1e-5, 2.3e-4, 6.7e-4])
+@pytest.mark.parametrize("width", [0.003067, 0.0035])
+def test_a_rise_between_the_steps_of_a_filter_is_seen_by_it(width, rise, monkeypatch):
+    mount = effect_class("mount_resonance")("accelerometer.tool")
+    effect = mount.with_values(frequency=73.0, damping_ratio=0.05)
+    coarse = _read(width, effect, monkeypatch, 1e-4, rise=rise)
+    fine = _read(width, effect, monkeypatch, 2e-6, rise=rise)
+    assert np.abs(coarse - fine).max() < 3e-5 * np.abs(fine).max()
+    sharp = _read(width, effect, monkeypatch, 1e-4)
+    assert np.abs(sharp - fine).max() > 100.0 * rise * np.abs(fine).max()
 
 
 def test_a_high_pass_lets_jumps_through_as_they_are(monkeypatch):

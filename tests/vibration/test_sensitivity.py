@@ -91,11 +91,14 @@ def test_a_change_is_what_two_simulations_of_scipy_differ_by(plant_of, change):
 
 
 @pytest.mark.parametrize("at_jumps", ["after", "mean", "moments"])
-@pytest.mark.parametrize("train", [PulseTrain, HalfSineTrain])
+@pytest.mark.parametrize("train", [PulseTrain, HalfSineTrain, "ramped"])
 @pytest.mark.parametrize("start", [-0.003, 0.0, 0.0214])
 def test_single_blows_add_up_to_the_motion_that_steps_give(plant_of, start, train, at_jumps):
     samples = Samples(-0.01, 1e-3, 300)
-    shape = train(force=1.0, period=0.05, width=0.008).unit_blows[0]
+    kind = PulseTrain if train == "ramped" else train
+    shape = kind(force=1.0, period=0.05, width=0.008).unit_blows[0]
+    if train == "ramped":
+        shape = shape.ramped(7e-4)
     system = plant_of().build(np.array([0.6, 0.0, 0.8]))
     nothing = (np.zeros_like(system.mass_gradient), np.zeros_like(system.force_gradient))
     linear = replace(system, mass_gradient=nothing[0], gravity_curvature=nothing[0],

@@ -52,6 +52,10 @@ def phi2(z: ArrayLike) -> ComplexArray:
 MOST_HITS = 10_000
 MOST_PIECES = 2_000_000
 
+# So many steps at most a ramp lasts that stairs are put in its place, and where they stand.
+_SHORT_RAMP = 10
+_GAUSS = 0.5 / np.sqrt(3.0)
+
 Hits = Annotated[int, Field(gt=0, le=MOST_HITS, strict=True)]
 """Blows of a burst, in a file."""
 
@@ -169,6 +173,49 @@ class PiecewiseForce:
             slope=self.slope / factor,
             angular_frequency=self.angular_frequency / factor,
         )
+
+    def ramped(self, rise: float) -> PiecewiseForce:
+        """A rectangle of height 1 that takes some time to rise, and as long to fall.
+
+        Args:
+            rise: s, above 0 and below its length; its impulse stays.
+        """
+        return PiecewiseForce(
+            start=np.array([0.0, rise, self.end]), end=self.end + rise,
+            constant=np.array([0.0, 1.0, 1.0]), slope=np.array([1.0, 0.0, -1.0]) / rise,
+            amplitude=np.zeros(3), angular_frequency=np.zeros(3),
+        )  # fmt: skip
+
+    def stepped(self, step: float) -> PiecewiseForce:
+        """With stairs in place of every short ramp, which have the same area and moments.
+
+        What takes jumps for what they are, between its samples, need then know of no ramps.
+
+        Args:
+            step: s between its samples; ramps of more than ten of them stay, and those that
+                follow one another.
+
+        Returns:
+            the force, itself where it has no short ramp.
+        """
+        parts = np.ceil(self.duration / step)
+        level = np.concatenate([[True], (self.slope == 0.0) & (self.amplitude == 0.0), [True]])
+        ramp = (self.slope != 0.0) & (self.amplitude == 0.0) & (parts <= _SHORT_RAMP)
+        ramp &= level[:-2] & level[2:]  # a chain of ramps is a measured history
+        if not ramp.any():
+            return self
+        # Two stairs to each part, at its Gauss points: right up to the third moment.
+        stairs = np.where(ramp, 2.0 * np.where(ramp, parts, 0.0), 0.0).astype(int)
+        own = np.repeat(np.arange(self.start.size), 1 + stairs)
+        place = np.arange(own.size) - (np.cumsum(1 + stairs) - 1 - stairs)[own]
+        length = np.where(ramp, self.duration, 0.0)[own]
+        at = np.floor(0.5 * (place - 1)) + np.where(place % 2, 0.5 - _GAUSS, 0.5 + _GAUSS)
+        share = np.where(place > 0, 1.0 / np.maximum(stairs[own], 1), 0.0)
+        pieces = {name: getattr(self, name)[own] for name in _PER_PIECE}
+        pieces["start"] = pieces["start"] + np.where(place > 0, 2.0 * at * share, 0.0) * length
+        pieces["constant"] = pieces["constant"] + place * share * pieces["slope"] * length
+        pieces["slope"] = np.where(ramp[own], 0.0, pieces["slope"])
+        return PiecewiseForce(end=self.end, **pieces)
 
     @cached_property
     def key(self) -> bytes:

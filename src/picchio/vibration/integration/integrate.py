@@ -181,6 +181,11 @@ def make_plan(
     force0, force1 = force_lines(points, _GAUSS, *pieces)
     sample = sample_numbers(points, times, 2 * _EDGE, first)
 
+    if at_jumps == "moments" and (stepped := force.stepped(samples.step)) is not force:
+        edges = _edges(stepped, end)
+        pieces = (stepped.start, stepped.end, stepped.constant, stepped.slope, stepped.amplitude,
+                  stepped.angular_frequency)  # fmt: skip
+
     def pushed(time: FloatArray, later: float) -> FloatArray:
         return np.asarray(force_beside(time, later, *pieces))
 
@@ -205,6 +210,8 @@ def force_at(
         samples: when.
         at_jumps: as in `integrate`.
     """
+    if at_jumps == "moments":
+        shape = shape.stepped(samples.step)
     out = np.zeros(samples.count)
     ends = np.array([max(start, 0.0), start + shape.end])
     ends = np.floor((ends - samples.start) / samples.step).astype(int)

@@ -278,9 +278,10 @@ def _blows(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterat
                       each_blow=True, one_way=True)  # fmt: skip
 
     def ramped(blows: Blows, size: float) -> Blows:
-        # Half of its rise later, but for (angular frequency x rise)^2 / 24: a ramp that is shorter
-        # than the steps of a sensor's filter is not seen by it as one.
-        return blows.change(start=blows.start + 0.5 * size * sigma.rise_time)
+        rise = size * sigma.rise_time
+        if rise <= 0.0:  # no blow is; but a fit may pass through it
+            return blows.change(start=blows.start + 0.5 * rise)
+        return blows.change(shape=blows.shape.ramped(min(rise, 0.5 * blows.shape.end)))
 
     if _is_flat(blows.shape):
         yield Inexact("rise_time", "rise_time", True, "blows", ramped, one_way=True)
