@@ -5,6 +5,7 @@
     python benchmarks/stiffness.py --taps 60 [--unknown] [--first 3000] [--json FILE]
     python benchmarks/stiffness.py --clamped 90 [--first 4000] [--json FILE]
     python benchmarks/stiffness.py --trains 30 [--first 5000] [--json FILE]
+    python benchmarks/stiffness.py --others 1 [--first 61000]
     python benchmarks/stiffness.py --real DATA [--repeats 5] [--json FILE]
 
 Blind: campaigns of `tests/worlds/loads.py`, arms with 3, 6 and 7 joints in turn, stiffness off by
@@ -12,15 +13,18 @@ up to a factor of four, everything slightly wrong; with --frf those of `tests/wo
 frequency response functions each; with --taps those of `tests/worlds/taps.py`, six blows in time,
 with --unknown without their force; with --clamped those of `tests/worlds/presses.py`, whose motors
 press while the tool is held; with --trains twelve records of usual blows each, of which every
-other campaign has no deflections. Real: DATA is the folder of measured data; 43
-loadings of a FANUC R-2000iC (`r2000ic-static`), published stiffness against plain least squares
-and against `picchio identify`; then each cause that may leave a fifth of the signal unexplained,
-judged on loadings left out: ten folds, so many times as `--repeats` says.
+other campaign has no deflections. Others: campaigns with one cause of any kind, or with none that
+the catalogue has, so many draws of each, files exact and a little wrong: how often springs are
+sought from nothing though no stiffness is far from stated. Real: DATA is the folder of measured
+data; 43 loadings of a FANUC R-2000iC (`r2000ic-static`), published stiffness against plain least
+squares and against `picchio identify`; then each cause that may leave a fifth of the signal
+unexplained, judged on loadings left out: ten folds, so many times as `--repeats` says.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import sys
 import time
@@ -38,6 +42,7 @@ from picchio.campaign.record import Record
 from picchio.campaign.tables import Tolerance
 from picchio.core.files import atomic_write
 from picchio.core.processes import one_thread
+from picchio.diagnosis.begin import begin
 from picchio.diagnosis.stiffness.fit import Fit, Problem, fit
 from picchio.diagnosis.stiffness.prior import prior_of, suspects
 from picchio.diagnosis.stiffness.select import folds, held_out
@@ -48,8 +53,11 @@ from picchio.model.expansion import WideChain
 TESTS = Path(__file__).resolve().parent.parent / "tests"
 sys.path[:0] = [str(TESTS), str(TESTS / "diagnosis")]
 import blind_stiffness  # noqa: E402
+import trial  # noqa: E402
 
 from worlds import frfs, loads, presses, taps  # noqa: E402
+from worlds.effects import EFFECTS  # noqa: E402
+from worlds.outside import EFFECTS as OUTSIDE  # noqa: E402
 
 ROBOT = "fanuc_r2000ic"
 
@@ -84,6 +92,22 @@ def responses(trial: Any, count: int, first: int) -> dict[str, Any]:
     print(f"processor time a campaign  {(time.process_time() - start) / count:.2f} s")
     found["joints"] = [vars(one) for one in (*stiffness, *damping)]
     return found
+
+
+def others(draws: int, first: int) -> dict[str, Any]:
+    robot, began, count = picchio.load_robot("fanuc_like_3dof"), [], 0
+    for mismatch in (0.0, 1.0):
+        for kind, names in (("single", EFFECTS), ("outside", OUTSIDE)):
+            for name, draw in itertools.product(names, range(first, first + draws)):
+                case = {"robot": robot.name, "kind": kind, "effect": name, "snr": 40,
+                        "draw": draw, "mismatch": mismatch}  # fmt: skip
+                campaign, truth = trial.make(case, 1)
+                count += 1
+                if begin(robot, campaign) is not None:
+                    began.append({**case, "causes": truth["causes"]})
+                    print(f"from nothing: {mismatch:g} times wrong, {truth['causes']}", flush=True)
+    print(f"sought from nothing in {len(began)} of {count} campaigns with one other cause")
+    return {"campaigns": count, "began": began}
 
 
 def read(folder: Path) -> Campaign:
@@ -184,6 +208,7 @@ def main() -> None:
     parser.add_argument("--taps", type=int, default=0)
     parser.add_argument("--clamped", type=int, default=0)
     parser.add_argument("--trains", type=int, default=0)
+    parser.add_argument("--others", type=int, default=0)
     parser.add_argument("--unknown", action="store_true")
     parser.add_argument("--first", type=int, default=1000)
     parser.add_argument("--real", type=Path)
@@ -203,6 +228,8 @@ def main() -> None:
         found["taps"] = responses(trial, given.taps, given.first)
     if given.trains:
         found["trains"] = responses(blind_stiffness.train_trial, given.trains, given.first)
+    if given.others:
+        found["others"] = others(given.others, given.first)
     if given.clamped:
         found["clamped"] = responses(
             partial(blind_stiffness.press_trial, presses), given.clamped, given.first

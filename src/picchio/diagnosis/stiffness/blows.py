@@ -121,7 +121,7 @@ def rough(
         places = [at]
     found = max((climb(problem, at, TAILS) for at in places), key=lambda one: one.evidence)
     if begin is not None:
-        found = settled_elsewhere(problem, found)
+        found = settled_elsewhere(problem, found, free=False)
     damping, size = found.mean[n : 2 * n], found.std[n : 2 * n]
     return Rough(
         np.exp(found.mean[:n]), found.std[:n], float(np.exp(np.average(damping, weights=size**-2))),

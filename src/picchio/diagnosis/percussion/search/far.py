@@ -30,7 +30,7 @@ from picchio.model.effects.structure.modal_damping import ModalDamping
 # What the stated values leave of the signal's power, at least, for this to be worth while.
 _MUCH = 0.02
 # What springs and damping alone leave of the functions, at most, and of what is left without.
-_LITTLE, _LESS = 0.25, 0.2
+_LITTLE, _LESS = 0.35, 0.25
 _HALF = 0.5  # likewise, while masses and places are taken as stated
 # Logarithms: a joint that is off by this is found by itself, one that is off by more is not.
 _OFF, _FAR = math.log(1.2), math.log(1.6)
