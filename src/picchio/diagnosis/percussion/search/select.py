@@ -23,7 +23,7 @@ from picchio.diagnosis.percussion.search.exchange import (
 )
 from picchio.diagnosis.percussion.search.refine import refined
 from picchio.diagnosis.percussion.search.restart import restarted
-from picchio.diagnosis.percussion.search.state import Search, Trial
+from picchio.diagnosis.percussion.search.state import LEAST_GAIN, Search, Trial
 from picchio.diagnosis.percussion.search.trials import (
     MOST_RIVALS,
     exceeding_trials,
@@ -48,6 +48,8 @@ _CLEAR = 10.0
 # worth while.
 _SWEEPS = 2
 _HALFWAY = 0.3
+# How often springs that were identified are settled further, at most.
+_MORE_ROUNDS = 6
 
 
 def begin_search(
@@ -78,9 +80,26 @@ def begin_search(
             baseline = other
         else:
             before.restore(problem)
+    if start.known.labels:
+        baseline = _settled_for_good(problem, baseline)
     effects = baseline.hypothesis.effects
     scales = measure_scales(problem, effects, problem.predictions(effects))
     return Search(problem, candidates, scales, *split, baseline, baseline, say, finer)
+
+
+def _settled_for_good(problem: Problem, found: Fit) -> Fit:
+    """A fit with springs that may start far away: linearised anew until it moves no further."""
+    for _ in range(_MORE_ROUNDS):
+        before = About.of(problem)
+        again = settled(problem, found, found.records, rounds=2, anew=False, patient=True)
+        if again.cost >= found.cost:
+            before.restore(problem)
+            break
+        little = found.cost - again.cost < LEAST_GAIN
+        found = again
+        if little:
+            break
+    return found
 
 
 def start_from(search: Search, known: Sequence[Estimate]) -> None:
