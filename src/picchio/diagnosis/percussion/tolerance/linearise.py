@@ -392,8 +392,27 @@ def recentre(problem: Problem, found: Fit, temper: float = 1.0) -> Hypothesis:
         taken = marginal.absorbed.get((hypothesis.effects[u.effect].label, u.name))
         if taken is not None:
             vector[k] -= taken @ change
+        vector[k] += _in_common(marginal, new, (hypothesis.effects[u.effect].label, u.name))
     _move(problem, new)
     return hypothesis.at(vector)
+
+
+def _in_common(marginal: Marginal, sizes: dict[str, FloatArray], value: tuple[str, str]) -> float:
+    """What all factors on a fitted value have in common, taken from them for it, a logarithm.
+
+    Nothing that is predicted changes. One and the other undo each other exactly, slopes of both
+    only nearly: a fit would creep along the valley between them and stop on the way.
+    """
+    found = []
+    for name, size in sizes.items():
+        for k, one in enumerate(marginal.slopes[name].what):
+            if one.factor_on is not None and one.factor_on[0] == value:
+                found.append((size, k, one.factor_on[1]))
+    weight = sum(sigma**-2 for _, _, sigma in found)
+    common = sum(size[k] / sigma for size, k, sigma in found) / weight if found else 0.0
+    for size, k, sigma in found:
+        size[k] -= common / sigma
+    return float(common)
 
 
 def _move(problem: Problem, sizes: dict[str, FloatArray], shifted: bool = True) -> None:

@@ -50,6 +50,8 @@ class Inexact:
         each_blow: whether every blow has its own number.
         one_way: whether it is moved upwards alone to see what it does: no blow begins before its
             record does.
+        factor_on: the fitted value on which it is a factor, as (label, parameter), and the
+            logarithm of one standard deviation: what all have in common is that value's.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Inexact:
     means: str = ""
     each_blow: bool = False
     one_way: bool = False
+    factor_on: tuple[tuple[str, str], float] | None = None
 
 
 class Nudge(Effect):
@@ -224,7 +227,9 @@ def _modes(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterat
             scales[mode] *= math.exp(size * sigma.damping_by_mode)
             plant.mode_scales = tuple(scales)
 
-        yield Inexact(f"damping_by_mode.{mode + 1}", "damping_by_mode", False, "structure", damped)
+        on = ("modal_damping:robot", "scale"), sigma.damping_by_mode
+        yield Inexact(f"damping_by_mode.{mode + 1}", "damping_by_mode", False, "structure", damped,
+                      factor_on=on)  # fmt: skip
 
 
 def _gravity(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterator[Inexact]:
