@@ -30,7 +30,12 @@ from picchio.diagnosis.percussion.fit.least_squares import (
     fit_growing,
 )
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.tolerance.linearise import linearise, recentre, settled
+from picchio.diagnosis.percussion.tolerance.linearise import (
+    _in_common,
+    linearise,
+    recentre,
+    settled,
+)
 from picchio.diagnosis.percussion.tolerance.marginal import Marginal
 from picchio.diagnosis.percussion.tolerance.nudges import Inexact, inexact, nudged, principal
 from picchio.diagnosis.percussion.tolerance.slopes import Slopes, all_slopes
@@ -254,6 +259,35 @@ def test_slopes_about_moved_numbers_are_what_differences_are(wrong_everywhere):
             expected = (moved(one, step) - moved(one, -step)) / 0.04
             apart = np.linalg.norm(column - expected)
             assert apart < 0.05 * np.linalg.norm(expected) + 0.05, one.name
+
+
+def test_what_all_modes_damping_has_in_common_is_the_robots(wrong_everywhere):
+    robot, campaign = wrong_everywhere
+    problem = Problem(robot, campaign)
+    record, end, value = problem.records[0], 0.16, ("modal_damping:robot", "scale")
+    with one_thread():
+        begun = fit_growing(problem, Hypothesis.baseline(robot, campaign.tolerance), windows=(end,))
+        linearise(problem, begun.hypothesis, problem.records, end)
+        marginal, here = problem.marginal, begun.hypothesis
+        sizes, rng = {}, np.random.default_rng(3)
+        for name, slopes in marginal.slopes.items():
+            on = np.array([one.factor_on is not None for one in slopes.what])
+            sizes[name] = on * (1.0 + 0.3 * rng.standard_normal(on.size))
+
+        def left(hypothesis):
+            moved = marginal.slopes[record.name].moved(sizes[record.name])
+            model = problem.model.with_effects(hypothesis.effects)
+            return residual_under(record, model, *nudged(record, moved), end)
+
+        before = left(here)
+        up = _in_common(marginal, sizes, value)
+        vector = here.vector()
+        names = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
+        vector[names.index(value)] += up
+        after = left(here.at(vector))
+    assert up == pytest.approx(0.17, abs=0.03)  # of three records a pose: 0.1 times the root of 3
+    assert sum(size.sum() for size in sizes.values()) == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(after, before, atol=1e-6 * np.abs(before).max())
 
 
 def test_a_world_that_is_a_little_wrong_leaves_noise(wrong_everywhere):
