@@ -346,6 +346,7 @@ class PercussionSetup:
         return moving, model.gravity_stiffness, blows.direction.tobytes()
 
     def _system(self, model: Model, blows: Blows) -> VibratingSystem:
+        key = self._system_key(model, blows)
 
         def make() -> VibratingSystem:
             # Only what drifts asks for more than the pose.
@@ -355,7 +356,6 @@ class PercussionSetup:
             )
             return plant.build(blows.direction)
 
-        key = self._system_key(model, blows)
         return self._systems.get(key, make)
 
     def _shifted(self, chain: SensorChain) -> Samples:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -174,17 +174,14 @@ def make_plan(
     count = int(np.floor((end - start) / fine + 1e-6)) + 1
     edges = _edges(force, end)
     extra = np.sort(np.concatenate([[0.0, end], edges]))
-    pieces = (force.start, force.end, force.constant, force.slope, force.amplitude,
-              force.angular_frequency)  # fmt: skip
+    pieces = _pieces(force)
     points = merged(start, fine, max(count, 0), extra, end, _EDGE)
     lengths = np.diff(points)
     force0, force1 = force_lines(points, _GAUSS, *pieces)
     sample = sample_numbers(points, times, 2 * _EDGE, first)
 
     if at_jumps == "moments" and (stepped := force.stepped(samples.step)) is not force:
-        edges = _edges(stepped, end)
-        pieces = (stepped.start, stepped.end, stepped.constant, stepped.slope, stepped.amplitude,
-                  stepped.angular_frequency)  # fmt: skip
+        edges, pieces = _edges(stepped, end), _pieces(stepped)
 
     def pushed(time: FloatArray, later: float) -> FloatArray:
         return np.asarray(force_beside(time, later, *pieces))
@@ -295,6 +292,12 @@ def jump_corrections(
 def _add(found: FloatArray, index: IndexArray, values: FloatArray) -> None:
     inside = (index >= 0) & (index < found.size)
     np.add.at(found, index[inside], values[inside])
+
+
+def _pieces(force: PiecewiseForce) -> tuple[Any, ...]:
+    """What the compiled code needs of a force."""
+    return (force.start, force.end, force.constant, force.slope, force.amplitude,
+            force.angular_frequency)  # fmt: skip
 
 
 def _edges(force: PiecewiseForce, end: float) -> FloatArray:
