@@ -10,7 +10,7 @@ from functools import partial
 from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic_difference, confidence
 from picchio.diagnosis.percussion.criteria.remainder import allowed, decisive_gain
-from picchio.diagnosis.percussion.data.problem import Problem, Split
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, Split
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import measure_scales
@@ -90,16 +90,24 @@ def begin_search(
 def _settled_for_good(problem: Problem, found: Fit) -> Fit:
     """A fit with springs that may start far away: linearised anew until it moves no further."""
     for _ in range(_MORE_ROUNDS):
-        before = About.of(problem)
-        again = settled(problem, found, found.records, rounds=2, anew=False, patient=True)
-        if again.cost >= found.cost:
-            before.restore(problem)
-            break
-        little = found.cost - again.cost < LEAST_GAIN
-        found = again
-        if little:
+        before, found = found, _settled_further(problem, found, found.records, patient=True)
+        if before.cost - found.cost < LEAST_GAIN:
             break
     return found
+
+
+def _settled_further(
+    problem: Problem, found: Fit, records: Sequence[MeasuredRecord], *, patient: bool = False
+) -> Fit:
+    """A fit settled from where its inexact numbers are now; itself, where that is no better."""
+    go_on = partial(settled, problem, found, records, rounds=2, anew=False, patient=patient)
+    with about_another(problem):
+        again = attempt("settled further", go_on)
+        about = About.of(problem)
+    if again is None or again.cost >= found.cost:
+        return found
+    about.restore(problem)
+    return again
 
 
 def start_from(search: Search, known: Sequence[Estimate]) -> None:
@@ -208,16 +216,10 @@ def _settled_again(search: Search) -> Fit:
 
     Else what looks like a small cause may be no more than a round that it had more.
     """
-    problem, here = search.problem, search.best
-    with about_another(problem):
-        go_on = partial(settled, problem, here, search.records, rounds=2, anew=False)
-        again = attempt("settled again", go_on)
-        about = About.of(problem)
-    if again is None or again.cost >= here.cost:
-        return here
-    about.restore(problem)
-    if search.baseline is here:
-        search.baseline, search.about = again, about
+    here = search.best
+    again = _settled_further(search.problem, here, search.records)
+    if search.baseline is here and again is not here:
+        search.baseline, search.about = again, About.of(search.problem)
     search.best = again
     return again
 
