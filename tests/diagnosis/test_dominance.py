@@ -75,6 +75,6 @@ def test_a_diagnosis_leaves_the_imitation_out():
     effects = nominal.hypothesis.effects
     scales = measure_scales(problem, effects, problem.predictions(effects))
     search = Search(problem, (), scales, problem.records, (), nominal, found)
-    whole, after = _fitted_to_all(search, nominal)
+    whole, after = _fitted_to_all(search, nominal, problem.records)
     assert whole.hypothesis.labels == search.labels == {"joint_stiffness:joint_1"}
     assert not after.is_noise

@@ -39,7 +39,7 @@ from picchio.diagnosis.percussion.criteria.exceeded import exceeded
 from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.criteria.remainder import Remainder, allowed
 from picchio.diagnosis.percussion.criteria.whiteness import Evidence
-from picchio.diagnosis.percussion.data.problem import Problem, Split, held_out
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, Split, held_out
 from picchio.diagnosis.percussion.fit.drawn import refit, with_solved_numbers
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.diagnosis.percussion.fit.parallel import parallel_records
@@ -57,7 +57,12 @@ from picchio.diagnosis.percussion.search.select import (
     start_from,
 )
 from picchio.diagnosis.percussion.search.state import LEAST_GAIN, Search, Trial
-from picchio.diagnosis.percussion.tolerance.linearise import about_another, linearise, settled
+from picchio.diagnosis.percussion.tolerance.linearise import (
+    about_another,
+    linearise,
+    seek_the_silent,
+    settled,
+)
 from picchio.diagnosis.result import Cause, Diagnosis, Estimate
 from picchio.model.effects.effect import Effect
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -191,7 +196,8 @@ def _nominal(search: Search) -> tuple[Fit, Evidence]:
 def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiagnosis:
     """What may be said of what a search has found."""
     problem = search.problem
-    whole, after = _fitted_to_all(search, nominal)
+    every = _told_by_slopes(search)
+    whole, after = _fitted_to_all(search, nominal, every)
     same: list[Trial] = []
     rivals = _rivals(search, whole)
     causes = fitted_causes(search, whole, rivals)
@@ -204,19 +210,17 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
             break
         dropped.append((doubted[0].effect, doubted[0].target))
         search.best = rest
-        whole = refit(problem, rest.hypothesis, problem.records)
+        whole = refit(problem, rest.hypothesis, every)
         after = fit_evidence(problem, whole)
         rivals = _rivals(search, whole)
         causes = fitted_causes(search, whole, rivals)
     if allowed(problem):
-        linearise(problem, whole.hypothesis, problem.records, both=True)
-        whole = refit(problem, whole.hypothesis, problem.records)
+        linearise(problem, whole.hypothesis, every, both=True)
+        whole = refit(problem, whole.hypothesis, every)
         # Where it comes to stand, or slopes and Jacobian would differ, and what no record can tell
         # would pass for known.
-        linearise(problem, whole.hypothesis, problem.records, both=True)
-        whole = fit(
-            problem, whole.hypothesis, problem.records, None, iterations=0, with_jacobian=True
-        )
+        linearise(problem, whole.hypothesis, every, both=True)
+        whole = fit(problem, whole.hypothesis, every, None, iterations=0, with_jacobian=True)
     off = exceeded(problem, whole)
     beyond = off is not None and off.improbable
     stands, judged = search.best.hypothesis, search.kept or search.records
@@ -295,20 +299,34 @@ def _without(search: Search, cause: Cause) -> Fit:
     return settled(search.problem, search.fit(rest, iterations=5), search.records, rounds=1)
 
 
-def _fitted_to_all(search: Search, nominal: Fit) -> tuple[Fit, Evidence]:
+def _told_by_slopes(search: Search) -> list[MeasuredRecord]:
+    """All records but those in which small errors grow beyond what slopes can say.
+
+    Nothing that is common to all is known from those. That their own numbers alone leave little of
+    them speaks for what was found; where they do not, they count against it.
+    """
+    problem = search.problem
+    with about_another(problem):
+        told = seek_the_silent(problem, search.best.hypothesis)
+    return [record for record in problem.records if record not in told]
+
+
+def _fitted_to_all(
+    search: Search, nominal: Fit, every: Sequence[MeasuredRecord]
+) -> tuple[Fit, Evidence]:
     """What was found, fitted to all records; where more than noise is left, what dominates."""
     problem = search.problem
     if not search.labels:
         return nominal, fit_evidence(problem, nominal)
     search.say("fitting what was found to all records")
-    whole = refit(problem, search.best.hypothesis, problem.records)
+    whole = refit(problem, search.best.hypothesis, every)
     after = fit_evidence(problem, whole)
     if len(search.labels) > 1 and not after.is_noise:
         search.say("checking which causes dominate the residual")
         stands = dominant_causes(problem, search.best)
         if stands is not search.best:
             search.best = stands
-            whole = refit(problem, stands.hypothesis, problem.records)
+            whole = refit(problem, stands.hypothesis, every)
             after = fit_evidence(problem, whole)
     return whole, after
 

@@ -15,7 +15,7 @@ from picchio.diagnosis.percussion.criteria.equivalence import (
     confidence,
 )
 from picchio.diagnosis.percussion.criteria.remainder import allowed, decisive_gain
-from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.drawn import refit
 from picchio.diagnosis.percussion.fit.least_squares import Fit
 from picchio.diagnosis.percussion.search.select import alternatives
@@ -86,7 +86,7 @@ def _on_all_records(
     refuted: list[Trial] = []
     for trial in trials:
         with about_another(problem):
-            there = attempt(trial.label, partial(_refitted, problem, trial))
+            there = attempt(trial.label, partial(_refitted, problem, trial, whole.records))
         if there is None:
             continue
         alike = bic_difference(problem, whole, there) < SAME or confidence(whole, there) < doubt
@@ -96,7 +96,7 @@ def _on_all_records(
     return kept, refuted
 
 
-def _refitted(problem: Problem, trial: Trial) -> Fit:
-    """A trial fitted to all records, about its own inexact numbers."""
-    found = refit(problem, trial.fit.hypothesis, problem.records)
-    return found if trial.draws else settled(problem, found, problem.records, 1, anew=False)
+def _refitted(problem: Problem, trial: Trial, records: Sequence[MeasuredRecord]) -> Fit:
+    """A trial fitted to all of these records, about its own inexact numbers."""
+    found = refit(problem, trial.fit.hypothesis, records)
+    return found if trial.draws else settled(problem, found, records, 1, anew=False)

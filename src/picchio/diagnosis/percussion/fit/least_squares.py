@@ -28,6 +28,8 @@ _TRUSTED = 0.25
 _LEAST_STEP = 1e-7
 # Of a step that the data see: what leaves no kink within it.
 _FINER = 0.05
+# A quotient that grows by so much as its step gets finer is of a jump: a joint sticks once more.
+JUMP = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,7 +335,7 @@ def jacobian(
         ahead = _difference(problem, hypothesis, k, 0.5 * step if both else step, records, end, at)
         if both:
             back = _difference(problem, hypothesis, k, -0.5 * step, records, end, at)
-            ahead = [0.5 * (a + b) for a, b in zip(ahead, back, strict=True)]
+            ahead = [between(a, b) for a, b in zip(ahead, back, strict=True)]
         columns[k] = ahead
     return [
         np.stack([columns[k][i] for k in range(len(unknowns))], axis=1)
@@ -362,11 +364,28 @@ def central_jacobian(
         end: s.
         at: the residuals there.
     """
-    steps = None
-    if is_nonsmooth(hypothesis):
-        coarse = jacobian(problem, hypothesis, records, end, at)
-        steps = _FINER * fine_steps(coarse, hypothesis.unknowns())
-    return jacobian(problem, hypothesis, records, end, at, steps, both=True)
+    if not is_nonsmooth(hypothesis):
+        return jacobian(problem, hypothesis, records, end, at, both=True)
+    coarse = jacobian(problem, hypothesis, records, end, at)
+    steps = _FINER * fine_steps(coarse, hypothesis.unknowns())
+    found = jacobian(problem, hypothesis, records, end, at, steps, both=True)
+    for fine, plain in zip(found, coarse, strict=True):
+        # A jump within even the finest step is no slope.
+        jumps = np.linalg.norm(fine, axis=0) > JUMP * np.linalg.norm(plain, axis=0)
+        fine[:, jumps] = plain[:, jumps]
+    return found
+
+
+def between(ahead: FloatArray, behind: FloatArray) -> FloatArray:
+    """A slope from those to either side; where a jump is to one side, that to the other.
+
+    Args:
+        ahead, behind: quotients of differences, alike in shape.
+    """
+    sizes = np.linalg.norm(ahead), np.linalg.norm(behind)
+    if max(sizes) > JUMP * min(sizes):
+        return ahead if sizes[0] < sizes[1] else behind
+    return 0.5 * (ahead + behind)
 
 
 def _by_modes(

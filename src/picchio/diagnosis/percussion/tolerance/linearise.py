@@ -11,7 +11,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Moved, Problem
+from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Moved, Problem, signal_power
 from picchio.diagnosis.percussion.fit.least_squares import (
     Fit,
     central_jacobian,
@@ -20,6 +20,7 @@ from picchio.diagnosis.percussion.fit.least_squares import (
     prior_cost,
 )
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.tolerance.alone import left_behind, sought_alone
 from picchio.diagnosis.percussion.tolerance.marginal import Marginal
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, inexact, nudged
 from picchio.diagnosis.percussion.tolerance.slopes import Slopes, all_slopes, slopes_of
@@ -39,6 +40,8 @@ _SETTLED = 0.002
 ELSE = 3.0
 # What is not exact explains little where it leaves more than this share of chi-square.
 _LITTLE = 0.5
+# One standard deviation that would move a record by so many times what it shows is beyond slopes.
+_WHOLE = 3.0
 # How far numbers are moved towards where slopes have them, until that is for the better.
 _SHARES = (1.0, 0.5, 0.2, 0.05)
 
@@ -70,6 +73,9 @@ def linearise(
     if len(slopes) < len(problem.records) or not any(s.what for s in slopes.values()):
         problem.marginal = None
         return
+    if is_nonsmooth(here):
+        signals = {r.name: math.sqrt(signal_power([r])) for r in problem.records}
+        slopes = {n: s.silenced(_WHOLE * signals[n]) for n, s in slopes.items()}
     _move(problem, problem.sizes, shifted=False)
     problem.marginal = None
     raw = problem.unmarginalised(effects, None, end)
@@ -131,7 +137,7 @@ def _without(
     normal: FloatArray | float = 0.0
     right: FloatArray | float = 0.0
     for name, jacobian_of in zip(names, jacobians, strict=True):
-        if name in fitted:
+        if name in fitted and not slopes[name].silent:
             own = slopes[name].own
             columns = flat[name].astype(float)
             seen = columns[:, :own].T @ np.column_stack([jacobian_of, columns])
@@ -145,6 +151,9 @@ def _without(
     absorbed = inverse @ (right / scale[:, None]) / scale[:, None]
     found = {}
     for name, jacobian_of in zip(names, jacobians, strict=True):
+        if slopes[name].silent:
+            found[name] = slopes[name]
+            continue
         own = slopes[name].own
         columns = slopes[name].columns.copy()
         left = flat[name][:, own:] - jacobian_of @ absorbed
@@ -187,9 +196,58 @@ def settled(
     for end in _KINKED if is_nonsmooth(here) else (_SHORT, None):
         here = _settled_up_to(problem, here, records, end, rounds, else_wrong)
     found = fit(problem, here, records, None, with_jacobian=True)
+    if is_nonsmooth(here) and found.chi_square <= else_wrong * found.samples:
+        found = with_those_left_behind(problem, found)
     if found.chi_square > else_wrong * found.samples:
         return _unless_little(problem, found)
     return found
+
+
+def with_those_left_behind(problem: Problem, found: Fit) -> Fit:
+    """A fit after the records that it left behind have been sought one by one; see `alone`.
+
+    Args:
+        problem: linearised about the fit; what is changed.
+        found: a fit that leaves little of the records it was fitted to.
+    """
+    here = found.hypothesis
+    sizes = sought_alone(problem, here, left_behind(problem, here))
+    if not sizes:
+        return found
+    _move(problem, {**problem.sizes, **sizes})
+    linearise(problem, here, found.records)
+    found = fit(problem, here, found.records, None, with_jacobian=True)
+    seek_the_silent(problem, found.hypothesis)
+    return found
+
+
+def silent(problem: Problem) -> list[MeasuredRecord]:
+    """Records in which small errors grow beyond what slopes can say.
+
+    Args:
+        problem: linearised.
+    """
+    marginal = problem.marginal
+    return [r for r in problem.records if marginal is not None and marginal.slopes[r.name].silent]
+
+
+def seek_the_silent(problem: Problem, here: Hypothesis) -> list[MeasuredRecord]:
+    """Have the records that no slopes tell of sought by themselves, about a hypothesis.
+
+    Args:
+        problem: linearised; what is changed.
+        here: the hypothesis.
+
+    Returns:
+        those of which little is left so.
+    """
+    records = silent(problem)
+    sizes = sought_alone(problem, here, records)
+    if sizes:
+        _move(problem, {**problem.sizes, **sizes})
+    left = problem.residuals(here.effects, records) if records else []
+    pairs = zip(records, left, strict=True)
+    return [record for record, rows in pairs if (rows**2).mean() < ELSE]
 
 
 def _settled_up_to(
@@ -349,6 +407,7 @@ def _cost(problem: Problem, hypothesis: Hypothesis, end: float | None, staying: 
     except InputError:
         return math.inf
     held = 0.0
+    quiet = {n for n in names if problem.marginal and problem.marginal.slopes[n].silent}
     for k, name in enumerate(names):
         moved, sizes = problem.moved.get(name), problem.sizes.get(name)
         if moved is not None and moved.shift is not None:
@@ -357,7 +416,9 @@ def _cost(problem: Problem, hypothesis: Hypothesis, end: float | None, staying: 
             own = problem.marginal.slopes[name].own
             held += float((sizes[:own] ** 2).sum())
             held += float((sizes[own:] ** 2).sum()) / len(names)
-    left = sum(float((r * r).sum()) for r in staying.whitened(there, names, labels))
+    rows = zip(names, staying.whitened(there, names, labels), strict=True)
+    # Where small errors grow beyond what slopes say, no step of all can be judged.
+    left = sum(float((r * r).sum()) for name, r in rows if name not in quiet)
     return left + held + prior_cost(hypothesis)
 
 
@@ -383,6 +444,10 @@ def recentre(problem: Problem, found: Fit, temper: float = 1.0) -> Hypothesis:
         # A pose's geometry takes long to find, and its small errors act in proportion.
         stays = np.array([what.where == POSE for what in marginal.slopes[name].what])
         new[name] = np.where(stays, 0.0, np.clip(size, -_FARTHEST, _FARTHEST))
+        if marginal.slopes[name].silent and name in problem.sizes:
+            # Slopes say nothing of it: its own numbers stay where they were sought.
+            count = marginal.slopes[name].own
+            new[name][:count] = problem.sizes[name][:count]
     own = marginal.slopes[names[0]].own
     change = new[names[0]][own:]
     if names[0] in problem.sizes:

@@ -18,6 +18,7 @@ from picchio.diagnosis.percussion.data.problem import (
     residual_changes,
     residual_under,
 )
+from picchio.diagnosis.percussion.fit.least_squares import JUMP, between
 from picchio.diagnosis.percussion.fit.parallel import worker_pool
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, Inexact, Nudge, inexact, nudged
 from picchio.model.effects.effect import Effect
@@ -47,12 +48,14 @@ class Slopes:
         own: how many columns are the record's own; the others the campaign shares.
         columns: (channels, samples, columns) in units of the noise, in single precision.
         norms: (columns,) their norms as they were taken, whatever has been taken out of them since.
+        silent: whether the columns are set to nothing, as small errors grow beyond what slopes say.
     """
 
     what: tuple[Inexact, ...]
     own: int
     columns: np.ndarray
     norms: FloatArray
+    silent: bool = False
 
     @classmethod
     def of(cls, what: Sequence[Inexact], own: int, columns: np.ndarray) -> Slopes:
@@ -84,7 +87,19 @@ class Slopes:
             return self
         what = tuple(one for one, stays in zip(self.what, kept, strict=True) if stays)
         own = int(kept[: self.own].sum())
-        return Slopes(what, own, self.columns[:, :, kept], self.norms[kept])
+        return replace(
+            self, what=what, own=own, columns=self.columns[:, :, kept], norms=self.norms[kept]
+        )
+
+    def silenced(self, most: float) -> Slopes:
+        """Themselves; with columns of nothing where one standard deviation would do too much.
+
+        Args:
+            most: norm of what a record can be off by, in units of the noise.
+        """
+        if not self.norms.size or self.norms.max() <= most:
+            return self
+        return replace(self, columns=np.zeros_like(self.columns), silent=True)
 
     def moved(self, sizes: FloatArray) -> list[tuple[Inexact, FloatArray]]:
         """What is moved by how many standard deviations, (numbers,) each.
@@ -133,7 +148,7 @@ def all_slopes(
     slopes = {}
     for records, columns in zip(poses.values(), found, strict=True):
         for record, own in zip(records, columns or (), strict=False):
-            blows = len(_starts(record))
+            blows = len(starts(record))
             what = tuple(w for w in every[record.name] for _ in range(blows if w.each_blow else 1))
             slopes[record.name] = Slopes.of(what, sum(not w.once for w in what), own)
     if not problem.sizes:
@@ -161,7 +176,7 @@ def slopes_of(
         if one.name not in problem.idle
     ]
     (columns,) = _of_records(problem, [record], tuple(effects), {record.name: every}, None, False)
-    blows = len(_starts(record))
+    blows = len(starts(record))
     what = [one for one in every for _ in range(blows if one.each_blow else 1)]
     own = [k for k, one in enumerate(what) if not one.once]
     order = {one.name: k for k, one in enumerate(what) if one.once}
@@ -171,6 +186,33 @@ def slopes_of(
         if one.name in order:
             together[:, :, k] = columns[:, :, order[one.name]]
     return Slopes.of((*(what[k] for k in own), *shared), len(own), together)
+
+
+def own_slopes(
+    problem: Problem,
+    record: MeasuredRecord,
+    effects: Sequence[Effect],
+    size: FloatArray,
+    end: float | None = None,
+) -> FloatArray:
+    """(channels, m, own) the slopes of a record's own numbers, wherever those are taken to be.
+
+    Args:
+        problem: linearised before.
+        record: one of the campaign's.
+        effects: of the model.
+        size: (columns,) standard deviations, as in `problem.sizes`.
+        end: s, up to when; None for the whole record.
+    """
+    assert problem.marginal is not None
+    slopes, kept = problem.marginal.slopes[record.name], problem.sizes
+    every = list(dict.fromkeys(slopes.what[: slopes.own]))
+    problem.sizes = {**kept, record.name: size}
+    try:
+        (found,) = _of_records(problem, [record], tuple(effects), {record.name: every}, end, False)
+    finally:
+        problem.sizes = kept
+    return found
 
 
 def _idle(slopes: Iterable[Slopes]) -> frozenset[str]:
@@ -253,7 +295,7 @@ def _number_by_number(
         ahead = move()
         if both and one.where == "structure":
             behind = move(way=-1.0)
-            ahead = [0.5 * (a + b) for a, b in zip(ahead, behind, strict=True)]
+            ahead = [between(a, b) for a, b in zip(ahead, behind, strict=True)]
         yield ahead
     if not every:
         yield [np.zeros((*about[False][1].shape, 0))]
@@ -271,7 +313,7 @@ def _by_modes(
 
     Both ways where that can be: what they do to the matrices is exact to the second order.
     """
-    blows = len(_starts(record))
+    blows = len(starts(record))
     numbers = [
         (one, blow)
         for one in every
@@ -314,7 +356,8 @@ def _moved_on(
         return [*here.values(), (one, step * np.eye(blow + 1)[blow])]
     size = here[one.name][1].copy()
     size[blow] += step
-    return [pair for name, pair in here.items() if name != one.name] + [(one, size)]
+    # In its place: turns about several axes in another order are another turn.
+    return [(one, size) if name == one.name else pair for name, pair in here.items()]
 
 
 def _under(model: Model, more: Sequence[Effect]) -> Model:
@@ -353,11 +396,13 @@ def _columns(
         if not rough or abs(fine) > 0.5 * abs(step) or abs(step) <= _FINEST:
             return found
         # Where a joint sticks once more within the step, the slope is none of either side.
-        return change(blow, fine)
+        finer = change(blow, fine)
+        # Where it does so however fine the step is, the quotient grows without bound.
+        return finer if np.linalg.norm(finer) < JUMP * np.linalg.norm(found) else found
 
     # Each blow by itself: the first one's change, moved to the others, falls between samples, and
     # the little that is then wrong of all of them alike passes for a force that drifts.
-    steps = [step] * (len(_starts(record)) if one.each_blow else 1)
+    steps = [step] * (len(starts(record)) if one.each_blow else 1)
     if rough:
         for blow, norm in enumerate(norms.get(one.name, ())):
             steps[blow] = min(step, fine_step(norm), key=abs)
@@ -375,7 +420,7 @@ def _moved_residual(
     return residual_under(record, problem.model.with_effects(effects), there, more, end)
 
 
-def _starts(record: MeasuredRecord) -> list[float]:
+def starts(record: MeasuredRecord) -> list[float]:
     """When each blow of a record begins, s."""
     blows = record.setup.blows
     return [float(blows.start[blows.hit == hit].min()) for hit in np.unique(blows.hit)]
