@@ -380,7 +380,8 @@ def between(ahead: FloatArray, behind: FloatArray) -> FloatArray:
     """A slope from those to either side; where a jump is to one side, that to the other.
 
     Args:
-        ahead, behind: quotients of differences, alike in shape.
+        ahead: quotient of differences.
+        behind: the same to the other side.
     """
     sizes = np.linalg.norm(ahead), np.linalg.norm(behind)
     if max(sizes) > JUMP * min(sizes):

@@ -37,6 +37,9 @@ def left_behind(problem: Problem, here: Hypothesis) -> list[MeasuredRecord]:
     Args:
         problem: linearised about the hypothesis.
         here: the hypothesis.
+
+    Returns:
+        of the campaign's, fitted or held out.
     """
     left = problem.residuals(here.effects)
     pairs = zip(problem.records, left, strict=True)

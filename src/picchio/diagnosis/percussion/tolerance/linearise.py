@@ -209,6 +209,9 @@ def with_those_left_behind(problem: Problem, found: Fit) -> Fit:
     Args:
         problem: linearised about the fit; what is changed.
         found: a fit that leaves little of the records it was fitted to.
+
+    Returns:
+        itself, where none was left behind.
     """
     here = found.hypothesis
     sizes = sought_alone(problem, here, left_behind(problem, here))
@@ -226,6 +229,9 @@ def silent(problem: Problem) -> list[MeasuredRecord]:
 
     Args:
         problem: linearised.
+
+    Returns:
+        of the campaign's.
     """
     marginal = problem.marginal
     return [r for r in problem.records if marginal is not None and marginal.slopes[r.name].silent]

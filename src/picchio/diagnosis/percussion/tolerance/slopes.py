@@ -96,6 +96,9 @@ class Slopes:
 
         Args:
             most: norm of what a record can be off by, in units of the noise.
+
+        Returns:
+            those, or slopes of the same numbers.
         """
         if not self.norms.size or self.norms.max() <= most:
             return self
@@ -421,6 +424,13 @@ def _moved_residual(
 
 
 def starts(record: MeasuredRecord) -> list[float]:
-    """When each blow of a record begins, s."""
+    """When each blow of a record begins, s.
+
+    Args:
+        record: with its blows.
+
+    Returns:
+        one a blow, as many as its numbers of hits differ.
+    """
     blows = record.setup.blows
     return [float(blows.start[blows.hit == hit].min()) for hit in np.unique(blows.hit)]
