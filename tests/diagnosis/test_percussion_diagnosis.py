@@ -94,6 +94,9 @@ def test_explained_is_what_the_contract_says():
     gain = Gain(("a",), ("b",), 0.31, 0.021, 0.020)
     assert gain.explained == pytest.approx((0.31**2 - 0.021**2) / (0.31**2 - 0.020**2))
     assert Gain(("a",), ("b",), 0.019, 0.019, 0.020).explained is None
+    # Noise alone scatters by as much: a share of that would be many times the whole.
+    assert Gain(("a",), ("b",), 0.02005, 0.0195, 0.020).explained is None
+    assert Gain(("a",), ("b",), 0.03, 0.0195, 0.020).explained == 1.0
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,9 @@ hardly ever are without being told as a set.
 FORMAT = "picchio-diagnosis/1"
 _HARDLY = 1e-4  # of the signal, RMS, that is not worth a sentence
 _SHOWN = 3  # causes that one line names
+# Of noise's power: by how much that of a campaign's records is not just what it is on average.
+_SCATTER = 0.01
+
 Verdict = Literal["nothing-wrong", "named", "ambiguous", "partial", "unexplained"]
 VERDICTS: dict[str, str] = {
     "nothing-wrong": "the residual is noise and what the tolerances allow",
@@ -212,11 +215,15 @@ class Gain:
 
     @property
     def explained(self) -> float | None:
-        """(baseline^2 - extended^2) / (baseline^2 - floor^2); None where nothing is to explain."""
+        """(baseline^2 - extended^2) / (baseline^2 - floor^2), 1 at most.
+
+        None where nothing is to explain, or no more than noise may be off by itself: a share of
+        that would say nothing.
+        """
         to_explain = self.baseline_nrmse**2 - self.noise_floor_nrmse**2
-        if to_explain <= 0.0:
+        if to_explain <= _SCATTER * self.noise_floor_nrmse**2:
             return None
-        return (self.baseline_nrmse**2 - self.extended_nrmse**2) / to_explain
+        return min((self.baseline_nrmse**2 - self.extended_nrmse**2) / to_explain, 1.0)
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""

@@ -186,6 +186,29 @@ class PiecewiseForce:
             amplitude=np.zeros(3), angular_frequency=np.zeros(3),
         )  # fmt: skip
 
+    def delayed(self, by: float) -> PiecewiseForce:
+        """The same later; nothing before.
+
+        Args:
+            by: s, above 0.
+
+        Returns:
+            it, one piece longer.
+        """
+
+        def first(values: FloatArray) -> FloatArray:
+            return np.concatenate([[0.0], values])
+
+        return replace(
+            self,
+            start=first(self.start + by),
+            end=self.end + by,
+            constant=first(self.constant),
+            slope=first(self.slope),
+            amplitude=first(self.amplitude),
+            angular_frequency=first(self.angular_frequency),
+        )
+
     def stepped(self, step: float) -> PiecewiseForce:
         """With stairs in place of every short ramp, which have the same area and moments.
 

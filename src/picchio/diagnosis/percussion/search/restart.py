@@ -7,9 +7,11 @@ from functools import partial
 
 from picchio.core.errors import InputError
 from picchio.diagnosis.attempt import attempt
+from picchio.diagnosis.percussion.criteria.remainder import allowed
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing, is_nonsmooth
 from picchio.diagnosis.percussion.search.state import Search
+from picchio.diagnosis.percussion.search.trials import settled_by_itself
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
 
@@ -27,7 +29,8 @@ def restarted(search: Search, best: Fit) -> Fit:
 
     What is far off is put back always; where more than noise is left, so is what does nothing where
     it is, such as the preload of a contact that never opens: it may have to be much smaller. A
-    whole number, such as a filter's order, then takes each of its other values.
+    whole number, such as a filter's order, then takes each of its other values, and what is not
+    exact is sought anew beside it.
 
     Args:
         search: data, sizes and records.
@@ -55,6 +58,10 @@ def restarted(search: Search, best: Fit) -> Fit:
                 windows = _GROWING if is_nonsmooth(start) else (None,)
                 grow = partial(fit_growing, windows=windows, iterations=8)
                 tried = attempt(effect.label, partial(grow, problem, start, search.records))
+                if parameter.whole and tried is not None and allowed(problem):
+                    tried, about = settled_by_itself(search, effect.label, tried)
+                    if tried is not None and tried.cost < found.cost:
+                        about.restore(problem)
                 found = tried if tried is not None and tried.cost < found.cost else found
     return found
 

@@ -36,6 +36,7 @@ from picchio.diagnosis.percussion.tolerance.linearise import (
     ELSE,
     About,
     about_another,
+    released,
     settled,
 )
 from picchio.diagnosis.result import BEYOND_DOUBT, Estimate
@@ -194,7 +195,7 @@ def _grow(search: Search, stack: ExitStack) -> None:
         again = restarted(search, search.best)
         if best.about is None or again is not best.fit:
             again = _settled_if_better(search, again)
-        search.best = again
+        search.best = released(problem, again)
         if known:
             _settle(search, best.label)
         if len(search.labels) >= MOST_CAUSES:

@@ -16,15 +16,17 @@ from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing, is_nonsmooth
 from picchio.diagnosis.percussion.fit.parallel import worker_pool
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.search.screen import Screen, Suspect
+from picchio.diagnosis.percussion.search.screen import Screen, Suspect, resized
 from picchio.diagnosis.percussion.search.state import Search, Trial
-from picchio.diagnosis.percussion.tolerance.linearise import About, about_another, settled
+from picchio.diagnosis.percussion.tolerance.linearise import ELSE, About, about_another, settled
 from picchio.model.effects.effect import Effect
 
 # One candidate fitted: to the first part of the records, and from there to all of them.
 
 # What is screened, and fitted first, s.
 SCREEN_WINDOW = 0.3
+# How small a candidate is made, of what was tried, that fits worse than none.
+_SMALLER = 0.1
 _ON_THE_WAY = (SCREEN_WINDOW, 2.0 * SCREEN_WINDOW)
 
 
@@ -44,7 +46,13 @@ def fit_short(
         first = fit(problem, hypothesis, records, window, iterations=turns)
         return fit_latent(problem, first, start)
     if window is None:
-        return fit(problem, hypothesis, records, None, iterations=3, near=near)
+        found = fit(problem, hypothesis, records, None, iterations=3, near=near)
+        if found.cost <= known.cost or start.discrete:
+            return found
+        # Worse than without it: it began too far from doing nothing.
+        smaller = known.hypothesis.plus(resized(start, _SMALLER))
+        again = fit(problem, smaller, records, None, iterations=3, near=near)
+        return min(found, again, key=lambda each: each.cost)
     windows = (0.06, 0.16, window)
     return fit_growing(problem, hypothesis, records, windows=windows, iterations=4, near=near)
 
@@ -85,6 +93,8 @@ _TWIN = 1e-4
 MOST_RIVALS = 5
 # Chi-square per sample up to which the first part of a part of the records shows nothing.
 _LITTLE = 1.2
+# By what share of what the best explains beyond the last one's another may explain less.
+_NEARBY = 0.05
 
 
 def try_candidates(
@@ -155,11 +165,14 @@ def try_candidates(
         tried.sort(key=lambda each: each[1].latent is None)
         fits = mapped("short", [effect for _, effect in tried])
         short = _best_of_each(tried, fits, some)
+        # About another's inexact numbers a true cause may leave more than one that is alike.
+        spread = short[-1][2] - short[0][2] if short and allowed(problem) else 0.0
+        nearby = _NEARBY * spread
         if best is None or not short:
-            return _long_trials(mapped, short, list(records), long_fits)
+            return _long_trials(mapped, short, list(records), long_fits, nearby)
         own = fit(problem, best.hypothesis, some, window, iterations=2)
         mark = min(bic(own), short[0][2])
-        return _long_trials(mapped, short, list(records), long_fits, mark, best.cost)
+        return _long_trials(mapped, short, list(records), long_fits, nearby, mark, best.cost)
 
 
 def _joined(chosen: Sequence[Suspect], early: Sequence[Suspect]) -> list[Suspect]:
@@ -212,12 +225,14 @@ def _long_trials(
     short: Sequence[tuple[Suspect, Fit, float]],
     records: Sequence[MeasuredRecord],
     long_fits: int,
+    nearby: float = 0.0,
     mark: float | None = None,
     rival: float = math.inf,
 ) -> list[Trial]:
     """Those that did best so far, fitted to everything; the best first.
 
-    `mark` is the score to come near to in the first part, `rival` the cost to come near to in all.
+    What is behind by no more than `nearby` is fitted as well. `mark` is the score to come near to
+    in the first part, `rival` the cost to come near to in all.
     """
     trials: list[Trial] = []
     wanted: list[tuple[Suspect, Fit]] = []
@@ -227,7 +242,8 @@ def _long_trials(
         behind = value - mark
         # One is fitted all the same, to tell how much better the best is; if it does not take long.
         told = bool(wanted) or suspect.effect.latent is not None
-        late = place >= long_fits or (told and behind > 0.5 * mark + 200.0)
+        far = max(0.5 * mark + 200.0, nearby)
+        late = place >= long_fits or (told and behind > far)
         if late and (behind > SAME or place >= 2 * long_fits):
             trials.append(Trial(suspect.label, found, math.inf, suspect.gain))
         else:
@@ -337,6 +353,8 @@ _SETTLED = 3
 _CLOSE = 5.0 * SAME
 # One that explains nearly as much may well explain more: it lacks at most this share.
 _NEARLY = 0.3
+# Of the cost without it, beside which a trial leaves little though more than inexactness explains.
+_TENTH = 0.1
 # The fall of chi-square above which a tolerance may be exceeded.
 _EXCEEDING = 9.0
 
@@ -393,10 +411,41 @@ def settled_alike(search: Search, trials: Sequence[Trial], best: Fit | None = No
     ][:_SETTLED]
     again = {}
     for trial in close:
-        with about_another(search.problem):
-            settle = partial(settled, search.problem, trial.fit, search.records, rounds=2)
-            there = attempt(trial.label, settle)
-            about = About.of(search.problem)
+        # Beside causes that leave little, numbers are near where one more small cause has them.
+        anew = not search.labels or trial.fit.chi_square > ELSE * trial.fit.samples
+        by_itself = partial(settled_by_itself, search, trial.label, trial.fit, anew=anew)
+        there, about = by_itself()
+        if _is_far(there) and trial.fit.cost < _TENTH * search.best.cost:
+            # All but what is not exact is explained: that is rather farther off than slopes reach.
+            other, elsewhere = by_itself(patient=True)
+            if other is not None and not _is_far(other):
+                there, about = other, elsewhere
         if there is not None and there.cost < trial.fit.cost:
             again[trial.label] = replace(trial, fit=there, score=bic(there), about=about)
     return sorted((again.get(t.label, t) for t in trials), key=lambda t: t.score)
+
+
+def settled_by_itself(
+    search: Search, label: str, start: Fit, *, anew: bool = True, patient: bool = False
+) -> tuple[Fit | None, About]:
+    """A fit about its own inexact numbers, and what the records are linearised about for it.
+
+    Args:
+        search: data and records; nothing of it changes.
+        label: of what is fitted.
+        start: the fit.
+        anew: as of `settled`.
+        patient: as of `settled`.
+
+    Returns:
+        None where that fails.
+    """
+    with about_another(search.problem):
+        settle = partial(
+            settled, search.problem, start, search.records, rounds=2, anew=anew, patient=patient
+        )
+        return attempt(label, settle), About.of(search.problem)
+
+
+def _is_far(found: Fit | None) -> bool:
+    return found is None or found.chi_square > ELSE * found.samples

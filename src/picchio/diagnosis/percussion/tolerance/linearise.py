@@ -27,6 +27,7 @@ from picchio.diagnosis.percussion.tolerance.slopes import Slopes, all_slopes, sl
 
 # Numbers are moved by so many standard deviations at most.
 _FARTHEST = 3.5
+_FAR = 3.0  # from here on it is asked whether they had to
 # The stretch, s, that is looked at first; how often slopes are taken at most, how often numbers are
 # moved by the same ones, what share of the fall that they foretold must come for that, and what
 # fall of the cost asks for one move more.
@@ -193,13 +194,51 @@ def settled(
         _move(problem, {})
         problem.idle = frozenset()  # a cause may set free what stood still without it
     here = start.hypothesis
-    for end in _KINKED if is_nonsmooth(here) else (_SHORT, None):
+    ends: Sequence[float | None] = _KINKED if is_nonsmooth(here) else (_SHORT, None)
+    if not anew and start.end is None and start.chi_square <= ELSE * start.samples:
+        ends = (None,)  # no cycle is skipped any more
+    for end in ends:
         here = _settled_up_to(problem, here, records, end, rounds, else_wrong)
     found = fit(problem, here, records, None, with_jacobian=True)
     if is_nonsmooth(here) and found.chi_square <= else_wrong * found.samples:
         found = with_those_left_behind(problem, found)
     if found.chi_square > else_wrong * found.samples:
         return _unless_little(problem, found)
+    return found
+
+
+def released(problem: Problem, found: Fit) -> Fit:
+    """A fit settled once more with what stands far off put back; itself, where that is no better.
+
+    A number may have gone there while an unknown that does nearly the same was missing: a blow's
+    slow rise for a sensor's delay. Each then holds the other where it is.
+
+    Args:
+        problem: linearised about the fit; about the other one, where that is better.
+        found: the fit.
+
+    Returns:
+        the better one.
+    """
+    if not problem.sizes or problem.marginal is None:
+        return found
+    name = problem.records[0].name
+    own = problem.marginal.slopes[name].own
+    shared = np.abs(problem.sizes[name][own:]) >= _FAR
+    if not shared.any():
+        return found
+    before, records = About.of(problem), found.records
+    sizes = {n: v.copy() for n, v in problem.sizes.items()}
+    for size in sizes.values():
+        size[size.size - shared.size :][shared] = 0.0
+    _move(problem, sizes)
+    linearise(problem, found.hypothesis, records)
+    here = fit(problem, found.hypothesis, records, None, iterations=6).hypothesis
+    here = _settled_up_to(problem, here, records, None, 1, math.inf)
+    again = fit(problem, here, records, None, with_jacobian=True)
+    if again.cost < found.cost:
+        return again
+    before.restore(problem)
     return found
 
 

@@ -286,7 +286,10 @@ def _blows(problem: Problem, record: MeasuredRecord, sigma: Tolerance) -> Iterat
         rise = size * sigma.rise_time
         if rise <= 0.0:  # no blow is; but a fit may pass through it
             return blows.change(start=blows.start + 0.5 * rise)
-        return blows.change(shape=blows.shape.ramped(min(rise, 0.5 * blows.shape.end)))
+        rise = min(rise, 0.5 * blows.shape.end)
+        # A blow of another shape rises anyhow: its middle is where the ramped one's is.
+        other = None if blows.other is None else blows.other.delayed(0.5 * rise)
+        return blows.change(shape=blows.shape.ramped(rise), other=other)
 
     if _is_flat(blows.shape):
         yield Inexact("rise_time", "rise_time", True, "blows", ramped, one_way=True)
