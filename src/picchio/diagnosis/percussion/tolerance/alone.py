@@ -23,8 +23,8 @@ from picchio.diagnosis.percussion.tolerance.slopes import own_slopes, starts
 
 # Standard deviations of noise's mean square beyond which a record is left behind.
 _BEHIND = 6.0
-# How often numbers are moved by slopes of their own up to a blow, how much a step is damped, how far
-# they go at most, standard deviations, and what fall of chi-square makes one more worth while.
+# How often numbers are moved by slopes of their own up to a blow, how much a step is damped, how
+# far they go at most, standard deviations, and what fall of chi-square is worth one step more.
 _MOVES = 4
 _DAMPINGS = (0.0, 0.01, 0.1, 1.0, 10.0, 100.0)
 _FARTHEST = 3.5
