@@ -23,11 +23,12 @@ from picchio.diagnosis.percussion.tolerance.slopes import own_slopes, starts
 
 # Standard deviations of noise's mean square beyond which a record is left behind.
 _BEHIND = 6.0
-# How often numbers are moved by slopes of their own up to a blow, how much a step is damped, how
-# far they go at most, standard deviations, and what fall of chi-square is worth one step more.
+# Numbers are moved by so many standard deviations at most.
+FARTHEST = 3.5
+# How often numbers are moved by slopes of their own up to a blow, how much a step is damped, and
+# what fall of chi-square is worth one step more.
 _MOVES = 4
 _DAMPINGS = (0.0, 0.01, 0.1, 1.0, 10.0, 100.0)
-_FARTHEST = 3.5
 _WORTH = 5.0
 
 
@@ -150,7 +151,7 @@ class _Alone:
                 step = -np.linalg.solve(normal + damping * np.diag(np.diag(normal)), right)
                 step = np.where(self._stays, 0.0, step)
                 other = np.array(self.size)
-                other[:own] = np.clip(other[:own] + step, -_FARTHEST, _FARTHEST)
+                other[:own] = np.clip(other[:own] + step, -FARTHEST, FARTHEST)
                 now = self.cost(other, end)
                 if now < before:
                     self.size, cost = other, now

@@ -20,14 +20,13 @@ from picchio.diagnosis.percussion.fit.least_squares import (
     prior_cost,
 )
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.tolerance.alone import left_behind, sought_alone
+from picchio.diagnosis.percussion.tolerance.alone import FARTHEST, left_behind, sought_alone
 from picchio.diagnosis.percussion.tolerance.marginal import Marginal
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, inexact, nudged
 from picchio.diagnosis.percussion.tolerance.slopes import Slopes, all_slopes, slopes_of
 
-# Numbers are moved by so many standard deviations at most.
-_FARTHEST = 3.5
-_FAR = 3.0  # from here on it is asked whether they had to
+# Standard deviations beyond which it is asked whether a number had to go there.
+_FAR = 3.0
 # The stretch, s, that is looked at first; how often slopes are taken at most, how often numbers are
 # moved by the same ones, what share of the fall that they foretold must come for that, and what
 # fall of the cost asks for one move more.
@@ -488,7 +487,7 @@ def recentre(problem: Problem, found: Fit, temper: float = 1.0) -> Hypothesis:
     for name, size in sizes.items():
         # A pose's geometry takes long to find, and its small errors act in proportion.
         stays = np.array([what.where == POSE for what in marginal.slopes[name].what])
-        new[name] = np.where(stays, 0.0, np.clip(size, -_FARTHEST, _FARTHEST))
+        new[name] = np.where(stays, 0.0, np.clip(size, -FARTHEST, FARTHEST))
         if marginal.slopes[name].silent and name in problem.sizes:
             # Slopes say nothing of it: its own numbers stay where they were sought.
             count = marginal.slopes[name].own
