@@ -2,20 +2,69 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+import warnings
+from dataclasses import dataclass, replace
 
 import numpy as np
 import rainflow
 from scipy.interpolate import CubicSpline
 
 from picchio.campaign.channels import parse_channel
-from picchio.core.errors import InputError
+from picchio.core.errors import InputError, PicchioWarning
+from picchio.diagnosis.life import life_before_and_after
+from picchio.diagnosis.percussion.conclude.causes import fitted_spread
 from picchio.model.geometry import Geometry
+from picchio.studies.tasks import Operation, Task
 from worlds import campaign as worlds
 
 _AWAY = 0.3  # rad, from a pose that was measured
 _STILL = 1e-6  # of the largest deflection
+CURVE = "nie-2016"  # it has no endurance limit: every joint has a life
 SLOPE = 1.0 / 0.3548  # of the paper's S-N curve (section 4.3), cycles over amplitude
+
+
+@dataclass(frozen=True, eq=False)
+class Unmeasured:
+    """Where and when nobody measured, and what the world's joints do there.
+
+    Attributes:
+        record: the measured record that it is struck like.
+        pose: (nv,) rad or m. direction: (3,) world.
+        world: of `worlds.quantities`.
+    """
+
+    record: object
+    pose: np.ndarray
+    direction: np.ndarray
+    world: dict
+
+    @classmethod
+    def draw(cls, found, truth, seed):
+        """Near a record's pose, its errors of pose, direction and blows drawn anew."""
+        rng = np.random.default_rng([seed, 9])
+        index = int(rng.integers(len(found.problem.records)))
+        record = found.problem.records[index]
+        robot = found.problem.robot
+        pose = record.setup.geometry.pose + rng.uniform(-_AWAY, _AWAY, len(robot.joint_names))
+        pose = np.clip(pose, robot.lower, robot.upper)
+        direction = rng.normal(size=3)
+        direction /= np.linalg.norm(direction)
+        number = int(record.name.removeprefix("r").removesuffix(".csv")) - 1
+        true = worlds.quantities(truth["world"], pose=pose, direction=direction, index=number)
+        return cls(record, pose, direction, true)
+
+    def pairs(self, problem, fit):
+        """(told, true) deflections of every joint that moves, by its name."""
+        times, series = _deflections(problem, self.record, self.pose, self.direction, fit)
+        inside = (times >= 0.0) & (times <= self.world["time"][-1])
+        true = CubicSpline(self.world["time"], self.world["deflection"], axis=1)(times[inside])
+        still = _STILL * np.abs(true).max()
+        return {
+            name: (a[inside], b)
+            for name, a, b in zip(problem.robot.flexible_names, series, true, strict=True)
+            if np.abs(b).max() > still  # a joint that friction holds has no life to be wrong by
+        }
 
 
 def errors(found, truth, seed):
@@ -32,34 +81,50 @@ def errors(found, truth, seed):
     Returns:
         {"baseline" or "extended": {"peak": [...], "life": [...]}}; empty where a model has none.
     """
-    rng = np.random.default_rng([seed, 9])
-    index = int(rng.integers(len(found.problem.records)))
-    record = found.problem.records[index]
-    robot = found.problem.robot
-    pose = record.setup.geometry.pose + rng.uniform(-_AWAY, _AWAY, len(robot.joint_names))
-    pose = np.clip(pose, robot.lower, robot.upper)
-    direction = rng.normal(size=3)
-    direction /= np.linalg.norm(direction)
-    number = int(record.name.removeprefix("r").removesuffix(".csv")) - 1
-    true = worlds.quantities(truth["world"], pose=pose, direction=direction, index=number)
-    told = {}
+    there, told = Unmeasured.draw(found, truth, seed), {}
     for name, fit in (("baseline", found.search.baseline), ("extended", found.extended)):
         try:
-            times, series = _deflections(found.problem, record, pose, direction, fit)
+            pairs = there.pairs(found.problem, fit).values()
         except InputError:
             continue
-        inside = (times >= 0.0) & (times <= true["time"][-1])
-        world = CubicSpline(true["time"], true["deflection"], axis=1)(times[inside])
-        still = _STILL * np.abs(world).max()
-        pairs = [
-            (a[inside], b)
-            for a, b in zip(series, world, strict=True)
-            if np.abs(b).max() > still  # a joint that friction holds has no life to be wrong by
-        ]
         peaks = [float(np.abs(a).max() / np.abs(b).max() - 1.0) for a, b in pairs]
         lives = [float(_damage(b) / _damage(a)) - 1.0 for a, b in pairs]
         told[name] = {"peak": peaks, "life": lives}
     return told
+
+
+def lives(found, truth, seed):
+    """By joint: the true life and the two ends of the interval told, logarithms over the life told.
+
+    By the paper's S-N curve.
+
+    Args:
+        found: a `PercussionDiagnosis`.
+        truth: of the campaign.
+        seed: of the burst.
+
+    Returns:
+        {joint: [true, low, high]}; empty where no life is told.
+    """
+    there = Unmeasured.draw(found, truth, seed)
+    campaign = found.problem.campaign
+    record = next(r for r in campaign.records if r.file == there.record.name)
+    work = Task((
+        Operation("burst", there.direction, record.blows(), record.hits, there.pose[None]),
+    ))  # fmt: skip
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PicchioWarning)
+        told = life_before_and_after(
+            found.problem.robot, work, found.extended.hypothesis.effects,
+            after=fitted_spread(found.extended), sn_curve=CURVE,
+        )["extended"]["joints"]  # fmt: skip
+    rows = {}
+    for name, (ours, true) in there.pairs(found.problem, found.extended).items():
+        life, ends = told[name]["rivets_to_failure"], told[name].get("rivets_interval")
+        if ends is not None and 0.0 < life < math.inf:
+            over = [_damage(ours) / _damage(true), *(end / life for end in ends)]
+            rows[name] = [round(math.log(x), 4) if x > 0.0 else -math.inf for x in over]
+    return rows
 
 
 def _deflections(problem, record, pose, direction, fit):

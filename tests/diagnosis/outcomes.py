@@ -126,6 +126,27 @@ def judge(case, truth, row):
     }
 
 
+def known(diagnosis, robot, truth):
+    """By how many of its standard deviations each stiffness and the damping told is off.
+
+    Args:
+        diagnosis: whose fitted nuisances are judged; causes are judged elsewhere.
+        robot: as its files have it.
+        truth: of the campaign.
+    """
+    drawn = truth["nuisances"]
+    true = {
+        f"stiffness.{joint.name}": joint.stiffness * drawn["stiffness"][joint.name]
+        for joint in robot.flexible_joints
+    }
+    true["damping_ratio"] = float(np.mean(robot.damping_ratio)) * drawn["damping_ratio"]
+    return {
+        name: round((value.value - true[name]) / value.std, 3)
+        for name, value in diagnosis.nuisances.items()
+        if name in true and value.std > 0.0
+    }
+
+
 def _is(cause, key, target):
     """Whether a cause is a tolerance, exceeded."""
     effect, where = cause

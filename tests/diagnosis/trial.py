@@ -160,6 +160,9 @@ def run(case, salt=0, without=(), method="diagnose", workers=1):
         result = judge_labels(case, truth, METHODS[method](robot, campaign, without))
     if "mismatch" in case:
         result |= outcomes.judge(case, truth, result)
+        if method == "diagnose" and result["outcome"] == "right":
+            result["known"] = outcomes.known(found.diagnosis, robot, truth)
+            result["lives"] = burst.lives(found, truth, seed_of(case, salt))
     result["seconds"] = round(time.monotonic() - began, 1)
     result["cpu_seconds"] = round(time.process_time() - spent, 1)
     return result

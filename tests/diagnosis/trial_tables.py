@@ -305,12 +305,34 @@ def print_mismatch(rows):
         )
 
 
+def print_known(rows):
+    """How often what is told of stiffness, damping and a life nobody measured holds."""
+    off = [abs(z) for row in rows for z in row.get("known", {}).values()]
+    if off:
+        count = sum("known" in row for row in rows)
+        inside = [f"{100 * sum(z <= k for z in off) / len(off):.1f} %" for k in (1.645, 1.960)]
+        print(
+            f"stiffness and damping, {len(off)} values of {count} campaigns: {inside[0]} within "
+            f"the 90 % interval, {inside[1]} within the 95 % interval"
+        )
+    lives = [each for row in rows for each in row.get("lives", {}).values()]
+    if lives:
+        inside = sum(low <= true <= high for true, low, high in lives)
+        width = quantile(sorted(0.5 * (high - low) for _, low, high in lives), 0.5)
+        print(
+            f"life of a burst that nobody measured, {len(lives)} joints: {inside} within the 90 % "
+            f"interval ({100 * inside / len(lives):.1f} %), which is {100 * width:.2g} % to either "
+            "side, the median"
+        )
+
+
 def mismatch_summary(rows):
     """Everything about worlds that are a little wrong: the table, bursts, what was said."""
     rows = [row for row in rows if "mismatch" in row]
     print_mismatch(rows)
     told = [row for row in rows if not _aside(row)]
     print_bursts(told)
+    print_known(told)
     for row in told:
         if row.get("outcome", "undecided") != "right":
             said = [row["verdict"], row["claimed"], row.get("leads", [])]

@@ -145,6 +145,32 @@ def test_blows_are_known_by_modes_after_however_many_changes_of_the_structure(sm
         np.testing.assert_array_equal(among[channel.name][-1], alone[channel.name][0])
 
 
+def test_what_is_far_from_straight_is_not_told_by_modes(worlds):
+    """Else a harder blow, which deflects more, and a sensor's gain would seem to be told apart."""
+    campaign, _ = made(worlds, seed=1)
+    robot = load_robot("fanuc_like_3dof")
+    setup = percussion_setups(robot, campaign)[1]
+    told = {}
+    soft = [effect_class("joint_stiffness")(f"joint_{k}", scale=0.2) for k in (1, 2, 3)]
+    for times in (1.0, 40.0):
+        one, here, other = (
+            Model(robot, True).with_effects(
+                [*soft, effect_class("force_amplitude")("tool", scale=times * scale)]
+            )
+            for scale in (0.995, 1.0, 1.005)
+        )
+        before, read, after = (setup.predict(model) for model in (one, here, other))
+        names = [name for name in read if name.startswith("accelerometer.tool")]
+        # Of what doubles with the force, a change of it by 1 % is 1 % of what is read.
+        bent = max(
+            np.abs(after[n] - before[n] - 0.01 * read[n]).max() / (0.01 * np.abs(read[n]).max())
+            for n in names
+        )
+        told[times] = bent, setup.changes(here, [(one, other)]) is not None
+    assert told[1.0][0] < 0.002 and told[1.0][1]
+    assert told[40.0][0] > 0.01 and not told[40.0][1]
+
+
 def test_a_pose_the_robot_cannot_have_is_told_with_its_file_and_record(tmp_path):
     arm = picchio.load_robot("fanuc_like_3dof")
     campaign = _campaign({"joint_1": 0.1, "joint_9": 0.2})

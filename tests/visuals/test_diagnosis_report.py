@@ -264,6 +264,17 @@ def test_what_all_sensors_have_alike_is_said_and_not_called_noise(case, capsys):
     assert diagnosis.to_dict()["note"] == why
 
 
+def test_records_from_which_no_value_is_are_told(case, capsys):
+    diagnosis = replace(case.found.diagnosis, untold=("r05.csv", "r09.csv"))
+    html = page_of(replace(case.found, diagnosis=diagnosis))
+    why = "No value is from r05.csv, r09.csv: errors of a tolerance or less grow too large there."
+    assert why in text(html)
+    show_diagnosis(diagnosis)
+    assert why in " ".join(capsys.readouterr().out.split())
+    assert diagnosis.to_dict()["untold"] == ["r05.csv", "r09.csv"]
+    assert "untold" not in case.found.diagnosis.to_dict()
+
+
 def test_the_residual_page_names_no_cause_but_shows_where(case, residual_page):
     html = residual_page
     said = text(html)

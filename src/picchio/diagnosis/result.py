@@ -286,6 +286,8 @@ class Diagnosis(Result):
         next_measurement: what to measure to know more; None where there is nothing to ask.
         note: why, where it is not what `VERDICTS` says; empty otherwise.
         remainder: what is left beside noise and tolerance; None where that was not looked at.
+        untold: percussion records from which no value is, as small errors grow too large in them;
+            what was found explains them all the same.
         not_looked_for: effect -> why these records cannot show it; of percussion records.
         scores: every candidate's score, for the report: dicts with effect, target, numbers.
         kinds: of a campaign with percussion and motion records, each kind's verdict and gain.
@@ -308,6 +310,7 @@ class Diagnosis(Result):
     next_measurement: Mapping[str, Any] | None = None
     note: str = ""
     remainder: Left | None = None
+    untold: tuple[str, ...] = ()
     not_looked_for: Mapping[str, str] = field(default_factory=dict)
     scores: tuple[Mapping[str, Any], ...] = ()
     kinds: Mapping[str, Any] = field(default_factory=dict)
@@ -321,6 +324,16 @@ class Diagnosis(Result):
     def plan(self) -> str | None:
         """What to measure next as a `picchio-plan/1` file; None where no plan can say it."""
         return (self.next_measurement or {}).get("plan")
+
+    @property
+    def told_without(self) -> str:
+        """A sentence on the records from which no value is; empty where there are none."""
+        if not self.untold:
+            return ""
+        return (
+            f"No value is from {', '.join(self.untold)}: errors of a tolerance or less grow too "
+            "large there. What was found explains them all the same"
+        )
 
     def model_text(self, folder: Path | None = None) -> str:
         """The extended model as a `picchio-model/1` file.
@@ -352,6 +365,7 @@ class Diagnosis(Result):
             "remainder": self.remainder.to_dict() if self.remainder else None,
             **more,
             **({"life_note": self.life_note} if self.life_note else {}),
+            **({"untold": list(self.untold)} if self.untold else {}),
             "not_looked_for": dict(self.not_looked_for),
             "scores": self.scores,
             **self.extra,

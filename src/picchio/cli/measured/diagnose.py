@@ -179,6 +179,8 @@ def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
         )
     if found.remainder is not None:
         out.print(f"  {found.remainder.told}")
+    if found.told_without:
+        out.print(f"{found.told_without}.")
     _show_channels(found.extra.get("channels") or ())
     for told in found.shared:
         if told["status"] in _STATUS:

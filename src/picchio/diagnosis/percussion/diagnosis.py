@@ -276,6 +276,7 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         scores=tuple(_scores(search)),
         note=note,
         remainder=remainder,
+        untold=tuple(r.name for r in problem.records if r not in every),
     )
     return PercussionDiagnosis(
         diagnosis, problem, nominal, whole, search, before, after,

@@ -51,6 +51,8 @@ _SWEEPS = 2
 _HALFWAY = 0.3
 # How often springs that were identified are settled further, at most.
 _MORE_ROUNDS = 6
+# What share of the cost may be left for going on from far off to be worth while.
+_FALLING = 0.7
 
 
 def begin_search(
@@ -77,6 +79,10 @@ def begin_search(
         # Springs that were identified: rather masses and places are farther off than slopes reach.
         before = About.of(problem)
         other = settled(problem, begin, split[0], patient=True)
+        for _ in range(_MORE_ROUNDS):
+            far, other = other, _settled_further(problem, other, split[0], patient=True)
+            if other.cost > _FALLING * far.cost:
+                break
         if other.chi_square <= ELSE * other.samples:
             baseline = other
         else:
