@@ -13,7 +13,6 @@ from scipy.interpolate import CubicSpline
 from picchio.campaign.channels import parse_channel
 from picchio.core.errors import InputError, PicchioWarning
 from picchio.diagnosis.life import life_before_and_after
-from picchio.diagnosis.percussion.conclude.causes import fitted_spread
 from picchio.model.geometry import Geometry
 from picchio.studies.tasks import Operation, Task
 from worlds import campaign as worlds
@@ -115,8 +114,8 @@ def lives(found, truth, seed):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PicchioWarning)
         told = life_before_and_after(
-            found.problem.robot, work, found.extended.hypothesis.effects,
-            after=fitted_spread(found.extended), sn_curve=CURVE,
+            found.problem.robot, work, found.effects,
+            after=found.left_open, sn_curve=CURVE,
         )["extended"]["joints"]  # fmt: skip
     rows = {}
     for name, (ours, true) in there.pairs(found.problem, found.extended).items():

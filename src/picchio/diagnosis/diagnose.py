@@ -119,7 +119,7 @@ def diagnose(
         else:
             hit = diagnose_percussion(loaded, records, **options)
             answer = replace(hit.diagnosis, details={"percussion": hit})
-        effects = hit.extended.hypothesis.effects
+        effects = hit.effects
         known = fitted_correlation(hit.extended) if answer.verdict != "unexplained" else None
         moves = answer.details.get("motion")
         if known is not None and moves is not None:

@@ -14,6 +14,7 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.model.effects.effect import Effect
+from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
 from picchio.studies.assessment.result import Assessment
 from picchio.studies.assessment.run import assess
@@ -40,6 +41,8 @@ class Uncertain:
         centre: (k,) where they stand.
         covariance: (k, k) of the coordinates.
         lower, upper: (k,) bounds; beyond them the effects stay as they are there.
+        small: how many of the last coordinates are many and little each, such as the masses of
+            links that are never exact: first order will do for them.
     """
 
     effects: Callable[[FloatArray], Sequence[Effect]]
@@ -47,6 +50,7 @@ class Uncertain:
     covariance: FloatArray
     lower: FloatArray | float = -math.inf
     upper: FloatArray | float = math.inf
+    small: int = 0
 
     def room(self, step: FloatArray) -> float:
         """How many such steps there are to the nearest bound.
@@ -220,7 +224,8 @@ def life_intervals(
     The most probable values at which the joint fares as badly (and as well) as the level asks
     for, by first-order reliability (Hasofer and Lind, J. Eng. Mech. Div. ASCE 100 (1974) 111):
     the slope of ln utilisation (and of ln damage), one standard deviation in every principal
-    direction of the covariance, says where they lie; both are then computed there.
+    direction of the covariance, says where they lie; both are then computed there. What the many
+    small numbers add is taken to be of the others, which are moved further for it.
 
     Args:
         robot: without the effects.
@@ -245,9 +250,8 @@ def life_intervals(
         try:
             with warnings.catch_warnings():  # said once already, of the centre
                 warnings.simplefilter("ignore")
-                return _strain(
-                    assess(with_effects(robot, unsure.effects(vector)), task, **settings)
-                )
+                model = Model.of(robot).with_effects(unsure.effects(vector))
+                return _strain(assess(model, task, **settings))
         except InputError:
             return None
 
@@ -255,21 +259,24 @@ def life_intervals(
     if centre is None:
         return {}
     reference, spent = centre
-    sizes, directions = np.linalg.eigh(unsure.covariance)
-    spread = directions * np.sqrt(np.maximum(sizes, 0.0))
-    spread = spread[:, np.sqrt(np.maximum(sizes, 0.0)) > _KNOWN]
+    lead = unsure.centre.size - unsure.small
+    sizes, directions = np.linalg.eigh(unsure.covariance[:lead, :lead])
+    kept = np.sqrt(np.maximum(sizes, 0.0)) > _KNOWN
+    spread = np.zeros((unsure.centre.size, int(kept.sum())))
+    spread[:lead] = directions[:, kept] * np.sqrt(sizes[kept])
     slopes = _slopes(unsure, spread, at, reference, spent)
+    wider = _widened(unsure, spread, slopes, at, _most_strained(task, found, each=False))
     told = {}
     for j, joint in enumerate(found.joints):
         if not joint.sn_curve:
             continue
         used, lives = [joint.utilisation], [joint.rivets_to_failure]
-        for point in _design_points(unsure.centre, spread, slopes[0, :, j], z):
+        for point in _design_points(unsure.centre, spread, slopes[0, :, j], z * wider[0, j]):
             there = at(point)
             used.append(
                 math.inf if there is None else joint.utilisation * there[0][j] / reference[j]
             )
-        for point in _design_points(unsure.centre, spread, slopes[1, :, j], z):
+        for point in _design_points(unsure.centre, spread, slopes[1, :, j], z * wider[1, j]):
             there = at(point)
             # The most strained pose is the first to be damaged: no damage there, none at all.
             if there is not None and there[1][j] > 0.0:
@@ -309,6 +316,32 @@ def _slopes(
     return slopes
 
 
+def _widened(
+    unsure: Uncertain,
+    spread: FloatArray,
+    slopes: FloatArray,
+    at: Callable[[FloatArray, Task], tuple[FloatArray, FloatArray] | None],
+    task: Task,
+) -> FloatArray:
+    """(2, joints) by how much the small numbers widen what utilisation and damage are known by."""
+    lead, one = unsure.centre.size - unsure.small, np.ones((2, slopes.shape[2]))
+    centre = at(unsure.centre, task) if unsure.small else None
+    if centre is None or not spread.size:
+        return one
+    steps = np.zeros((unsure.centre.size, unsure.small))
+    steps[lead:] = np.diag(np.sqrt(unsure.covariance.diagonal()[lead:]))
+    size = steps[lead:].diagonal()
+    small = _slopes(unsure, steps, lambda vector: at(vector, task), *centre) / size[:, None]
+    across = unsure.covariance[:lead, lead:]
+    across = spread[:lead].T @ across / (spread**2).sum(axis=0)[:, None]
+    own = np.einsum("adj,adj->aj", slopes, slopes)
+    both = 2.0 * np.einsum("adj,ds,asj->aj", slopes, across, small)
+    rest = np.einsum("asj,st,atj->aj", small, unsure.covariance[lead:, lead:], small)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = np.sqrt(np.maximum(own + both + rest, 0.0) / own)
+    return np.where(own > 0.0, found, one)
+
+
 def _design_points(
     centre: FloatArray, spread: FloatArray, slope: FloatArray, z: float
 ) -> list[FloatArray]:
@@ -326,11 +359,18 @@ def _strain(found: Assessment) -> tuple[FloatArray, FloatArray]:
     return used, spent
 
 
-def _most_strained(task: Task, found: Assessment) -> Task:
-    """The task with every operation's and joint's most strained poses alone."""
+def _most_strained(task: Task, found: Assessment, each: bool = True) -> Task:
+    """The task with every operation's and joint's most strained poses alone.
+
+    Where not of `each` operation: with the one pose of all at which a joint is most strained.
+    """
+    used = [np.nan_to_num(result.utilisation) for result in found.operations]
+    best = np.max([own.max(axis=0) for own in used], axis=0)
     operations = []
-    for operation, result in zip(task.operations, found.operations, strict=True):
-        ranked = np.argsort(np.nan_to_num(result.utilisation), axis=0)[-_WORST:]
-        kept = np.unique(ranked)
-        operations.append(replace(operation, poses=operation.poses[kept]))
+    for operation, own in zip(task.operations, used, strict=True):
+        kept = np.unique(np.argsort(own, axis=0)[-_WORST:])
+        if not each:
+            kept = np.flatnonzero((own >= best).any(axis=1))
+        if kept.size:
+            operations.append(replace(operation, poses=operation.poses[kept]))
     return replace(task, operations=tuple(operations))

@@ -12,16 +12,15 @@ import numpy as np
 from picchio.campaign.campaign import Campaign
 from picchio.core.processes import one_thread
 from picchio.diagnosis.attempt import attempt
-from picchio.diagnosis.life import life_before_and_after
+from picchio.diagnosis.life import Uncertain, life_before_and_after
 from picchio.diagnosis.percussion.conclude.causes import (
     fitted_causes,
     fitted_nuisances,
-    fitted_spread,
-    nominal_spread,
     reported_covariance,
     with_solved,
 )
 from picchio.diagnosis.percussion.conclude.holdout import held_out_remainder, holdout_gain
+from picchio.diagnosis.percussion.conclude.left_open import as_stated, fitted_spread, nominal_spread
 from picchio.diagnosis.percussion.conclude.others import weighed
 from picchio.diagnosis.percussion.conclude.verdict import (
     claimed_of,
@@ -84,6 +83,8 @@ class PercussionDiagnosis:
         search: the way there.
         before, after: tests of what the two leave.
         others: models with the alternative sets, in the order of the diagnosis's.
+        left_open: how well all that a life depends on is known.
+        stated: the extended model, what is not exact where it is stated.
     """
 
     diagnosis: Diagnosis
@@ -94,6 +95,13 @@ class PercussionDiagnosis:
     before: Evidence
     after: Evidence
     others: tuple[Hypothesis, ...] = ()
+    left_open: Uncertain | None = None
+    stated: Hypothesis | None = None
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """Of the extended model as studies and files have it."""
+        return (self.stated or self.extended.hypothesis).effects
 
     def life(self, task: Task) -> dict[str, Any]:
         """A task's life before and after, with intervals, and with every alternative set.
@@ -108,9 +116,9 @@ class PercussionDiagnosis:
         return life_before_and_after(
             robot,
             task,
-            self.extended.hypothesis.effects,
-            before=nominal_spread(robot, self.problem.campaign.tolerance),
-            after=fitted_spread(self.extended),
+            self.effects,
+            before=nominal_spread(self.problem),
+            after=self.left_open,
             others=[other.effects for other in self.others],
             causes=[(cause.effect, cause.target) for cause in self.diagnosis.causes],
         )
@@ -222,6 +230,7 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         linearise(problem, whole.hypothesis, every, both=True)
         whole = fit(problem, whole.hypothesis, every, None, iterations=0, with_jacobian=True)
     off = exceeded(problem, whole)
+    left_open, stated = fitted_spread(problem, whole), as_stated(problem, whole)
     beyond = off is not None and off.improbable
     stands, judged = search.best.hypothesis, search.kept or search.records
     nuisances = search.baseline.hypothesis
@@ -280,7 +289,7 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
     )
     return PercussionDiagnosis(
         diagnosis, problem, nominal, whole, search, before, after,
-        tuple(others.values()) if claimed else (),
+        tuple(others.values()) if claimed else (), left_open, stated,
     )  # fmt: skip
 
 

@@ -8,20 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from picchio.campaign.tables import Tolerance
 from picchio.core.arrays import FloatArray
-from picchio.diagnosis.life import Uncertain
 from picchio.diagnosis.percussion.criteria.equivalence import bic, confidence
 from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_range
 from picchio.diagnosis.percussion.criteria.pose_consistency import jackknife_covariance
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.drawn import width_spread
-from picchio.diagnosis.percussion.fit.least_squares import Fit, prior_precision
+from picchio.diagnosis.percussion.fit.least_squares import Fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.state import EXACT, Search, Trial
 from picchio.diagnosis.result import Cause, Correlation, Value, unit_of
 from picchio.model.effects.effect import CHANNEL_UNIT, Effect
-from picchio.robot.flexible_robot import FlexibleRobot
 
 
 def fitted_causes(
@@ -118,11 +115,6 @@ def reported_covariance(whole: Fit) -> FloatArray:
     return covariance
 
 
-def fitted_spread(whole: Fit) -> Uncertain:
-    """How well all values of a fit are known, for the life."""
-    return _uncertain(whole.hypothesis, reported_covariance(whole))
-
-
 def fitted_correlation(whole: Fit) -> Correlation:
     """How all values of a fit hang together, nuisances included.
 
@@ -136,27 +128,6 @@ def fitted_correlation(whole: Fit) -> Correlation:
     unknowns = [(effects[u.effect], u.name) for u in whole.hypothesis.unknowns()]
     names = [(effect.name, effect.target, name) for effect, name in unknowns]
     return Correlation.of(names, reported_covariance(whole))
-
-
-def nominal_spread(robot: FlexibleRobot, tolerance: Tolerance) -> Uncertain:
-    """How well the nominal values are known before anything was measured."""
-    hypothesis = Hypothesis.baseline(robot, tolerance)
-    precision = prior_precision(hypothesis)
-    at = np.ix_(*[np.flatnonzero(precision.diagonal() > 0.0)] * 2)
-    covariance = np.zeros_like(precision)
-    covariance[at] = np.linalg.inv(precision[at])
-    return _uncertain(hypothesis, covariance)
-
-
-def _uncertain(hypothesis: Hypothesis, covariance: FloatArray) -> Uncertain:
-    unknowns = hypothesis.unknowns()
-    return Uncertain(
-        lambda vector: hypothesis.at(vector).effects,
-        hypothesis.vector(),
-        covariance,
-        np.array([u.lower for u in unknowns]),
-        np.array([u.upper for u in unknowns]),
-    )
 
 
 def _confidence(

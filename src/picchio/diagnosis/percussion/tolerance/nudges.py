@@ -129,18 +129,21 @@ def nudged(
     return record, tuple(Nudge(moved, where) for where in used)
 
 
-def inexact(problem: Problem, record: MeasuredRecord, tolerance: Tolerance) -> list[Inexact]:
+def inexact(
+    problem: Problem, record: MeasuredRecord, tolerance: Tolerance, *, measured: bool = True
+) -> list[Inexact]:
     """All that is not exact in a record: the record's own first, then what the campaign shares.
 
     Args:
         problem: robot and campaign.
         record: one of its records.
         tolerance: the standard deviations; what is exact is left out.
+        measured: whether the record is one of several that tell of its pose together.
     """
     makers = (_links, _poses, _modes, _gravity, _tool_points, _directions, _blows, _sensors)
     # What is drawn once a pose is taken to be drawn anew in each of its records, and so much wider
     # that together they say no more than one.
-    together = sum(other.pose == record.pose for other in problem.records)
+    together = sum(other.pose == record.pose for other in problem.records) if measured else 1
     alike = math.sqrt(max(together, 1))
     wider = {key: alike * getattr(tolerance, key) for key in _ONCE_A_POSE}
     tolerance = tolerance.model_copy(update=wider)

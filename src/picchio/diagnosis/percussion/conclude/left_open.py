@@ -1,0 +1,146 @@
+"""What a fit leaves open of blows that nobody measured, for the interval of a life.
+
+Beside the fitted values these are the numbers that are never exact: what the campaign shares as far
+as the records tell it, and what is drawn anew for every burst. A heavier link with a stiffer joint
+would have left the same records: both are moved together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from picchio.campaign.tables import Tolerance
+from picchio.core.arrays import FloatArray
+from picchio.diagnosis.life import Uncertain
+from picchio.diagnosis.percussion.conclude.causes import reported_covariance
+from picchio.diagnosis.percussion.data.problem import Problem
+from picchio.diagnosis.percussion.fit.least_squares import Fit, prior_precision
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.tolerance.nudges import Inexact, Nudge, inexact
+from picchio.model.blows import Blows
+from picchio.model.effects.effect import Effect, Where
+
+# What the life depends on; where the robot stands moves it by less than a thousandth.
+_PLACES: tuple[Where, ...] = ("structure", "blows")
+
+
+def fitted_spread(problem: Problem, whole: Fit) -> Uncertain:
+    """How well all that a life depends on is known after a fit.
+
+    Args:
+        problem: linearised about the fit.
+        whole: the fit to all records.
+    """
+    hypothesis, marginal = whole.hypothesis, problem.marginal
+    covariance = reported_covariance(whole)
+    if marginal is None:
+        return _uncertain(hypothesis, covariance, [])
+    claimed = {effect.label for effect in hypothesis.effects}
+    names = [record.name for record in whole.records]
+    raw = problem.unmarginalised(hypothesis.effects, whole.records)
+    spread = marginal.shared_estimate(raw, names, claimed=claimed)[1]
+    slopes = marginal.slopes[names[0]]
+    shared = slopes.what[slopes.own :]
+    kept = [k for k, one in enumerate(shared) if _counts(one) and one.means not in claimed]
+    rows = [(hypothesis.effects[u.effect].label, u.name) for u in hypothesis.unknowns()]
+    taken = np.array([marginal.absorbed.get(row, np.zeros(len(shared))) for row in rows])
+    across = -(taken.reshape(len(rows), len(shared)) @ spread)[:, kept]
+    together = np.block([[covariance, across], [across.T, spread[np.ix_(kept, kept)]]])
+    numbers = [*(shared[k] for k in kept), *_anew(problem, problem.campaign.tolerance)]
+    return _uncertain(as_stated(problem, whole), together, numbers)
+
+
+def as_stated(problem: Problem, whole: Fit) -> Hypothesis:
+    """A fit with everything that is not exact where it is stated, as a study or a file has it.
+
+    What the fitted values can make up for they do: beside masses that are 1 % too small as stated,
+    springs that are 1 % softer than those fitted do as the records say.
+
+    Args:
+        problem: linearised about the fit.
+        whole: the fit to all records.
+    """
+    hypothesis, marginal = whole.hypothesis, problem.marginal
+    if marginal is None or not problem.sizes:
+        return hypothesis
+    name, vector = problem.records[0].name, hypothesis.vector()
+    size = problem.sizes[name][marginal.slopes[name].own :]
+    for k, unknown in enumerate(hypothesis.unknowns()):
+        taken = marginal.absorbed.get((hypothesis.effects[unknown.effect].label, unknown.name))
+        if taken is not None:
+            vector[k] = np.clip(vector[k] + taken @ size, unknown.lower, unknown.upper)
+    return hypothesis.at(vector)
+
+
+def nominal_spread(problem: Problem) -> Uncertain:
+    """How well all that a life depends on is known before anything was measured.
+
+    Args:
+        problem: robot and campaign.
+    """
+    tolerance = problem.campaign.tolerance
+    hypothesis = Hypothesis.baseline(problem.robot, tolerance)
+    precision = prior_precision(hypothesis)
+    at = np.ix_(*[np.flatnonzero(precision.diagonal() > 0.0)] * 2)
+    covariance = np.zeros_like(precision)
+    covariance[at] = np.linalg.inv(precision[at])
+    every = inexact(problem, problem.records[0], tolerance)
+    shared = [one for one in every if one.once and _counts(one)]
+    numbers = [*shared, *_anew(problem, tolerance)]
+    return _uncertain(hypothesis, covariance, numbers)
+
+
+def _counts(one: Inexact) -> bool:
+    # How fast a blow rises, which is a number upwards alone, is nothing to a joint.
+    return one.where in _PLACES and not one.one_way
+
+
+def _anew(problem: Problem, sigma: Tolerance) -> list[Inexact]:
+    """What is drawn for every burst: each mode's damping, the blows' direction and their force."""
+    every = inexact(problem, problem.records[0], sigma, measured=False)
+    found = [one for one in every if one.key == "damping_by_mode"]
+
+    def turned(axis: FloatArray) -> Inexact:
+        def turn(blows: Blows, size: float) -> Blows:
+            return blows.change(direction=pin.exp3(size * sigma.direction * axis) @ blows.direction)
+
+        return Inexact(f"direction.{'xyz'[int(axis.argmax())]}", "direction", False, "blows", turn)
+
+    def harder(blows: Blows, size: float) -> Blows:
+        return blows.change(height=blows.height * (1.0 + size * sigma.blow_force))
+
+    if sigma.direction > 0.0:
+        found += [turned(axis) for axis in np.eye(3)]
+    if sigma.blow_force > 0.0:
+        # A few cycles make most of the damage: as if all blows were harder.
+        found.append(Inexact("blow_force", "blow_force", False, "blows", harder))
+    return found
+
+
+def _uncertain(
+    hypothesis: Hypothesis, covariance: FloatArray, numbers: Sequence[Inexact]
+) -> Uncertain:
+    """A hypothesis's unknowns, then numbers that are not exact; those not given are alone."""
+    unknowns = hypothesis.unknowns()
+    lead, count = len(unknowns), len(unknowns) + len(numbers)
+    whole = np.eye(count)
+    whole[: len(covariance), : len(covariance)] = covariance
+
+    def effects(vector: FloatArray) -> Sequence[Effect]:
+        sizes = vector[lead:, None]
+        moved = [(one, size) for one, size in zip(numbers, sizes, strict=True) if size[0]]
+        used = [place for place in _PLACES if any(one.where == place for one, _ in moved)]
+        return [*hypothesis.at(vector[:lead]).effects, *(Nudge(moved, where) for where in used)]
+
+    free = np.full(len(numbers), np.inf)
+    return Uncertain(
+        effects,
+        np.concatenate([hypothesis.vector(), np.zeros(len(numbers))]),
+        whole,
+        np.concatenate([[u.lower for u in unknowns], -free]),
+        np.concatenate([[u.upper for u in unknowns], free]),
+        len(numbers),
+    )
