@@ -53,9 +53,9 @@ class Unmeasured:
         true = worlds.quantities(truth["world"], pose=pose, direction=direction, index=number)
         return cls(record, pose, direction, true)
 
-    def pairs(self, problem, fit):
+    def pairs(self, problem, effects):
         """(told, true) deflections of every joint that moves, by its name."""
-        times, series = _deflections(problem, self.record, self.pose, self.direction, fit)
+        times, series = _deflections(problem, self.record, self.pose, self.direction, effects)
         inside = (times >= 0.0) & (times <= self.world["time"][-1])
         true = CubicSpline(self.world["time"], self.world["deflection"], axis=1)(times[inside])
         still = _STILL * np.abs(true).max()
@@ -81,9 +81,10 @@ def errors(found, truth, seed):
         {"baseline" or "extended": {"peak": [...], "life": [...]}}; empty where a model has none.
     """
     there, told = Unmeasured.draw(found, truth, seed), {}
-    for name, fit in (("baseline", found.search.baseline), ("extended", found.extended)):
+    baseline = found.search.baseline.hypothesis.effects
+    for name, effects in (("baseline", baseline), ("extended", found.effects)):
         try:
-            pairs = there.pairs(found.problem, fit).values()
+            pairs = there.pairs(found.problem, effects).values()
         except InputError:
             continue
         peaks = [float(np.abs(a).max() / np.abs(b).max() - 1.0) for a, b in pairs]
@@ -93,7 +94,7 @@ def errors(found, truth, seed):
 
 
 def lives(found, truth, seed):
-    """By joint: the true life and the two ends of the interval told, logarithms over the life told.
+    """The true life and the two ends of the interval told, logarithms over the life told.
 
     By the paper's S-N curve.
 
@@ -103,7 +104,8 @@ def lives(found, truth, seed):
         seed: of the burst.
 
     Returns:
-        {joint: [true, low, high]}; empty where no life is told.
+        {joint: [true, low, high]}, and "robot": of whichever joint is the first to fail; empty
+        where no life is told.
     """
     there = Unmeasured.draw(found, truth, seed)
     campaign = found.problem.campaign
@@ -116,17 +118,23 @@ def lives(found, truth, seed):
         told = life_before_and_after(
             found.problem.robot, work, found.effects,
             after=found.left_open, sn_curve=CURVE,
-        )["extended"]["joints"]  # fmt: skip
-    rows = {}
-    for name, (ours, true) in there.pairs(found.problem, found.extended).items():
-        life, ends = told[name]["rivets_to_failure"], told[name].get("rivets_interval")
-        if ends is not None and 0.0 < life < math.inf:
-            over = [_damage(ours) / _damage(true), *(end / life for end in ends)]
-            rows[name] = [round(math.log(x), 4) if x > 0.0 else -math.inf for x in over]
-    return rows
+        )["extended"]  # fmt: skip
+    rows, true_lives = {}, []
+
+    def row(true, told):
+        ends = told["rivets_interval"]
+        over = [x / told["rivets_to_failure"] for x in (true, *ends)]
+        return [round(math.log(x), 4) if x > 0.0 else -math.inf for x in over]
+
+    for name, (ours, true) in there.pairs(found.problem, found.effects).items():
+        joint = told["joints"][name]
+        if "rivets_interval" in joint and 0.0 < joint["rivets_to_failure"] < math.inf:
+            true_lives.append(joint["rivets_to_failure"] * _damage(ours) / _damage(true))
+            rows[name] = row(true_lives[-1], joint)
+    return {**rows, "robot": row(min(true_lives), told)} if true_lives else {}
 
 
-def _deflections(problem, record, pose, direction, fit):
+def _deflections(problem, record, pose, direction, effects):
     """Times, s, and every joint's deflections there, rad."""
     robot = problem.robot
     geometry = Geometry(record.setup.geometry.chain, pose)
@@ -139,7 +147,7 @@ def _deflections(problem, record, pose, direction, fit):
         channels=tuple(parse_channel(name)[0] for name in names),
     )
     # A sensor's fault is in the readings, not in the arm.
-    effects = [e for e in fit.hypothesis.effects if e.where != "sensor"]
+    effects = [e for e in effects if e.where != "sensor"]
     predicted = setup.predict(problem.model.with_effects(effects))
     return setup.samples.times, [predicted[name] for name in names]
 

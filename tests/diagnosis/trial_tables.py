@@ -315,15 +315,19 @@ def print_known(rows):
             f"stiffness and damping, {len(off)} values of {count} campaigns: {inside[0]} within "
             f"the 90 % interval, {inside[1]} within the 95 % interval"
         )
-    lives = [each for row in rows for each in row.get("lives", {}).values()]
-    if lives:
-        inside = sum(low <= true <= high for true, low, high in lives)
-        width = quantile(sorted(0.5 * (high - low) for _, low, high in lives), 0.5)
-        print(
-            f"life of a burst that nobody measured, {len(lives)} joints: {inside} within the 90 % "
-            f"interval ({100 * inside / len(lives):.1f} %), which is {100 * width:.2g} % to either "
-            "side, the median"
-        )
+    for whose in ("robot", "joint"):
+        lives = [
+            each for row in rows for name, each in row.get("lives", {}).items()
+            if (name == "robot") == (whose == "robot")
+        ]  # fmt: skip
+        if lives:
+            inside = sum(low <= true <= high for true, low, high in lives)
+            width = quantile(sorted(0.5 * (high - low) for _, low, high in lives), 0.5)
+            print(
+                f"{whose}'s life under a burst that nobody measured: {inside} of {len(lives)} "
+                f"within the 90 % interval ({100 * inside / len(lives):.1f} %), which is "
+                f"{100 * width:.2g} % to either side, the median"
+            )
 
 
 def mismatch_summary(rows):

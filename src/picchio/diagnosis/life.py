@@ -28,6 +28,8 @@ NO_SHAFT = "no joint has a shaft or a reducer, so no life can be told: give them
 
 # Poses of each operation and joint that slopes are taken at, the most strained ones.
 _WORST = 2
+# No value is moved by more than so many of its standard deviations for a bound.
+_FARTHEST = 4.0
 # Directions in which less is unknown than that do not move a life.
 _KNOWN = 1e-7
 
@@ -225,7 +227,8 @@ def life_intervals(
     for, by first-order reliability (Hasofer and Lind, J. Eng. Mech. Div. ASCE 100 (1974) 111):
     the slope of ln utilisation (and of ln damage), one standard deviation in every principal
     direction of the covariance, says where they lie; both are then computed there. What the many
-    small numbers add is taken to be of the others, which are moved further for it.
+    small numbers add is taken to be of the others, which are moved further for it; where they would
+    be far off, bounds follow the slope.
 
     Args:
         robot: without the effects.
@@ -265,24 +268,33 @@ def life_intervals(
     spread = np.zeros((unsure.centre.size, int(kept.sum())))
     spread[:lead] = directions[:, kept] * np.sqrt(sizes[kept])
     slopes = _slopes(unsure, spread, at, reference, spent)
-    wider = _widened(unsure, spread, slopes, at, _most_strained(task, found, each=False))
+    known = _known_by(unsure, spread, slopes, at, _most_strained(task, found, each=False))
     told = {}
     for j, joint in enumerate(found.joints):
         if not joint.sn_curve:
             continue
         used, lives = [joint.utilisation], [joint.rivets_to_failure]
-        for point in _design_points(unsure.centre, spread, slopes[0, :, j], z * wider[0, j]):
+        points = [
+            _design_points(unsure.centre, spread, slope, z * size)
+            for slope, size in zip(slopes[:, :, j], known[:, j], strict=True)
+        ]
+        for point in points[0]:
             there = at(point)
             used.append(
                 math.inf if there is None else joint.utilisation * there[0][j] / reference[j]
             )
-        for point in _design_points(unsure.centre, spread, slopes[1, :, j], z * wider[1, j]):
+        for point in points[1]:
             there = at(point)
             # The most strained pose is the first to be damaged: no damage there, none at all.
             if there is not None and there[1][j] > 0.0:
                 there = at(point, task)
             damage = math.inf if there is None else there[1][j] / task.rivets_per_pass
             lives.append(1.0 / damage if damage > 0.0 else math.inf)
+        for side in (z, -z):  # along the slope alone
+            if not points[0]:
+                used.append(joint.utilisation * math.exp(side * known[0, j]))
+            if not points[1]:
+                lives.append(joint.rivets_to_failure * math.exp(side * known[1, j]))
         told[joint.name] = {
             "rivets_interval": (float(min(lives)), float(max(lives))),
             "utilisation_interval": (float(min(used)), float(max(used))),
@@ -316,40 +328,44 @@ def _slopes(
     return slopes
 
 
-def _widened(
+def _known_by(
     unsure: Uncertain,
     spread: FloatArray,
     slopes: FloatArray,
     at: Callable[[FloatArray, Task], tuple[FloatArray, FloatArray] | None],
     task: Task,
 ) -> FloatArray:
-    """(2, joints) by how much the small numbers widen what utilisation and damage are known by."""
-    lead, one = unsure.centre.size - unsure.small, np.ones((2, slopes.shape[2]))
-    centre = at(unsure.centre, task) if unsure.small else None
-    if centre is None or not spread.size:
-        return one
-    steps = np.zeros((unsure.centre.size, unsure.small))
-    steps[lead:] = np.diag(np.sqrt(unsure.covariance.diagonal()[lead:]))
-    size = steps[lead:].diagonal()
-    small = _slopes(unsure, steps, lambda vector: at(vector, task), *centre) / size[:, None]
-    across = unsure.covariance[:lead, lead:]
-    across = spread[:lead].T @ across / (spread**2).sum(axis=0)[:, None]
+    """(2, joints) the standard deviations of ln utilisation and ln damage, small numbers as well.
+
+    Of the others there are `slopes` in the directions of `spread`; of the small ones slopes are
+    taken one by one, of the task that is given.
+    """
     own = np.einsum("adj,adj->aj", slopes, slopes)
-    both = 2.0 * np.einsum("adj,ds,asj->aj", slopes, across, small)
+    lead = unsure.centre.size - unsure.small
+    centre = at(unsure.centre, task) if unsure.small else None
+    if centre is None:
+        return np.sqrt(own)
+    size = np.sqrt(unsure.covariance.diagonal()[lead:])
+    steps = np.concatenate([np.zeros((lead, unsure.small)), np.diag(size)])
+    small = _slopes(unsure, steps, lambda vector: at(vector, task), *centre) / size[:, None]
+    across = spread[:lead].T @ unsure.covariance[:lead, lead:]
+    across = across / (spread**2).sum(axis=0)[:, None]
+    both = np.einsum("adj,ds,asj->aj", slopes, across, small)
     rest = np.einsum("asj,st,atj->aj", small, unsure.covariance[lead:, lead:], small)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        found = np.sqrt(np.maximum(own + both + rest, 0.0) / own)
-    return np.where(own > 0.0, found, one)
+    return np.sqrt(np.maximum(own + 2.0 * both + rest, 0.0))
 
 
 def _design_points(
-    centre: FloatArray, spread: FloatArray, slope: FloatArray, z: float
+    centre: FloatArray, spread: FloatArray, slope: FloatArray, reach: float
 ) -> list[FloatArray]:
-    """Where what has this slope (per column of the spread) is as large, as small, as z says."""
+    """Where what has this slope (per column of the spread) changes by so much, up and down.
+
+    None where they would be too far off for that.
+    """
     size = float(np.linalg.norm(slope))
-    if size == 0.0:
+    if not size * _FARTHEST > reach:
         return []
-    return [centre + side * spread @ (slope / size) for side in (z, -z)]
+    return [centre + side * reach / size * spread @ (slope / size) for side in (1.0, -1.0)]
 
 
 def _strain(found: Assessment) -> tuple[FloatArray, FloatArray]:

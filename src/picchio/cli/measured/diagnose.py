@@ -237,9 +237,9 @@ def _show_life(life: Mapping[str, Any]) -> None:
     out.print(table(columns, rows, ruled=False, head_style="dim", title="Life"))
     if "interval_level" in life:
         out.print(
-            f"  {100 * life['interval_level']:g} % intervals: before, of the stated "
-            "tolerance; after, of what was fitted. The material's scatter is not in them (picchio "
-            "assess --uncertainty)",
+            f"  {100 * life['interval_level']:g} % intervals: before, of all that has a tolerance; "
+            "after, of what the records leave open of it, and of what differs from burst to burst. "
+            "The material's scatter is not in them (picchio assess --uncertainty)",
             style="dim",
         )
 
