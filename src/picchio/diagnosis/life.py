@@ -13,6 +13,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.recent import Recent
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -28,8 +29,8 @@ NO_SHAFT = "no joint has a shaft or a reducer, so no life can be told: give them
 
 # Poses of each operation and joint that slopes are taken at, the most strained ones.
 _WORST = 2
-# No value is moved by more than so many of its standard deviations for a bound.
-_FARTHEST = 4.0
+# Poses whose geometry is kept while all values are looked at there.
+_KEPT = 64
 # Directions in which less is unknown than that do not move a life.
 _KNOWN = 1e-7
 
@@ -40,11 +41,10 @@ class Uncertain:
 
     Attributes:
         effects: coordinates (k,) -> the effects there.
-        centre: (k,) where they stand.
+        centre: (k,) where they most probably stand.
         covariance: (k, k) of the coordinates.
         lower, upper: (k,) bounds; beyond them the effects stay as they are there.
-        small: how many of the last coordinates are many and little each, such as the masses of
-            links that are never exact: first order will do for them.
+        told: (k,) where the model has them whose life is told, if not there.
     """
 
     effects: Callable[[FloatArray], Sequence[Effect]]
@@ -52,7 +52,7 @@ class Uncertain:
     covariance: FloatArray
     lower: FloatArray | float = -math.inf
     upper: FloatArray | float = math.inf
-    small: int = 0
+    told: FloatArray | None = None
 
     def room(self, step: FloatArray) -> float:
         """How many such steps there are to the nearest bound.
@@ -226,9 +226,8 @@ def life_intervals(
     The most probable values at which the joint fares as badly (and as well) as the level asks
     for, by first-order reliability (Hasofer and Lind, J. Eng. Mech. Div. ASCE 100 (1974) 111):
     the slope of ln utilisation (and of ln damage), one standard deviation in every principal
-    direction of the covariance, says where they lie; both are then computed there. What the many
-    small numbers add is taken to be of the others, which are moved further for it; where they would
-    be far off, bounds follow the slope.
+    direction of the covariance, says where they lie; both are then computed there. What is told
+    itself is within, too, where it is not that of the most probable values.
 
     Args:
         robot: without the effects.
@@ -247,54 +246,45 @@ def life_intervals(
     worst = _most_strained(task, found)
     z = NormalDist().inv_cdf(0.5 + 0.5 * LEVEL)
     settings = {**options, "steady_check": False, "uncertainty": False}
+    bare = Model(robot, geometries=Recent(_KEPT))
 
     def at(vector: FloatArray, task: Task = worst) -> tuple[FloatArray, FloatArray] | None:
         """Utilisation and damage there; None where the model is none."""
         try:
             with warnings.catch_warnings():  # said once already, of the centre
                 warnings.simplefilter("ignore")
-                model = Model.of(robot).with_effects(unsure.effects(vector))
-                return _strain(assess(model, task, **settings))
+                return _strain(assess(bare.with_effects(unsure.effects(vector)), task, **settings))
         except InputError:
             return None
 
     centre = at(unsure.centre)
     if centre is None:
         return {}
-    reference, spent = centre
-    lead = unsure.centre.size - unsure.small
-    sizes, directions = np.linalg.eigh(unsure.covariance[:lead, :lead])
-    kept = np.sqrt(np.maximum(sizes, 0.0)) > _KNOWN
-    spread = np.zeros((unsure.centre.size, int(kept.sum())))
-    spread[:lead] = directions[:, kept] * np.sqrt(sizes[kept])
-    slopes = _slopes(unsure, spread, at, reference, spent)
-    known = _known_by(unsure, spread, slopes, at, _most_strained(task, found, each=False))
+    told_there = centre if unsure.told is None else at(unsure.told)
+    if told_there is None:
+        return {}
+    reference = told_there[0]
+    sizes, directions = np.linalg.eigh(unsure.covariance)
+    spread = directions * np.sqrt(np.maximum(sizes, 0.0))
+    spread = spread[:, np.sqrt(np.maximum(sizes, 0.0)) > _KNOWN]
+    slopes = _slopes(unsure, spread, at, *centre)
     told = {}
     for j, joint in enumerate(found.joints):
         if not joint.sn_curve:
             continue
         used, lives = [joint.utilisation], [joint.rivets_to_failure]
-        points = [
-            _design_points(unsure.centre, spread, slope, z * size)
-            for slope, size in zip(slopes[:, :, j], known[:, j], strict=True)
-        ]
-        for point in points[0]:
+        for point in _design_points(unsure.centre, spread, slopes[0, :, j], z):
             there = at(point)
             used.append(
                 math.inf if there is None else joint.utilisation * there[0][j] / reference[j]
             )
-        for point in points[1]:
+        for point in _design_points(unsure.centre, spread, slopes[1, :, j], z):
             there = at(point)
             # The most strained pose is the first to be damaged: no damage there, none at all.
             if there is not None and there[1][j] > 0.0:
                 there = at(point, task)
             damage = math.inf if there is None else there[1][j] / task.rivets_per_pass
             lives.append(1.0 / damage if damage > 0.0 else math.inf)
-        for side in (z, -z):  # along the slope alone
-            if not points[0]:
-                used.append(joint.utilisation * math.exp(side * known[0, j]))
-            if not points[1]:
-                lives.append(joint.rivets_to_failure * math.exp(side * known[1, j]))
         told[joint.name] = {
             "rivets_interval": (float(min(lives)), float(max(lives))),
             "utilisation_interval": (float(min(used)), float(max(used))),
@@ -328,44 +318,14 @@ def _slopes(
     return slopes
 
 
-def _known_by(
-    unsure: Uncertain,
-    spread: FloatArray,
-    slopes: FloatArray,
-    at: Callable[[FloatArray, Task], tuple[FloatArray, FloatArray] | None],
-    task: Task,
-) -> FloatArray:
-    """(2, joints) the standard deviations of ln utilisation and ln damage, small numbers as well.
-
-    Of the others there are `slopes` in the directions of `spread`; of the small ones slopes are
-    taken one by one, of the task that is given.
-    """
-    own = np.einsum("adj,adj->aj", slopes, slopes)
-    lead = unsure.centre.size - unsure.small
-    centre = at(unsure.centre, task) if unsure.small else None
-    if centre is None:
-        return np.sqrt(own)
-    size = np.sqrt(unsure.covariance.diagonal()[lead:])
-    steps = np.concatenate([np.zeros((lead, unsure.small)), np.diag(size)])
-    small = _slopes(unsure, steps, lambda vector: at(vector, task), *centre) / size[:, None]
-    across = spread[:lead].T @ unsure.covariance[:lead, lead:]
-    across = across / (spread**2).sum(axis=0)[:, None]
-    both = np.einsum("adj,ds,asj->aj", slopes, across, small)
-    rest = np.einsum("asj,st,atj->aj", small, unsure.covariance[lead:, lead:], small)
-    return np.sqrt(np.maximum(own + 2.0 * both + rest, 0.0))
-
-
 def _design_points(
-    centre: FloatArray, spread: FloatArray, slope: FloatArray, reach: float
+    centre: FloatArray, spread: FloatArray, slope: FloatArray, z: float
 ) -> list[FloatArray]:
-    """Where what has this slope (per column of the spread) changes by so much, up and down.
-
-    None where they would be too far off for that.
-    """
+    """Where what has this slope (per column of the spread) is as large, as small, as z says."""
     size = float(np.linalg.norm(slope))
-    if not size * _FARTHEST > reach:
+    if size == 0.0:
         return []
-    return [centre + side * reach / size * spread @ (slope / size) for side in (1.0, -1.0)]
+    return [centre + side * spread @ (slope / size) for side in (z, -z)]
 
 
 def _strain(found: Assessment) -> tuple[FloatArray, FloatArray]:
@@ -375,18 +335,11 @@ def _strain(found: Assessment) -> tuple[FloatArray, FloatArray]:
     return used, spent
 
 
-def _most_strained(task: Task, found: Assessment, each: bool = True) -> Task:
-    """The task with every operation's and joint's most strained poses alone.
-
-    Where not of `each` operation: with the one pose of all at which a joint is most strained.
-    """
-    used = [np.nan_to_num(result.utilisation) for result in found.operations]
-    best = np.max([own.max(axis=0) for own in used], axis=0)
+def _most_strained(task: Task, found: Assessment) -> Task:
+    """The task with every operation's and joint's most strained poses alone."""
     operations = []
-    for operation, own in zip(task.operations, used, strict=True):
-        kept = np.unique(np.argsort(own, axis=0)[-_WORST:])
-        if not each:
-            kept = np.flatnonzero((own >= best).any(axis=1))
-        if kept.size:
-            operations.append(replace(operation, poses=operation.poses[kept]))
+    for operation, result in zip(task.operations, found.operations, strict=True):
+        ranked = np.argsort(np.nan_to_num(result.utilisation), axis=0)[-_WORST:]
+        kept = np.unique(ranked)
+        operations.append(replace(operation, poses=operation.poses[kept]))
     return replace(task, operations=tuple(operations))

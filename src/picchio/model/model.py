@@ -11,6 +11,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.recent import Recent
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
 from picchio.excitation.pulse_train import PulseTrain
@@ -45,6 +46,7 @@ class Model:
             arm) carries all of gravity, so that it leaves no torque in shaft and reducer. A
             balancer that is known belongs into the sidecar instead.
         effects: how the world departs from the robot's files; those of a saved model come first.
+        geometries: where those of poses are kept, for what looks at the same poses once more.
     """
 
     robot: FlexibleRobot
@@ -52,6 +54,7 @@ class Model:
     gravity_balanced: bool = False
     effects: tuple[Effect, ...] = ()
     own: tuple[Effect, ...] = field(default=(), repr=False)
+    geometries: Recent[Geometry] | None = field(default=None, repr=False)
     _keys: dict[tuple[Where, ...], tuple[object, ...]] = field(
         default_factory=dict, init=False, repr=False
     )
@@ -260,6 +263,24 @@ class Model:
         reasons = [(e.label, e.without_load(conditions or Conditions())) for e in self.effects]
         return tuple(f"{label} {reason}" for label, reason in reasons if reason is not None)
 
+    def geometry(self, pose: FloatArray) -> Geometry:
+        """Masses and kinematics at a pose, to second order; models of one robot share it.
+
+        Args:
+            pose: (nv,) rad or m.
+
+        Returns:
+            one that is kept, if any is.
+        """
+        from picchio.model.geometry import Geometry
+
+        def make() -> Geometry:
+            return Geometry.of(self.robot, pose)
+
+        if self.geometries is None:
+            return make()
+        return self.geometries.get((id(self.robot), pose.tobytes()), make)
+
     def linear_system(self, pose: FloatArray) -> LinearSystem:
         """The linear equations of motion at a pose.
 
@@ -272,10 +293,7 @@ class Model:
             InputError: wrong length, a singular mass matrix.
         """
         if self.changes_structure:
-            from picchio.model.geometry import Geometry
-
-            geometry = Geometry.of(self.robot, pose)
-            return self.plant(geometry).build(np.array([0.0, 0.0, 1.0])).linear()
+            return self.plant(self.geometry(pose)).build(np.array([0.0, 0.0, 1.0])).linear()
         state = self.robot.state(pose)
         springs = state.stiffness
         damping = modal_damping_matrix(state.mass_matrix, springs, self.robot.damping_ratio)

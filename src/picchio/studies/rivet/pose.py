@@ -163,7 +163,7 @@ class ModelAtPose:
     @cached_property
     def geometry(self) -> Geometry:
         """Masses and kinematics at the pose, to second order; models of one robot share it."""
-        return self._given_geometry or Geometry.of(self.model.robot, self.pose)
+        return self._given_geometry or self.model.geometry(self.pose)
 
     @property
     def pose(self) -> FloatArray:

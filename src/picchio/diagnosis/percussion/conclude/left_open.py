@@ -8,6 +8,7 @@ would have left the same records: both are moved together.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -41,7 +42,7 @@ def fitted_spread(problem: Problem, whole: Fit) -> Uncertain:
     claimed = {effect.label for effect in hypothesis.effects}
     names = [record.name for record in whole.records]
     raw = problem.unmarginalised(hypothesis.effects, whole.records)
-    spread = marginal.shared_estimate(raw, names, claimed=claimed)[1]
+    where, spread = marginal.shared_estimate(raw, names, claimed=claimed)
     slopes = marginal.slopes[names[0]]
     shared = slopes.what[slopes.own :]
     kept = [k for k, one in enumerate(shared) if _counts(one) and one.means not in claimed]
@@ -50,7 +51,11 @@ def fitted_spread(problem: Problem, whole: Fit) -> Uncertain:
     across = -(taken.reshape(len(rows), len(shared)) @ spread)[:, kept]
     together = np.block([[covariance, across], [across.T, spread[np.ix_(kept, kept)]]])
     numbers = [*(shared[k] for k in kept), *_anew(problem, problem.campaign.tolerance)]
-    return _uncertain(as_stated(problem, whole), together, numbers)
+    found = _uncertain(hypothesis, together, numbers)
+    centre = found.centre.copy()
+    centre[len(rows) : len(rows) + len(kept)] = where[kept]
+    told = np.concatenate([as_stated(problem, whole).vector(), np.zeros(len(numbers))])
+    return replace(found, centre=centre, told=told)
 
 
 def as_stated(problem: Problem, whole: Fit) -> Hypothesis:
@@ -142,5 +147,4 @@ def _uncertain(
         whole,
         np.concatenate([[u.lower for u in unknowns], -free]),
         np.concatenate([[u.upper for u in unknowns], free]),
-        len(numbers),
     )
