@@ -48,6 +48,7 @@ from picchio.model.effects.registry import effect_class
 from picchio.model.effects.sensors.sensor_gain import SensorGain
 from picchio.model.geometry import Geometry
 from picchio.model.model import Model
+from picchio.prediction import percussion
 from worlds import campaign as worlds
 
 ARM = "fanuc_like_3dof"
@@ -346,6 +347,37 @@ def test_records_held_out_are_found_though_a_gap_makes_small_errors_large():
     with one_thread():
         told = _told_by_slopes(stands)
     assert [r.name for r in problem.records if r not in told] == ["r09.csv"]
+
+
+def test_no_record_tells_the_mass_of_all_however_slopes_are_taken(wrong_everywhere, monkeypatch):
+    """Joints stiffer, links heavier and blows harder by the same share leave the same records.
+
+    Where slopes of some records are taken by modes and of others by differences, both must be of
+    the unknowns as well as of the tolerances: else a mass is told, 5 deviations off.
+    """
+    robot, campaign = wrong_everywhere
+    problem = Problem(robot, campaign)
+    here, plain = Hypothesis.baseline(robot, campaign.tolerance), problem.model
+    shares = []
+
+    def bent(record, share):
+        monkeypatch.setattr(percussion, "_BENT", share)
+        return record.setup.changes(plain, [(plain, plain)]) is None
+
+    for record in problem.records:
+        grid = np.geomspace(1e-5, 1e-2, 40)
+        shares.append(next(share for share in grid if not bent(record, share)))
+    monkeypatch.setattr(percussion, "_BENT", float(np.median(shares)))
+    assert 0 < sum(share > percussion._BENT for share in shares) < len(shares)
+    with one_thread():
+        linearise(problem, here, problem.records, both=True)
+        slopes = all_slopes(problem, here.effects, None, True)
+    left = whole = 0.0
+    for name, own in problem.marginal.slopes.items():
+        heavier = [one.key == "link_mass" for one in own.what]
+        left += float((own.columns[:, :, heavier].astype(float).sum(axis=2) ** 2).sum())
+        whole += float((slopes[name].columns[:, :, heavier].astype(float).sum(axis=2) ** 2).sum())
+    assert left < 1e-7 * whole
 
 
 def test_what_all_modes_damping_has_in_common_is_the_robots(wrong_everywhere):

@@ -378,7 +378,7 @@ class Problem:
         wanted = tuple(effects)
         model = self.model.with_effects(wanted)
         around = [tuple(map(self.model.with_effects, pair)) for pair in pairs]
-        found = []
+        found: list[FloatArray | None] = []
         for record in records:
             moved = self.moved.get(record.name)
             there, more = (record, ()) if moved is None else (moved.record, moved.effects)
@@ -387,15 +387,23 @@ class Problem:
                 return replace(one, effects=(*one.effects, *more)) if more else one
 
             both = [(under(one), under(other)) for one, other in around]
-            changes = residual_changes(record, model, there, under(model), both, end)
-            if changes is None:
-                return [None] * len(pairs)
-            found.append(changes)
+            found.append(residual_changes(record, model, there, under(model), both, end))
+        if all(each is None for each in found):
+            return [None] * len(pairs)
+
+        def change(record: MeasuredRecord, changes: FloatArray | None, k: int) -> FloatArray:
+            if changes is not None:
+                return np.asarray(changes[k])
+            # As the slopes of what is not exact are taken in this record, or what no record can
+            # tell, such as the mass of all, would seem to be told.
+            before, after = (self._residual(record, one, end) for one in around[k])
+            return after - before
+
         names, labels = [r.name for r in records], [effect.label for effect in wanted]
         out: list[list[FloatArray] | None] = []
         for k in range(len(pairs)):
-            own = [each[k] for each in found]
-            known = all(math.isfinite(part.sum()) for part in own)
+            known = all(e is None or math.isfinite(e[k].sum()) for e in found)
+            own = [change(*each, k) for each in zip(records, found, strict=True)] if known else []
             if known and self.marginal is not None:
                 own = self.marginal.whitened(own, names, labels)
             out.append(own if known else None)
