@@ -37,7 +37,6 @@ from picchio.diagnosis.motion.fit.least_squares import len_of
 from picchio.diagnosis.motion.fit.state import State
 from picchio.diagnosis.motion.search.candidates import evidence_of
 from picchio.diagnosis.percussion.conclude.causes import fitted_nuisances, fitted_values
-from picchio.diagnosis.percussion.criteria.pose_consistency import fit_evidence
 from picchio.diagnosis.percussion.diagnosis import PercussionDiagnosis, diagnose_percussion
 from picchio.diagnosis.percussion.fit.drawn import refit
 from picchio.diagnosis.percussion.fit.parallel import parallel_records
@@ -270,10 +269,9 @@ def _with_alternatives(percussion: PercussionDiagnosis) -> Iterator[PercussionDi
             *(h for h in percussion.others if h != hypothesis),
         )
         sets = (mine, *(p for p in said.alternatives if p != pairs))
-        yield replace(
-            percussion, extended=whole, after=fit_evidence(problem, whole), others=others,
-            diagnosis=replace(said, causes=causes, alternatives=sets),
-        )  # fmt: skip
+        yield percussion.with_fit(
+            whole, others=others, diagnosis=replace(said, causes=causes, alternatives=sets)
+        )
 
 
 def _comparisons(percussion: PercussionDiagnosis, motion: Diagnosis) -> list[Comparison]:
@@ -361,10 +359,8 @@ def _joined(
             return replace(cause, parameters=_widened(values, blows.get(label), moves.get(label)))
 
         known = [moves[label] for label in sorted(both | carried)]
-        percussion = replace(
-            percussion,
-            extended=whole,
-            after=fit_evidence(problem, whole),
+        percussion = percussion.with_fit(
+            whole,
             others=tuple(_informed(other, known) for other in percussion.others),
             diagnosis=replace(
                 said,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -97,6 +97,25 @@ class PercussionDiagnosis:
     others: tuple[Hypothesis, ...] = ()
     left_open: Uncertain | None = None
     stated: Hypothesis | None = None
+
+    def with_fit(self, whole: Fit, **changes: Any) -> PercussionDiagnosis:
+        """The same with another extended model.
+
+        Args:
+            whole: fitted to all records.
+            **changes: other attributes.
+
+        Returns:
+            what follows from the fit is that of the new one.
+        """
+        return replace(
+            self,
+            extended=whole,
+            after=fit_evidence(self.problem, whole),
+            left_open=fitted_spread(self.problem, whole),
+            stated=as_stated(self.problem, whole),
+            **changes,
+        )
 
     @property
     def effects(self) -> tuple[Effect, ...]:
