@@ -380,6 +380,26 @@ def test_no_record_tells_the_mass_of_all_however_slopes_are_taken(wrong_everywhe
     assert left < 1e-7 * whole
 
 
+@pytest.mark.slow
+def test_the_model_that_is_told_does_as_the_records_say(wrong_everywhere):
+    """It holds no masses: its springs make up for those that the fit has moved."""
+    robot, campaign = wrong_everywhere
+    found = diagnose_percussion(robot, campaign, workers=1)
+    fitted = found.extended.hypothesis
+
+    def left(effects):
+        exact = Problem(robot, campaign, workers=1)
+        return sum(float((rows**2).sum()) for rows in exact.residuals(effects, exact.records))
+
+    assert found.diagnosis.verdict == "nothing-wrong"
+    assert left(found.effects) < 0.9 * left(fitted.effects)
+    # A life's interval has more in it than the fitted values, which it holds together with masses.
+    known, count = found.left_open, len(fitted.unknowns())
+    assert known.centre.size > count + 10
+    across = known.covariance[:count, count:]
+    assert np.abs(across).max() > 0.1 * np.sqrt(known.covariance.diagonal()[:count]).max()
+
+
 def test_what_all_modes_damping_has_in_common_is_the_robots(wrong_everywhere):
     robot, campaign = wrong_everywhere
     problem = Problem(robot, campaign)

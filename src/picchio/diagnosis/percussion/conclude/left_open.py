@@ -24,7 +24,8 @@ from picchio.diagnosis.percussion.tolerance.nudges import Inexact, Nudge, inexac
 from picchio.model.blows import Blows
 from picchio.model.effects.effect import Effect, Where
 
-# What the life depends on; where the robot stands moves it by less than a thousandth.
+# What the life depends on. Where the robot stands moves it by 0.2 % or less for most joints; by 4 %
+# where a mode lies close to a multiple of the blows' rate.
 _PLACES: tuple[Where, ...] = ("structure", "blows")
 
 
@@ -46,14 +47,12 @@ def fitted_spread(problem: Problem, whole: Fit) -> Uncertain:
     slopes = marginal.slopes[names[0]]
     shared = slopes.what[slopes.own :]
     kept = [k for k, one in enumerate(shared) if _counts(one) and one.means not in claimed]
-    rows = [(hypothesis.effects[u.effect].label, u.name) for u in hypothesis.unknowns()]
-    taken = np.array([marginal.absorbed.get(row, np.zeros(len(shared))) for row in rows])
-    across = -(taken.reshape(len(rows), len(shared)) @ spread)[:, kept]
+    across = -(marginal.taken(_rows(hypothesis)) @ spread)[:, kept]
     together = np.block([[covariance, across], [across.T, spread[np.ix_(kept, kept)]]])
     numbers = [*(shared[k] for k in kept), *_anew(problem, problem.campaign.tolerance)]
     found = _uncertain(hypothesis, together, numbers)
     centre = found.centre.copy()
-    centre[len(rows) : len(rows) + len(kept)] = where[kept]
+    centre[len(covariance) : len(covariance) + len(kept)] = where[kept]
     told = np.concatenate([as_stated(problem, whole).vector(), np.zeros(len(numbers))])
     return replace(found, centre=centre, told=told)
 
@@ -71,13 +70,15 @@ def as_stated(problem: Problem, whole: Fit) -> Hypothesis:
     hypothesis, marginal = whole.hypothesis, problem.marginal
     if marginal is None or not problem.sizes:
         return hypothesis
-    name, vector = problem.records[0].name, hypothesis.vector()
+    name = problem.records[0].name
     size = problem.sizes[name][marginal.slopes[name].own :]
-    for k, unknown in enumerate(hypothesis.unknowns()):
-        taken = marginal.absorbed.get((hypothesis.effects[unknown.effect].label, unknown.name))
-        if taken is not None:
-            vector[k] = np.clip(vector[k] + taken @ size, unknown.lower, unknown.upper)
-    return hypothesis.at(vector)
+    vector = hypothesis.vector() + marginal.taken(_rows(hypothesis)) @ size
+    unknowns = hypothesis.unknowns()
+    return hypothesis.at(np.clip(vector, [u.lower for u in unknowns], [u.upper for u in unknowns]))
+
+
+def _rows(hypothesis: Hypothesis) -> list[tuple[str, str]]:
+    return [(hypothesis.effects[u.effect].label, u.name) for u in hypothesis.unknowns()]
 
 
 def nominal_spread(problem: Problem) -> Uncertain:
@@ -99,7 +100,8 @@ def nominal_spread(problem: Problem) -> Uncertain:
 
 
 def _counts(one: Inexact) -> bool:
-    # How fast a blow rises, which is a number upwards alone, is nothing to a joint.
+    # How fast a blow rises, which is a number upwards alone, is 0.1 % of a joint's life, and 2 % at
+    # the end of a wrist.
     return one.where in _PLACES and not one.one_way
 
 

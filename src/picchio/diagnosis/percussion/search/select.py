@@ -51,8 +51,8 @@ _SWEEPS = 2
 _HALFWAY = 0.3
 # How often springs that were identified are settled further, at most.
 _MORE_ROUNDS = 6
-# What share of the cost may be left for going on from far off to be worth while.
-_FALLING = 0.7
+# What share of the cost a turn must take for going on from far off to be worth while.
+_FALLING = 0.3
 
 
 def begin_search(
@@ -79,26 +79,26 @@ def begin_search(
         # Springs that were identified: rather masses and places are farther off than slopes reach.
         before = About.of(problem)
         other = settled(problem, begin, split[0], patient=True)
-        for _ in range(_MORE_ROUNDS):
-            far, other = other, _settled_further(problem, other, split[0], patient=True)
-            if other.cost > _FALLING * far.cost:
-                break
+        other = _settled_on(problem, other, _FALLING)
         if other.chi_square <= ELSE * other.samples:
             baseline = other
         else:
             before.restore(problem)
     if start.known.labels:
-        baseline = _settled_for_good(problem, baseline)
+        baseline = _settled_on(problem, baseline)
     effects = baseline.hypothesis.effects
     scales = measure_scales(problem, effects, problem.predictions(effects))
     return Search(problem, candidates, scales, *split, baseline, baseline, say, finer)
 
 
-def _settled_for_good(problem: Problem, found: Fit) -> Fit:
-    """A fit with springs that may start far away: linearised anew until it moves no further."""
+def _settled_on(problem: Problem, found: Fit, share: float = 0.0) -> Fit:
+    """A fit with springs that may start far away: linearised anew while that is worth while.
+
+    While it takes more than `share` of what the fit costs, or else until it moves no further.
+    """
     for _ in range(_MORE_ROUNDS):
         before, found = found, _settled_further(problem, found, found.records, patient=True)
-        if before.cost - found.cost < LEAST_GAIN:
+        if before.cost - found.cost < max(LEAST_GAIN, share * before.cost):
             break
     return found
 

@@ -138,15 +138,23 @@ class Marginal:
             found.append(out)
         return found
 
+    def taken(self, unknowns: Sequence[tuple[str, str]]) -> FloatArray:
+        """(unknowns, shared) what each unknown takes up of one standard deviation of each number.
+
+        Args:
+            unknowns: effect's label and parameter of each.
+        """
+        count = len(self.shared)
+        rows = [self.absorbed.get(unknown, np.zeros(count)) for unknown in unknowns]
+        return np.array(rows).reshape(len(unknowns), count)
+
     def absorbed_covariance(self, unknowns: Sequence[tuple[str, str]]) -> FloatArray:
         """(unknowns, unknowns) by how much what they took up leaves a fit's unknowns unsure.
 
         Args:
             unknowns: effect's label and parameter of each.
         """
-        count = len(self.shared)
-        rows = np.array([self.absorbed.get(u, np.zeros(count)) for u in unknowns])
-        rows = rows.reshape(len(unknowns), count)
+        count, rows = len(self.shared), self.taken(unknowns)
         whole = {name: s.columns.shape[1] for name, s in self.slopes.items()}
         gram = np.sum([self._products(n, m, frozenset()).shared for n, m in whole.items()], axis=0)
         return np.asarray(rows @ (np.eye(count) - _left(gram)) @ rows.T)
