@@ -104,6 +104,9 @@ def test_the_extended_model_and_the_json_are_whole(found, tmp_path):
     told = {t["effect"] for t in robot.effect_tables}
     assert {"payload", "joint_stiffness"} <= told and "viscous_friction" not in told
     assert "viscous_friction of joint_3" in path.read_text()
+    assert (
+        "as stated here" not in path.read_text()
+    )  # where all else is exact, values are those told
     (load,) = (table for table in robot.effect_tables if table["effect"] == "payload")
     (cause,) = (each for each in found.causes if each.effect == "payload")
     assert load["parameters"]["mass"] == pytest.approx(cause.parameters["mass"].value, rel=1e-9)

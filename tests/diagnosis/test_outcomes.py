@@ -1,12 +1,16 @@
 """Verdicts in worlds that are a little wrong, judged."""
 
 import math
+from types import SimpleNamespace
 
+import numpy as np
 import outcomes
 import pytest
 import trial
 import trial_tables
 
+import picchio
+from picchio.diagnosis.result import Value
 from worlds import campaign as worlds
 
 BOTH = ("accelerometer.tool", "deflection")
@@ -130,3 +134,24 @@ def test_the_table_counts_what_was_judged(capsys):
     assert null.split()[:8] == ["ur10", "null", "1", "all", "1", "0", "0", "1"]
     assert single.split()[:8] == ["ur10", "single", "1", "all", "3", "1", "1", "1"]
     assert "1/2" in single and "2/2" in single and head.split()[-1] == "seconds"
+
+
+def test_what_is_told_of_springs_and_lives_is_held_against_the_truth(capsys):
+    robot = picchio.load_robot("fanuc_like_3dof")
+    spring = robot.flexible_joints[0]
+    ratio = float(np.mean(robot.damping_ratio))
+    drawn = dict.fromkeys(robot.flexible_names, 1.0) | {spring.name: 1.02}
+    truth = {"nuisances": {"stiffness": drawn, "damping_ratio": 1.0}}
+    told = {
+        f"stiffness.{spring.name}": Value(1.04 * spring.stiffness, 0.01 * spring.stiffness, ""),
+        "damping_ratio": Value(0.7 * ratio, 0.1 * ratio, "1"),
+        "force": Value(300.0, 3.0, "N"),
+    }
+    known = outcomes.known(SimpleNamespace(nuisances=told), robot, truth)
+    assert known == {f"stiffness.{spring.name}": 2.0, "damping_ratio": -3.0}
+    lives = {"joint_1": [0.1, -0.2, 0.2], "robot": [0.3, -0.2, 0.2]}
+    trial_tables.print_known([{"known": known, "lives": lives}, {"known": {"damping_ratio": 0.1}}])
+    springs, arm, joints = capsys.readouterr().out.strip().splitlines()
+    assert "3 values of 2 campaigns: 33.3 % within the 90 % interval, 33.3 %" in springs
+    assert arm.startswith("robot's life") and "0 of 1 within" in arm
+    assert joints.startswith("joint's life") and "1 of 1 within" in joints and "20 %" in joints

@@ -384,8 +384,10 @@ def test_no_record_tells_the_mass_of_all_however_slopes_are_taken(wrong_everywhe
 def test_the_model_that_is_told_does_as_the_records_say(wrong_everywhere):
     """It holds no masses: its springs make up for those that the fit has moved."""
     robot, campaign = wrong_everywhere
-    found = diagnose_percussion(robot, campaign, workers=1)
+    answer = picchio.diagnose(robot, campaign, workers=1)
+    found = answer.details["percussion"]
     fitted = found.extended.hypothesis
+    assert "stand as stated here" in answer.model_text()
 
     def left(effects):
         exact = Problem(robot, campaign, workers=1)

@@ -34,6 +34,10 @@ from picchio.robot.loading.saved_model import is_saved_model
 from picchio.studies.tasks import Task, load_task
 
 _FOUND = "found by picchio diagnose"
+_MAKES_UP = (
+    "; masses and what else is never exact stand as stated here, so values differ a little from "
+    "those told: together they do as the records say"
+)
 
 
 @one_thread()
@@ -120,6 +124,8 @@ def diagnose(
             hit = diagnose_percussion(loaded, records, **options)
             answer = replace(hit.diagnosis, details={"percussion": hit})
         effects = hit.effects
+        if effects != hit.extended.hypothesis.effects:
+            notes += _MAKES_UP
         known = fitted_correlation(hit.extended) if answer.verdict != "unexplained" else None
         moves = answer.details.get("motion")
         if known is not None and moves is not None:
