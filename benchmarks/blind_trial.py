@@ -156,7 +156,9 @@ def main():
     parser.add_argument("--workers", type=int, default=1, help="processes of each diagnosis")
     parser.add_argument("--fresh", action="store_true", help="seeds never used before")
     parser.add_argument("--development", action="store_true", help="the seeds used while building")
-    parser.add_argument("--method", default="diagnose", help="or: score-test, plain-bic")
+    parser.add_argument(
+        "--method", default="diagnose", help="or: score-test, plain-bic, another checkout's folder"
+    )
     parser.add_argument("--summary", action="store_true", help="run nothing")
     parser.add_argument("--since", metavar="COMMIT", help="tables of rows since this change only")
     parser.add_argument("--against", type=Path, help="a simpler method's rows: compare")

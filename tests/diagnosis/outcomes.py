@@ -140,6 +140,9 @@ def known(diagnosis, robot, truth):
         for joint in robot.flexible_joints
     }
     true["damping_ratio"] = float(np.mean(robot.damping_ratio)) * drawn["damping_ratio"]
+    for cause in truth["causes"]:  # whose own value is judged
+        true.pop({"joint_stiffness": f"stiffness.{cause['target']}",
+                  "modal_damping": "damping_ratio"}.get(cause["effect"]), None)  # fmt: skip
     return {
         name: round((value.value - true[name]) / value.std, 3)
         for name, value in diagnosis.nuisances.items()

@@ -141,7 +141,7 @@ def test_what_is_told_of_springs_and_lives_is_held_against_the_truth(capsys):
     spring = robot.flexible_joints[0]
     ratio = float(np.mean(robot.damping_ratio))
     drawn = dict.fromkeys(robot.flexible_names, 1.0) | {spring.name: 1.02}
-    truth = {"nuisances": {"stiffness": drawn, "damping_ratio": 1.0}}
+    truth = {"nuisances": {"stiffness": drawn, "damping_ratio": 1.0}, "causes": []}
     told = {
         f"stiffness.{spring.name}": Value(1.04 * spring.stiffness, 0.01 * spring.stiffness, ""),
         "damping_ratio": Value(0.7 * ratio, 0.1 * ratio, "1"),
@@ -149,6 +149,9 @@ def test_what_is_told_of_springs_and_lives_is_held_against_the_truth(capsys):
     }
     known = outcomes.known(SimpleNamespace(nuisances=told), robot, truth)
     assert known == {f"stiffness.{spring.name}": 2.0, "damping_ratio": -3.0}
+    truth["causes"] = [{"effect": "joint_stiffness", "target": spring.name}]
+    judged = outcomes.known(SimpleNamespace(nuisances=told), robot, truth)
+    assert judged == {"damping_ratio": -3.0}  # the spring is judged as a cause
     lives = {"joint_1": [0.1, -0.2, 0.2], "robot": [0.3, -0.2, 0.2]}
     trial_tables.print_known([{"known": known, "lives": lives}, {"known": {"damping_ratio": 0.1}}])
     springs, arm, joints = capsys.readouterr().out.strip().splitlines()

@@ -185,6 +185,8 @@ class Problem:
     Attributes:
         idle: numbers that are not exact but that no record shows, such as the centre of mass of a
             link that turns about its own axis.
+        unsettled: chi-square per sample that what is not exact leaves on the average, where it is
+            neither integrated out nor settled; else 0.
 
     Raises:
         InputError: no percussion record, or none with a channel that can be predicted.
@@ -204,6 +206,7 @@ class Problem:
         self.moved: dict[str, Moved] = {}
         self.sizes: dict[str, FloatArray] = {}
         self.idle: frozenset[str] = frozenset()
+        self.unsettled = 0.0
         self.pins: list[Pin] = []
         self.robot, self.campaign = robot, campaign
         self.model = Model(robot, gravity_stiffness)

@@ -95,6 +95,9 @@ MOST_RIVALS = 5
 _LITTLE = 1.2
 # By what share of what the best explains beyond the last one's another may explain less.
 _NEARBY = 0.05
+# How many times the average what is not exact may leave: few numbers make most of it, and the
+# square of one is beyond that in one of twenty.
+_BY_CHANCE = 4.0
 
 
 def try_candidates(
@@ -165,9 +168,10 @@ def try_candidates(
         tried.sort(key=lambda each: each[1].latent is None)
         fits = mapped("short", [effect for _, effect in tried])
         short = _best_of_each(tried, fits, some)
-        # About another's inexact numbers a true cause may leave more than one that is alike.
+        # About another's inexact numbers a true cause may leave more than one that is alike; about
+        # none, as much as they do.
         spread = short[-1][2] - short[0][2] if short and allowed(problem) else 0.0
-        nearby = _NEARBY * spread
+        nearby = max(_NEARBY * spread, _BY_CHANCE * problem.unsettled * start.samples)
         if best is None or not short:
             return _long_trials(mapped, short, list(records), long_fits, nearby)
         own = fit(problem, best.hypothesis, some, window, iterations=2)

@@ -83,6 +83,7 @@ def linearise(
     shared, absorbed = _without(problem, slopes, jacobians, {r.name for r in fitted})
     unknowns = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
     problem.marginal = Marginal(shared, dict(zip(unknowns, absorbed, strict=True)))
+    problem.unsettled = 0.0
     _move(problem, problem.sizes)
 
 
@@ -337,6 +338,10 @@ def _unless_little(problem: Problem, found: Fit) -> Fit:
     if found.chi_square < _LITTLE * plain.chi_square and not absurd:
         return found
     _move(problem, {})
+    if problem.marginal is not None:
+        columns = [s.columns for s in problem.marginal.slopes.values()]
+        samples = sum(c.shape[0] * c.shape[1] for c in columns)
+        problem.unsettled = sum(float((c * c).sum()) for c in columns) / max(samples, 1)
     problem.marginal = None
     return plain
 
@@ -346,13 +351,14 @@ class About:
     """About what the records are linearised: what `linearise` and `recentre` have found.
 
     Attributes:
-        marginal, sizes, moved, idle: the problem's.
+        marginal, sizes, moved, idle, unsettled: the problem's.
     """
 
     marginal: Marginal | None
     sizes: dict[str, FloatArray]
     moved: dict[str, Moved]
     idle: frozenset[str]
+    unsettled: float
 
     @classmethod
     def of(cls, problem: Problem) -> About:
@@ -361,7 +367,9 @@ class About:
         Args:
             problem: whose slopes, and numbers that are not exact.
         """
-        return cls(problem.marginal, problem.sizes, problem.moved, problem.idle)
+        return cls(
+            problem.marginal, problem.sizes, problem.moved, problem.idle, problem.unsettled
+        )
 
     def restore(self, problem: Problem) -> None:
         """Linearise as it was then.
@@ -371,7 +379,7 @@ class About:
         """
         known = problem.moved is self.moved
         problem.marginal, problem.sizes, problem.moved = self.marginal, self.sizes, self.moved
-        problem.idle = self.idle
+        problem.idle, problem.unsettled = self.idle, self.unsettled
         if not known:
             problem.renew()
 
