@@ -20,7 +20,12 @@ from picchio.diagnosis.percussion.search.candidates import all_candidates, measu
 from picchio.diagnosis.percussion.search.exchange import exchange, prune
 from picchio.diagnosis.percussion.search.restart import restarted
 from picchio.diagnosis.percussion.search.screen import Suspect, acts_either_way, smallest
-from picchio.diagnosis.percussion.search.select import _chosen, alternatives, run_search
+from picchio.diagnosis.percussion.search.select import (
+    _chosen,
+    alternatives,
+    begin_search,
+    run_search,
+)
 from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.diagnosis.percussion.search.trials import (
     _short_list,
@@ -357,3 +362,22 @@ def test_what_was_fitted_to_a_part_of_the_records_is_no_alternative(two_causes):
     assert short.score < right.score and not short.finished(problem.records)
     search = search_of(problem, baseline, best=right.fit, steps=[[right, short]])
     assert alternatives(search) == ([], [])
+
+
+@pytest.mark.parametrize(
+    "records", [6, pytest.param(18, marks=pytest.mark.slow)], ids=["replaced", "followed"]
+)
+def test_a_half_sine_is_not_told_as_a_width_that_suits_stated_numbers_better(records, arm):
+    """About numbers as they are stated the wrong one explains more: the blows rise slowly."""
+    case = {"robot": ROBOT, "kind": "single", "snr": 40, "draw": 90006, "mismatch": 1.0}
+    if records < 18:
+        case |= {"records": records, "effect": "pulse_shape"}
+    campaign, truth = trial.make(case, 1)
+    assert [cause["effect"] for cause in truth["causes"]] == ["pulse_shape"]
+    problem = Problem(arm, campaign)
+    rivals = [(effect_class(name), "tool") for name in ("pulse_width", "pulse_shape")]
+    search = begin_search(problem, rivals, held_out(problem)[0])
+    run_search(search)
+    assert search.labels == {"pulse_shape:tool"}
+    (first, *_) = search.steps[0]
+    assert (first.label == "pulse_width:tool") == (records < 18)

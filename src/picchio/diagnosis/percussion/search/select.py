@@ -8,7 +8,11 @@ from dataclasses import replace
 from functools import partial
 
 from picchio.diagnosis.attempt import attempt
-from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic_difference, confidence
+from picchio.diagnosis.percussion.criteria.equivalence import (
+    SAME,
+    bic_difference,
+    confidence,
+)
 from picchio.diagnosis.percussion.criteria.remainder import allowed, decisive_gain
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, Split
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
@@ -30,6 +34,7 @@ from picchio.diagnosis.percussion.search.trials import (
     holdout_choice,
     over_the_same_samples,
     settled_alike,
+    settled_by_itself,
     try_candidates,
 )
 from picchio.diagnosis.percussion.tolerance.linearise import (
@@ -198,6 +203,7 @@ def _grow(search: Search, stack: ExitStack) -> None:
             break
         if best.about is not None and search.best is best.fit:
             best.about.restore(problem)
+        search.best = _without_earlier(search, best.label)
         again = restarted(search, search.best)
         if best.about is None or again is not best.fit:
             again = _settled_if_better(search, again)
@@ -206,6 +212,33 @@ def _grow(search: Search, stack: ExitStack) -> None:
             _settle(search, best.label)
         if len(search.labels) >= MOST_CAUSES:
             break
+
+
+def _without_earlier(search: Search, newest: str) -> Fit:
+    """The fit without an earlier cause, where that does as well about its own inexact numbers.
+
+    That one may have been chosen in the newest's place. What is not exact is off as suits both,
+    so that none can be done without; about its own, the right one leaves no more alone.
+    """
+    best, problem = search.best, search.problem
+    if not allowed(problem) or newest not in search.labels:
+        return best
+    for label in search.labels - {newest}:
+        rest = best.hypothesis.minus(label)
+        without = attempt(f"without {label}", partial(search.fit, rest, iterations=5))
+        if without is None or without.chi_square > ELSE * without.samples:
+            continue
+        start = replace(best, hypothesis=rest)  # as the other's numbers are, which are near
+        again, about = settled_by_itself(search, label, start, anew=False)
+        if again is None:
+            continue
+        before = About.of(problem)
+        with about_another(problem, about):
+            gain = search.pays(again, best, before)
+        if gain < search.least:
+            about.restore(problem)
+            best = again
+    return best
 
 
 def _settled_if_better(search: Search, found: Fit) -> Fit:

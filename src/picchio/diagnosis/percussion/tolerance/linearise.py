@@ -367,9 +367,7 @@ class About:
         Args:
             problem: whose slopes, and numbers that are not exact.
         """
-        return cls(
-            problem.marginal, problem.sizes, problem.moved, problem.idle, problem.unsettled
-        )
+        return cls(problem.marginal, problem.sizes, problem.moved, problem.idle, problem.unsettled)
 
     def restore(self, problem: Problem) -> None:
         """Linearise as it was then.
