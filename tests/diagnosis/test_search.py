@@ -17,7 +17,7 @@ from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
-from picchio.diagnosis.percussion.search.exchange import exchange, prune
+from picchio.diagnosis.percussion.search.exchange import exchange, exchange_settled, prune
 from picchio.diagnosis.percussion.search.restart import restarted
 from picchio.diagnosis.percussion.search.screen import Suspect, acts_either_way, smallest
 from picchio.diagnosis.percussion.search.select import (
@@ -33,6 +33,7 @@ from picchio.diagnosis.percussion.search.trials import (
     holdout_choice,
     over_the_same_samples,
     records_of_every_pose,
+    settled_by_itself,
 )
 from picchio.model.effects.registry import effect_class
 from worlds import campaign as worlds
@@ -381,3 +382,27 @@ def test_a_half_sine_is_not_told_as_a_width_that_suits_stated_numbers_better(rec
     assert search.labels == {"pulse_shape:tool"}
     (first, *_) = search.steps[0]
     assert (first.label == "pulse_width:tool") == (records < 18)
+
+
+def test_a_rival_that_came_near_is_compared_about_its_own_inexact_numbers(arm):
+    """About those that suit the wrong one it seems worse; without the second cause, as good."""
+    hidden = [("pulse_shape", "tool", {}), ("sensor_clipping", "deflection", {"limit": 6e-4})]
+    campaign, _ = worlds.make(robot=ROBOT, seed=1, causes=hidden, records=3, mismatch=1.0)
+    problem = Problem(arm, campaign)
+    search = begin_search(problem, [], held_out(problem)[0])
+    start = search.baseline.hypothesis
+    clipping = effect_class("sensor_clipping")("deflection", limit=6e-4)
+    step = []
+    for name, values in (("pulse_width", {"scale": 0.75}), ("pulse_shape", {"blend": 1.0})):
+        own = effect_class(name)("tool", **values)
+        found = search.fit(start.plus(own), iterations=6)
+        step.append(Trial(own.label, found, bic(found), 0.0))
+    wrong = search.fit(step[0].fit.hypothesis.plus(clipping), iterations=6)
+    best, about = settled_by_itself(search, clipping.label, wrong)
+    about.restore(problem)
+    search.best = best
+    search.steps = [step, [Trial(clipping.label, best, bic(best), 0.0)]]
+    assert exchange(search) is best
+    other, _ = exchange_settled(search)
+    assert other.hypothesis.labels == {"pulse_shape:tool", clipping.label}
+    assert other.cost < best.cost - 100.0

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Set
+import math
+from collections.abc import Iterator, Set
 from dataclasses import replace
 from functools import partial
 
 from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.criteria.equivalence import bic
+from picchio.diagnosis.percussion.criteria.remainder import allowed
 from picchio.diagnosis.percussion.fit.drawn import fit_latent, with_hidden
 from picchio.diagnosis.percussion.fit.least_squares import HOPELESS, Fit, fit, fits_without
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
@@ -16,8 +18,13 @@ from picchio.diagnosis.percussion.search.trials import (
     SCREEN_WINDOW,
     SHORT_LIST,
     records_of_every_pose,
+    settled_by_itself,
     try_candidates,
 )
+from picchio.diagnosis.percussion.tolerance.linearise import About
+
+# What share of what the chosen one explained a rival may lack to be settled beside other causes.
+_NEAR = 0.1
 
 
 def prune(search: Search, found: Fit, *, alone: bool = True) -> Fit:
@@ -54,21 +61,53 @@ def exchange(search: Search) -> Fit:
     The first cause is chosen while the others still disturb: a rival may have been the right one.
     """
     best = search.best
-    for step in search.steps[:-1]:
-        for rival in step[1:]:
-            chosen = step[0].label
-            if chosen not in best.hypothesis.labels or not rival.finished(search.records):
-                continue
-            if rival.label in best.hypothesis.labels or rival.draws:
-                continue
-            joined = rival.fit.hypothesis
-            for cause in best.hypothesis.causes:
-                if cause.label not in (chosen, *joined.labels):
-                    joined = joined.joined(cause)
+    for rival, joined in _rivals_beside(search):
+        if rival.label not in best.hypothesis.labels:
             other = attempt(rival.label, partial(_exchanged, search, joined, best))
             if other is not None and bic(other) < bic(best) - search.least:
                 best = other
     return best
+
+
+def exchange_settled(search: Search) -> tuple[Fit, About] | None:
+    """As `exchange`, each fit about its own inexact numbers; and about what it is linearised.
+
+    Returns:
+        None where no rival that came near does better so, or where everything is exact.
+    """
+    best: tuple[Fit, About] | None = None
+    if not allowed(search.problem):
+        return best
+    for rival, joined in _rivals_beside(search, _NEAR):
+        start = attempt(rival.label, partial(search.fit, joined, iterations=6))
+        if start is None:
+            continue
+        other, about = settled_by_itself(search, rival.label, start)
+        mark = search.best if best is None else best[0]
+        if other is not None and bic(other) < bic(mark) - search.least:
+            best = other, about
+    return best
+
+
+def _rivals_beside(search: Search, near: float = math.inf) -> Iterator[tuple[Trial, Hypothesis]]:
+    """Rivals of earlier causes, fitted then, each beside the other causes there are now.
+
+    Those that lacked at most a share `near` of what the chosen one explained.
+    """
+    causes, labels = search.best.hypothesis.causes, search.labels
+    for step in search.steps[:-1]:
+        chosen = step[0]
+        most = chosen.fit.cost + near * max(search.baseline.cost - chosen.fit.cost, 0.0)
+        for rival in step[1:]:
+            if chosen.label not in labels or not rival.finished(search.records):
+                continue
+            if rival.label in labels or rival.draws or rival.fit.cost > most:
+                continue
+            joined = rival.fit.hypothesis
+            for cause in causes:
+                if cause.label not in (chosen.label, *joined.labels):
+                    joined = joined.joined(cause)
+            yield rival, joined
 
 
 def _exchanged(search: Search, hypothesis: Hypothesis, best: Fit) -> Fit | None:

@@ -20,6 +20,7 @@ from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import measure_scales
 from picchio.diagnosis.percussion.search.exchange import (
     exchange,
+    exchange_settled,
     prune,
     refit_latent,
     replace_causes,
@@ -288,6 +289,9 @@ def _settle(search: Search, newest: str) -> None:
         search.best = prune(search, again, alone=False)
     if search.leaves_noise(search.best):
         return
+    if (found := exchange_settled(search)) is not None and search.confirmed(*found):
+        search.best, about = found
+        about.restore(search.problem)
     other = exchange(search)
     if other is not search.best:  # beside the right one, others may have nothing to do
         other = prune(search, other, alone=False)

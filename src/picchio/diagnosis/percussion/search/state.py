@@ -218,11 +218,12 @@ class Search:
         # What is no model at a pose that was held out is refuted by it.
         return -math.inf if after_it is None else chi_square(before) - after_it
 
-    def confirmed(self, other: Fit) -> bool:
+    def confirmed(self, other: Fit, about: About | None = None) -> bool:
         """Whether the records held out do not speak against a fit in place of the best.
 
         Args:
             other: the fit that would replace the best.
+            about: what the records were linearised about for it; as now where None.
         """
-        gain = self.held_out_gain(self.best, other)
+        gain = self.held_out_gain(self.best, other, about)
         return gain is None or gain > 0.0
