@@ -162,6 +162,11 @@ def main():
     parser.add_argument("--summary", action="store_true", help="run nothing")
     parser.add_argument("--since", metavar="COMMIT", help="tables of rows since this change only")
     parser.add_argument("--against", type=Path, help="a simpler method's rows: compare")
+    parser.add_argument(
+        "--curve", metavar="NAME=ROWS", action="append", default=[],
+        help="with --summary and --mismatch: other ways' rows, by size of mismatch",
+    )  # fmt: skip
+    parser.add_argument("--plot", type=Path, help="of --curve, a picture")
     parser.add_argument("--page", type=Path, help="a page whose tables to bring up to date")
     wrong = parser.add_argument_group("worlds that are a little wrong everywhere")
     wrong.add_argument("--mismatch", type=numbers, help="times the tolerances, by commas")
@@ -213,6 +218,14 @@ def main():
                 print(f"{number}/{len(todo)}", *note, file=sys.stderr)
     import trial_tables
 
+    if given.curve:
+        ways = {"picchio": rows}
+        for name, _, path in (each.partition("=") for each in given.curve):
+            ways[name] = trial_tables.read_rows(Path(path))
+        trial_tables.print_curve(ways)
+        if given.plot:
+            trial_tables.draw_curve(ways, given.plot)
+        return
     if given.mismatch is not None:
         trial_tables.mismatch_summary(since(rows, given.since) if given.since else rows)
         return

@@ -39,3 +39,26 @@ def test_no_case_is_counted_twice(rows):
     cases = [row["case"] for row in rows]
     assert len(set(cases)) == len(cases)
     assert len({row["salt"] for row in rows}) == 1
+
+
+def test_the_curve_counts_the_cases_that_every_way_was_given_at_every_mismatch(tmp_path, capsys):
+    def rows(outcomes):
+        return [
+            {"case": f"arm/single//40/{draw}/{size} times wrong", "kind": "single",
+             "verdict": "named", "mismatch": size, "outcome": outcome}
+            for (draw, size), outcome in outcomes.items()
+        ]  # fmt: skip
+
+    ways = {
+        "one": rows({(0, 0): "right", (0, 2): "wrong", (1, 0): "right", (1, 2): "right"}),
+        "two": rows({(0, 0): "right", (0, 2): "undecided", (1, 0): "wrong"}),
+    }
+    table = trial_tables.curve(ways)
+    assert table == {
+        ("single", 0, "one"): [1, 0, 0], ("single", 0, "two"): [1, 0, 0],
+        ("single", 2, "one"): [0, 0, 1], ("single", 2, "two"): [0, 1, 0],
+    }  # fmt: skip
+    trial_tables.print_curve(ways)
+    assert capsys.readouterr().out.splitlines()[3].split() == ["single", "2", "one", "0", "0", "1"]
+    trial_tables.draw_curve(ways, tmp_path / "curve.png")
+    assert (tmp_path / "curve.png").stat().st_size > 5000

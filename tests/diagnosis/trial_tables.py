@@ -305,6 +305,79 @@ def print_mismatch(rows):
         )
 
 
+CURVE = ("right", "undecided", "wrong")
+
+
+def curve(methods):
+    """What every method makes of the same worlds as they get more wrong.
+
+    Args:
+        methods: {name: rows}.
+
+    Returns:
+        dict: (kind, mismatch, method) -> [right, undecided, wrong], of the cases that all were
+        given, those of one kind being the same at every mismatch.
+    """
+    told = {name: {row["case"]: row for row in rows if not _aside(row)}
+            for name, rows in methods.items()}  # fmt: skip
+    shared = set.intersection(*(set(each) for each in told.values()))
+    sizes = sorted({row["mismatch"] for rows in methods.values() for row in rows})
+    table: dict = {}
+    for name, each in told.items():
+        draws: dict = defaultdict(dict)
+        for case in sorted(shared):
+            draws[case.rsplit("/", 1)[0]][each[case]["mismatch"]] = each[case]
+        for row in (row for own in draws.values() if len(own) == len(sizes)
+                    for row in own.values()):  # fmt: skip
+            at = (row["kind"], row["mismatch"], name)
+            table.setdefault(at, [0, 0, 0])[CURVE.index(row["outcome"])] += 1
+    return dict(sorted(table.items(), key=lambda item: item[0][:2]))
+
+
+def print_curve(methods):
+    """`curve` as a table."""
+    table = curve(methods)
+    width = max(map(len, methods))
+    print(f"{'kind':<8}{'times':>6}  {'way':<{width}}  right  undecided  wrong")
+    for (kind, size, name), count in table.items():
+        print(f"{kind:<8}{size:>6g}  {name:<{width}}  {count[0]:>5}  {count[1]:>9}  {count[2]:>5}")
+
+
+def draw_curve(methods, path):
+    """`curve` as a picture: a column a method, a row a kind, a bar a mismatch."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    table = curve(methods)
+    kinds = list(dict.fromkeys(kind for kind, _, _ in table))
+    sizes = sorted({size for _, size, _ in table})
+    figure, axes = plt.subplots(
+        len(kinds), len(methods), figsize=(2.9 * len(methods), 2.3 * len(kinds)),
+        sharex=True, sharey="row", squeeze=False, layout="constrained",
+    )  # fmt: skip
+    for line, kind in zip(axes, kinds, strict=True):
+        for axis, name in zip(line, methods, strict=True):
+            foot = [0] * len(sizes)
+            for k, (what, colour) in enumerate(
+                zip(CURVE, ("#2e7d32", "#c9c9c9", "#c62828"), strict=True)
+            ):
+                height = [table.get((kind, size, name), [0, 0, 0])[k] for size in sizes]
+                axis.bar([f"{s:g}" for s in sizes], height, bottom=foot, color=colour, label=what)
+                foot = [a + b for a, b in zip(foot, height, strict=True)]
+            axis.spines[["top", "right"]].set_visible(False)
+            axis.yaxis.get_major_locator().set_params(integer=True)
+            if line is axes[0]:
+                axis.set_title(name, fontsize=10)
+        line[0].set_ylabel({"null": "nothing hidden", "single": "one cause"}.get(kind, kind))
+    figure.supxlabel("how many times its tolerance everything is off", fontsize=10)
+    handles, labels = axes[0][0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False)
+    figure.savefig(path, dpi=150)
+    plt.close(figure)
+
+
 def print_known(rows):
     """How often what is told of stiffness, damping and a life nobody measured holds."""
     off = [abs(z) for row in rows for z in row.get("known", {}).values()]
