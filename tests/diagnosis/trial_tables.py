@@ -379,7 +379,11 @@ def draw_curve(methods, path):
 
 
 def print_known(rows):
-    """How often what is told of stiffness, damping and a life nobody measured holds."""
+    """How often what is told of stiffness, damping and a life nobody measured holds.
+
+    Where the catalogue lacks the cause, no model is told.
+    """
+    rows = [row for row in rows if row.get("kind") not in UNNAMEABLE]
     off = [abs(z) for row in rows for z in row.get("known", {}).values()]
     if off:
         count = sum("known" in row for row in rows)

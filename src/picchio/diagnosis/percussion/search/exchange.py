@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Set
 from dataclasses import replace
 from functools import partial
@@ -61,8 +60,9 @@ def exchange(search: Search) -> Fit:
     The first cause is chosen while the others still disturb: a rival may have been the right one.
     """
     best = search.best
-    for rival, joined in _rivals_beside(search):
-        if rival.label not in best.hypothesis.labels:
+    for chosen, rival in _earlier(search):
+        joined = _in_its_place(search, best, chosen, rival)
+        if joined is not None:
             other = attempt(rival.label, partial(_exchanged, search, joined, best))
             if other is not None and bic(other) < bic(best) - search.least:
                 best = other
@@ -75,39 +75,37 @@ def exchange_settled(search: Search) -> tuple[Fit, About] | None:
     Returns:
         None where no rival that came near does better so, or where everything is exact.
     """
-    best: tuple[Fit, About] | None = None
-    if not allowed(search.problem):
-        return best
-    for rival, joined in _rivals_beside(search, _NEAR):
-        start = attempt(rival.label, partial(search.fit, joined, iterations=6))
-        if start is None:
+    best, found = search.best, None
+    for chosen, rival in _earlier(search) if allowed(search.problem) else ():
+        explained = max(search.baseline.cost - chosen.fit.cost, 0.0)
+        joined = _in_its_place(search, best, chosen, rival)
+        if joined is None or rival.fit.cost - chosen.fit.cost > _NEAR * explained:
             continue
-        other, about = settled_by_itself(search, rival.label, start)
-        mark = search.best if best is None else best[0]
-        if other is not None and bic(other) < bic(mark) - search.least:
-            best = other, about
-    return best
+        start = attempt(rival.label, partial(search.fit, joined, iterations=6))
+        if start is not None:
+            other, about = settled_by_itself(search, rival.label, start)
+            if other is not None and bic(other) < bic(best) - search.least:
+                best = other
+                found = other, about
+    return found
 
 
-def _rivals_beside(search: Search, near: float = math.inf) -> Iterator[tuple[Trial, Hypothesis]]:
-    """Rivals of earlier causes, fitted then, each beside the other causes there are now.
+def _earlier(search: Search) -> Iterator[tuple[Trial, Trial]]:
+    """What was chosen before the newest cause, with each of its rivals."""
+    return ((step[0], rival) for step in search.steps[:-1] for rival in step[1:])
 
-    Those that lacked at most a share `near` of what the chosen one explained.
-    """
-    causes, labels = search.best.hypothesis.causes, search.labels
-    for step in search.steps[:-1]:
-        chosen = step[0]
-        most = chosen.fit.cost + near * max(search.baseline.cost - chosen.fit.cost, 0.0)
-        for rival in step[1:]:
-            if chosen.label not in labels or not rival.finished(search.records):
-                continue
-            if rival.label in labels or rival.draws or rival.fit.cost > most:
-                continue
-            joined = rival.fit.hypothesis
-            for cause in causes:
-                if cause.label not in (chosen.label, *joined.labels):
-                    joined = joined.joined(cause)
-            yield rival, joined
+
+def _in_its_place(search: Search, best: Fit, chosen: Trial, rival: Trial) -> Hypothesis | None:
+    """A rival in place of what was chosen, beside the other causes; None where it can't be."""
+    labels, joined = best.hypothesis.labels, rival.fit.hypothesis
+    if chosen.label not in labels or rival.label in labels:
+        return None
+    if rival.draws or not rival.finished(search.records):
+        return None
+    for cause in best.hypothesis.causes:
+        if cause.label not in (chosen.label, *joined.labels):
+            joined = joined.joined(cause)
+    return joined
 
 
 def _exchanged(search: Search, hypothesis: Hypothesis, best: Fit) -> Fit | None:
