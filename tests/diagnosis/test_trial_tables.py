@@ -62,3 +62,13 @@ def test_the_curve_counts_the_cases_that_every_way_was_given_at_every_mismatch(t
     assert capsys.readouterr().out.splitlines()[3].split() == ["single", "2", "one", "0", "0", "1"]
     trial_tables.draw_curve(ways, tmp_path / "curve.png")
     assert (tmp_path / "curve.png").stat().st_size > 5000
+
+
+def test_the_page_has_the_curve_that_its_rows_give(capsys):
+    files = {"picchio": "wrong", "before": "wrong_before", "plain BIC": "wrong_plain_bic"}
+    ways = {
+        way: trial_tables.read_rows(DOCS / f"blind_trial_{name}.jsonl")
+        for way, name in files.items()
+    }
+    trial_tables.print_curve(ways)
+    assert capsys.readouterr().out.rstrip() in PAGE.read_text()

@@ -357,6 +357,8 @@ def draw_curve(methods, path):
         len(kinds), len(methods), figsize=(2.9 * len(methods), 2.3 * len(kinds)),
         sharex=True, sharey="row", squeeze=False, layout="constrained",
     )  # fmt: skip
+    for axis, name in zip(axes[0], methods, strict=True):
+        axis.set_title(name, fontsize=10)
     for line, kind in zip(axes, kinds, strict=True):
         for axis, name in zip(line, methods, strict=True):
             foot = [0] * len(sizes)
@@ -368,8 +370,6 @@ def draw_curve(methods, path):
                 foot = [a + b for a, b in zip(foot, height, strict=True)]
             axis.spines[["top", "right"]].set_visible(False)
             axis.yaxis.get_major_locator().set_params(integer=True)
-            if line is axes[0]:
-                axis.set_title(name, fontsize=10)
         line[0].set_ylabel({"null": "nothing hidden", "single": "one cause"}.get(kind, kind))
     figure.supxlabel("how many times its tolerance everything is off", fontsize=10)
     handles, labels = axes[0][0].get_legend_handles_labels()

@@ -72,6 +72,9 @@ def exchange(search: Search) -> Fit:
 def exchange_settled(search: Search) -> tuple[Fit, About] | None:
     """As `exchange`, each fit about its own inexact numbers; and about what it is linearised.
 
+    Args:
+        search: what was found, step by step.
+
     Returns:
         None where no rival that came near does better so, or where everything is exact.
     """
