@@ -178,6 +178,9 @@ def main():
     wrong.add_argument("--effects", type=words, help="hidden first, in turn; else drawn")
     wrong.add_argument("--snr", type=int, default=40, help="dB")
     given = parser.parse_args()
+    ways = ("diagnose", "score-test", "plain-bic")
+    if given.method not in ways and not (Path(given.method) / "src" / "picchio").is_dir():
+        parser.error(f"--method {given.method}: none of {', '.join(ways)}, and no checkout")
     rows = []
     if given.out.exists():
         rows = [json.loads(line) for line in given.out.read_text().splitlines() if line]

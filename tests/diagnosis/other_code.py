@@ -17,6 +17,8 @@ from picchio.campaign.tables import Tolerance
 from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 
 robot, path, without = sys.argv[1], sys.argv[2], json.loads(sys.argv[3])
+if not picchio.__file__.startswith(sys.argv[4]):
+    raise SystemExit(f"the code that runs is {picchio.__file__}, not of {sys.argv[4]}")
 # A tolerance that the other code does not know of is none to it.
 kept, table = [], ""
 for line in open(path, encoding="utf-8"):
@@ -45,12 +47,13 @@ def diagnose(checkout: Path, robot: str, campaign, without=()) -> dict:
         campaign: handed over as files.
         without: effects that its catalogue lacks.
     """
+    source = Path(checkout).resolve() / "src"
     with tempfile.TemporaryDirectory() as folder:
         campaign.save(Path(folder) / "campaign")
         path = str(Path(folder) / "campaign" / "campaign.toml")
         done = subprocess.run(
-            [sys.executable, "-c", _SCRIPT, robot, path, json.dumps(sorted(without))],
-            env={**os.environ, "PYTHONPATH": str(Path(checkout).resolve() / "src")},
+            [sys.executable, "-c", _SCRIPT, robot, path, json.dumps(sorted(without)), str(source)],
+            env={**os.environ, "PYTHONPATH": str(source)},
             capture_output=True,
             text=True,
         )

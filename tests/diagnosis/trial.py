@@ -37,10 +37,6 @@ CLASSES = (
     {"payload", "link_mass", "joint_inertia"},
     {"joint_stiffness", "servo_compliance"},  # a servo's motor without inertia is a softer joint
     {"sensor_axes", "sensor_misalignment"},  # axes that are swapped are turned
-    # One has the other as its limit: below its corner a filter delays, and a hysteresis whose
-    # spring is stiff is friction.
-    {"sensor_delay", "sensor_lowpass"},
-    {"coulomb_friction", "hysteresis"},
 )
 # What few records cannot tell from something else: (target, records) of an accelerometer alone.
 SETS = {
