@@ -8,11 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 from picchio.diagnosis.attempt import attempt
-from picchio.diagnosis.percussion.criteria.equivalence import (
-    SAME,
-    bic_difference,
-    confidence,
-)
+from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic_difference, confidence
 from picchio.diagnosis.percussion.criteria.remainder import allowed, decisive_gain
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, Split
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
