@@ -181,7 +181,8 @@ def test_sliders_and_choices_change_the_picture(open_page, arm_scene, pictures) 
     page.wait_for_timeout(400)
     assert page.evaluate("picchio.state.playing")
     assert page.locator("#clock").inner_text().endswith("slow")
-    assert changed(picture(page), first) > 500
+    # between two blows the arm comes to rest: it is looked at until a blow moves it
+    assert any(changed(picture(page), first) > 500 for _ in range(20))
 
 
 def test_it_can_be_used_by_keyboard(open_page, arm_scene) -> None:
