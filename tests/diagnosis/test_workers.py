@@ -15,11 +15,12 @@ import picchio
 from picchio.core.errors import InputError
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import fit
-from picchio.diagnosis.percussion.fit.parallel import parallel_records, worker_pool
+from picchio.diagnosis.percussion.fit.parallel import parallel_records
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.search.state import Search
 from picchio.diagnosis.percussion.search.trials import try_candidates
+from picchio.diagnosis.workers import worker_pool
 from picchio.model.effects.registry import effect_class
 
 ARM = "fanuc_like_3dof"
@@ -105,6 +106,32 @@ def test_shared_records_are_predicted_alike(problem, start):
         # Less than it costs to send.
         assert problem.helpers.residuals(start.effects, problem.records, 0.05) is None
     assert problem.helpers is None
+
+
+@linux
+def test_shared_changes_are_those_of_one_process(problem, start):
+    before, after = (start.plus(effect_class("payload")("tool", mass=m)).effects for m in (0, 0.2))
+    pairs = [(before, after), (after, before)]
+    alone = problem.own_changes(before, pairs, problem.records, None)
+    whitened = problem.changes(before, pairs, problem.records, None)
+    with parallel_records(problem):
+        told = problem.helpers.changes(before, pairs, problem.records, None)
+        assert all(np.array_equal(a, b) for a, b in zip(told, alone, strict=True))
+        shared = problem.changes(before, pairs, problem.records, None)
+    assert all(np.abs(own).max() > 1.0 for own in alone)
+    for ours, theirs in zip(shared, whitened, strict=True):
+        assert all(np.array_equal(a, b) for a, b in zip(ours, theirs, strict=True))
+
+
+@linux
+def test_a_worker_forks_no_others():
+    def within(item):
+        with worker_pool(2, {"who": lambda _: os.getpid()}) as mapped:
+            return os.getpid(), set(mapped("who", [1, 2, 3]))
+
+    with worker_pool(2, {"within": within}) as mapped:
+        told = mapped("within", range(3))
+    assert all({own} == forked != {os.getpid()} for own, forked in told)
 
 
 @linux

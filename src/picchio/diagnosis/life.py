@@ -13,7 +13,9 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
+from picchio.core.processes import one_thread
 from picchio.core.recent import Recent
+from picchio.diagnosis.workers import worker_pool
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 from picchio.robot.flexible_robot import FlexibleRobot
@@ -83,6 +85,7 @@ def life_before_and_after(
     after: Uncertain | None = None,
     others: Sequence[Sequence[Effect]] = (),
     causes: Sequence[tuple[str, str]] = (),
+    workers: int | None = 1,
     **options: Any,
 ) -> dict[str, Any]:
     """The task's life by the robot's files, and with the effects that were found.
@@ -96,6 +99,7 @@ def life_before_and_after(
         others: effects of other models that the data cannot tell from this one.
         causes: (effect, target) of the effects that are causes; of several it is told what each
             does to the life.
+        workers: processes, as `worker_pool` has them.
         **options: of `picchio.studies.assessment.run`.
 
     Returns:
@@ -112,8 +116,8 @@ def life_before_and_after(
         InputError: as `assess`.
     """
     found: dict[str, Any] = {
-        "baseline": _life(robot, task, options, before),
-        "extended": _life(with_effects(robot, effects), task, options, after, robot),
+        "baseline": _life(robot, task, options, before, robot, workers),
+        "extended": _life(with_effects(robot, effects), task, options, after, robot, workers),
     }
     if any("rivets_interval" in found[side] for side in ("baseline", "extended")):
         found["interval_level"] = LEVEL
@@ -185,6 +189,7 @@ def _life(
     options: dict[str, Any],
     unsure: Uncertain | None = None,
     bare: FlexibleRobot | None = None,
+    workers: int | None = 1,
 ) -> dict[str, Any]:
     found = assess(robot, task, **{"uncertainty": False, **options})
     told: dict[str, Any] = {
@@ -202,7 +207,7 @@ def _life(
     }
     if unsure is None:
         return told
-    intervals = life_intervals(bare or robot, task, found, unsure, options)
+    intervals = life_intervals(bare or robot, task, found, unsure, options, workers)
     for name, each in intervals.items():
         told["joints"][name] |= each
     known = [joint for joint in found.joints if joint.name in intervals]
@@ -220,6 +225,7 @@ def life_intervals(
     found: Assessment,
     unsure: Uncertain,
     options: dict[str, Any],
+    workers: int | None = 1,
 ) -> dict[str, dict[str, tuple[float, float]]]:
     """Intervals of every joint's life and utilisation, from how well a model's values are known.
 
@@ -235,6 +241,7 @@ def life_intervals(
         found: the assessment at the centre.
         unsure: the effects and how well they are known.
         options: of `picchio.studies.assessment.run`.
+        workers: processes, as `worker_pool` has them.
 
     Returns:
         joint -> {"rivets_interval": (low, high), "utilisation_interval": (low, high)}, of joints
@@ -267,51 +274,83 @@ def life_intervals(
     sizes, directions = np.linalg.eigh(unsure.covariance)
     spread = directions * np.sqrt(np.maximum(sizes, 0.0))
     spread = spread[:, np.sqrt(np.maximum(sizes, 0.0)) > _KNOWN]
-    slopes = _slopes(unsure, spread, at, *centre)
-    told = {}
-    for j, joint in enumerate(found.joints):
-        if not joint.sn_curve:
-            continue
-        used, lives = [joint.utilisation], [joint.rivets_to_failure]
-        for point in _design_points(unsure.centre, spread, slopes[0, :, j], z):
-            there = at(point)
-            used.append(
-                math.inf if there is None else joint.utilisation * there[0][j] / reference[j]
+
+    def slope(step: FloatArray) -> FloatArray | None:
+        return _slope(unsure, step, at, *centre)
+
+    def used(asked: tuple[int, FloatArray]) -> float | None:
+        j, point = asked
+        there = at(point)
+        return None if there is None else found.joints[j].utilisation * there[0][j] / reference[j]
+
+    def life(asked: tuple[int, FloatArray]) -> float | None:
+        j, point = asked
+        there = at(point)
+        # The most strained pose is the first to be damaged: no damage there, none at all.
+        if there is not None and there[1][j] > 0.0:
+            there = at(point, task)
+        if there is None:
+            return None
+        damage = there[1][j] / task.rivets_per_pass
+        return 1.0 / damage if damage > 0.0 else math.inf
+
+    functions: dict[str, Callable[[Any], Any]] = {"slope": slope, "used": used, "life": life}
+    told: dict[str, dict[str, tuple[float, float]]] = {}
+    with one_thread(), worker_pool(workers, functions) as mapped:
+        slopes = _of_both(mapped("slope", spread.T), len(found.joints))
+        points = [
+            [
+                (j, point)
+                for j, joint in enumerate(found.joints)
+                if joint.sn_curve
+                for point in _design_points(unsure.centre, spread, own[:, j], z)
+            ]
+            for own in slopes
+        ]
+        # Where there is no model, nothing holds.
+        reached = [
+            [least if value is None else float(value) for value in mapped(name, own)]
+            for name, least, own in zip(("used", "life"), (math.inf, 0.0), points, strict=True)
+        ]
+    for k, joint in enumerate(found.joints):
+        if joint.sn_curve:
+            used_there, lives_there = (
+                [value for (j, _), value in zip(own, values, strict=True) if j == k]
+                for own, values in zip(points, reached, strict=True)
             )
-        for point in _design_points(unsure.centre, spread, slopes[1, :, j], z):
-            there = at(point)
-            # The most strained pose is the first to be damaged: no damage there, none at all.
-            if there is not None and there[1][j] > 0.0:
-                there = at(point, task)
-            damage = math.inf if there is None else there[1][j] / task.rivets_per_pass
-            lives.append(1.0 / damage if damage > 0.0 else math.inf)
-        told[joint.name] = {
-            "rivets_interval": (float(min(lives)), float(max(lives))),
-            "utilisation_interval": (float(min(used)), float(max(used))),
-        }
+            used_there.append(joint.utilisation)
+            lives_there.append(joint.rivets_to_failure)
+            told[joint.name] = {
+                "rivets_interval": (min(lives_there), max(lives_there)),
+                "utilisation_interval": (min(used_there), max(used_there)),
+            }
     return told
 
 
-def _slopes(
+def _slope(
     unsure: Uncertain,
-    spread: FloatArray,
+    step: FloatArray,
     at: Callable[[FloatArray], tuple[FloatArray, FloatArray] | None],
     reference: FloatArray,
     spent: FloatArray,
-) -> FloatArray:
+) -> FloatArray | None:
+    """(2, joints): of ln utilisation and ln damage, over one step; None where no model is near."""
+    # Away from a bound, and less far where the model is none or bounds are near.
+    side = 1.0 if unsure.room(step) >= min(unsure.room(-step), 1.0) else -1.0
+    for share in (side, -side, 0.25 * side, -0.25 * side):
+        share *= min(unsure.room(np.sign(share) * step), 1.0)
+        there = at(unsure.centre + share * step) if abs(share) > 1e-3 else None
+        if there is not None:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                return np.log([there[0] / reference, there[1] / spent]) / share
+    return None
+
+
+def _of_both(found: Sequence[FloatArray | None], joints: int) -> FloatArray:
     """(2, directions, joints): of ln utilisation and ln damage, a standard deviation each."""
-    slopes = np.zeros((2, spread.shape[1], reference.size))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        for i, step in enumerate(spread.T):
-            # Away from a bound, and less far where the model is none or bounds are near.
-            side = 1.0 if unsure.room(step) >= min(unsure.room(-step), 1.0) else -1.0
-            for share in (side, -side, 0.25 * side, -0.25 * side):
-                share *= min(unsure.room(np.sign(share) * step), 1.0)
-                there = at(unsure.centre + share * step) if abs(share) > 1e-3 else None
-                if there is not None:
-                    slopes[0, i] = np.log(there[0] / reference) / share
-                    slopes[1, i] = np.log(there[1] / spent) / share
-                    break
+    none = np.zeros((2, joints))
+    slopes = np.array([none if each is None else each for each in found])
+    slopes = slopes.reshape(-1, 2, joints).swapaxes(0, 1)
     # Where there is no damage its slope is none: utilisation's leads to where there may be some.
     slopes[1] = np.where(np.isfinite(slopes[1]).all(axis=0), slopes[1], slopes[0])
     slopes[~np.isfinite(slopes)] = 0.0

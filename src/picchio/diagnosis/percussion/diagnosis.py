@@ -140,6 +140,7 @@ class PercussionDiagnosis:
             after=self.left_open,
             others=[other.effects for other in self.others],
             causes=[(cause.effect, cause.target) for cause in self.diagnosis.causes],
+            workers=self.problem.workers,
         )
 
 

@@ -28,6 +28,7 @@ from picchio.diagnosis.stiffness.responses import (
     response_to,
 )
 from picchio.diagnosis.stiffness.taps import POWER, SAMPLED, Seen, Window, lines, transform
+from picchio.diagnosis.workers import worker_pool
 from picchio.robot.flexible_robot import FlexibleRobot
 
 _LONGEST = 3.0  # s of a record that are looked at: what rings longer hardly tells more
@@ -83,6 +84,7 @@ def rough(
     records: Sequence[BlowRecord],
     tolerance: Tolerance | None = None,
     begin: Rough | None = None,
+    workers: int | None = 1,
 ) -> Rough | None:
     """Springs and damping from nothing.
 
@@ -92,6 +94,7 @@ def rough(
         tolerance: how exact masses, poses and places are; None to take them as stated, which is
             many times faster.
         begin: what was found so, to begin with; None to match modes first.
+        workers: processes, as `worker_pool` has them.
 
     Returns:
         None where no channel tells a motion.
@@ -119,7 +122,11 @@ def rough(
         at = stated.copy()
         at[:n], at[n : 2 * n] = np.log(begin.stiffness), math.log(begin.damping)
         places = [at]
-    found = max((climb(problem, at, TAILS) for at in places), key=lambda one: one.evidence)
+    with worker_pool(workers, {"climb": lambda at: climb(problem, at, TAILS)}) as mapped:
+        climbed = [one for one in mapped("climb", places) if one is not None]
+    if not climbed:
+        return None
+    found = max(climbed, key=lambda one: one.evidence)
     if begin is not None:
         found = settled_elsewhere(problem, found, free=False)
     damping, size = found.mean[n : 2 * n], found.std[n : 2 * n]

@@ -379,7 +379,49 @@ class Problem:
             that is not known without integrating.
         """
         wanted = tuple(effects)
-        model = self.model.with_effects(wanted)
+        asked = [(tuple(before), tuple(after)) for before, after in pairs]
+        told = self.helpers.changes(wanted, asked, records, end) if self.helpers else None
+        found = self.own_changes(wanted, asked, records, end) if told is None else told
+        if all(each is None for each in found):
+            return [None] * len(pairs)
+
+        def change(record: MeasuredRecord, changes: FloatArray | None, k: int) -> FloatArray:
+            if changes is not None:
+                return np.asarray(changes[k])
+            # As the slopes of what is not exact are taken in this record, or what no record can
+            # tell, such as the mass of all, would seem to be told.
+            before, after = map(self.model.with_effects, asked[k])
+            return self._residual(record, after, end) - self._residual(record, before, end)
+
+        names, labels = [r.name for r in records], [effect.label for effect in wanted]
+        out: list[list[FloatArray] | None] = []
+        for k in range(len(pairs)):
+            known = all(e is None or math.isfinite(e[k].sum()) for e in found)
+            own = [change(*each, k) for each in zip(records, found, strict=True)] if known else []
+            if known and self.marginal is not None:
+                own = self.marginal.whitened(own, names, labels)
+            out.append(own if known else None)
+        return out
+
+    def own_changes(
+        self,
+        effects: Iterable[Effect],
+        pairs: Sequence[tuple[Iterable[Effect], Iterable[Effect]]],
+        records: Sequence[MeasuredRecord],
+        end: float | None,
+    ) -> list[FloatArray | None]:
+        """As `changes`, in units of the noise alone, by this process alone.
+
+        Args:
+            effects: about which model.
+            pairs: the effects before and after each change.
+            records: of which.
+            end: s, look no further.
+
+        Returns:
+            (pairs, channels, m) a record, as `residual_changes`.
+        """
+        model = self.model.with_effects(effects)
         around = [tuple(map(self.model.with_effects, pair)) for pair in pairs]
         found: list[FloatArray | None] = []
         for record in records:
@@ -391,26 +433,7 @@ class Problem:
 
             both = [(under(one), under(other)) for one, other in around]
             found.append(residual_changes(record, model, there, under(model), both, end))
-        if all(each is None for each in found):
-            return [None] * len(pairs)
-
-        def change(record: MeasuredRecord, changes: FloatArray | None, k: int) -> FloatArray:
-            if changes is not None:
-                return np.asarray(changes[k])
-            # As the slopes of what is not exact are taken in this record, or what no record can
-            # tell, such as the mass of all, would seem to be told.
-            before, after = (self._residual(record, one, end) for one in around[k])
-            return after - before
-
-        names, labels = [r.name for r in records], [effect.label for effect in wanted]
-        out: list[list[FloatArray] | None] = []
-        for k in range(len(pairs)):
-            known = all(e is None or math.isfinite(e[k].sum()) for e in found)
-            own = [change(*each, k) for each in zip(records, found, strict=True)] if known else []
-            if known and self.marginal is not None:
-                own = self.marginal.whitened(own, names, labels)
-            out.append(own if known else None)
-        return out
+        return found
 
     def renew(self) -> None:
         """Have other processes see what was moved: they have it as it was when they began."""

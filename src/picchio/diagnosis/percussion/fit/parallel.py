@@ -1,103 +1,22 @@
-"""Work on several cores, by processes that share this one's memory.
-
-`worker_pool` maps functions over independent items; `parallel_records` has records predicted
-where a search's steps depend on each other.
-"""
+"""Records predicted by several processes, where a search's steps depend on each other."""
 
 from __future__ import annotations
 
-import itertools
 import multiprocessing
 import os
-import signal
-import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from multiprocessing.connection import Connection
 from typing import Any
 
 from picchio.core.arrays import FloatArray
-from picchio.core.processes import end_with
-from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Pin, Problem
+from picchio.diagnosis.workers import begin_worker, worker_count
 from picchio.model.effects.effect import Effect
 
-_MOST = 8
 # Numbers of a residual (channels x samples, all records) below which sending costs what it saves.
 _WORTH_SENDING = 10_000
-_shared: dict[int, Mapping[str, Callable[[Any], Any]]] = {}
-_numbers = itertools.count()
-
-
-def worker_count(workers: int | None) -> int:
-    """As many as are asked for; as many as cores where None, eight at most.
-
-    One where a process can't be forked safely: not on Linux, or within such a process.
-    """
-    if sys.platform != "linux" or multiprocessing.current_process().daemon:
-        return 1
-    return min(len(os.sched_getaffinity(0)), _MOST) if workers is None else workers
-
-
-@contextmanager
-def worker_pool(
-    workers: int | None, functions: Mapping[str, Callable[[Any], Any]]
-) -> Iterator[Callable[[str, Iterable[Any]], list[Any]]]:
-    """Within the block, a function that maps others over items: (name, items) -> results in order.
-
-    The functions may use whatever exists when the block begins: processes are forked, so nothing
-    of that is copied or sent. Items and results are. Where a process can't be forked safely (not
-    on Linux, or within such a process), or one core is all there is, this one does the work itself.
-
-    A function that fails gives None, see `attempt`.
-
-    Args:
-        workers: processes; as many as cores where None, eight at most.
-        functions: name -> function of one item.
-    """
-    number, count = next(_numbers), worker_count(workers)
-    pool: ProcessPoolExecutor | None = None
-    if count > 1:
-        _shared[number] = functions
-        pool = ProcessPoolExecutor(
-            count, multiprocessing.get_context("fork"), _start, (os.getpid(),)
-        )
-
-    def mapped(name: str, items: Iterable[Any]) -> list[Any]:
-        todo = list(items)
-        if pool is None or len(todo) < 2:
-            return [attempt(name, partial(functions[name], item)) for item in todo]
-        return list(pool.map(_run, [(number, name, item) for item in todo]))
-
-    others = set(multiprocessing.active_children())
-    try:
-        yield mapped
-    except BaseException:
-        # Interrupted: what they are at is of no use any more.
-        for process in set(multiprocessing.active_children()) - others:
-            process.kill()
-        raise
-    finally:
-        _shared.pop(number, None)
-        if pool is not None:
-            pool.shutdown(cancel_futures=True)
-
-
-def _start(parent: int) -> None:
-    """In a forked process: Ctrl-C is for the parent, which ends this one; so does its death."""
-    end_with(parent)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _run(task: tuple[int, str, Any]) -> Any:
-    number, name, item = task
-    # Whatever shows warnings may have been in the middle of something when this was forked.
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return attempt(name, partial(_shared[number][name], item))
 
 
 @contextmanager
@@ -107,6 +26,12 @@ def parallel_records(problem: Problem) -> Iterator[None]:
     They are forked, so they have the problem as it is now; which effects, which records and up to
     when is sent, residuals come back. Results are the same. Where there is one core, or no safe
     fork (not on Linux), nothing is shared.
+
+    Args:
+        problem: whose records.
+
+    Returns:
+        a context manager.
     """
     count = worker_count(problem.workers) - 1
     if count < 1 or problem.helpers is not None:
@@ -157,6 +82,26 @@ class _Helpers:
         self, effects: Sequence[Effect], records: Sequence[MeasuredRecord], end: float | None
     ) -> list[FloatArray] | None:
         """(channels, m) of every record; None where sharing is not worth it or not possible."""
+        return self._told("own_residuals", (tuple(effects),), records, end)
+
+    def changes(
+        self,
+        effects: Sequence[Effect],
+        pairs: Sequence[tuple[Sequence[Effect], Sequence[Effect]]],
+        records: Sequence[MeasuredRecord],
+        end: float | None,
+    ) -> list[FloatArray | None] | None:
+        """(pairs, channels, m) or None of every record; None as `residuals`."""
+        return self._told("own_changes", (tuple(effects), pairs), records, end)
+
+    def _told(
+        self,
+        what: str,
+        given: tuple[Any, ...],
+        records: Sequence[MeasuredRecord],
+        end: float | None,
+    ) -> list[Any] | None:
+        """What a method of the problem tells of every record, each process asked for its share."""
         parts = len(self._ends) + 1
         numbers = sum(len(r.values) * r.until(end).samples.count for r in records)
         known = all(r.name in self._places for r in records)
@@ -172,17 +117,17 @@ class _Helpers:
         try:
             for connection, share in zip(self._ends, shares[1:], strict=True):
                 places = [self._places[r.name] for r in share]
-                connection.send((tuple(effects), places, end, pins))
+                connection.send((what, given, places, end, pins))
                 asked.append(connection)
             try:
-                told.append(self._problem.own_residuals(effects, shares[0], end))
+                told.append(getattr(self._problem, what)(*given, shares[0], end))
             finally:
                 # Whatever happens here, what was asked for is taken, or it would answer the next.
                 told += [connection.recv() for connection in asked]
         except (EOFError, OSError):  # one of them was killed: go on alone
             self.close()
             return None
-        found: list[FloatArray] = []
+        found: list[Any] = []
         for answer in told:
             if isinstance(answer, Exception):
                 raise answer
@@ -204,21 +149,21 @@ def _serve(
     problem: Problem, connection: Connection, others: Sequence[Connection], parent: int
 ) -> None:
     """Answer until the other end is closed."""
-    _start(parent)
+    begin_worker(parent)
     for other in others:
         other.close()
     warnings.simplefilter("ignore")
     problem.helpers = None
     while True:
         try:
-            effects, places, end, pins = connection.recv()
+            what, given, places, end, pins = connection.recv()
         except (EOFError, OSError):
             return
-        answer: list[FloatArray] | Exception
+        answer: list[Any] | Exception
         try:
             _pin(problem, pins)
             records = [problem.records[i] for i in places]
-            answer = problem.own_residuals(effects, records, end)
+            answer = getattr(problem, what)(*given, records, end)
         except Exception as error:
             answer = error
         try:

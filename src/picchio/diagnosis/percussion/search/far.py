@@ -90,7 +90,7 @@ def far_from_stated(problem: Problem, records: Sequence[MeasuredRecord]) -> Roug
     if problem.robot.effect_tables:  # whose springs and masses are not the files'
         return None
     blown, tolerance = list(_blown(problem, records)), problem.campaign.tolerance
-    found = rough(problem.robot, blown)
+    found = rough(problem.robot, blown, workers=problem.workers)
     if found is None or not _is_far(found) or found.left > _HALF * found.before:
         return None
     if allowed(problem):

@@ -14,11 +14,11 @@ from picchio.diagnosis.percussion.criteria.remainder import allowed, decisive_ga
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit, fit_growing, is_nonsmooth
-from picchio.diagnosis.percussion.fit.parallel import worker_pool
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.screen import Screen, Suspect, resized
 from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.diagnosis.percussion.tolerance.linearise import ELSE, About, about_another, settled
+from picchio.diagnosis.workers import worker_pool
 from picchio.model.effects.effect import Effect
 
 # One candidate fitted: to the first part of the records, and from there to all of them.

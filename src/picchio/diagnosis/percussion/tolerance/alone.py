@@ -16,10 +16,10 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, residual_under
-from picchio.diagnosis.percussion.fit.parallel import worker_pool
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, nudged
 from picchio.diagnosis.percussion.tolerance.slopes import own_slopes, starts
+from picchio.diagnosis.workers import worker_pool
 
 # Standard deviations of noise's mean square beyond which a record is left behind.
 _BEHIND = 6.0

@@ -19,8 +19,8 @@ from picchio.diagnosis.percussion.data.problem import (
     residual_under,
 )
 from picchio.diagnosis.percussion.fit.least_squares import JUMP, between
-from picchio.diagnosis.percussion.fit.parallel import worker_pool
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, Inexact, Nudge, inexact, nudged
+from picchio.diagnosis.workers import worker_pool
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 from picchio.prediction.percussion import BY_MODES
