@@ -16,6 +16,7 @@ from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.search import trials
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.search.exchange import exchange, exchange_settled, prune
 from picchio.diagnosis.percussion.search.restart import restarted
@@ -406,3 +407,68 @@ def test_a_rival_that_came_near_is_compared_about_its_own_inexact_numbers(arm):
     other, _ = exchange_settled(search)
     assert other.hypothesis.labels == {"pulse_shape:tool", clipping.label}
     assert other.cost < best.cost - 100.0
+
+
+def test_a_simpler_rival_is_compared_even_where_noise_is_left(arm):
+    """A hysteresis that hardly yields is a spring with one number more."""
+    hidden = [
+        ("joint_stiffness", "joint_3", {"scale": 1.4}),
+        ("sensor_clipping", "deflection", {"limit": 6e-4}),
+    ]
+    campaign, _ = worlds.make(robot=ROBOT, seed=2, causes=hidden, records=3, mismatch=1.0)
+    problem = Problem(arm, campaign)
+    search = begin_search(problem, [], held_out(problem)[0])
+    start = search.baseline.hypothesis
+    clipping = effect_class("sensor_clipping")("deflection", limit=6e-4)
+    spring = effect_class("joint_stiffness")("joint_3", scale=1.4)
+    yielding = effect_class("hysteresis")("joint_3", torque=2000.0, deflection=0.1)
+    step = []
+    for own in (yielding, spring):
+        found = search.fit(start.joined(own), iterations=6)
+        step.append(Trial(own.label, found, bic(found), 0.0))
+    best = search.fit(step[0].fit.hypothesis.plus(clipping), iterations=6)
+    search.best = best
+    search.steps = [step, [Trial(clipping.label, best, bic(best), 0.0)]]
+    search.leaves_noise = lambda found: True
+    other, _ = exchange_settled(search)
+    assert other.hypothesis.labels == {spring.label, clipping.label}
+    search.steps = [step[::-1], search.steps[1]]  # the spring was chosen: it has fewer numbers
+    search.best = search.fit(step[1].fit.hypothesis.plus(clipping), iterations=6)
+    assert exchange_settled(search) is None
+
+
+@pytest.mark.parametrize("faint", [True, False])
+def test_as_much_as_settling_gave_the_best_it_may_give_another(faint, two_causes, monkeypatch):
+    """Where tolerances make up for what is wrong, a cause begins in a valley of its own."""
+    problem, baseline, *_ = two_causes
+    search = search_of(problem, replace(baseline, cost=2000.0))
+    search.leaves_noise = lambda found: faint
+    fits = {"payload:tool": 1000.0, "link_mass:link_2": 1095.0, "force_amplitude:tool": 1400.0}
+    gains = {"payload:tool": 150.0, "link_mass:link_2": 250.0, "force_amplitude:tool": 900.0}
+    tried = [
+        trial_with(problem, baseline, *label.split(":"), **{key: 1.1})
+        for label, key in zip(fits, ("mass", "scale", "scale"), strict=True)
+    ]
+    tried = [replace(t, fit=replace(t.fit, cost=fits[t.label]), score=fits[t.label]) for t in tried]
+    settled = []
+
+    def by_itself(search, label, start, **_):
+        settled.append(label)
+        return replace(start, cost=start.cost - gains[label]), None
+
+    monkeypatch.setattr(trials, "allowed", lambda problem: True)
+    monkeypatch.setattr(trials, "_NEARLY", 0.05)
+    monkeypatch.setattr(trials, "decisive_gain", lambda one, other: one.cost - other.cost)
+    monkeypatch.setattr(trials, "settled_by_itself", by_itself)
+    best = trials.settled_alike(search, tried)[0]
+    assert settled == (["payload:tool", "link_mass:link_2"] if faint else ["payload:tool"])
+    assert best.label == settled[-1]
+
+
+@pytest.mark.slow
+def test_a_payload_that_tolerances_make_up_for_is_not_told_as_a_link():
+    """4.6 kg of which springs and masses, each stretched a little, leave noise."""
+    case = {"robot": ROBOT, "kind": "single", "snr": 40, "mismatch": 1.0, "draw": 90114}
+    told = trial.run(case, 1)
+    assert told["truth"] == [["payload", "tool"]]
+    assert told["right"], told["claimed"]

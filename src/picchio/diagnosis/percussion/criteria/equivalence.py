@@ -16,6 +16,7 @@ from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.drawn import hidden_cost
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
+from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.registry import effect_class
 
@@ -33,10 +34,18 @@ def bic(found: Fit) -> float:
 
     What numbers drawn anew in every record cost is in `drawn_cost`.
     """
-    causes = found.hypothesis.causes
-    numbers = sum(_numbers(effect) for effect in causes)
+    numbers = count_numbers(found.hypothesis)
     hidden = hidden_cost(found.hypothesis, len(found.records), found.samples)
     return found.cost + numbers * math.log(max(found.samples, 2)) + hidden
+
+
+def count_numbers(hypothesis: Hypothesis) -> int:
+    """How many numbers its causes hold.
+
+    Args:
+        hypothesis: whose.
+    """
+    return sum(_numbers(effect) for effect in hypothesis.causes)
 
 
 def _numbers(effect: Effect) -> int:

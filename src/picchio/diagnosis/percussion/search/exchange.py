@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 from picchio.diagnosis.attempt import attempt
-from picchio.diagnosis.percussion.criteria.equivalence import bic
+from picchio.diagnosis.percussion.criteria.equivalence import bic, count_numbers
 from picchio.diagnosis.percussion.criteria.remainder import allowed
 from picchio.diagnosis.percussion.fit.drawn import fit_latent, with_hidden
 from picchio.diagnosis.percussion.fit.least_squares import HOPELESS, Fit, fit, fits_without
@@ -72,6 +72,10 @@ def exchange(search: Search) -> Fit:
 def exchange_settled(search: Search) -> tuple[Fit, About] | None:
     """As `exchange`, each fit about its own inexact numbers; and about what it is linearised.
 
+    Where only noise is left, what was chosen may still be more than it takes: while another cause
+    was missing, a hysteresis that loses energy made up for a softer spring beside a friction. Then
+    rivals with fewer numbers are tried.
+
     Args:
         search: what was found, step by step.
 
@@ -79,7 +83,10 @@ def exchange_settled(search: Search) -> tuple[Fit, About] | None:
         None where no rival that came near does better so, or where everything is exact.
     """
     best, found = search.best, None
+    quiet = search.leaves_noise(best)
     for chosen, rival in _earlier(search) if allowed(search.problem) else ():
+        if quiet and count_numbers(rival.fit.hypothesis) >= count_numbers(chosen.fit.hypothesis):
+            continue
         explained = max(search.baseline.cost - chosen.fit.cost, 0.0)
         joined = _in_its_place(search, best, chosen, rival)
         if joined is None or rival.fit.cost - chosen.fit.cost > _NEAR * explained:

@@ -404,19 +404,24 @@ def settled_alike(search: Search, trials: Sequence[Trial], best: Fit | None = No
     if not allowed(search.problem) or not trials:
         return list(trials)
     mark = trials[0].fit if best is None else best
-    nearly = _NEARLY * (search.best.cost - mark.cost) if best is None else 0.0
-    close = [
-        t
-        for t in trials
-        if t.finished(search.records)
-        and not t.draws
-        and (decisive_gain(t.fit, mark) < _CLOSE or t.fit.cost - mark.cost < nearly)
-        and (best is None or t.fit.hypothesis.labels != best.hypothesis.labels)
-    ][:_SETTLED]
-    again = {}
-    for trial in close:
+    faint = search.leaves_noise(search.baseline if best is not None else search.best)
+    if best is None:
+        nearly = _NEARLY * (search.best.cost - mark.cost)
+    else:  # about the numbers of what is claimed its rivals seem worse than they are
+        nearly = (1.0 - _NEARLY) * (search.baseline.cost - mark.cost) if faint else 0.0
+    again: dict[str, Trial] = {}
+    left = _SETTLED
+    for trial in trials:
+        if not trial.finished(search.records) or trial.draws or not left:
+            continue
+        if best is not None and trial.fit.hypothesis.labels == best.hypothesis.labels:
+            continue
+        if decisive_gain(trial.fit, mark) >= _CLOSE and trial.fit.cost - mark.cost >= nearly:
+            continue
+        left -= 1
         # Beside causes that leave little, numbers are near where one more small cause has them.
-        anew = not search.labels or trial.fit.chi_square > ELSE * trial.fit.samples
+        alone = len(trial.fit.hypothesis.labels) < 2
+        anew = alone or trial.fit.chi_square > ELSE * trial.fit.samples
         by_itself = partial(settled_by_itself, search, trial.label, trial.fit, anew=anew)
         there, about = by_itself()
         if _is_far(there) and trial.fit.cost < _TENTH * search.best.cost:
@@ -426,6 +431,8 @@ def settled_alike(search: Search, trials: Sequence[Trial], best: Fit | None = No
                 there, about = other, elsewhere
         if there is not None and there.cost < trial.fit.cost:
             again[trial.label] = replace(trial, fit=there, score=bic(there), about=about)
+            if faint:  # as much may be there for another
+                nearly = max(nearly, trial.fit.cost - there.cost)
     return sorted((again.get(t.label, t) for t in trials), key=lambda t: t.score)
 
 
