@@ -37,7 +37,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 # Not the folder of benchmarks, which has a rainflow.py of its own.
-sys.path[0] = str(ROOT / "tests" / "diagnosis")
+sys.path[0] = str(ROOT / "tests" / "diagnosis" / "blind")
 ARM = "fanuc_like_3dof"
 SALT = 1  # of the seeds published in docs/; those with 0 were used while building
 

@@ -25,7 +25,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 # Not this folder, which has a rainflow.py of its own.
-sys.path[0] = str(ROOT / "tests" / "diagnosis")
+sys.path[0] = str(ROOT / "tests" / "diagnosis" / "blind")
 import trial  # noqa: E402
 
 from picchio.core.files import atomic_write  # noqa: E402

@@ -51,7 +51,7 @@ from picchio.diagnosis.stiffness.statics import make_table
 from picchio.model.expansion import WideChain
 
 TESTS = Path(__file__).resolve().parent.parent / "tests"
-sys.path[:0] = [str(TESTS), str(TESTS / "diagnosis")]
+sys.path[:0] = [str(TESTS / each) for each in ("", "diagnosis/blind", "diagnosis/stiffness")]
 import blind_stiffness  # noqa: E402
 import trial  # noqa: E402
 

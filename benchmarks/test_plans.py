@@ -40,7 +40,8 @@ from picchio.diagnosis.stiffness.prior import prior_of
 from picchio.studies.default_task import possible_poses, task_of
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parent / "tests"), str(HERE.parent / "tests" / "diagnosis"), str(HERE)]
+TESTS = HERE.parent / "tests"
+sys.path[:0] = [str(TESTS), str(TESTS / "diagnosis" / "stiffness"), str(HERE)]
 import blind_stiffness  # noqa: E402
 import stiffness as loadings  # noqa: E402
 

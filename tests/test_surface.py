@@ -104,7 +104,7 @@ def test_no_module_stands_in_the_way_of_a_name() -> None:
 
 def rubbing(robot: picchio.FlexibleRobot) -> picchio.Campaign:
     """Motion records of an arm whose second joint has dry friction."""
-    sys.path.insert(0, str(Path(__file__).parent / "diagnosis"))
+    sys.path.insert(0, str(Path(__file__).parent / "diagnosis" / "motion"))
     try:
         import motion_records
     finally:

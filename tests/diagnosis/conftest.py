@@ -1,4 +1,4 @@
-"""The trial's helpers and the worlds stand beside the tests."""
+"""The blind trial, the makers of records and the worlds stand beside the tests."""
 
 from __future__ import annotations
 
@@ -6,6 +6,6 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-for folder in (str(HERE), str(HERE.parent)):
-    if folder not in sys.path:
-        sys.path.insert(0, folder)
+for folder in (HERE / "blind", HERE / "motion", HERE / "stiffness", HERE.parent):
+    if str(folder) not in sys.path:
+        sys.path.insert(0, str(folder))

@@ -2,9 +2,8 @@
 
 import json
 import math
-import sys
-from pathlib import Path
 
+import blind_stiffness
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -19,20 +18,12 @@ from picchio.diagnosis.stiffness.prior import prior_of
 from picchio.diagnosis.stiffness.responses import make_problem
 from picchio.robot.annotations.sidecar import read_sidecar
 
-sys.path.insert(0, str(Path(__file__).parent))
-import blind_stiffness
-
-sys.path.pop(0)
-
 
 @pytest.fixture(scope="module")
 def frfs():
     """The independent world of responses."""
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-    try:
-        from worlds import frfs
-    finally:
-        sys.path.pop(0)
+    from worlds import frfs
+
     return frfs
 
 

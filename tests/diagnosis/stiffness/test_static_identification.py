@@ -2,9 +2,8 @@
 
 import json
 import math
-import sys
-from pathlib import Path
 
+import blind_stiffness
 import numpy as np
 import pytest
 
@@ -15,21 +14,14 @@ from picchio.campaign.tables import Tolerance
 from picchio.diagnosis.stiffness.static import identify_static
 from picchio.robot.annotations.sidecar import read_sidecar
 
-sys.path.insert(0, str(Path(__file__).parent))
-import blind_stiffness
-
-sys.path.pop(0)
 EXACT = Tolerance.zero().model_dump()
 
 
 @pytest.fixture(scope="module")
 def loads():
     """The independent world of loadings."""
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-    try:
-        from worlds import loads
-    finally:
-        sys.path.pop(0)
+    from worlds import loads
+
     return loads
 
 

@@ -1,9 +1,8 @@
 """Static loadings and frequency response functions in one campaign."""
 
 import math
-import sys
-from pathlib import Path
 
+import blind_stiffness
 import numpy as np
 import pytest
 
@@ -14,20 +13,12 @@ from picchio.diagnosis.identify import method_for
 from picchio.diagnosis.stiffness.mixed import with_stiffness
 from picchio.diagnosis.stiffness.prior import prior_of
 
-sys.path.insert(0, str(Path(__file__).parent))
-import blind_stiffness
-
-sys.path.pop(0)
-
 
 @pytest.fixture(scope="module")
 def worlds():
     """The independent worlds of loads and of responses."""
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-    try:
-        from worlds import frfs, loads
-    finally:
-        sys.path.pop(0)
+    from worlds import frfs, loads
+
     return loads, frfs
 
 

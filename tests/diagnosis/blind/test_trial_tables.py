@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import trial_tables
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+DOCS = Path(__file__).resolve().parents[3] / "docs"
 PAGE = DOCS / "blind_trial.md"
 
 

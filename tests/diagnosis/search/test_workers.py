@@ -193,9 +193,8 @@ print(before, after, loaded(), sep=";")
 
 
 def _loaded(workers):
-    here = Path(__file__).resolve().parent
     script = LOADED.format(
-        folders=[str(here), str(here.parent)], case=CASE, arm=ARM, workers=workers
+        folders=[str(Path(trial.__file__).parent), trial.TESTS], case=CASE, arm=ARM, workers=workers
     )
     told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert not told.returncode, told.stderr
@@ -229,12 +228,14 @@ if __name__ == "__main__":
 @pytest.mark.slow
 def test_the_same_data_get_the_same_answer():
     """Whatever order Python's sets have in a run, and however many processes there are."""
-    here = Path(__file__).resolve().parent
     case = {"robot": ARM, "kind": "pair", "snr": 40, "draw": 1, "records": 9}
     answers = []
     for seed, workers in (("1", 1), ("2", 2)):
         script = ANSWER.format(
-            folders=[str(here), str(here.parent)], case=case, arm=ARM, workers=workers
+            folders=[str(Path(trial.__file__).parent), trial.TESTS],
+            case=case,
+            arm=ARM,
+            workers=workers,
         )
         told = subprocess.run(
             [sys.executable, "-c", script],

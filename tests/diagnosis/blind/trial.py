@@ -11,7 +11,7 @@ import time
 import zlib
 from pathlib import Path
 
-TESTS = str(Path(__file__).resolve().parent.parent)
+TESTS = str(Path(__file__).resolve().parents[2])
 if TESTS not in sys.path:
     sys.path.insert(0, TESTS)
 

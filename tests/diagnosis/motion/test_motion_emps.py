@@ -1,16 +1,11 @@
 """EMPS: issue 9's figures, and known effects put into the real records."""
 
-import sys
-from pathlib import Path
-
+import motion_injection as injection
 import pytest
 
 import picchio.datasets
 from picchio.diagnosis.motion.diagnosis import diagnose_motion
 from picchio.robot.loading.load import load_robot
-
-sys.path.insert(0, str(Path(__file__).parent))
-import motion_injection as injection
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ from picchio.diagnosis.result import Value
 from picchio.diagnosis.stiffness.taps import lines, transform
 from picchio.robot.loading.load import load_robot
 
-ROBOTS = Path(__file__).resolve().parents[2] / "robots"
+ROBOTS = Path(__file__).resolve().parents[3] / "robots"
 
 FACTORS = (0.40, 1.9, 0.55)
 DAMPING = 0.4

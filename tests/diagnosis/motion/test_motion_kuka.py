@@ -1,17 +1,12 @@
 """KUKA KR 300: the lag of the second encoder first, stiffness only where B and C gain."""
 
-import sys
-from pathlib import Path
-
+import motion_injection as injection
 import numpy as np
 import pytest
 
 import picchio.datasets
 from picchio.diagnosis.motion.diagnosis import diagnose_motion
 from picchio.robot.loading.load import load_robot
-
-sys.path.insert(0, str(Path(__file__).parent))
-import motion_injection as injection
 
 pytestmark = pytest.mark.slow
 AXES = ("joint_a1", "joint_a2", "joint_a3")

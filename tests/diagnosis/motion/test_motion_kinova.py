@@ -1,16 +1,11 @@
 """Kinova Gen3: friction per joint, and the ripple's orders, which nobody told."""
 
-import sys
-from pathlib import Path
-
+import motion_injection as injection
 import pytest
 
 import picchio.datasets
 from picchio.diagnosis.motion.diagnosis import diagnose_motion
 from picchio.robot.loading.load import load_robot
-
-sys.path.insert(0, str(Path(__file__).parent))
-import motion_injection as injection
 
 pytestmark = pytest.mark.slow
 JOINTS = [f"joint_{n}" for n in range(1, 8)]

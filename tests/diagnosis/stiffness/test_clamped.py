@@ -1,10 +1,9 @@
 """The tool held fast while motors press: closed form, blind trials, a fit with loads, bad input."""
 
 import math
-import sys
 from dataclasses import replace
-from pathlib import Path
 
+import blind_stiffness
 import numpy as np
 import pytest
 
@@ -14,20 +13,12 @@ from picchio.campaign.record import Record
 from picchio.core.errors import InputError
 from picchio.diagnosis.stiffness.static import identify_static
 
-sys.path.insert(0, str(Path(__file__).parent))
-import blind_stiffness
-
-sys.path.pop(0)
-
 
 @pytest.fixture(scope="module")
 def worlds():
     """The independent worlds of presses and of loads."""
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-    try:
-        from worlds import loads, presses
-    finally:
-        sys.path.pop(0)
+    from worlds import loads, presses
+
     return presses, loads
 
 

@@ -1,10 +1,8 @@
 """What a motion diagnosis is judged on: named records, channel by channel, or nothing."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from motion_records import ARM, campaign
 
 from picchio.campaign.campaign import Campaign
 from picchio.campaign.record import Record
@@ -13,9 +11,6 @@ from picchio.diagnosis.motion.conclude.holdout import channel_verdict
 from picchio.diagnosis.motion.diagnosis import diagnose_motion
 from picchio.prediction.motion.readings import angle_noise, resolution
 from picchio.robot.loading.load import load_robot
-
-sys.path.insert(0, str(Path(__file__).parent))
-from motion_records import ARM, campaign
 
 
 @pytest.fixture(scope="module")

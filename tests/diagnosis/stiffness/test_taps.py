@@ -1,8 +1,6 @@
 """Taps in time: an instrumented hammer, ring-downs of unknown blows, and what is refused."""
 
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,11 +17,8 @@ from picchio.diagnosis.stiffness.taps import spectra
 @pytest.fixture(scope="module")
 def taps():
     """The independent world of taps."""
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-    try:
-        from worlds import taps
-    finally:
-        sys.path.pop(0)
+    from worlds import taps
+
     return taps
 
 

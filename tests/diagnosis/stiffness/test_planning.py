@@ -3,7 +3,6 @@
 import csv
 import json
 import math
-import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -29,22 +28,16 @@ ARM = "fanuc_like_3dof"
 @pytest.fixture(scope="module")
 def loads():
     """The independent world of loads."""
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-    try:
-        from worlds import loads
-    finally:
-        sys.path.pop(0)
+    from worlds import loads
+
     return loads
 
 
 @pytest.fixture(scope="module")
 def frfs():
     """The independent world of responses."""
-    sys.path.insert(0, str(Path(__file__).parents[1]))
-    try:
-        from worlds import frfs
-    finally:
-        sys.path.pop(0)
+    from worlds import frfs
+
     return frfs
 
 

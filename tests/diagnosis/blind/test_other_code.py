@@ -9,7 +9,7 @@ from picchio.campaign.tables import Tolerance
 from worlds import campaign as worlds
 
 ROBOT = "fanuc_like_3dof"
-HERE = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parents[3]
 
 
 def test_a_checkout_diagnoses_the_same_records():

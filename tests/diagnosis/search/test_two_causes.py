@@ -1,14 +1,7 @@
 """Two causes at once, in worlds that are a little wrong everywhere."""
 
-import sys
-from pathlib import Path
-
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
 import trial
-
-sys.path.pop(0)
 
 
 @pytest.mark.slow
