@@ -429,12 +429,11 @@ def test_a_simpler_rival_is_compared_even_where_noise_is_left(arm):
     best = search.fit(step[0].fit.hypothesis.plus(clipping), iterations=6)
     search.best = best
     search.steps = [step, [Trial(clipping.label, best, bic(best), 0.0)]]
-    search.leaves_noise = lambda found: True
-    other, _ = exchange_settled(search)
+    other, _ = exchange_settled(search, simpler=True)
     assert other.hypothesis.labels == {spring.label, clipping.label}
     search.steps = [step[::-1], search.steps[1]]  # the spring was chosen: it has fewer numbers
     search.best = search.fit(step[1].fit.hypothesis.plus(clipping), iterations=6)
-    assert exchange_settled(search) is None
+    assert exchange_settled(search, simpler=True) is None
 
 
 @pytest.mark.parametrize("faint", [True, False])

@@ -27,6 +27,7 @@ from picchio.diagnosis.percussion.conclude.verdict import (
     doubtful,
     leaves_little,
     may_be_partial,
+    not_quiet,
     pair_of,
     verdict_of,
     why_not_claimed,
@@ -257,7 +258,7 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
     gain = holdout_gain(problem, nuisances, stands, search.records, search.kept, search.about)
     left = None
     if allowed(problem):
-        left = Remainder.of(nominal), Remainder.of(whole)
+        left = Remainder.of(nominal, before), Remainder.of(whole, after)
     # More rivals can only lessen the confidence: what isn't sure by now won't be claimed.
     if causes and (leaves_little(after, left) or may_be_partial(causes, gain.explained, left)):
         search.say("looking for other causes that would do as well")
@@ -288,6 +289,8 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         leads = tuple(_leads(search))
     elif claimed_of(verdict):
         leads = tuple(dropped)
+    if verdict == "unexplained" and not note and after.overstated:
+        note = not_quiet(after.overstated)
     ask = None
     if verdict in ("ambiguous", "unexplained", "partial") and not common:
         search.say("looking for the measurement that would tell most")

@@ -160,6 +160,18 @@ def why_not_claimed(
     )
 
 
+def not_quiet(groups: Sequence[str]) -> str:
+    """That the time before the blows was not quiet.
+
+    Args:
+        groups: whose records hold less than the noise of that time.
+    """
+    return (
+        f"the time before the blows is louder than the noise of the records ({', '.join(groups)}): "
+        "something shook the robot or the sensor then, such as the floor or a motor, and goes on"
+    )
+
+
 def pair_of(label: str) -> tuple[str, str]:
     """Effect and target."""
     name, _, target = label.partition(":")

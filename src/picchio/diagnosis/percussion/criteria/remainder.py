@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from picchio.core.arrays import FloatArray
+from picchio.diagnosis.percussion.criteria.whiteness import Evidence
 from picchio.diagnosis.percussion.data.problem import Problem, signal_power
 from picchio.diagnosis.percussion.fit.least_squares import Fit
 from picchio.diagnosis.percussion.fit.unknowns import FITTED
@@ -44,14 +45,17 @@ class Remainder:
     signal: float
 
     @classmethod
-    def of(cls, found: Fit) -> Remainder:
+    def of(cls, found: Fit, evidence: Evidence) -> Remainder:
         """What a fit leaves.
 
         Args:
             found: the fit; its records' signals count.
+            evidence: of what it leaves, by band: what stands out in one is left, even if all
+                together are less than the noise was taken for.
         """
         signal = signal_power(found.records)
-        return cls(max(found.chi_square - found.samples, 0.0), max(signal, 1e-300))
+        excess = max(found.chi_square - found.samples, evidence.excess, 0.0)
+        return cls(excess, max(signal, 1e-300))
 
     @property
     def nrmse(self) -> float:

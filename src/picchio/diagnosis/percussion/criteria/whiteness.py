@@ -26,6 +26,8 @@ _SLOW = 12.0
 _SLOW_UNSEEN = 50.0
 BAND_LIMIT = 4.5
 POSE_LIMIT = 5.0
+# Standard deviations below noise at which the noise was not that of the records.
+_OVERSTATED = -6.0
 
 
 @dataclass(frozen=True)
@@ -37,12 +39,14 @@ class Level:
         part: "3-9 Hz", "pose 2".
         power: mean.
         z: how many standard deviations above 1, of a normal variable as likely.
+        samples: how many it is the mean of.
     """
 
     group: str
     part: str
     power: float
     z: float
+    samples: int = 0
 
 
 @dataclass(frozen=True)
@@ -54,12 +58,19 @@ class Evidence:
         poses: by group and pose.
         chi_square: per sample, all together.
         pose_inconsistency: by how many standard deviations the unknowns differ from pose to pose.
+        groups: by group alone.
     """
 
     bands: tuple[Level, ...]
     poses: tuple[Level, ...]
     chi_square: float
     pose_inconsistency: float = 0.0
+    groups: tuple[Level, ...] = ()
+
+    @property
+    def overstated(self) -> tuple[str, ...]:
+        """Groups that hold less than the noise of their quiet time: it was not quiet."""
+        return tuple(level.group for level in self.groups if level.z < _OVERSTATED)
 
     @property
     def is_noise(self) -> bool:
@@ -74,6 +85,15 @@ class Evidence:
     def worst_band(self) -> float:
         """Largest z of the bands."""
         return max((level.z for level in self.bands), default=0.0)
+
+    @property
+    def excess(self) -> float:
+        """Chi-square above that of noise, of the bands that stand out alone.
+
+        Where noise is overstated all others are below it, and a sum of all would hide these.
+        """
+        standing = [level for level in self.bands if level.z >= BAND_LIMIT]
+        return sum((level.power - 1.0) * level.samples for level in standing)
 
     @property
     def worst_pose(self) -> float:
@@ -109,10 +129,12 @@ def whiteness_test(problem: Problem, found: Fit) -> Evidence:
             count += row.size - first
     bands: list[Level] = []
     poses: list[Level] = []
+    groups: list[Level] = []
     for group, entries in powers.items():
         error = 2.0 * float(np.mean(errors[group])) / np.sqrt(_channels_of(problem, group))
         edges = _edges(top, [f for _, f, _ in entries])
         high = float(edges[-1])
+        groups += _level(group, "all", [spectrum for _, _, spectrum in entries], error)
         colour = _colour(problem, group)
         for low, up in zip(edges[:-1], edges[1:], strict=True):
             picked = [s[(f > low) & (f <= up)] for _, f, s in entries]
@@ -122,7 +144,8 @@ def whiteness_test(problem: Problem, found: Fit) -> Evidence:
             picked = [s[f <= high] for p, f, s in entries if p == pose]
             unsure = float(np.hypot(error, colour(0.5 * high)))
             poses += _level(group, f"pose {pose + 1}", picked, unsure)
-    return Evidence(tuple(bands), tuple(poses), total / max(count, 1))
+    chi_square = total / max(count, 1)
+    return Evidence(tuple(bands), tuple(poses), chi_square, groups=tuple(groups))
 
 
 def _edges(top: float, frequencies: Sequence[FloatArray]) -> FloatArray:
@@ -191,7 +214,8 @@ def _level(group: str, part: str, picked: Sequence[FloatArray], error: float) ->
         return []
     power = float(values.mean())
     scatter = float(np.sqrt(1.0 / values.size + error**2 + _MODEL_FLOOR**2))
-    return [Level(group, part, power, standard_deviations(power, scatter))]
+    z = standard_deviations(power, scatter)
+    return [Level(group, part, power, z, 2 * values.size)]
 
 
 def standard_deviations(power: float, scatter: float) -> float:

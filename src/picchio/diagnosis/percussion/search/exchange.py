@@ -69,23 +69,21 @@ def exchange(search: Search) -> Fit:
     return best
 
 
-def exchange_settled(search: Search) -> tuple[Fit, About] | None:
+def exchange_settled(search: Search, simpler: bool = False) -> tuple[Fit, About] | None:
     """As `exchange`, each fit about its own inexact numbers; and about what it is linearised.
-
-    Where only noise is left, what was chosen may still be more than it takes: while another cause
-    was missing, a hysteresis that loses energy made up for a softer spring beside a friction. Then
-    rivals with fewer numbers are tried.
 
     Args:
         search: what was found, step by step.
+        simpler: try rivals with fewer numbers alone. Where only noise is left, what was chosen may
+            still be more than it takes: while a friction was missing, a hysteresis, which loses
+            energy, made up for a spring.
 
     Returns:
         None where no rival that came near does better so, or where everything is exact.
     """
     best, found = search.best, None
-    quiet = search.leaves_noise(best)
     for chosen, rival in _earlier(search) if allowed(search.problem) else ():
-        if quiet and count_numbers(rival.fit.hypothesis) >= count_numbers(chosen.fit.hypothesis):
+        if simpler and count_numbers(rival.fit.hypothesis) >= count_numbers(chosen.fit.hypothesis):
             continue
         explained = max(search.baseline.cost - chosen.fit.cost, 0.0)
         joined = _in_its_place(search, best, chosen, rival)

@@ -283,10 +283,13 @@ def _settle(search: Search, newest: str) -> None:
     again = refit_latent(search, search.best, newest if search.leaves_noise(search.best) else "")
     if again.cost < search.best.cost:
         search.best = prune(search, again, alone=False)
-    if (found := exchange_settled(search)) is not None and search.confirmed(*found):
+    quiet = search.leaves_noise(search.best)
+    found = exchange_settled(search, simpler=quiet)
+    if found is not None and search.confirmed(*found):
         search.best, about = found
         about.restore(search.problem)
-    if search.leaves_noise(search.best):
+        quiet = search.leaves_noise(search.best)
+    if quiet:
         return
     other = exchange(search)
     if other is not search.best:  # beside the right one, others may have nothing to do

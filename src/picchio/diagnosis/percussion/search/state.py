@@ -188,7 +188,11 @@ class Search:
         hypothesis = found.hypothesis
         if not allowed(self.problem) or not hypothesis.causes or hypothesis.at_ends:
             return False
-        return Remainder.of(found).may_be_named(Remainder.of(self.baseline))
+        left, before = (
+            Remainder.of(each, whiteness_test(self.problem, each))
+            for each in (found, self.baseline)
+        )
+        return left.may_be_named(before)
 
     def leaves_noise(self, found: Fit) -> bool:
         """Whether noise is all that a fit leaves.
