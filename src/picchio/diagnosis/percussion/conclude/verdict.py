@@ -168,7 +168,7 @@ def not_quiet(groups: Sequence[str]) -> str:
     """
     return (
         f"the time before the blows is louder than the noise of the records ({', '.join(groups)}): "
-        "something shook the robot or the sensor then, such as the floor or a motor, and goes on"
+        "something shook the robot or the sensor then, such as the floor or a motor, and may go on"
     )
 
 
