@@ -182,7 +182,7 @@ print(json.dumps(dict(
 
 
 CLASH = """
-from picchio.model.effects.structure.payload import Payload
+from picchio.model.effects.structure.masses.payload import Payload
 class Cargo(Payload):
     pass
 """

@@ -10,7 +10,7 @@ import scipy.linalg
 
 import picchio
 from picchio.core.errors import InputError
-from picchio.model.effects.structure.link_bending import LinkBending
+from picchio.model.effects.structure.springs.link_bending import LinkBending
 from picchio.model.geometry import Geometry
 from picchio.model.model import Model
 

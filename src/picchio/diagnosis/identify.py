@@ -25,8 +25,8 @@ from picchio.diagnosis.identified import FORMAT, Identification, Identified, Ide
 from picchio.diagnosis.percussion.search.state import EXACT
 from picchio.diagnosis.result import Cause, Diagnosis, Value, unit_of
 from picchio.model.effects.registry import effect_class
-from picchio.model.effects.structure.joint_stiffness import JointStiffness
-from picchio.model.effects.structure.modal_damping import ModalDamping
+from picchio.model.effects.structure.springs.joint_stiffness import JointStiffness
+from picchio.model.effects.structure.springs.modal_damping import ModalDamping
 from picchio.robot.annotations.sidecar import FORMAT as SIDECAR
 from picchio.robot.annotations.sidecar import Sidecar, spreads_of
 from picchio.robot.flexible_robot import FlexibleRobot

@@ -19,7 +19,7 @@ from picchio.fatigue.miner import damage, utilisation
 from picchio.fatigue.shaft_stress import stress_per_torque
 from picchio.fatigue.sn.curve import SNCurve
 from picchio.fatigue.uncertain_lives import Uncertain
-from picchio.model.effects.structure.joint_stiffness import JointStiffness
+from picchio.model.effects.structure.springs.joint_stiffness import JointStiffness
 from picchio.model.many_poses import ManyPoses
 from picchio.model.model import Model
 from picchio.robot.annotations.flexibility import is_estimate

@@ -24,8 +24,8 @@ from picchio.diagnosis.percussion.search.state import Search
 from picchio.diagnosis.percussion.tolerance.linearise import About, settled
 from picchio.diagnosis.stiffness.blows import BlowRecord, Rough, rough
 from picchio.model.effects.effect import Effect
-from picchio.model.effects.structure.joint_stiffness import JointStiffness
-from picchio.model.effects.structure.modal_damping import ModalDamping
+from picchio.model.effects.structure.springs.joint_stiffness import JointStiffness
+from picchio.model.effects.structure.springs.modal_damping import ModalDamping
 
 # What the stated values leave of the signal's power, at least, for this to be worth while.
 _MUCH = 0.02

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.effects.structure.yielding import MODAL_SHARE
+from picchio.model.effects.structure.springs.yielding import MODAL_SHARE
 from picchio.model.plant import Changes
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.scales import Scales
-from picchio.model.effects.structure import yielding
+from picchio.model.effects.structure.springs import yielding
 from picchio.model.plant import Changes
 
 

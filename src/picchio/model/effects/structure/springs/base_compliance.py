@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from picchio.core.errors import InputError
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
-from picchio.model.effects.structure import yielding
+from picchio.model.effects.structure.springs import yielding
 from picchio.model.expansion import BASE_AXES
 from picchio.model.plant import Changes
 from picchio.robot.units import SLIDING

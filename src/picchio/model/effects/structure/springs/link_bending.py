@@ -8,7 +8,7 @@ from typing import Self
 from picchio.model.effects.effect import Effect, Parameter
 from picchio.model.effects.evidence import Evidence
 from picchio.model.effects.scales import Scales
-from picchio.model.effects.structure import yielding
+from picchio.model.effects.structure.springs import yielding
 from picchio.model.expansion import link_end
 from picchio.model.plant import Changes
 

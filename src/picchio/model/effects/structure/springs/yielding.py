@@ -17,13 +17,29 @@ MODAL_SHARE = Parameter(
 
 
 def stiffness(meaning: str, upper: float) -> Parameter:
-    """Of what is rigid in the nominal model, N m/rad."""
+    """Of what is rigid in the nominal model, N m/rad.
+
+    Args:
+        meaning: of the parameter, a sentence.
+        upper: above it nothing yields that a record could show, N m/rad.
+
+    Returns:
+        the parameter; infinite where nothing yields.
+    """
     return Parameter("stiffness", "N*m/rad", neutral=float("inf"), lower=1e-3, upper=upper,
                      logarithmic=True, meaning=meaning, by_inverse=True)  # fmt: skip
 
 
 def damping(meaning: str, upper: float) -> Parameter:
-    """Beside such a stiffness, N m s/rad."""
+    """Beside such a stiffness, N m s/rad.
+
+    Args:
+        meaning: of the parameter, a sentence.
+        upper: N m s/rad.
+
+    Returns:
+        the parameter.
+    """
     return Parameter(
         "damping", "N*m*s/rad", lower=1e-9, upper=upper, logarithmic=True, meaning=meaning
     )

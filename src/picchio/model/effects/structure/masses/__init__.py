@@ -1,0 +1,1 @@
+"""Effects on the masses that move, and on where the force meets them."""
