@@ -20,7 +20,7 @@ from picchio.diagnosis.percussion.search.trials import (
     settled_by_itself,
     try_candidates,
 )
-from picchio.diagnosis.percussion.tolerance.linearise import About
+from picchio.diagnosis.percussion.tolerance.linearise import About, about_another
 
 # What share of what the chosen one explained a rival may lack to be settled beside other causes.
 _NEAR = 0.1
@@ -96,6 +96,32 @@ def exchange_settled(search: Search, simpler: bool = False) -> tuple[Fit, About]
                 best = other
                 found = other, about
     return found
+
+
+def in_an_earlier_place(search: Search, newest: Trial) -> tuple[Fit, About] | None:
+    """The newest cause in the place of an earlier one; and about what that is linearised.
+
+    Where tolerances make up for most of what is wrong, their slopes may let another cause seem the
+    best. Beside that the right one adds little; in its place it does better.
+
+    Args:
+        search: what stands without the newest.
+        newest: the cause, fitted beside what stands.
+
+    Returns:
+        None where it does not do better in any place, or where everything is exact.
+    """
+    if not allowed(search.problem):
+        return None
+    for label in search.labels:
+        start = replace(newest.fit, hypothesis=newest.fit.hypothesis.minus(label))
+        with about_another(search.problem, newest.about):
+            other, about = settled_by_itself(search, newest.label, start, anew=False)
+        if other is None or search.pays(search.best, other, about) < search.least:
+            continue
+        if search.confirmed(other, about):
+            return other, about
+    return None
 
 
 def _earlier(search: Search) -> Iterator[tuple[Trial, Trial]]:

@@ -17,6 +17,7 @@ from picchio.diagnosis.percussion.search.candidates import measure_scales
 from picchio.diagnosis.percussion.search.exchange import (
     exchange,
     exchange_settled,
+    in_an_earlier_place,
     prune,
     refit_latent,
     replace_causes,
@@ -187,6 +188,10 @@ def _grow(search: Search, stack: ExitStack) -> None:
         # What the model itself is not exact to may look like a last small cause in some pose.
         known = bool(here.hypothesis.labels)
         if (quiet or enough) and known and confidence(best.fit, here) < BEYOND_DOUBT:
+            # Yet it may be what an earlier one only stood for.
+            if (found := in_an_earlier_place(search, best)) is not None:
+                search.best, about = found
+                about.restore(problem)
             break
         # A remainder that is allowed needs no cause that explains but a part of it.
         if enough and not search.leaves_noise(best.fit):
