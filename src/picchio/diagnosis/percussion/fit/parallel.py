@@ -54,13 +54,14 @@ class _Helpers:
         self._places = {record.name: i for i, record in enumerate(problem.records)}
         self._ends: list[Connection] = []
         self._processes: list[Any] = []
-        self._start()
+        self._leaving: list[Any] = []
+        self._broken = False
 
     def renew(self) -> None:
-        """Start them anew: they have the problem as it is now."""
+        """Have the problem as it is from now on: they start anew where they are next asked."""
         if os.getpid() == self._owner:
-            self.close()
-            self._start()
+            self._dismiss()
+            self._broken = False
 
     def _start(self) -> None:
         context = multiprocessing.get_context("fork")
@@ -102,13 +103,15 @@ class _Helpers:
         end: float | None,
     ) -> list[Any] | None:
         """What a method of the problem tells of every record, each process asked for its share."""
-        parts = len(self._ends) + 1
+        parts = 1 if self._broken else self._count + 1
         numbers = sum(len(r.values) * r.until(end).samples.count for r in records)
         known = all(r.name in self._places for r in records)
         if os.getpid() != self._owner or parts == 1 or not known or len(records) < parts:
             return None
         if numbers < _WORTH_SENDING:
             return None
+        if not self._ends:
+            self._start()
         bounds = [len(records) * k // parts for k in range(parts + 1)]
         shares = [records[a:b] for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
         pins = tuple(self._problem.pins)
@@ -125,7 +128,8 @@ class _Helpers:
                 # Whatever happens here, what was asked for is taken, or it would answer the next.
                 told += [connection.recv() for connection in asked]
         except (EOFError, OSError):  # one of them was killed: go on alone
-            self.close()
+            self._dismiss()
+            self._broken = True
             return None
         found: list[Any] = []
         for answer in told:
@@ -136,12 +140,18 @@ class _Helpers:
 
     def close(self) -> None:
         """Let them end."""
-        for connection in self._ends:
-            connection.close()
-        for process in self._processes:
+        self._dismiss()
+        for process in self._leaving:
             process.join(timeout=1.0)
             if process.is_alive():
                 process.kill()
+        self._leaving = []
+
+    def _dismiss(self) -> None:
+        """Ask no more of them; they end by themselves, for which nobody waits."""
+        for connection in self._ends:
+            connection.close()
+        self._leaving = [p for p in (*self._leaving, *self._processes) if p.is_alive()]
         self._ends, self._processes = [], []
 
 
