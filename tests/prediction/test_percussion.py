@@ -171,6 +171,46 @@ def test_what_is_far_from_straight_is_not_told_by_modes(worlds):
     assert told[40.0][0] > 0.01 and not told[40.0][1]
 
 
+@pytest.mark.parametrize("times", [1.0, 40.0])
+def test_a_sensor_at_its_limit_does_not_tell_what_no_record_can(times, worlds):
+    """All forces, masses and springs twice as large move nothing, at the limit or below it.
+
+    Samples that a step takes to the limit, or away from it, would seem to tell.
+    """
+    campaign, _ = made(worlds, seed=1)
+    robot = load_robot("fanuc_like_3dof")
+    setup = percussion_setups(robot, campaign)[1]
+    soft = [("joint_stiffness", f"joint_{k}", 0.2) for k in (1, 2, 3)]
+    base = [*soft, ("force_amplitude", "tool", times)]
+
+    def model(*more, limit=np.inf):
+        effects = [effect_class(name)(target, scale=scale) for name, target, scale in more]
+        return Model(robot, True).with_effects(
+            [*effects, effect_class("sensor_clipping")("deflection", limit=limit)]
+        )
+
+    most = max(np.abs(v).max() for n, v in setup.predict(model(*base)).items() if "defl" in n)
+    limited = model(*base, limit=0.5 * most)
+    links = [("link_mass", f"link_{k}", 1.0) for k in (1, 2, 3)]
+    pairs, steps = [], (0.999, 1.001)
+    for moved in (*base, *links):
+        others = [each for each in (*base, *links) if each is not moved]
+        ends = [(*others, (*moved[:2], moved[2] * step)) for step in steps]
+        pairs.append(tuple(model(*end, limit=0.5 * most) for end in ends))
+    found, there = setup.changes(limited, pairs), setup.predict(limited)
+    straight = setup.changes(model(*base), [tuple(model(*e) for e in ends)]) is not None
+    assert straight == (times == 1.0)
+    at_limit = 0
+    for name, changed in found.items():
+        if name.startswith("deflection"):
+            beyond = np.abs(there[name]) >= 0.5 * most
+            at_limit += beyond.sum()
+            assert not changed[:, beyond].any()
+        if name != "force":
+            assert np.abs(changed.sum(axis=0)).max() < 1e-4 * np.abs(changed).max(), name
+    assert at_limit > 10
+
+
 def test_a_pose_the_robot_cannot_have_is_told_with_its_file_and_record(tmp_path):
     arm = picchio.load_robot("fanuc_like_3dof")
     campaign = _campaign({"joint_1": 0.1, "joint_9": 0.2})

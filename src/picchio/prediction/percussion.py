@@ -279,11 +279,12 @@ class PercussionSetup:
 
         Returns:
             (pairs, count) of each channel, SI, not a number where the models differ in another way;
-            None where the motion is not nearly linear, is steady, or a sensor is at its limit.
+            None where the motion is not nearly linear, or is steady. A sample at its sensor's limit
+            stays there.
         """
         sensors = model.sensors(self.conditions)
         chains = {group: sensors.get(group) for group in self._members}
-        if self.steady or any(np.isfinite(chain.limit) for chain in chains.values()):
+        if self.steady:
             return None
         struck = self.struck(model)
         system, same = self._system(model, struck.blows), self._system_key(model, struck.blows)
@@ -330,11 +331,25 @@ class PercussionSetup:
                 continue
             among, single = (_read(slopes, each) for each in made[key])
             whole = self._read(model, chain, members, taken)
-            if np.linalg.norm(whole - among[-1]) > _BENT * np.linalg.norm(whole):
+            limited = np.isfinite(chain.limit)
+            bent = np.linalg.norm(whole - among[-1]) > _BENT * np.linalg.norm(whole)
+            if bent and not any(np.isfinite(each.limit) for each in chains.values()):
                 return None
             rows = np.empty((len(pairs), *whole.shape))
-            rows[together], rows[alone] = among[:-1], single
-            out |= self._behind(taken, members, rows)
+            if bent:
+                for row, (one, other) in zip(rows, pairs, strict=True):
+                    row[:] = self._read(other, chain, members, taken)
+                    row -= self._read(one, chain, members, taken)
+            else:
+                rows[together], rows[alone] = among[:-1], single
+            changed = self._behind(taken, members, rows)
+            if limited:
+                there = self._behind(taken, members, whole)
+                changed = {
+                    name: np.where(np.abs(there[name]) < chain.limit, own, 0.0)
+                    for name, own in changed.items()
+                }
+            out |= changed
         return out
 
     def struck(self, model: Model) -> Struck:
