@@ -491,6 +491,33 @@ def test_as_much_as_settling_gave_the_best_it_may_give_another(faint, two_causes
     assert best.label == settled[-1]
 
 
+@pytest.mark.parametrize(("explained", "tries"), [(60.0, 3), (250.0, 1)])
+def test_what_explains_nearly_all_is_settled_from_where_it_has_come(
+    explained, tries, two_causes, monkeypatch
+):
+    """A rotor of a seven-joint arm: settled it left 4.7 a sample, and from there on 1.01."""
+    problem, baseline, *_ = two_causes
+    search = search_of(problem, replace(baseline, cost=2000.0))
+    search.leaves_noise = lambda found: False
+    own = trial_with(problem, baseline, "payload", "tool", mass=1.1)
+    begun = replace(own, fit=replace(own.fit, cost=500.0), score=500.0)
+    far = [10.0 * each / each.std() for each in begun.fit.residuals]
+    near = [each / each.std() for each in begun.fit.residuals]
+    asked = []
+
+    def by_itself(search, label, start, *, anew=True, patient=False):
+        asked.append((start.cost, anew, patient))
+        if start.cost == explained and not anew and patient:
+            return replace(start, cost=20.0, residuals=near), None
+        return replace(start, cost=explained, residuals=far), None
+
+    monkeypatch.setattr(trials, "allowed", lambda problem: True)
+    monkeypatch.setattr(trials, "settled_by_itself", by_itself)
+    (best,) = trials.settled_alike(search, [begun])
+    assert len(asked) == tries
+    assert best.fit.cost == (20.0 if tries == 3 else explained)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("draw", "hidden"),

@@ -157,10 +157,10 @@ def _confidence(
 
 
 def fitted_nuisances(found: Fit) -> dict[str, Value]:
-    """Fitted nuisances, in their own units."""
+    """Fitted nuisances, in their own units; less sure where more than noise is left."""
     if found.jacobians is None:
         return {}
-    covariance = found.covariance()
+    covariance = reported_covariance(found)
     unknowns, vector = found.hypothesis.unknowns(), found.hypothesis.vector()
     robot = found.records[0].setup.geometry.robot
     nominal = dict(zip(robot.flexible_names, robot.stiffness, strict=True))

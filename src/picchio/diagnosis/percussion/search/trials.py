@@ -422,13 +422,9 @@ def settled_alike(search: Search, trials: Sequence[Trial], best: Fit | None = No
         # Beside causes that leave little, numbers are near where one more small cause has them.
         alone = len(trial.fit.hypothesis.labels) < 2
         anew = alone or trial.fit.chi_square > ELSE * trial.fit.samples
-        by_itself = partial(settled_by_itself, search, trial.label, trial.fit, anew=anew)
-        there, about = by_itself()
-        if _is_far(there) and trial.fit.cost < _TENTH * search.best.cost:
-            # All but what is not exact is explained: that is rather farther off than slopes reach.
-            other, elsewhere = by_itself(patient=True)
-            if other is not None and not _is_far(other):
-                there, about = other, elsewhere
+        there, about = settled_by_itself(search, trial.label, trial.fit, anew=anew)
+        if _is_far(there):
+            there, about = _gone_on(search, trial, there, about, anew)
         if there is not None and there.cost < trial.fit.cost:
             again[trial.label] = replace(trial, fit=there, score=bic(there), about=about)
             if faint:  # as much may be there for another
@@ -456,6 +452,25 @@ def settled_by_itself(
             settled, search.problem, start, search.records, rounds=2, anew=anew, patient=patient
         )
         return attempt(label, settle), About.of(search.problem)
+
+
+def _gone_on(
+    search: Search, trial: Trial, there: Fit | None, about: About, anew: bool
+) -> tuple[Fit | None, About]:
+    """A trial settled however much is left on the way; as it was, where that is in vain.
+
+    Where all but what is not exact is explained, that is rather farther off than slopes reach:
+    from where it is stated, or from where it has come so far.
+    """
+    nearest = trial.fit if there is None else min(trial.fit, there, key=lambda found: found.cost)
+    if nearest.cost >= _TENTH * search.best.cost:
+        return there, about
+    settle = partial(settled_by_itself, search, trial.label, patient=True)
+    other, elsewhere = settle(trial.fit, anew=anew)
+    if _is_far(other) and nearest is there:
+        with about_another(search.problem, about):
+            other, elsewhere = settle(nearest, anew=False)
+    return (there, about) if _is_far(other) else (other, elsewhere)
 
 
 def _is_far(found: Fit | None) -> bool:
