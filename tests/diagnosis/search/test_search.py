@@ -491,6 +491,23 @@ def test_as_much_as_settling_gave_the_best_it_may_give_another(faint, two_causes
     assert best.label == settled[-1]
 
 
+def test_another_kind_of_filter_is_tried_even_where_noise_is_left(arm):
+    """Noise of all samples together hides what is left, and a rate of the blows makes up for it."""
+    hidden = [("sensor_lowpass", "accelerometer.tool", {"frequency": 45.0})]
+    campaign, _ = worlds.make(robot=ROBOT, seed=3, causes=hidden, records=3, mismatch=1.0)
+    search = begin_search(problem := Problem(arm, campaign), [], held_out(problem)[0])
+    filtered = effect_class("sensor_lowpass")("accelerometer.tool", frequency=45.0, digital=1.0)
+    start = search.fit(search.baseline.hypothesis.plus(filtered), iterations=6)
+    first, about = settled_by_itself(search, filtered.label, start)
+    about.restore(problem)
+    search.leaves_noise = lambda found: True
+    best = restarted(search, first)
+    (told,) = best.hypothesis.causes
+    assert told.values["digital"] == 0.0
+    assert told.values["frequency"] == pytest.approx(45.0, rel=0.005)
+    assert best.cost < first.cost
+
+
 @pytest.mark.parametrize(("explained", "tries"), [(60.0, 3), (250.0, 1)])
 def test_what_explains_nearly_all_is_settled_from_where_it_has_come(
     explained, tries, two_causes, monkeypatch

@@ -29,8 +29,9 @@ def restarted(search: Search, best: Fit) -> Fit:
 
     What is far off is put back always; where more than noise is left, so is what does nothing where
     it is, such as the preload of a contact that never opens: it may have to be much smaller. A
-    whole number, such as a filter's order, then takes each of its other values, and what is not
-    exact is sought anew beside it.
+    whole number, such as a filter's order, then takes each of its other values. Where something is
+    not exact, it does so always, and that is sought anew beside it: it may have made up for another
+    kind of filter, and noise hides in all samples together what is left.
 
     Args:
         search: data, sizes and records.
@@ -42,7 +43,7 @@ def restarted(search: Search, best: Fit) -> Fit:
         for name, sizes in _usual(effect, search.scales).items():
             (parameter,) = (p for p in effect.parameters if p.name == name)
             if parameter.whole:
-                again = noisy
+                again = noisy or allowed(problem)
             else:
                 far = [not 1.0 / _FAR < effect.values[name] / size < _FAR for size in sizes]
                 again = all(far) and parameter.logarithmic
