@@ -1,8 +1,8 @@
 """What a verdict is worth in a world that is a little wrong everywhere.
 
 - right: the claimed set, or one of at most three alternatives, is what was hidden, each cause up to
-  what no record of the campaign tells it from; with nothing hidden, `nothing-wrong`; where the true
-  cause is not in the catalogue, `unexplained`.
+  what no record of the campaign tells it from, and perhaps a tolerance truly exceeded; with nothing
+  hidden, `nothing-wrong`; where the true cause is not in the catalogue, `unexplained`.
 - wrong: a cause is claimed (`named`, `partial`) that is neither hidden, nor in the class of one
   that is, nor a tolerance truly exceeded.
 - undecided: the rest.
@@ -100,14 +100,22 @@ def judge(case, truth, row):
     causes = [(c["effect"], c["target"]) for c in truth["causes"]]
     hidden = [cause for cause in causes if cause[0] in known]
     beyond = errors.beyond(truth["errors"], EXCEEDED)
-    false = [
-        list(cause)
-        for cause in map(tuple, row["claimed"])
-        if not any(alike(cause, true, groups, first) for true in hidden)
-        and not any(_is(cause, key, target) for key, target, _ in beyond)
-    ]
+
+    def is_hidden(cause):
+        return any(alike(cause, true, groups, first) for true in hidden)
+
+    def exceeded(cause):
+        return any(_is(cause, key, target) for key, target, _ in beyond)
+
+    claimed = [tuple(cause) for cause in row["claimed"]]
+    false = [list(cause) for cause in claimed if not (is_hidden(cause) or exceeded(cause))]
     alternatives = row.get("alternatives", [])
-    sets = [row["claimed"], *(alternatives if len(alternatives) <= MOST else [])]
+    sets = [claimed, *(alternatives if len(alternatives) <= MOST else [])]
+    # A tolerance that is truly exceeded is a part of the truth, too; it need not be claimed.
+    sets = [
+        [cause for cause in map(tuple, each) if is_hidden(cause) or not exceeded(cause)]
+        for each in sets
+    ]
     outcome = "undecided"
     if row["verdict"] in CLAIMS and false:
         outcome = "wrong"

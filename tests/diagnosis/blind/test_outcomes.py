@@ -85,6 +85,9 @@ def test_a_tolerance_truly_exceeded_may_be_told():
         found = judged([], "named", [cause], errors=off, kind="null")
         assert found["outcome"] == "undecided" and not found["false"]
     assert len(found["exceeded"]) == 2
+    assert judged([HEAVY], "named", [HEAVY, SOFT], errors=off)["outcome"] == "right"
+    assert judged([HEAVY], "named", [SOFT], errors=off)["outcome"] == "undecided"
+    assert judged([SOFT], "named", [SOFT], errors=off)["outcome"] == "right"
     assert judged([], "named", [("joint_stiffness", "joint_1")], errors=off)["outcome"] == "wrong"
 
 
