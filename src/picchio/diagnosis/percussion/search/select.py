@@ -8,7 +8,12 @@ from dataclasses import replace
 from functools import partial
 
 from picchio.diagnosis.attempt import attempt
-from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic_difference, confidence
+from picchio.diagnosis.percussion.criteria.equivalence import (
+    SAME,
+    bic,
+    bic_difference,
+    confidence,
+)
 from picchio.diagnosis.percussion.criteria.remainder import allowed, decisive_gain
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, Split
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
@@ -181,10 +186,14 @@ def _grow(search: Search, stack: ExitStack) -> None:
         if best is not None and best.about is not None and gain <= _CLEAR * search.least:
             here = _settled_again(search)
             gain = search.pays(here, best.fit, best.about)
+        if best is not None and gain < search.least:
+            best = _of_another_kind(search, best)
+            gain = search.pays(here, best.fit, best.about)
         if best is None or gain < search.least:
             break
         # The slopes of those that were not chosen need not be kept.
-        trials[:] = [best, *(replace(t, about=None) for t in trials if t is not best)]
+        rest = [replace(t, about=None) for t in trials if t.label != best.label]
+        trials[:] = [best, *rest]
         # What the model itself is not exact to may look like a last small cause in some pose.
         known = bool(here.hypothesis.labels)
         if (quiet or enough) and known and confidence(best.fit, here) < BEYOND_DOUBT:
@@ -214,6 +223,20 @@ def _grow(search: Search, stack: ExitStack) -> None:
             _settle(search, best.label)
         if len(search.labels) >= MOST_CAUSES:
             break
+
+
+def _of_another_kind(search: Search, best: Trial) -> Trial:
+    """A trial that does not pay, with another whole number where one does better.
+
+    That of a filter's order is chosen beside numbers as they are stated, which may suit another.
+    """
+    (cause,) = (e for e in best.fit.hypothesis.causes if e.label == best.label)
+    if not allowed(search.problem) or not any(p.whole for p in cause.parameters):
+        return best
+    with about_another(search.problem, best.about):
+        again = restarted(search, best.fit)
+        about = About.of(search.problem)
+    return best if again is best.fit else replace(best, fit=again, score=bic(again), about=about)
 
 
 def _without_earlier(search: Search, newest: str) -> Fit:
