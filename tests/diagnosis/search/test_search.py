@@ -542,7 +542,6 @@ def test_the_order_of_a_filter_is_not_left_as_it_seemed_beside_stated_numbers():
     told = trial.run(case, 1)
     assert told["truth"] == [["sensor_lowpass", "deflection"]]
     assert told["right"], told["claimed"]
-    assert abs(told["errors"]["sensor_lowpass.frequency"][1]) < 3.0
 
 
 @pytest.mark.slow
