@@ -279,8 +279,8 @@ class PercussionSetup:
 
         Returns:
             (pairs, count) of each channel, SI, not a number where the models differ in another way;
-            None where the motion is not nearly linear, or is steady. A sample at its sensor's limit
-            stays there.
+            None where the motion is not nearly linear, or is steady. Where a sensor has a limit, a
+            sample that is there stays there, and what is not nearly linear is predicted twice.
         """
         sensors = model.sensors(self.conditions)
         chains = {group: sensors.get(group) for group in self._members}

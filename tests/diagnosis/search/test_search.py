@@ -9,6 +9,7 @@ import pytest
 import trial
 
 import picchio
+from picchio.diagnosis.percussion.conclude.causes import fitted_nuisances
 from picchio.diagnosis.percussion.criteria.equivalence import SAME, bic
 from picchio.diagnosis.percussion.criteria.whiteness import whiteness_test
 from picchio.diagnosis.percussion.data.problem import Problem, held_out
@@ -506,6 +507,18 @@ def test_another_kind_of_filter_is_tried_even_where_noise_is_left(arm):
     assert told.values["digital"] == 0.0
     assert told.values["frequency"] == pytest.approx(45.0, rel=0.005)
     assert best.cost < first.cost
+
+
+def test_values_are_less_sure_where_more_than_noise_is_left(arm):
+    campaign, _ = worlds.make(robot=ROBOT, seed=11, records=6, hits=2, ring=0.1)
+    problem = Problem(arm, campaign)
+    found = fit(problem, Hypothesis.baseline(arm, campaign.tolerance), with_jacobian=True)
+    more = replace(found, residuals=[2.0 * each for each in found.residuals])
+    assert more.chi_square > 3.0 * more.samples
+    told = fitted_nuisances(more)
+    for name, value in fitted_nuisances(found).items():
+        assert told[name].value == value.value
+        assert told[name].std > 1.8 * value.std > 0.0
 
 
 @pytest.mark.parametrize(("explained", "tries"), [(60.0, 3), (250.0, 1)])
