@@ -57,6 +57,7 @@ from picchio.diagnosis.percussion.search.select import (
     start_from,
 )
 from picchio.diagnosis.percussion.search.state import LEAST_GAIN, Search, Trial
+from picchio.diagnosis.percussion.tolerance.in_turns import refit_in_turns
 from picchio.diagnosis.percussion.tolerance.linearise import (
     about_another,
     linearise,
@@ -239,7 +240,7 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
             break
         dropped.append((doubted[0].effect, doubted[0].target))
         search.best = rest
-        whole = refit(problem, rest.hypothesis, every)
+        whole = refit_in_turns(problem, rest.hypothesis, every)
         after = fit_evidence(problem, whole)
         rivals = _rivals(search, whole)
         causes = fitted_causes(search, whole, rivals)
@@ -352,14 +353,14 @@ def _fitted_to_all(
     if not search.labels:
         return nominal, fit_evidence(problem, nominal)
     search.say("fitting what was found to all records")
-    whole = refit(problem, search.best.hypothesis, every)
+    whole = refit_in_turns(problem, search.best.hypothesis, every)
     after = fit_evidence(problem, whole)
     if len(search.labels) > 1 and not after.is_noise:
         search.say("checking which causes dominate the residual")
         stands = dominant_causes(problem, search.best)
         if stands is not search.best:
             search.best = stands
-            whole = refit(problem, stands.hypothesis, every)
+            whole = refit_in_turns(problem, stands.hypothesis, every)
             after = fit_evidence(problem, whole)
     return whole, after
 

@@ -107,8 +107,7 @@ def _own_latent(
     problem: Problem, hypothesis: Hypothesis, records: Sequence[MeasuredRecord]
 ) -> Hypothesis:
     """Numbers that are drawn anew in every record must be found in these, too."""
-    drawing = [e for e in hypothesis.effects if e.latent is not None and not e.latent.linear]
-    for effect in drawing:
+    for effect in hypothesis.drawing:
         found = fit(problem, hypothesis, records, None, iterations=0)
         found = fit_latent(problem, found, effect)
         whole = {**effect.hidden, **current_hidden(found.hypothesis, effect.label)}

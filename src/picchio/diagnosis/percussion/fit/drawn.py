@@ -484,13 +484,13 @@ def _shortened(
 
 def refit(problem: Problem, hypothesis: Hypothesis, records: Sequence[MeasuredRecord]) -> Fit:
     """A hypothesis refitted to some records, from where it stands, with its Jacobian."""
-    drawing = [e for e in hypothesis.effects if e.latent is not None]
-    hidden = [e for e in drawing if e.latent and not e.latent.linear]
+    hidden = hypothesis.drawing
+    solved = [e for e in hypothesis.effects if e.latent is not None and e.latent.linear]
     # Blows' times in records that were held out are not known yet: nothing can be fitted to them.
     turns = 0 if any(e.latent and e.latent.times for e in hidden) else 4
     found = fit(problem, hypothesis, records, None, iterations=turns, with_jacobian=not hidden)
     # What is solved for is another number in more records.
-    for effect in (*hidden, *(e for e in drawing if e not in hidden)):
+    for effect in (*hidden, *solved):
         found = fit_latent(problem, found, effect)
     if hidden:
         found = fit(problem, found.hypothesis, records, None, iterations=1, with_jacobian=True)

@@ -146,6 +146,19 @@ class Hypothesis:
         return frozenset(effect.label for effect in self.causes)
 
     @property
+    def drawing(self) -> tuple[Effect, ...]:
+        """The effects with numbers that are drawn anew in every record, and sought there."""
+        return tuple(e for e in self.effects if e.latent is not None and not e.latent.linear)
+
+    def is_known_in(self, record: str) -> bool:
+        """Whether the numbers that are drawn anew have been sought in a record.
+
+        Args:
+            record: its name.
+        """
+        return all(record in effect.hidden for effect in self.drawing)
+
+    @property
     def at_ends(self) -> frozenset[str]:
         """Labels of the nuisances that stand at an end of what is tolerated: they ask for more."""
         pairs = zip(self.unknowns(), self.vector(), strict=True)

@@ -45,8 +45,8 @@ def prune(search: Search, found: Fit, *, alone: bool = True) -> Fit:
 
 def refit_latent(search: Search, best: Fit, newest: str) -> Fit:
     """What earlier causes draw anew in every record, looked for again beside the newest cause."""
-    for cause in best.hypothesis.causes:
-        if cause.label != newest and cause.latent is not None and not cause.latent.linear:
+    for cause in best.hypothesis.drawing:
+        if cause.label != newest:
             # From the start: without the newest cause some numbers may have been far off.
             start = replace(best, hypothesis=with_hidden(best.hypothesis, cause, {}))
             again = attempt(cause.label, partial(fit_latent, search.problem, start, cause))

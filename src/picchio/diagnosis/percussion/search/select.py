@@ -40,6 +40,7 @@ from picchio.diagnosis.percussion.search.trials import (
     settled_by_itself,
     try_candidates,
 )
+from picchio.diagnosis.percussion.tolerance.in_turns import settled_in_turns
 from picchio.diagnosis.percussion.tolerance.linearise import (
     ELSE,
     About,
@@ -218,7 +219,7 @@ def _grow(search: Search, stack: ExitStack) -> None:
         again = restarted(search, search.best)
         if best.about is None or again is not best.fit:
             again = _settled_if_better(search, again)
-        search.best = released(problem, again)
+        search.best = released(problem, settled_in_turns(problem, again))
         if known:
             _settle(search, best.label)
         if len(search.labels) >= MOST_CAUSES:

@@ -23,8 +23,12 @@ from picchio.diagnosis.workers import worker_pool
 
 # Standard deviations of noise's mean square beyond which a record is left behind.
 _BEHIND = 6.0
+# ... and how many times what is left of the others, the median.
+_FARTHER = 3.0
 # Numbers are moved by so many standard deviations at most.
 FARTHEST = 3.5
+# Chi-square per sample, up to a blow, above which more is wrong than a record's own numbers.
+_ELSE = 10.0
 # How often numbers are moved by slopes of their own up to a blow, how much a step is damped, and
 # what fall of chi-square is worth one step more.
 _MOVES = 4
@@ -33,7 +37,9 @@ _WORTH = 5.0
 
 
 def left_behind(problem: Problem, here: Hypothesis) -> list[MeasuredRecord]:
-    """Records of which a hypothesis leaves more than noise, whatever is not exact.
+    """Records of which a hypothesis leaves more than noise, and much more than of most others.
+
+    Where as much is left of all of them, something else is wrong.
 
     Args:
         problem: linearised about the hypothesis.
@@ -43,8 +49,12 @@ def left_behind(problem: Problem, here: Hypothesis) -> list[MeasuredRecord]:
         of the campaign's, fitted or held out.
     """
     left = problem.residuals(here.effects)
-    pairs = zip(problem.records, left, strict=True)
-    return [record for record, rows in pairs if _excess(rows) > _BEHIND]
+    usual = float(np.median([(rows**2).mean() - 1.0 for rows in left]))
+    return [
+        record
+        for record, rows in zip(problem.records, left, strict=True)
+        if _excess(rows) > _BEHIND and (rows**2).mean() - 1.0 > _FARTHER * usual
+    ]
 
 
 def sought_alone(
@@ -85,6 +95,8 @@ def _blow_by_blow(problem: Problem, here: Hypothesis, record: MeasuredRecord) ->
     before = alone.size
     for end in _ends(record):
         alone.move(end)
+        if (alone.left(end=end) ** 2).mean() > _ELSE:
+            return None
     return alone.size if alone.cost(alone.size, None) < alone.cost(before, None) else None
 
 

@@ -200,7 +200,7 @@ def settled(
     for end in ends:
         here = _settled_up_to(problem, here, records, end, rounds, else_wrong)
     found = fit(problem, here, records, None, with_jacobian=True)
-    if is_nonsmooth(here) and found.chi_square <= else_wrong * found.samples:
+    if is_nonsmooth(here) and found.chi_square <= ELSE * found.samples:
         found = with_those_left_behind(problem, found)
     if found.chi_square > else_wrong * found.samples:
         return _unless_little(problem, found)
@@ -425,7 +425,7 @@ def _moved_on(problem: Problem, here: Hypothesis, found: Fit) -> tuple[Hypothesi
     cost = _cost(problem, here, found.end, staying)
     temper = max(1.0, found.chi_square / max(found.samples, 1))
     # Of all records, as what it costs is: the fit's own are but those that it was fitted to.
-    linear = problem.residuals(found.hypothesis.effects, None, found.end)
+    linear = problem.residuals(found.hypothesis.effects, _told_of(problem, here), found.end)
     foretold = sum(float((r * r).sum()) for r in linear) + prior_cost(found.hypothesis)
     whole = recentre(problem, found, temper)
     start, way, sizes = here.vector(), whole.vector() - here.vector(), problem.sizes
@@ -439,6 +439,11 @@ def _moved_on(problem: Problem, here: Hypothesis, found: Fit) -> tuple[Hypothesi
     return here, cost, 0.0
 
 
+def _told_of(problem: Problem, here: Hypothesis) -> list[MeasuredRecord]:
+    """Records that tell what is not exact: of those held out blows' times may not be known."""
+    return [r for r in problem.records if here.is_known_in(r.name)] or list(problem.records)
+
+
 def _between(
     before: Mapping[str, FloatArray], after: Mapping[str, FloatArray], share: float
 ) -> dict[str, FloatArray]:
@@ -450,10 +455,11 @@ def _between(
 
 def _cost(problem: Problem, hypothesis: Hypothesis, end: float | None, staying: Marginal) -> float:
     """What it costs to have everything just where it is: no slope but of what always stays."""
-    names = [record.name for record in problem.records]
+    told = _told_of(problem, hypothesis)
+    names = [record.name for record in told]
     labels = [effect.label for effect in hypothesis.effects]
     try:
-        there = problem.unmarginalised(hypothesis.effects, None, end)
+        there = problem.unmarginalised(hypothesis.effects, told, end)
     except InputError:
         return math.inf
     held = 0.0
@@ -486,9 +492,15 @@ def recentre(problem: Problem, found: Fit, temper: float = 1.0) -> Hypothesis:
     marginal, hypothesis = problem.marginal, found.hypothesis
     if marginal is None:
         return hypothesis
-    names = [record.name for record in problem.records]
-    raw = problem.unmarginalised(hypothesis.effects, None, found.end)
+    told = _told_of(problem, hypothesis)
+    names = [record.name for record in told]
+    raw = problem.unmarginalised(hypothesis.effects, told, found.end)
     sizes = marginal.estimated(raw, names, temper, (e.label for e in hypothesis.effects))
+    for record in problem.records:
+        if record.name not in sizes:  # what is its own stays where it is stated
+            shared = sizes[names[0]][marginal.slopes[names[0]].own :]
+            stated = np.zeros(marginal.slopes[record.name].own)
+            sizes[record.name] = np.concatenate([stated, shared])
     new = {}
     for name, size in sizes.items():
         # A pose's geometry takes long to find, and its small errors act in proportion.
