@@ -19,7 +19,7 @@ Worlds that are a little wrong everywhere, by so many times the tolerances that 
         --robots fanuc_like_3dof,ur10 --kinds null,single,pair,outside,left-out
     python benchmarks/blind_trial.py --out curve.jsonl --mismatch 0,0.5,1,2,4 --kinds single
     python benchmarks/blind_trial.py --out poses.jsonl --mismatch 1 --errors pose,pose_repeat
-    python benchmarks/blind_trial.py --out wrong.jsonl --mismatch 1 --summary
+    python benchmarks/blind_trial.py --out wrong.jsonl --mismatch 1 --seeds 0:20 --summary
 """
 
 from __future__ import annotations
@@ -172,7 +172,7 @@ def main():
     wrong.add_argument("--mismatch", type=numbers, help="times the tolerances, by commas")
     wrong.add_argument("--robots", type=words, default=[ARM], help="by commas")
     wrong.add_argument("--kinds", type=words, default=["null", "single"], help="by commas")
-    wrong.add_argument("--seeds", type=span, default=range(10), help="draws a:b, without b")
+    wrong.add_argument("--seeds", type=span, help="draws a:b, without b; 0:10")
     wrong.add_argument("--sensors", type=words, help="such as accelerometer; else with deflections")
     wrong.add_argument("--errors", type=words, help="keys of [tolerance] that are off; else all")
     wrong.add_argument("--effects", type=words, help="hidden first, in turn; else drawn")
@@ -199,8 +199,8 @@ def main():
         done = {row["case"] for row in rows}
         todo = []
         for case in cases(given.draws) if given.mismatch is None else wrong_cases(
-            given.robots, given.kinds, given.seeds, given.mismatch, given.sensors, given.errors,
-            given.snr, given.effects,
+            given.robots, given.kinds, given.seeds or range(10), given.mismatch, given.sensors,
+            given.errors, given.snr, given.effects,
         ):  # fmt: skip
             name = trial.name_of(case)
             wanted = not given.only or any(part in name for part in given.only.split(","))
@@ -230,6 +230,7 @@ def main():
             trial_tables.draw_curve(ways, given.plot)
         return
     if given.mismatch is not None:
+        rows = trial_tables.of_draws(rows, given.seeds, given.mismatch)
         trial_tables.mismatch_summary(since(rows, given.since) if given.since else rows)
         return
     if given.against:

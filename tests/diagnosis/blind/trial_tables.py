@@ -14,6 +14,10 @@ ARM = "fanuc_like_3dof"
 UNNAMEABLE = {"outside": "out of the catalogue", "left-out": "true cause taken out"}
 BEGIN, END = "<!-- tables: printed, not written -->", "<!-- end of the tables -->"
 BESIDE = "<!-- {}: printed, not written -->", "<!-- end of {} -->"
+# Worlds that are a little wrong everywhere: the rows, the draws and mismatches that the page tells.
+WRONG = "blind_trial_wrong.jsonl"
+LAST_DRAWS = range(90000, 91000), (1.0, 2.0)
+IN_WRONG = "<!-- wrong everywhere: printed -->", "<!-- end of wrong everywhere -->"
 SIMPLER = "blind_trial_score_test.jsonl", "blind_trial_plain_bic.jsonl"
 ENOUGH = 30.0  # chi-square from which a measurement is foretold to tell causes apart
 REMOVED = {40: 0.99, 20: 0.95}  # asked for, by SNR
@@ -54,6 +58,22 @@ def printed_against(rows, others):
     return _block(begin, end, print_against, rows, read_rows(others))
 
 
+def printed_wrong(rows):
+    """What `mismatch_summary` prints of the draws that the page is about, as a block for it."""
+    return _block(*IN_WRONG, mismatch_summary, of_draws(rows, *LAST_DRAWS))
+
+
+def of_draws(rows, seeds=None, times=None):
+    """Rows of worlds that are a little wrong: of these draws and mismatches, all where None."""
+    return [
+        row
+        for row in rows
+        if "mismatch" in row
+        and (seeds is None or int(row["case"].split("/")[4]) in seeds)
+        and (times is None or row["mismatch"] in times)
+    ]
+
+
 def _block(begin, end, what, *given):
     room = StringIO()
     with redirect_stdout(room):
@@ -64,6 +84,8 @@ def _block(begin, end, what, *given):
 def into_page(rows, page):
     """Put the tables between a page's marks; those of simpler methods, whose rows lie beside it."""
     blocks = [(BEGIN, END, printed(rows))]
+    if (page.parent / WRONG).exists():
+        blocks.append((*IN_WRONG, printed_wrong(read_rows(page.parent / WRONG))))
     for name in SIMPLER:
         if (page.parent / name).exists():
             marks = (mark.format(name) for mark in BESIDE)
@@ -409,10 +431,8 @@ def print_known(rows):
 
 def mismatch_summary(rows):
     """Everything about worlds that are a little wrong: the table, bursts, what was said."""
-    rows = [row for row in rows if "mismatch" in row]
     print_mismatch(rows)
     told = [row for row in rows if not _aside(row)]
-    print_bursts(told)
     print_known(told)
     for row in told:
         if row.get("outcome", "undecided") != "right":

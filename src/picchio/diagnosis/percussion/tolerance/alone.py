@@ -37,9 +37,7 @@ _WORTH = 5.0
 
 
 def left_behind(problem: Problem, here: Hypothesis) -> list[MeasuredRecord]:
-    """Records of which a hypothesis leaves more than noise, and much more than of most others.
-
-    Where as much is left of all of them, something else is wrong.
+    """Records of which a hypothesis leaves more than noise, whatever is not exact; see `behind`.
 
     Args:
         problem: linearised about the hypothesis.
@@ -48,11 +46,25 @@ def left_behind(problem: Problem, here: Hypothesis) -> list[MeasuredRecord]:
     Returns:
         of the campaign's, fitted or held out.
     """
-    left = problem.residuals(here.effects)
+    return behind(problem.records, problem.residuals(here.effects))
+
+
+def behind(records: Sequence[MeasuredRecord], left: Sequence[FloatArray]) -> list[MeasuredRecord]:
+    """Records of which more than noise is left, and much more than of most others.
+
+    Where as much is left of all of them, something else is wrong.
+
+    Args:
+        records: any.
+        left: (channels, m) each, in units of the noise.
+
+    Returns:
+        of these.
+    """
     usual = float(np.median([(rows**2).mean() - 1.0 for rows in left]))
     return [
         record
-        for record, rows in zip(problem.records, left, strict=True)
+        for record, rows in zip(records, left, strict=True)
         if _excess(rows) > _BEHIND and (rows**2).mean() - 1.0 > _FARTHER * usual
     ]
 

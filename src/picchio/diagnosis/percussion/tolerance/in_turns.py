@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import partial
 
@@ -18,6 +17,7 @@ from picchio.diagnosis.percussion.fit.drawn import (
 )
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.tolerance.alone import behind
 from picchio.diagnosis.percussion.tolerance.linearise import (
     ELSE,
     About,
@@ -29,8 +29,6 @@ from picchio.model.effects.effect import Effect
 _TURNS = 4
 # What share of the cost a turn must take for another to be worth while.
 _LITTLE = 1e-3
-# Standard deviations of what noise alone leaves of a record, beyond which more is left.
-_STANDS_OUT = 5.0
 
 
 def settled_in_turns(problem: Problem, found: Fit) -> Fit:
@@ -96,13 +94,9 @@ def _turn(problem: Problem, found: Fit) -> Fit:
 
 
 def _drawn_again(problem: Problem, found: Fit, effect: Effect) -> Fit:
-    """Blows' times sought once more, blow by blow, in records of which more than noise is left."""
+    """Blows' times sought once more, blow by blow, in records that are left behind."""
     assert effect.latent is not None
-    left = [
-        record
-        for record, rows in zip(found.records, found.residuals, strict=True)
-        if (rows**2).mean() > 1.0 + _STANDS_OUT * math.sqrt(2.0 / rows.size)
-    ]
+    left = behind(found.records, found.residuals)
     if not effect.latent.times or not left:
         return found
     alone = fit(problem, found.hypothesis, left, None, iterations=0)
