@@ -25,6 +25,7 @@ from picchio.diagnosis.percussion.search.exchange import (
     in_an_earlier_place,
     prune,
 )
+from picchio.diagnosis.percussion.search.refine import coarsened
 from picchio.diagnosis.percussion.search.restart import restarted
 from picchio.diagnosis.percussion.search.screen import Suspect, acts_either_way, smallest
 from picchio.diagnosis.percussion.search.select import (
@@ -571,3 +572,31 @@ def test_what_tolerances_make_up_for_is_not_told_as_another_link(draw, hidden):
     told = trial.run(case, 1)
     assert told["truth"] == [hidden]
     assert told["right"], told["claimed"]
+
+
+@pytest.mark.slow
+def test_another_rate_is_not_told_as_blows_out_of_step_while_more_is_wrong():
+    """Beside a filter that is not known yet each blow's own time explains more."""
+    case = {"robot": ROBOT, "kind": "pair", "snr": 40, "mismatch": 1.0, "draw": 90712}
+    row = trial.run(case, 1)
+    assert row["outcome"] == "right"
+    assert row["verdict"] == "named"
+
+
+def test_numbers_that_follow_a_rule_give_way_to_the_few_that_tell_it(arm):
+    rate = ("pulse_rate", "tool", {"scale": 0.979})
+    filtered = ("sensor_lowpass", SENSORS[0], {"frequency": 36.0})
+    campaign, _ = worlds.make(robot=ROBOT, seed=7, causes=[rate, filtered], records=3)
+    problem = Problem(arm, campaign)
+    baseline = fit_growing(problem, Hypothesis.baseline(arm, campaign.tolerance))
+    candidates = [c for c in all_candidates(problem) if c[0].name == "pulse_rate"]
+    search = search_of(problem, baseline, candidates=candidates)
+    start = fit(problem, baseline.hypothesis, iterations=0)
+    late = fit_latent(problem, start, effect_class("pulse_jitter")("tool"))
+    drawn = Trial("pulse_jitter:tool", late, bic(late), 0.0)
+    (told,) = coarsened(search, [drawn])
+    assert told.label == "pulse_rate:tool"
+    assert told.fit.hypothesis.causes[0].values["scale"] == pytest.approx(0.982, abs=6e-3)
+    assert told.fit.cost > late.cost  # by what the filter leaves, its own numbers explain more
+    left_out = search_of(problem, baseline)
+    assert coarsened(left_out, [drawn]) == [drawn]

@@ -313,6 +313,17 @@ class Effect(ABC):
         other.hidden = {k: tuple(float(x) for x in v) for k, v in hidden.items()}
         return other
 
+    def coarser(self, interval: float) -> tuple[Effect, ...]:
+        """Effects of few numbers that do nearly what the hidden ones do.
+
+        Args:
+            interval: of the blows, s.
+
+        Returns:
+            with their values; none where the hidden numbers follow no rule.
+        """
+        return ()
+
     def drawn(self, blows: Blows, conditions: Conditions) -> FloatArray | None:
         """The numbers (h,) of a record's blows; zero beyond those drawn, None for other records.
 

@@ -1,4 +1,4 @@
-"""A cause told with more numbers: a load with its own centre of mass, a link as a whole body."""
+"""A cause told with more numbers, as a load with its own centre of mass, or with fewer."""
 
 from __future__ import annotations
 
@@ -12,6 +12,39 @@ from picchio.diagnosis.percussion.search.state import Search, Trial
 
 # Iterations of the fit with more numbers, at most: mass and its place trade off slowly.
 _TURNS = 40
+# What few numbers explain of what those drawn anew do, for them to be what is there.
+_MOST = 0.5
+
+
+def coarsened(search: Search, trials: Sequence[Trial]) -> list[Trial]:
+    """Trials, the best first; numbers drawn in every record give way to the few that they follow.
+
+    Each blow a little earlier than the one before is another rate of the blows. From the programmed
+    times that was too far off to be found, where something else is wrong as well; what so many
+    numbers explain beyond it is of that.
+
+    Args:
+        search: data and records.
+        trials: the best first.
+
+    Returns:
+        the best first, without the one that gave way.
+    """
+    best = trials[0]
+    if not best.draws or not best.finished(search.records):
+        return list(trials)
+    (drawn,) = (e for e in best.fit.hypothesis.causes if e.label == best.label)
+    rest = best.fit.hypothesis.minus(best.label)
+    for start in drawn.coarser(search.records[0].setup.blows.interval):
+        if start.label not in search.considered or start.label in rest.labels:
+            continue
+        found = attempt(start.label, partial(search.fit, rest.plus(start), iterations=_TURNS))
+        explained = 0.0 if found is None else search.best.cost - found.cost
+        if found is not None and explained > _MOST * (search.best.cost - best.fit.cost):
+            others = [t for t in trials if t.label not in (best.label, start.label)]
+            told = Trial(start.label, found, bic(found), best.promise)
+            return sorted([told, *others], key=lambda t: t.score)
+    return list(trials)
 
 
 def refined(search: Search, trials: Sequence[Trial]) -> list[Trial]:

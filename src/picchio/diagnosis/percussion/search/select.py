@@ -28,7 +28,7 @@ from picchio.diagnosis.percussion.search.exchange import (
     replace_causes,
     rivals_of,
 )
-from picchio.diagnosis.percussion.search.refine import refined
+from picchio.diagnosis.percussion.search.refine import coarsened, refined
 from picchio.diagnosis.percussion.search.restart import restarted
 from picchio.diagnosis.percussion.search.state import LEAST_GAIN, Search, Trial
 from picchio.diagnosis.percussion.search.trials import (
@@ -180,7 +180,7 @@ def _grow(search: Search, stack: ExitStack) -> None:
             break
         if not search.pinned:
             trials = over_the_same_samples(search, trials)
-        trials = refined(search, settled_alike(search, trials))
+        trials = refined(search, settled_alike(search, coarsened(search, trials)))
         search.steps.append(trials)
         best = _chosen(search, trials, wider=not quiet)
         gain = search.pays(here, best.fit, best.about) if best is not None else 0.0

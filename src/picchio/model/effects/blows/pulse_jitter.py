@@ -7,7 +7,13 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.model.blows import Blows
 from picchio.model.conditions import Conditions
+from picchio.model.effects.blows.pulse_rate import PulseRate
 from picchio.model.effects.effect import Effect, Latent, Parameter
+
+# Blows' times are those of another rate where it leaves at most this share of their variance; of
+# fewer blows than these a line is no rule.
+_ON_A_LINE = 0.2
+_FEWEST = 4
 
 
 class PulseJitter(Effect):
@@ -30,6 +36,20 @@ class PulseJitter(Effect):
         """Shift each blow of this record by its own amount."""
         shift = self.drawn(blows, conditions)
         return blows if shift is None else blows.change(start=blows.start + shift)
+
+    def coarser(self, interval: float) -> tuple[Effect, ...]:
+        """Blows at another rate, where each comes later than the last one by about as much.
+
+        All but the first may be late by as much: what a sensor adds passes for it.
+        """
+        times = np.array([time for own in self.hidden.values() for time in own[1:]])
+        hits = np.array([float(h) for own in self.hidden.values() for h in range(1, len(own))])
+        if np.unique(hits).size < _FEWEST or not times.any():
+            return ()
+        slope, late = np.polyfit(hits, times, 1)
+        if np.var(times - slope * hits - late) > _ON_A_LINE * np.var(times):
+            return ()
+        return (PulseRate(self.target).bounded(scale=1.0 + float(slope) / interval),)
 
     def draw(self, rng: np.random.Generator, hits: int) -> FloatArray:
         """A record's first blow is its t = 0, so it is not shifted."""
