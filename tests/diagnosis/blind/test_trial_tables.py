@@ -22,6 +22,22 @@ def test_the_page_says_what_the_rows_say(rows):
     )
 
 
+def test_the_page_says_what_worlds_that_are_a_little_wrong_say():
+    told = trial_tables.read_rows(DOCS / trial_tables.WRONG)
+    assert trial_tables.printed_wrong(told) in PAGE.read_text(), (
+        "python benchmarks/blind_trial.py --out docs/blind_trial.jsonl --summary "
+        "--page docs/blind_trial.md brings the page up to date"
+    )
+
+
+def test_rows_are_told_by_their_draws_and_mismatches():
+    rows = [{"case": f"arm/null//40/{n}/1 times wrong", "mismatch": 1.0} for n in range(4)]
+    rows += [{"case": "arm/null//40/2", "draw": 2}, {**rows[2], "mismatch": 2.0}]
+    assert trial_tables.of_draws(rows, range(1, 3), [1.0]) == rows[1:3]
+    assert trial_tables.of_draws(rows, range(2, 3)) == [rows[2], rows[5]]
+    assert trial_tables.of_draws(rows) == [*rows[:4], rows[5]]
+
+
 @pytest.mark.parametrize("name", trial_tables.SIMPLER)
 def test_the_page_says_how_simpler_ways_did(name, rows):
     assert trial_tables.printed_against(rows, DOCS / name) in PAGE.read_text()

@@ -3,6 +3,7 @@
 import pytest
 
 from picchio.diagnosis.percussion.conclude.verdict import verdict_of, why_not_claimed
+from picchio.diagnosis.percussion.criteria.remainder import Remainder
 from picchio.diagnosis.percussion.criteria.whiteness import BAND_LIMIT, Evidence, Level
 from picchio.diagnosis.result import Cause, Value
 
@@ -42,6 +43,23 @@ def causes(*confidences):
 )
 def test_verdict(confidences, before, after, others, explained, common, verdict):
     assert verdict_of(causes(*confidences), before, after, others, explained, common) == verdict
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "explained", "verdict"),
+    [
+        (9e3, 2.0e3, 0.7, "partial"),  # 1.4 % of the signal, RMS: what a model may leave
+        (2e4, 9e3, 0.7, "unexplained"),  # more than half
+        (1e6, 4.0e4, 0.95, "unexplained"),  # 6 % of the signal: something else is there
+        (1e7, 4.0e4, 0.99, "partial"),  # as much, but next to nothing of what is explained
+    ],
+)
+def test_what_leaves_more_than_a_remainder_can_be_may_be_no_more_than_alike(
+    before, after, explained, verdict
+):
+    left = Remainder(before, 1e7), Remainder(after, 1e7)
+    found = verdict_of(causes(0.999), MORE, MORE, False, explained, (), left)
+    assert found == verdict
 
 
 def test_which_of_several_causes_is_doubted_is_said():

@@ -13,8 +13,9 @@ from picchio.model.effects.registry import effect_class
 # A value this many of its standard deviations from doing nothing may as well do nothing.
 _UNSURE = 2.0
 # What causes that are claimed in part must explain of the held-out excess, in power. Where all else
-# is exact, what they leave is of something unknown, and they may be no more than alike: a vibration
-# absorber was told as a servo, which explained 0.93. What is correlated by 0.99 explains so much.
+# is exact, or more is left than a remainder can be, that is of something unknown, and they may be
+# no more than alike: a vibration absorber was told as a servo, which explained 0.93, a mass on a
+# spring as a payload (0.94). What is correlated by 0.99 explains so much.
 _NEARLY_ALL = 0.98
 
 BeforeAndAfter = tuple[Remainder, Remainder]
@@ -81,7 +82,7 @@ def may_be_partial(
     if left is not None:
         latents = [effect_class(cause.effect).latent for cause in causes]
         follows = any(latent is not None and latent.times for latent in latents)
-        mostly = left[1].may_be_partial(left[0], follows)
+        mostly = (mostly or left[1].is_usual) and left[1].may_be_partial(left[0], follows)
     return mostly and all(c.confidence >= BEYOND_DOUBT and not _is_nothing(c) for c in causes)
 
 

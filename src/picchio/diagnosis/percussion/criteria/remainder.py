@@ -24,6 +24,8 @@ from picchio.diagnosis.percussion.fit.unknowns import FITTED
 ALLOWED = 0.01
 # Its usual size: the standard deviation of a half-normal distribution; and sizes to integrate over.
 USUAL = 0.005
+# ... and how many of these a remainder is at most.
+_FARTHEST = 5.0
 _SIZES = np.geomspace(1e-5, 10.0, 300)
 # Variances of what is left, in units of the noise's, beside which what is not exact is sought.
 _TEMPERS = np.geomspace(1.0, 1e6, 7)
@@ -66,6 +68,11 @@ class Remainder:
     def within_tolerance(self) -> bool:
         """Whether an honest model may leave as much."""
         return self.nrmse <= ALLOWED
+
+    @property
+    def is_usual(self) -> bool:
+        """Whether it may be a remainder at all, and not another cause that is not known."""
+        return self.nrmse <= _FARTHEST * USUAL
 
     def share_of(self, before: Remainder) -> float:
         """Its power relative to that of what was explained since.
