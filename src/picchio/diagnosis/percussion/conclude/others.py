@@ -16,10 +16,10 @@ from picchio.diagnosis.percussion.criteria.equivalence import (
 )
 from picchio.diagnosis.percussion.criteria.remainder import allowed, decisive_gain
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
-from picchio.diagnosis.percussion.fit.drawn import refit
 from picchio.diagnosis.percussion.fit.least_squares import Fit
 from picchio.diagnosis.percussion.search.select import alternatives
 from picchio.diagnosis.percussion.search.state import Search, Trial
+from picchio.diagnosis.percussion.tolerance.in_turns import refit_in_turns
 from picchio.diagnosis.percussion.tolerance.linearise import about_another, settled
 from picchio.diagnosis.result import BEYOND_DOUBT, Cause
 
@@ -98,5 +98,6 @@ def _on_all_records(
 
 def _refitted(problem: Problem, trial: Trial, records: Sequence[MeasuredRecord]) -> Fit:
     """A trial fitted to all of these records, about its own inexact numbers."""
-    found = refit(problem, trial.fit.hypothesis, records)
-    return found if trial.draws else settled(problem, found, records, 1, anew=False)
+    found = refit_in_turns(problem, trial.fit.hypothesis, records)
+    drawing = found.hypothesis.drawing
+    return found if drawing else settled(problem, found, records, 1, anew=False)
