@@ -85,14 +85,15 @@ def test_a_hum_is_as_strong_as_it_is_without_noise():
 
 
 def test_blows_that_come_ever_earlier_are_blows_at_another_rate():
+    """Also where records have blows of different programmed rates."""
     rng = np.random.default_rng(4)
     jitter = effect_class("pulse_jitter")("tool", std=4e-3)
-    hits = np.arange(12)
-    scatter = 2e-4 * rng.standard_normal((3, 12))
-    line = {f"r{i}": tuple(-8.4e-4 * hits + own) for i, own in enumerate(scatter)}
-    (rate,) = jitter.with_hidden(line).coarser(0.04)
+    hits, intervals = np.arange(12), {"r0": 0.04, "r1": 0.04, "r2": 0.08}
+    scatter = dict(zip(intervals, 2e-4 * rng.standard_normal((3, 12)), strict=True))
+    line = {name: tuple(-0.021 * intervals[name] * hits + scatter[name]) for name in intervals}
+    (rate,) = jitter.with_hidden(line).coarser(intervals)
     assert rate.label == "pulse_rate:tool"
-    assert rate.values["scale"] == pytest.approx(1.0 - 8.4e-4 / 0.04, abs=5e-4)
-    chance = {f"r{i}": tuple(1.3e-3 * rng.standard_normal(12)) for i in range(3)}
-    assert jitter.with_hidden(chance).coarser(0.04) == ()
-    assert jitter.coarser(0.04) == ()  # none are known
+    assert rate.values["scale"] == pytest.approx(0.979, abs=5e-4)
+    chance = {name: tuple(1.3e-3 * rng.standard_normal(12)) for name in intervals}
+    assert jitter.with_hidden(chance).coarser(intervals) == ()
+    assert jitter.coarser(intervals) == ()  # none are known

@@ -313,11 +313,11 @@ class Effect(ABC):
         other.hidden = {k: tuple(float(x) for x in v) for k, v in hidden.items()}
         return other
 
-    def coarser(self, interval: float) -> tuple[Effect, ...]:
+    def coarser(self, intervals: Mapping[str, float]) -> tuple[Effect, ...]:
         """Effects of few numbers that do nearly what the hidden ones do.
 
         Args:
-            interval: of the blows, s.
+            intervals: record -> time from blow to blow as programmed, s.
 
         Returns:
             with their values; none where the hidden numbers follow no rule.

@@ -82,7 +82,7 @@ def may_be_partial(
     if left is not None:
         latents = [effect_class(cause.effect).latent for cause in causes]
         follows = any(latent is not None and latent.times for latent in latents)
-        mostly = (mostly or left[1].is_usual) and left[1].may_be_partial(left[0], follows)
+        mostly = (mostly or left[1].is_plausible) and left[1].may_be_partial(left[0], follows)
     return mostly and all(c.confidence >= BEYOND_DOUBT and not _is_nothing(c) for c in causes)
 
 

@@ -70,7 +70,7 @@ class Remainder:
         return self.nrmse <= ALLOWED
 
     @property
-    def is_usual(self) -> bool:
+    def is_plausible(self) -> bool:
         """Whether it may be a remainder at all, and not another cause that is not known."""
         return self.nrmse <= _FARTHEST * USUAL
 

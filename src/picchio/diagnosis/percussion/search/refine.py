@@ -35,7 +35,8 @@ def coarsened(search: Search, trials: Sequence[Trial]) -> list[Trial]:
         return list(trials)
     (drawn,) = (e for e in best.fit.hypothesis.causes if e.label == best.label)
     rest = best.fit.hypothesis.minus(best.label)
-    for start in drawn.coarser(search.records[0].setup.blows.interval):
+    intervals = {record.name: record.setup.blows.interval for record in search.records}
+    for start in drawn.coarser(intervals):
         if start.label not in search.considered or start.label in rest.labels:
             continue
         found = attempt(start.label, partial(search.fit, rest.plus(start), iterations=_TURNS))

@@ -28,7 +28,7 @@ _FARTHER = 3.0
 # Numbers are moved by so many standard deviations at most.
 FARTHEST = 3.5
 # Chi-square per sample, up to a blow, above which more is wrong than a record's own numbers.
-_ELSE = 10.0
+_NOT_ITS_OWN = 10.0
 # How often numbers are moved by slopes of their own up to a blow, how much a step is damped, and
 # what fall of chi-square is worth one step more.
 _MOVES = 4
@@ -107,7 +107,7 @@ def _blow_by_blow(problem: Problem, here: Hypothesis, record: MeasuredRecord) ->
     before = alone.size
     for end in _ends(record):
         alone.move(end)
-        if (alone.left(end=end) ** 2).mean() > _ELSE:
+        if (alone.left(end=end) ** 2).mean() > _NOT_ITS_OWN:
             return None
     return alone.size if alone.cost(alone.size, None) < alone.cost(before, None) else None
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from picchio.core.arrays import FloatArray
@@ -37,19 +39,21 @@ class PulseJitter(Effect):
         shift = self.drawn(blows, conditions)
         return blows if shift is None else blows.change(start=blows.start + shift)
 
-    def coarser(self, interval: float) -> tuple[Effect, ...]:
+    def coarser(self, intervals: Mapping[str, float]) -> tuple[Effect, ...]:
         """Blows at another rate, where each comes later than the last one by about as much.
 
         All but the first may be late by as much: what a sensor adds passes for it.
         """
-        times = np.array([time for own in self.hidden.values() for time in own[1:]])
+        times = np.array(
+            [t / intervals[name] for name, own in self.hidden.items() for t in own[1:]]
+        )
         hits = np.array([float(h) for own in self.hidden.values() for h in range(1, len(own))])
         if np.unique(hits).size < _FEWEST or not times.any():
             return ()
-        slope, late = np.polyfit(hits, times, 1)
-        if np.var(times - slope * hits - late) > _ON_A_LINE * np.var(times):
+        slope, first = np.polyfit(hits, times, 1)
+        if np.var(times - slope * hits - first) > _ON_A_LINE * np.var(times):
             return ()
-        return (PulseRate(self.target).bounded(scale=1.0 + float(slope) / interval),)
+        return (PulseRate(self.target).bounded(scale=1.0 + float(slope)),)
 
     def draw(self, rng: np.random.Generator, hits: int) -> FloatArray:
         """A record's first blow is its t = 0, so it is not shifted."""
