@@ -146,6 +146,7 @@ def test_two_hidden_effects_are_both_named(draw):
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 @pytest.mark.timeout(900)
 def test_three_effects_are_named_though_the_first_stood_for_two():
     """Of the blind trial's seeds: the cause chosen first is another link's mass."""
@@ -179,6 +180,7 @@ def test_beside_a_little_of_what_is_unknown_the_known_cause_alone_is_claimed():
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("effect", ["backlash", "force_amplitude"])
 def test_with_the_true_cause_taken_out_no_other_is_named(effect):

@@ -83,6 +83,7 @@ class Changes:
         self._motors: dict[str, str] = {}
         self._bent: dict[str, tuple[float, float]] = {}
         self._masses: dict[tuple[str, tuple[float, ...] | None], float] = {("robot", None): 1.0}
+        self._bodies: dict[str, FloatArray] = {}
         self.centres: dict[str, FloatArray] = {}
         self.added_inertias: list[tuple[str, float]] = []
         self._springs: list[_Spring] = []
@@ -118,8 +119,7 @@ class Changes:
             link: its name, or the tool frame's.
             ten: (10,) mass, first moments and inertia in the link's frame.
         """
-        for weight, point in point_masses(ten, _REACH):
-            self.add_mass(weight, link, point)
+        self._bodies[link] = self._bodies.get(link, 0.0) + ten
 
     def add_inertia(self, joint: str, inertia: float) -> None:
         """Add a constant inertia that turns with the link side, kg m^2."""
@@ -244,7 +244,15 @@ class Changes:
     @property
     def added_masses(self) -> tuple[Mass, ...]:
         """(weight, link, point) of every mass beside the robot's own."""
-        return tuple((weight, *of) for of, weight in self._masses.items())[1:]
+        return tuple((weight, *of) for of, weight in self._weights().items())[1:]
+
+    def _weights(self) -> dict[tuple[str, tuple[float, ...] | None], float]:
+        """Of the robot, of links and of points of them, the bodies made of point masses."""
+        found = self._masses.copy()
+        for link, ten in self._bodies.items():
+            for weight, point in point_masses(ten, _REACH):
+                found[link, point] = found.get((link, point), 0.0) + weight
+        return found
 
 
 class Plant(Changes):
@@ -338,7 +346,7 @@ class Plant(Changes):
             out[np.ix_(*[wide] * values.ndim)] = values
             return out
 
-        inertia = geometry.total(self._masses, tuple(taken))
+        inertia = geometry.total(self._weights(), tuple(taken))
         mass, gradient = among_all(inertia.mass), among_all(inertia.mass_gradient)
         gravity, curvature = np.zeros((size, size)), np.zeros((size, size, size))
         if self.gravity_stiffness:

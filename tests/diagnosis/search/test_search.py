@@ -373,9 +373,8 @@ def test_what_was_fitted_to_a_part_of_the_records_is_no_alternative(two_causes):
     assert alternatives(search) == ([], [])
 
 
-@pytest.mark.parametrize(
-    "records", [6, pytest.param(18, marks=pytest.mark.slow)], ids=["replaced", "followed"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("records", [6, 18], ids=["replaced", "followed"])
 def test_a_half_sine_is_not_told_as_a_width_that_suits_stated_numbers_better(records, arm):
     """About numbers as they are stated the wrong one explains more: the blows rise slowly."""
     case = {"robot": ROBOT, "kind": "single", "snr": 40, "draw": 90006, "mismatch": 1.0}
@@ -443,6 +442,7 @@ def test_a_simpler_rival_is_compared_even_where_noise_is_left(arm):
     assert exchange_settled(search, simpler=True) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chosen", ["link_2", "link_3"])
 def test_what_stands_out_little_beside_a_cause_may_be_that_cause(chosen, arm):
     """Tolerances made up for a lighter link, and their slopes chose another one."""
@@ -550,6 +550,7 @@ def test_what_explains_nearly_all_is_settled_from_where_it_has_come(
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 def test_the_order_of_a_filter_is_not_left_as_it_seemed_beside_stated_numbers():
     """Blows rose slowly: two orders stood for that, and left three times the noise."""
     case = {"robot": ROBOT, "kind": "single", "snr": 40, "mismatch": 1.0, "draw": 90415}
@@ -559,6 +560,7 @@ def test_the_order_of_a_filter_is_not_left_as_it_seemed_beside_stated_numbers():
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 @pytest.mark.parametrize(
     ("draw", "hidden"),
     [
@@ -575,6 +577,7 @@ def test_what_tolerances_make_up_for_is_not_told_as_another_link(draw, hidden):
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 def test_another_rate_is_not_told_as_blows_out_of_step_while_more_is_wrong():
     """Beside a filter that is not known yet each blow's own time explains more."""
     case = {"robot": ROBOT, "kind": "pair", "snr": 40, "mismatch": 1.0, "draw": 90712}

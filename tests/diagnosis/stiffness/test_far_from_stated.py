@@ -200,6 +200,7 @@ def test_stiffness_from_nothing_where_everything_is_a_little_wrong(worlds):
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 def test_springs_that_begin_far_away_are_settled_for_good():
     """Seven joints, seen by an accelerometer alone; the last one's spring begins a quarter off."""
     world = trains(7, 5204)

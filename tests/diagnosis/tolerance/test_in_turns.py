@@ -41,6 +41,7 @@ def power(fit):
     return np.array([(rows**2).mean() for rows in fit.residuals])
 
 
+@pytest.mark.slow
 def test_blows_times_and_tolerances_are_found_together(late):
     """Springs pass for wrong by five deviations where times are left a little off."""
     problem, truth, found = late

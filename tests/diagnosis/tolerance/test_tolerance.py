@@ -516,6 +516,7 @@ def test_worlds_that_are_a_little_wrong_everywhere(kind, draw, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.minutes
 @pytest.mark.parametrize(
     ("draw", "alone"),
     [

@@ -219,7 +219,7 @@ def _grow(search: Search, stack: ExitStack) -> None:
         again = restarted(search, search.best)
         if best.about is None or again is not best.fit:
             again = _settled_if_better(search, again)
-        search.best = released(problem, settled_in_turns(problem, again))
+        search.best = released(problem, settled_in_turns(problem, again), search.least)
         if known:
             _settle(search, best.label)
         if len(search.labels) >= MOST_CAUSES:

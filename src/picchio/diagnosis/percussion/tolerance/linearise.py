@@ -207,7 +207,7 @@ def settled(
     return found
 
 
-def released(problem: Problem, found: Fit) -> Fit:
+def released(problem: Problem, found: Fit, least: float) -> Fit:
     """A fit settled once more with what stands far off put back; itself, where that is no better.
 
     A number may have gone there while an unknown that does nearly the same was missing: a blow's
@@ -216,6 +216,7 @@ def released(problem: Problem, found: Fit) -> Fit:
     Args:
         problem: linearised about the fit; about the other one, where that is better.
         found: the fit.
+        least: fall of the cost that must be in sight.
 
     Returns:
         the better one.
@@ -233,11 +234,13 @@ def released(problem: Problem, found: Fit) -> Fit:
         size[size.size - shared.size :][shared] = 0.0
     _move(problem, sizes)
     linearise(problem, found.hypothesis, records)
-    here = fit(problem, found.hypothesis, records, None, iterations=6).hypothesis
-    here = _settled_up_to(problem, here, records, None, 1, math.inf)
-    again = fit(problem, here, records, None, with_jacobian=True)
-    if again.cost < found.cost:
-        return again
+    begun = fit(problem, found.hypothesis, records, None, iterations=6)
+    # Slopes foretell more than comes of it, if anything.
+    if begun.cost < found.cost - least:
+        here = _settled_up_to(problem, begun.hypothesis, records, None, 1, math.inf)
+        again = fit(problem, here, records, None, with_jacobian=True)
+        if again.cost < found.cost:
+            return again
     before.restore(problem)
     return found
 
