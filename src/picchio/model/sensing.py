@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -33,9 +34,7 @@ class Filter:
         Returns:
             (order + 1,) of numerator and denominator, highest power first.
         """
-        from scipy.signal import butter
-
-        return butter(self.order, 2.0 * np.pi * self.frequency, kind, analog=True)
+        return _butterworth(self.order, 2.0 * np.pi * self.frequency, kind, True)
 
     def sampled(self, kind: Literal["low", "high"], step: float) -> tuple[FloatArray, FloatArray]:
         """Its transfer function in the delay by one sample.
@@ -47,13 +46,24 @@ class Filter:
         Returns:
             (order + 1,) of numerator and denominator, the undelayed first.
         """
-        from scipy.signal import butter
-
-        return butter(self.order, min(2.0 * self.frequency * step, _NYQUIST), kind)
+        return _butterworth(self.order, min(2.0 * self.frequency * step, _NYQUIST), kind, False)
 
 
 # Of half the rate: the highest corner of a digital filter.
 _NYQUIST = 0.99
+
+
+@lru_cache(maxsize=256)
+def _butterworth(
+    order: int, corner: float, kind: Literal["low", "high"], analogue: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Numerator and denominator: designed once, and asked for by every record."""
+    from scipy.signal import butter
+
+    found: tuple[FloatArray, FloatArray] = butter(order, corner, kind, analog=analogue)
+    for part in found:
+        part.flags.writeable = False
+    return found
 
 
 @dataclass
