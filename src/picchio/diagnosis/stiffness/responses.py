@@ -138,6 +138,13 @@ class Standing:
     responses: tuple[Response, ...]
     factors: FloatArray
 
+    @cached_property
+    def driven(self) -> tuple[int, ...]:
+        """Of each response the first one that is pushed alike at the same lines."""
+        first: dict[tuple[bytes, ...], int] = {}
+        keys = [(r.s.tobytes(), r.push.tobytes(), r.pushes.tobytes()) for r in self.responses]
+        return tuple(first.setdefault(key, i) for i, key in enumerate(keys))
+
     def mass_at(self, off: FloatArray) -> FloatArray:
         """The mass matrix (n, n).
 
@@ -159,6 +166,47 @@ class Standing:
             part = off[self.pairs[:, other], None, None] * self.products
             np.add.at(found, self.pairs[:, own], part)
         return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Driven:
+    """How the arm answers to a force, whatever reads it.
+
+    Attributes:
+        motion: (m, n) of the joints, at every line.
+        slopes: (m, p, n) its derivatives by the numbers.
+        at_once: (n,) acceleration where nothing but the masses resists.
+    """
+
+    motion: ComplexArray
+    slopes: ComplexArray
+    at_once: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        response: Response,
+        off: FloatArray,
+        system: tuple[FloatArray, FloatArray, FloatArray],
+        slopes: tuple[FloatArray, FloatArray, FloatArray],
+    ) -> _Driven:
+        """The answer to what a response is the answer to.
+
+        `system` is stiffness, damping and mass, (n, n), and `slopes` their derivatives (p, n, n).
+        """
+        w = response.s[:, None, None]
+        powers = np.ones_like(w), w, w**2
+        push = response.push + off @ response.pushes
+        inverse = np.linalg.inv(sum(a * part for a, part in zip(powers, system, strict=True)))
+        motion = inverse @ push
+        m, n = motion.shape
+        both = np.concatenate([motion.real, motion.imag])
+        by: ComplexArray = np.zeros((m, len(slopes[0]), n), complex)
+        for a, part in zip(powers, slopes, strict=True):
+            real = (both @ part.reshape(-1, n).T).reshape(2, m, -1, n)
+            by -= a * (real[0] + 1j * real[1])
+        by[:, 2 * n : 2 * n + len(off)] += response.pushes
+        return cls(motion, by @ inverse, np.linalg.solve(system[2], push))
 
 
 @dataclass(frozen=True, eq=False)
@@ -365,43 +413,30 @@ class FrfProblem:
                 d_stiff[2 * n + pull] = self.gravity_std * standing.gravity
             d_mass = np.zeros((p, n, n))
             d_mass[2 * n : 2 * n + len(self.steps)] = by_mass
-            parts = (d_stiff.reshape(p, -1), d_damp.reshape(p, -1), d_mass.reshape(p, -1))
-            for response in standing.responses:
-                found.append(self._response(response, off, (stiff, damp, mass), parts))
+            system, slopes = (stiff, damp, mass), (d_stiff, d_damp, d_mass)
+            driven: dict[int, _Driven] = {}  # of channels that read the same motion once
+            for response, first in zip(standing.responses, standing.driven, strict=True):
+                if first not in driven:
+                    driven[first] = _Driven.of(response, off, system, slopes)
+                found.append(self._response(response, off, driven[first]))
         return found
 
-    def _response(
-        self,
-        response: Response,
-        off: FloatArray,
-        system: tuple[FloatArray, FloatArray, FloatArray],
-        parts: tuple[FloatArray, FloatArray, FloatArray],
-    ) -> Predicted:
-        stiff, damp, mass = system
+    def _response(self, response: Response, off: FloatArray, driven: _Driven) -> Predicted:
         line = response.s[:, None]
-        w = line[:, :, None]
-        n, p = self.joints, parts[0].shape[0]
-        push = response.push + off @ response.pushes
+        n, p = self.joints, driven.slopes.shape[1]
         sight, tilt = response.sight + off @ response.sights, response.tilt + off @ response.tilts
-        sides = np.stack([push, sight, tilt], axis=1)
-        solved = np.linalg.solve(stiff + w**2 * mass + w * damp, sides[None])
         lead = response.s**response.power
-        v = solved[:, :, 0]
-        u = lead[:, None] * solved[:, :, 1] + solved[:, :, 2]
+        v = driven.motion
         seen = lead[:, None] * sight + tilt
         gain = response.factor(off)[:, None]
         bent = (response.bent + off @ response.bends) * np.ones(len(line))
         plain = np.einsum("mn,mn->m", seen, v)
-        at_once = sight @ np.linalg.solve(mass, push) if response.power == 2 else 0.0
+        at_once = sight @ driven.at_once if response.power == 2 else 0.0
         value = gain[:, 0] * (plain + bent * (at_once - plain))
-        outer = (u[:, :, None] * v[:, None, :]).reshape(len(line), -1)
         follows = gain * (1.0 - bent[:, None])
-        slope = -follows * (outer @ parts[0].T + line * (outer @ parts[1].T)
-                         + line**2 * (outer @ parts[2].T))  # fmt: skip
+        slope = follows * (driven.slopes @ seen[:, :, None])[:, :, 0]
         own = slice(2 * n, 2 * n + len(self.steps))
-        slope[:, own] += follows * (
-            u @ response.pushes.T + lead[:, None] * (v @ response.sights.T) + v @ response.tilts.T
-        )
+        slope[:, own] += follows * (lead[:, None] * (v @ response.sights.T) + v @ response.tilts.T)
         slope[:, own] += value[:, None] * (
             response.gains - line * response.delays + 0.5 * line**2 * response.widths
         )
