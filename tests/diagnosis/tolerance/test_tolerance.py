@@ -32,10 +32,13 @@ from picchio.diagnosis.percussion.fit.least_squares import (
     fit_growing,
 )
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.tolerance import linearise as linearised
 from picchio.diagnosis.percussion.tolerance.linearise import (
+    About,
     _in_common,
     linearise,
     recentre,
+    released,
     settled,
     silent,
 )
@@ -460,6 +463,34 @@ def test_a_world_of_six_joints_leaves_noise():
     assert found.chi_square / found.samples == pytest.approx(1.0, abs=0.02)
     evidence = fit_evidence(problem, found)
     assert evidence.is_noise, (evidence.worst_band, evidence.worst_pose)
+
+
+def test_what_stands_far_off_is_settled_anew_only_where_less_is_in_sight(
+    wrong_everywhere, monkeypatch
+):
+    """Put back, a number that is far off goes there again: slopes tell so before it is settled."""
+    robot, campaign = wrong_everywhere
+    problem = Problem(robot, campaign)
+    with one_thread():
+        start = Hypothesis.baseline(robot, campaign.tolerance)
+        found = settled(problem, fit_growing(problem, start), problem.records[::2])
+        sizes = {name: size.copy() for name, size in problem.sizes.items()}
+        for size in sizes.values():
+            size[-1] = 4.0  # shared by all: the sensor's place
+        problem.sizes = sizes
+        linearise(problem, found.hypothesis, found.records)
+        off = fit(problem, found.hypothesis, found.records, None, with_jacobian=True)
+        about, asked, as_it_is = About.of(problem), [], linearised._settled_up_to
+
+        def counted(*given):
+            asked.append(given)
+            return as_it_is(*given)
+
+        monkeypatch.setattr(linearised, "_settled_up_to", counted)
+        assert released(problem, off, least=math.inf) is off
+        assert not asked and problem.marginal is about.marginal and problem.sizes is about.sizes
+        assert released(problem, off, least=-math.inf).cost <= off.cost
+        assert asked
 
 
 @pytest.mark.slow
