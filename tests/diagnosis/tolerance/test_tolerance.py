@@ -329,16 +329,17 @@ def test_records_held_out_are_found_though_a_gap_makes_small_errors_large():
 
     Where a joint has backlash the third blow's small errors are the tenth's large ones: slopes
     taken where nothing is off say nothing of it, though the fitted records are known to the noise.
+    Nor does it hang on a billionth of where the search begins.
     """
     case = {"robot": ARM, "kind": "pair", "snr": 40, "draw": 41002, "mismatch": 1.0}
     campaign, truth = trial.make(case, 1)
     robot = picchio.load_robot(ARM)
     problem = Problem(robot, campaign)
     records, kept = held_out(problem)[0]
-    here = Hypothesis.baseline(robot, campaign.tolerance)
+    here, rng = Hypothesis.baseline(robot, campaign.tolerance), np.random.default_rng(3)
     for cause in truth["causes"]:
-        kind = effect_class(cause["effect"])
-        here = here.plus(kind(cause["target"]).with_values(**cause["parameters"]))
+        near = {k: v * (1 + 1e-9 * rng.standard_normal()) for k, v in cause["parameters"].items()}
+        here = here.plus(effect_class(cause["effect"])(cause["target"]).with_values(**near))
     with one_thread():
         found = settled(problem, refit(problem, here, records), records, rounds=2)
         left = problem.residuals(found.hypothesis.effects, kept)

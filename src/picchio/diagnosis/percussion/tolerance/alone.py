@@ -29,6 +29,8 @@ _FARTHER = 3.0
 FARTHEST = 3.5
 # Chi-square per sample, up to a blow, above which more is wrong than a record's own numbers.
 _NOT_ITS_OWN = 10.0
+# How many other ways are tried past a kink, of all of a record's.
+_OTHERS = 16
 # How often numbers are moved by slopes of their own up to a blow, how much a step is damped, and
 # what fall of chi-square is worth one step more.
 _MOVES = 4
@@ -105,10 +107,7 @@ def _blow_by_blow(problem: Problem, here: Hypothesis, record: MeasuredRecord) ->
     """(columns,) its numbers; None where they are no better than those it has."""
     alone = _Alone(problem, here, record)
     before = alone.size
-    for end in _ends(record):
-        alone.move(end)
-        if (alone.left(end=end) ** 2).mean() > _NOT_ITS_OWN:
-            return None
+    alone.follow(_ends(record))
     return alone.size if alone.cost(alone.size, None) < alone.cost(before, None) else None
 
 
@@ -147,6 +146,8 @@ class _Alone:
         )[: self._slopes.own]
         none = np.zeros(self._slopes.columns.shape[2])
         self.size = problem.sizes.get(record.name, none)
+        # What the numbers may be off by as far as is known: at first, what is stated.
+        self._scatter = np.diag(np.where(self._stays, 0.0, 1.0))
 
     def left(self, size: FloatArray | None = None, end: float | None = None) -> FloatArray:
         """(channels, m) what the numbers leave, in units of the noise, the pose integrated out."""
@@ -161,6 +162,31 @@ class _Alone:
         held = float((size[: self._slopes.own] ** 2).sum())
         return total + held if math.isfinite(total) else math.inf
 
+    def follow(self, ends: Sequence[float | None]) -> None:
+        """Move the numbers up to one end after the other, as long as they explain what is seen.
+
+        Past a kink that they just miss, no step leads on from where they are: then others are tried
+        that explain what came before as well, drawn by how well that tells them.
+        """
+        others, rng, explained = _OTHERS, np.random.default_rng(0), False
+        for end in ends:
+            start, scatter = self.size, self._scatter
+            self.move(end)
+            while explained and others and not self.explains(end):
+                others -= 1
+                best, cost = (self.size, self._scatter), self.cost(self.size, end)
+                self.size = self._off(start, scatter @ rng.standard_normal(len(scatter)))
+                self.move(end)
+                if self.cost(self.size, end) > cost:
+                    self.size, self._scatter = best
+            if (self.left(end=end) ** 2).mean() > _NOT_ITS_OWN:
+                return
+            explained = self.explains(end)
+
+    def explains(self, end: float | None) -> bool:
+        """Whether no more than noise is left up to an end."""
+        return _excess(self.left(end=end)) <= _BEHIND
+
     def move(self, end: float | None) -> None:
         """Move the numbers by Gauss and Newton's steps, by what they do up to some time."""
         cost, own = self.cost(self.size, end), self._slopes.own
@@ -168,20 +194,27 @@ class _Alone:
             columns = own_slopes(self._problem, self._record, self._here.effects, self.size, end)
             flat = columns.reshape(-1, own).astype(float)
             normal = flat.T @ flat + np.eye(own)
+            free = np.ix_(~self._stays, ~self._stays)
+            self._scatter = np.zeros((own, own))
+            self._scatter[free] = np.linalg.inv(np.linalg.cholesky(normal[free])).T
             held = np.where(self._stays, 0.0, self.size[:own])
             right = flat.T @ self._raw(self.size, end).ravel() + held
             before = cost
             for damping in _DAMPINGS:
                 step = -np.linalg.solve(normal + damping * np.diag(np.diag(normal)), right)
-                step = np.where(self._stays, 0.0, step)
-                other = np.array(self.size)
-                other[:own] = np.clip(other[:own] + step, -FARTHEST, FARTHEST)
+                other = self._off(self.size, np.where(self._stays, 0.0, step))
                 now = self.cost(other, end)
                 if now < before:
                     self.size, cost = other, now
                     break
             if before - cost < _WORTH:
                 return
+
+    def _off(self, size: FloatArray, step: FloatArray) -> FloatArray:
+        """Numbers that are off by a step of its own, as far as they may be."""
+        other = np.array(size)
+        other[: step.size] = np.clip(other[: step.size] + step, -FARTHEST, FARTHEST)
+        return other
 
     def _raw(self, size: FloatArray, end: float | None) -> FloatArray:
         there, more = nudged(self._record, self._slopes.moved(size))
