@@ -295,8 +295,10 @@ class PiecewiseForce:
         acts = np.flatnonzero(constant)  # most pieces are silence, and phi1 is what costs
         total = np.zeros((pole.size, index.size), dtype=np.complex128)
         total[:, acts] = constant[acts] * (u[acts] * phi1(lam * u[acts]))
-        if (slope := self.slope[index]).any():
-            total = total + slope * (u * u * phi2(lam * u))
+        slope = self.slope[index]
+        if (ramps := np.flatnonzero(slope)).size:
+            v = u[ramps]
+            total[:, ramps] += slope[ramps] * (v * v * phi2(lam * v))
         amplitude = self.amplitude[index]
         if amplitude.any():
             for c, mu in (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,7 +34,7 @@ class Geometry:
         self.pose = pose
         self._inertias: dict[object, Inertia] = {}
         self._motions: dict[object, Motion] = {}
-        self._stacks: Recent[dict[str, FloatArray]] = Recent(_KEPT_STACKS)
+        self._stacks: Recent[FloatArray] = Recent(_KEPT_STACKS)
         # Records of one pose share theirs.
         self.plants: Recent[Plant] = Recent(_KEPT_PLANTS)
         self.begun: Recent[Plant] = Recent(_KEPT_BESIDE)
@@ -101,18 +100,18 @@ class Geometry:
         """
         every = tuple(masses)
 
-        def make() -> dict[str, FloatArray]:
-            parts = [self.inertia(what, point) for what, point in every]
-            return {
-                f.name: np.stack([
-                    own[np.ix_(*[taken] * own.ndim)] for own in (getattr(p, f.name) for p in parts)
-                ])
-                for f in fields(Inertia)
-            }  # fmt: skip
+        def make() -> FloatArray:
+            parts = [vars(self.inertia(what, point)).values() for what, point in every]
+            rows = [[own[np.ix_(*[taken] * own.ndim)].ravel() for own in part] for part in parts]
+            return np.stack([np.concatenate(row) for row in rows])
 
-        weights = np.array(list(masses.values()))
-        stacks = self._stacks.get((every, taken), make)
-        return Inertia(**{name: np.tensordot(weights, own, 1) for name, own in stacks.items()})
+        # One product for all that an inertia is made of: it is asked for many thousand times.
+        flat = np.array(list(masses.values())) @ self._stacks.get((every, taken), make)
+        found, at = {}, 0
+        for name, own in vars(self.inertia(*every[0])).items():
+            shape = (len(taken),) * own.ndim
+            found[name] = flat[at : (at := at + len(taken) ** own.ndim)].reshape(shape)
+        return Inertia(**found)
 
     def motion(self, frame: str, taken: tuple[int, ...] | None = None) -> Motion:
         """As `WideChain.motion`; a joint's name means the link that it carries.

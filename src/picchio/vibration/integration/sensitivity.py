@@ -136,11 +136,14 @@ def blow_changes(
     decay = np.exp(np.outer(poles * samples.step, np.arange(samples.count)))
     series = np.zeros((len(changes), 2 * len(poles) + 1, samples.count))
     known: dict[tuple[bytes, float], FloatArray] = {}
+    at_starts: dict[bytes, ComplexArray] = {}  # of each shape, whenever it strikes
     for own, strikes in zip(series, changes, strict=True):
         for strike in strikes:
             key = strike.shape.key, strike.start
             if key not in known:
-                y = _answer(poles, decay, strike, samples)
+                if key[0] not in at_starts:
+                    at_starts[key[0]] = _at_starts(poles, strike.shape)
+                y = _answer(poles, decay, strike, samples, at_starts[key[0]])
                 force = force_at(strike.shape, strike.start, samples, at_jumps)
                 known[key] = np.vstack([y.real, y.imag, force])
             own += strike.height * known[key]
@@ -157,19 +160,27 @@ def blow_changes(
     )
 
 
-def _answer(
-    poles: ComplexArray, decay: ComplexArray, strike: Strike, samples: Samples
-) -> ComplexArray:
-    """(m, count) of y' = pole y + F from rest, F one blow of height 1.
-
-    `decay` is (m, count), of each pole after so many samples.
-    """
-    shape = strike.shape
+def _at_starts(poles: ComplexArray, shape: PiecewiseForce) -> ComplexArray:
+    """(m, pieces + 1) of y' = pole y + F from rest: where each piece begins, and the last ends."""
     after = [np.zeros(poles.size, complex)]
     for piece, span in enumerate(shape.duration):
         grown = after[-1] * np.exp(poles * span)
         after.append(grown + shape.convolve(poles, np.array([piece]), np.array([span]))[:, 0])
-    at_start = np.stack(after, axis=1)
+    return np.stack(after, axis=1)
+
+
+def _answer(
+    poles: ComplexArray,
+    decay: ComplexArray,
+    strike: Strike,
+    samples: Samples,
+    at_start: ComplexArray,
+) -> ComplexArray:
+    """(m, count) of y' = pole y + F from rest, F one blow of height 1.
+
+    `decay` is (m, count), of each pole after so many samples; `at_start` as `_at_starts`.
+    """
+    shape = strike.shape
 
     def within(u: FloatArray) -> ComplexArray:
         piece = np.searchsorted(shape.start, u, side="right") - 1

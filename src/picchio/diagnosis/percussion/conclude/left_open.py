@@ -20,7 +20,7 @@ from picchio.diagnosis.percussion.conclude.causes import reported_covariance
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit, prior_precision
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.tolerance.nudges import Inexact, Nudge, inexact
+from picchio.diagnosis.percussion.tolerance.nudges import Inexact, as_effects, inexact
 from picchio.model.blows import Blows
 from picchio.model.effects.effect import Effect, Where
 
@@ -139,8 +139,7 @@ def _uncertain(
     def effects(vector: FloatArray) -> Sequence[Effect]:
         sizes = vector[lead:, None]
         moved = [(one, size) for one, size in zip(numbers, sizes, strict=True) if size[0]]
-        used = [place for place in _PLACES if any(one.where == place for one, _ in moved)]
-        return [*hypothesis.at(vector[:lead]).effects, *(Nudge(moved, where) for where in used)]
+        return [*hypothesis.at(vector[:lead]).effects, *as_effects(moved)]
 
     free = np.full(len(numbers), np.inf)
     return Uncertain(

@@ -70,7 +70,7 @@ class Nudge(Effect):
 
     Args:
         moved: what is moved, and by how many standard deviations, (numbers,) each.
-        where: what is moved; others are passed over.
+        where: what all of them change.
     """
 
     name = "tolerance"
@@ -81,7 +81,7 @@ class Nudge(Effect):
     def __init__(self, moved: Sequence[tuple[Inexact, FloatArray]], where: Where) -> None:
         super().__init__("robot")
         self.where = where  # type: ignore[misc]
-        self._moved = [(one, size) for one, size in moved if one.where == where]
+        self._moved = moved
         self.__dict__["key"] = (
             self.name, where, *((one.name, size.tobytes()) for one, size in self._moved)
         )  # fmt: skip
@@ -124,9 +124,20 @@ def nudged(
             pose[index] += size * sigma
         setup = replace(setup, geometry=setup.geometry.beside(pose))
         record = replace(record, setup=setup, _cuts={})
+    return record, as_effects(moved)
+
+
+def as_effects(moved: Sequence[tuple[Inexact, FloatArray]]) -> tuple[Effect, ...]:
+    """Numbers moved as effects, one a kind of thing that they change; no pose is among it.
+
+    Args:
+        moved: what, and by how many standard deviations, (numbers,) each.
+    """
+    by: dict[Where | str, list[tuple[Inexact, FloatArray]]] = {}
+    for pair in moved:
+        by.setdefault(pair[0].where, []).append(pair)
     places: tuple[Where, ...] = ("structure", "blows", "sensor")
-    used = [w for w in places if any(one.where == w for one, _ in moved)]
-    return record, tuple(Nudge(moved, where) for where in used)
+    return tuple(Nudge(by[where], where) for where in places if where in by)
 
 
 def inexact(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import zip_longest
 
 import numpy as np
@@ -71,7 +71,7 @@ class Slopes:
         """
         return cls(tuple(what), own, columns, np.sqrt((columns**2).sum(axis=(0, 1), dtype=float)))
 
-    @property
+    @cached_property
     def means(self) -> tuple[str, ...]:
         """Of every column the effect and target that stand for it as a cause; empty for none."""
         return tuple(one.means for one in self.what)
