@@ -24,6 +24,8 @@ from picchio.diagnosis.percussion.search.exchange import (
     exchange_settled,
     in_an_earlier_place,
     prune,
+    replace_causes,
+    rivals_of,
 )
 from picchio.diagnosis.percussion.search.refine import coarsened
 from picchio.diagnosis.percussion.search.restart import restarted
@@ -413,6 +415,14 @@ def test_a_rival_that_came_near_is_compared_about_its_own_inexact_numbers(arm):
     other, _ = exchange_settled(search)
     assert other.hypothesis.labels == {"pulse_shape:tool", clipping.label}
     assert other.cost < best.cost - 100.0
+    # Nor need it have come near before all causes were known.
+    search.steps, search.candidates = [], [(effect_class("pulse_shape"), "tool")]
+    (rival,) = rivals_of(search, best, "pulse_width:tool")
+    assert rival.score > bic(best)
+    other, _ = replace_causes(search, {clipping.label})
+    assert other.hypothesis.labels == {"pulse_shape:tool", clipping.label}
+    assert other.cost < best.cost - 100.0
+    assert search.best is best
 
 
 def test_a_simpler_rival_is_compared_even_where_noise_is_left(arm):
@@ -485,7 +495,7 @@ def test_as_much_as_settling_gave_the_best_it_may_give_another(faint, two_causes
         return replace(start, cost=start.cost - gains[label]), None
 
     monkeypatch.setattr(trials, "allowed", lambda problem: True)
-    monkeypatch.setattr(trials, "_NEARLY", 0.05)
+    monkeypatch.setattr(trials, "NEARLY", 0.05)
     monkeypatch.setattr(trials, "decisive_gain", lambda one, other: one.cost - other.cost)
     monkeypatch.setattr(trials, "settled_by_itself", by_itself)
     best = trials.settled_alike(search, tried)[0]

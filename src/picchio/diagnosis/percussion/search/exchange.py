@@ -14,9 +14,11 @@ from picchio.diagnosis.percussion.fit.least_squares import HOPELESS, Fit, fit, f
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.diagnosis.percussion.search.trials import (
+    NEARLY,
     SCREEN_WINDOW,
     SHORT_LIST,
     records_of_every_pose,
+    settled_alike,
     settled_by_itself,
     try_candidates,
 )
@@ -171,19 +173,35 @@ def rivals_of(search: Search, best: Fit, label: str, short_list: int = SHORT_LIS
     return known[1]
 
 
-def replace_causes(search: Search, settled: Set[str] = frozenset()) -> Fit:
+def replace_causes(search: Search, settled: Set[str] = frozenset()) -> tuple[Fit, About]:
     """The best fit with every cause in turn replaced by whichever does better, until noise is left.
 
     What was added one by one need not be the best set: the first stands for several at once.
-    Causes that are `settled` were the best beside the others.
+    Causes that are `settled` were the best beside the others. Rivals that explain nearly as much
+    are compared each about its own inexact numbers: those of what stands suit that alone.
+
+    Args:
+        search: what was found; it stays.
+        settled: labels of causes.
+
+    Returns:
+        the fit, and about what the records are linearised for it.
     """
-    best = search.best
-    for cause in best.hypothesis.causes:
-        if cause.label in settled or cause.label not in best.hypothesis.labels:  # taken out since
-            continue
-        trials = rivals_of(search, best, cause.label)
-        if trials and trials[0].score < bic(best) - search.least:
-            best = refit_latent(search, prune(search, trials[0].fit), trials[0].label)
-            if search.leaves_noise(best):
-                break
-    return best
+    problem, best = search.problem, search.best
+    with about_another(problem):
+        for cause in best.hypothesis.causes:
+            if cause.label in settled or cause.label not in best.hypothesis.labels:  # taken out
+                continue
+            trials = rivals_of(search, best, cause.label)
+            rest = partial(search.fit, best.hypothesis.minus(cause.label), iterations=5)
+            without = attempt(f"without {cause.label}", rest) if allowed(problem) else None
+            if without is not None:
+                near = NEARLY * (without.cost - best.cost)
+                trials = settled_alike(search, trials, best, near)
+            if trials and trials[0].score < bic(best) - search.least:
+                if trials[0].about is not None:
+                    trials[0].about.restore(problem)
+                best = refit_latent(search, prune(search, trials[0].fit), trials[0].label)
+                if search.leaves_noise(best):
+                    break
+        return best, About.of(problem)

@@ -149,7 +149,10 @@ def run_search(search: Search) -> None:
                 break
             search.say("checking whether the causes chosen first were the right ones")
             settled = {label for label in search.labels if _tried_before(search, label)}
-            _accept(search, replace_causes(search, settled))
+            other, about = replace_causes(search, settled)
+            if other is not best and search.confirmed(other, about):
+                search.best = other
+                about.restore(search.problem)
             if search.best is best:
                 break
             if len(search.labels) < MOST_CAUSES:

@@ -356,7 +356,7 @@ def over_the_same_samples(search: Search, trials: Sequence[Trial]) -> list[Trial
 _SETTLED = 3
 _CLOSE = 5.0 * SAME
 # One that explains nearly as much may well explain more: it lacks at most this share.
-_NEARLY = 0.3
+NEARLY = 0.3
 # Of the cost without it, beside which a trial leaves little though more than inexactness explains.
 _TENTH = 0.1
 # The fall of chi-square above which a tolerance may be exceeded.
@@ -387,7 +387,9 @@ def exceeding_trials(search: Search) -> list[Trial]:
     return sorted(trials, key=lambda t: t.score)
 
 
-def settled_alike(search: Search, trials: Sequence[Trial], best: Fit | None = None) -> list[Trial]:
+def settled_alike(
+    search: Search, trials: Sequence[Trial], best: Fit | None = None, near: float = 0.0
+) -> list[Trial]:
     """Trials, the best first; close ones are compared each about its own inexact numbers.
 
     All were fitted about those of the hypothesis without them, which one may suit better than
@@ -397,6 +399,7 @@ def settled_alike(search: Search, trials: Sequence[Trial], best: Fit | None = No
         search: data and records.
         trials: the best first.
         best: the fit to come close to; the first trial's where None.
+        near: how much worse than `best` one may be, at least, to be close to it.
 
     Returns:
         all of them, the best first.
@@ -406,9 +409,9 @@ def settled_alike(search: Search, trials: Sequence[Trial], best: Fit | None = No
     mark = trials[0].fit if best is None else best
     faint = search.leaves_noise(search.baseline if best is not None else search.best)
     if best is None:
-        nearly = _NEARLY * (search.best.cost - mark.cost)
+        nearly = NEARLY * (search.best.cost - mark.cost)
     else:  # about the numbers of what is claimed its rivals seem worse than they are
-        nearly = (1.0 - _NEARLY) * (search.baseline.cost - mark.cost) if faint else 0.0
+        nearly = (1.0 - NEARLY) * (search.baseline.cost - mark.cost) if faint else near
     again: dict[str, Trial] = {}
     left = _SETTLED
     for trial in trials:
