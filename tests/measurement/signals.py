@@ -1,5 +1,7 @@
 """Records of arms that ring, in NumPy alone: damped sines, and noise whose truth is known."""
 
+from functools import cache
+
 import numpy as np
 from scipy.signal import lfilter, welch
 
@@ -46,6 +48,15 @@ def steady(time, weights, period=PERIOD, width=WIDTH, order=0):
     return whole - whole.mean()
 
 
+@cache
+def clean_signal(first, last, rate, seed, order, hits):
+    """Of samples at a rate, without noise; under blows without end where there is no number."""
+    time, weights = np.arange(first, last) / rate, np.random.default_rng(seed).normal(size=3)
+    if hits is None:
+        return steady(time, weights, order=order)
+    return burst(time, weights, hits, order=order)
+
+
 def noise(kind, samples, std, rng):
     """Noise of this standard deviation: white, or one of two colours."""
     white = rng.normal(size=samples + 500)
@@ -66,11 +77,10 @@ def record(file, rng, *, kind="white", level=0.01, hum=0.0, rate=2000.0, before=
     time = np.arange(first, round(duration * rate)) / rate
     arrays, truth = {}, {}
     for index, name in enumerate(CHANNELS):
-        weights = np.random.default_rng(index + seeds).normal(size=3)
         order = 1 if name.startswith("vel") else 2 if name.startswith("acc") else 0
-        clean = (steady(time, weights, order=order) if is_steady
-                 else burst(time, weights, hits, order=order))  # fmt: skip
-        clean *= LEVELS[index] / np.sqrt(np.mean(clean**2))
+        given = None if is_steady else hits
+        clean = clean_signal(first, round(duration * rate), rate, index + seeds, order, given)
+        clean = clean * (LEVELS[index] / np.sqrt(np.mean(clean**2)))
         if name not in channels:
             continue
         truth[name] = level * LEVELS[index]

@@ -117,12 +117,14 @@ def find_period(time: FloatArray, series: FloatArray, programmed: float) -> floa
     step = 0.1 * programmed**2 / (length * harmonics[-1])
     trials = programmed + step * np.arange(-int(_REACH * programmed / step),
                                            int(_REACH * programmed / step) + 1)  # fmt: skip
-    taper = np.hanning(x.size)
+    tapered = np.hanning(x.size) * x
     power = np.zeros(trials.size)
-    for k in harmonics:
-        for first in range(0, trials.size, 256):
-            wave = np.exp(-2j * np.pi * k * np.outer(1.0 / trials[first : first + 256], t))
-            power[first : first + 256] += np.abs(wave @ (taper * x)) ** 2
+    for first in range(0, trials.size, 256):
+        turn = np.exp(-2j * np.pi * np.outer(1.0 / trials[first : first + 256], t))
+        wave = np.ones_like(turn)
+        for _ in harmonics:
+            wave *= turn
+            power[first : first + 256] += np.abs(wave @ tapered) ** 2
     best = float(trials[power.argmax()])
     return _refined(t, x, harmonics, best, step)
 
