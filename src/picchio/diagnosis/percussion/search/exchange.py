@@ -197,7 +197,7 @@ def replace_causes(search: Search, settled: Set[str] = frozenset()) -> tuple[Fit
             without = attempt(f"without {cause.label}", rest) if allowed(problem) else None
             if without is not None:
                 near = NEARLY * (without.cost - best.cost)
-                trials = settled_alike(search, trials, best, near)
+                trials = settled_alike(search, trials, best, near=near)
             if trials and trials[0].score < bic(best) - search.least:
                 if trials[0].about is not None:
                     trials[0].about.restore(problem)

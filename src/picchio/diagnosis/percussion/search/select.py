@@ -169,7 +169,7 @@ def _grow(search: Search, stack: ExitStack) -> None:
     """Add causes until nothing pays, noise is left, or there are too many."""
     problem = search.problem
     for _ in range(MOST_CAUSES):
-        here = search.best
+        here = search.stood[search.labels] = search.best
         # What is left may be a remainder, or a cause that is small beside those that are known.
         enough = search.explains_enough(here)
         search.say(f"looking for cause {len(search.labels) + 1}")
@@ -188,7 +188,7 @@ def _grow(search: Search, stack: ExitStack) -> None:
         best = _chosen(search, trials, wider=not quiet)
         gain = search.pays(here, best.fit, best.about) if best is not None else 0.0
         if best is not None and best.about is not None and gain <= _CLEAR * search.least:
-            here = _settled_again(search)
+            here = search.stood[search.labels] = _settled_again(search)
             gain = search.pays(here, best.fit, best.about)
         if best is not None and gain < search.least:
             best = _of_another_kind(search, best)
@@ -354,14 +354,15 @@ def alternatives(search: Search) -> tuple[list[Trial], list[Trial]]:
     tried: list[Trial] = []
     for cause in best.hypothesis.causes:
         trials = _tried_before(search, cause.label)
-        if not trials or _hidden_by_tolerances(search):
+        without = search.stood.get(search.labels - {cause.label}, search.baseline)
+        if not trials or _hidden_by_tolerances(search, without):
             known = {t.label for t in trials if t.finished(search.records)}
             more = rivals_of(search, best, cause.label, MOST_RIVALS)
             if len(best.hypothesis.causes) == 1:
                 more = [*exceeding_trials(search), *more]
             trials = [*trials, *(t for t in more if t.label not in known)]
         finished = [t for t in trials if t.finished(search.records)]
-        finished = settled_alike(search, finished, best)
+        finished = settled_alike(search, finished, best, without)
         tried += finished
         for trial in finished:
             if trial.fit.hypothesis.labels == best.hypothesis.labels:
@@ -373,9 +374,9 @@ def alternatives(search: Search) -> tuple[list[Trial], list[Trial]]:
     return same, tried
 
 
-def _hidden_by_tolerances(search: Search) -> bool:
-    """Whether tolerances could make up for what is wrong, so that trials say little of rivals."""
-    return allowed(search.problem) and search.leaves_noise(search.baseline)
+def _hidden_by_tolerances(search: Search, without: Fit) -> bool:
+    """Whether tolerances could make up for what a fit lacks, so that trials say little of it."""
+    return allowed(search.problem) and search.leaves_noise(without)
 
 
 def _rise(search: Search, other: Fit) -> float:

@@ -79,6 +79,7 @@ class Search:
         say: told what is being done.
         finer: effects and targets that tell another cause with more numbers.
         steps: per step the trials, the best first.
+        stood: labels of causes -> the fit with these, where more were looked for beside them.
         pinned: whether noise was all that was left, and what is known is held fixed since.
         replacements: label of a cause -> the fit it was replaced in, and the trials.
     """
@@ -93,6 +94,7 @@ class Search:
     say: Callable[[str], None] = lambda text: None
     finer: Sequence[tuple[type[Effect], str]] = ()
     steps: list[list[Trial]] = field(default_factory=list)
+    stood: dict[frozenset[str], Fit] = field(default_factory=dict)
     pinned: bool = False
     replacements: dict[str, tuple[Fit, list[Trial]]] = field(default_factory=dict)
     least: float = field(init=False)

@@ -388,7 +388,11 @@ def exceeding_trials(search: Search) -> list[Trial]:
 
 
 def settled_alike(
-    search: Search, trials: Sequence[Trial], best: Fit | None = None, near: float = 0.0
+    search: Search,
+    trials: Sequence[Trial],
+    best: Fit | None = None,
+    without: Fit | None = None,
+    near: float = 0.0,
 ) -> list[Trial]:
     """Trials, the best first; close ones are compared each about its own inexact numbers.
 
@@ -399,6 +403,7 @@ def settled_alike(
         search: data and records.
         trials: the best first.
         best: the fit to come close to; the first trial's where None.
+        without: the fit that lacks what the trials are rivals of; the baseline where None.
         near: how much worse than `best` one may be, at least, to be close to it.
 
     Returns:
@@ -407,11 +412,12 @@ def settled_alike(
     if not allowed(search.problem) or not trials:
         return list(trials)
     mark = trials[0].fit if best is None else best
-    faint = search.leaves_noise(search.baseline if best is not None else search.best)
+    before = search.best if best is None else without or search.baseline
+    faint = search.leaves_noise(before)
     if best is None:
-        nearly = NEARLY * (search.best.cost - mark.cost)
+        nearly = NEARLY * (before.cost - mark.cost)
     else:  # about the numbers of what is claimed its rivals seem worse than they are
-        nearly = (1.0 - NEARLY) * (search.baseline.cost - mark.cost) if faint else near
+        nearly = (1.0 - NEARLY) * (before.cost - mark.cost) if faint else near
     again: dict[str, Trial] = {}
     left = _SETTLED
     for trial in trials:
