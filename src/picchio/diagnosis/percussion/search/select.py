@@ -169,7 +169,8 @@ def _grow(search: Search, stack: ExitStack) -> None:
     """Add causes until nothing pays, noise is left, or there are too many."""
     problem = search.problem
     for _ in range(MOST_CAUSES):
-        here = search.stood[search.labels] = search.best
+        here = search.best
+        search.stood[search.labels] = here, About.of(problem)
         # What is left may be a remainder, or a cause that is small beside those that are known.
         enough = search.explains_enough(here)
         search.say(f"looking for cause {len(search.labels) + 1}")
@@ -188,7 +189,8 @@ def _grow(search: Search, stack: ExitStack) -> None:
         best = _chosen(search, trials, wider=not quiet)
         gain = search.pays(here, best.fit, best.about) if best is not None else 0.0
         if best is not None and best.about is not None and gain <= _CLEAR * search.least:
-            here = search.stood[search.labels] = _settled_again(search)
+            here = _settled_again(search)
+            search.stood[search.labels] = here, About.of(problem)
             gain = search.pays(here, best.fit, best.about)
         if best is not None and gain < search.least:
             best = _of_another_kind(search, best)
@@ -354,12 +356,13 @@ def alternatives(search: Search) -> tuple[list[Trial], list[Trial]]:
     tried: list[Trial] = []
     for cause in best.hypothesis.causes:
         trials = _tried_before(search, cause.label)
-        without = search.stood.get(search.labels - {cause.label}, search.baseline)
-        if not trials or _hidden_by_tolerances(search, without):
+        without, about = search.before(cause.label)
+        hidden = _hidden_by_tolerances(search, without)
+        if not trials or hidden:
             known = {t.label for t in trials if t.finished(search.records)}
             more = rivals_of(search, best, cause.label, MOST_RIVALS)
-            if len(best.hypothesis.causes) == 1:
-                more = [*exceeding_trials(search), *more]
+            if hidden or len(best.hypothesis.causes) == 1:
+                more = [*exceeding_trials(search, without, about), *more]
             trials = [*trials, *(t for t in more if t.label not in known)]
         finished = [t for t in trials if t.finished(search.records)]
         finished = settled_alike(search, finished, best, without)

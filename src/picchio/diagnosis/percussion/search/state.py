@@ -79,7 +79,8 @@ class Search:
         say: told what is being done.
         finer: effects and targets that tell another cause with more numbers.
         steps: per step the trials, the best first.
-        stood: labels of causes -> the fit with these, where more were looked for beside them.
+        stood: labels of causes -> the fit with these beside which more were looked for, and about
+            what the records were linearised for it.
         pinned: whether noise was all that was left, and what is known is held fixed since.
         replacements: label of a cause -> the fit it was replaced in, and the trials.
     """
@@ -94,7 +95,7 @@ class Search:
     say: Callable[[str], None] = lambda text: None
     finer: Sequence[tuple[type[Effect], str]] = ()
     steps: list[list[Trial]] = field(default_factory=list)
-    stood: dict[frozenset[str], Fit] = field(default_factory=dict)
+    stood: dict[frozenset[str], tuple[Fit, About]] = field(default_factory=dict)
     pinned: bool = False
     replacements: dict[str, tuple[Fit, list[Trial]]] = field(default_factory=dict)
     least: float = field(init=False)
@@ -119,6 +120,14 @@ class Search:
     def gained(self) -> float:
         """Fall of BIC by what was found."""
         return bic(self.baseline) - bic(self.best)
+
+    def before(self, label: str) -> tuple[Fit, About]:
+        """What stood before a cause, as in `stood`; the baseline where that is not known.
+
+        Args:
+            label: of one of the causes that stand.
+        """
+        return self.stood.get(self.labels - {label}, (self.baseline, self.about))
 
     def fit(self, hypothesis: Hypothesis, iterations: int, rival: float = float("inf")) -> Fit:
         """A hypothesis fitted to all of the records that are fitted.

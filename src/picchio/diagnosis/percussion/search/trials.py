@@ -363,24 +363,26 @@ _TENTH = 0.1
 _EXCEEDING = 9.0
 
 
-def exceeding_trials(search: Search) -> list[Trial]:
+def exceeding_trials(search: Search, without: Fit, about: About) -> list[Trial]:
     """What stands for each tolerance that may be exceeded, fitted; the best first.
 
     Tolerances together may have made up for one of them, so that its slope alone promises little.
 
     Args:
         search: data and records.
+        without: a fit that may lack one.
+        about: what the records were linearised about for it.
     """
-    problem, baseline, trials = search.problem, search.baseline, []
-    with about_another(problem, search.about):
+    problem, trials = search.problem, []
+    with about_another(problem, about):
         if problem.marginal is None:
             return []
-        raw = problem.unmarginalised(baseline.hypothesis.effects, baseline.records)
-        falls = problem.marginal.freed(raw, [record.name for record in baseline.records])
+        raw = problem.unmarginalised(without.hypothesis.effects, without.records)
+        falls = problem.marginal.freed(raw, [record.name for record in without.records])
         for kind, target in search.candidates:
             label = f"{kind.name}:{target}"
-            if falls.get(label, 0.0) > _EXCEEDING:
-                start = baseline.hypothesis.plus(kind(target))
+            if falls.get(label, 0.0) > _EXCEEDING and label not in without.hypothesis.labels:
+                start = without.hypothesis.plus(kind(target))
                 found = attempt(label, partial(search.fit, start, iterations=6))
                 if found is not None:
                     trials.append(Trial(label, found, bic(found), falls[label]))
