@@ -90,6 +90,29 @@ def test_confidence_is_of_the_poses_not_of_their_sum(problem, base):
     assert confidence(like([100.0] * 3), like([100.0] * 3)) == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize(
+    ("falls", "sure"),
+    [
+        ((100.0, 570.0, 720.0, -45.0, 100.0, 1130.0), True),  # joint 1 stiffer, or a hysteresis
+        ((100.0, 570.0, 720.0, -45.0, -45.0, 1130.0), False),
+        ((100.0, 570.0, -45.0, 1130.0), False),
+        ((900.0, 0.0, 0.0, 0.0, 0.0, 0.0), False),
+    ],
+)
+def test_of_many_poses_no_single_one_decides(problem, base, falls, sure):
+    record = problem.records[0]
+    records = [
+        type(record)(record.setup, record.values, record.noise, i) for i in range(len(falls))
+    ]
+
+    def like(sums):
+        rows = [np.full((1, 4), np.sqrt(s / 4.0)) for s in sums]
+        return Fit(base.hypothesis, rows, None, sum(sums), tuple(records), None)
+
+    found = confidence(like([100.0] * len(falls)), like([100.0 + fall for fall in falls]))
+    assert (found > 0.99) == sure
+
+
 @pytest.mark.parametrize(("less", "sure"), [(30.0, 0.5), (70.0, 1.0)])
 def test_a_single_pose_counts_only_beyond_doubt(problem, base, less, sure):
     record = problem.records[0]

@@ -12,6 +12,7 @@ from collections.abc import Sequence, Set
 
 import numpy as np
 
+from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.criteria.identifiability import unconstrained_range
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem
 from picchio.diagnosis.percussion.fit.drawn import hidden_cost
@@ -24,6 +25,8 @@ from picchio.model.effects.registry import effect_class
 SAME = 10.0
 _DECISIVE = 60.0
 _CHANCE = 2.0
+# As many poses as are needed to do without the one that says most for, and most against.
+_MANY = 5
 _PARALLEL = 1.0 - 1e-9
 # What is known of a cause's number beforehand, in typical sizes or e-folds: hardly anything.
 _VAGUE = 3.0
@@ -56,15 +59,14 @@ def confidence(better: Fit, other: Fit) -> float:
     """That a fit is better than another one of the same records.
 
     From the differences of the poses' scores and their spread (Student's t). A single pose has no
-    spread: what it says counts only where it decides beyond doubt on its own. What is known
-    beforehand of fitted numbers, such as a tolerance, belongs to no pose: all have a share of it.
+    spread: what it says counts only where it decides beyond doubt on its own. Of five or more no
+    single one decides against what all the others but the one that says most agree on. What is
+    known beforehand of fitted numbers, such as a tolerance, belongs to no pose: all have a share.
 
     Args:
         better: the one with less left.
         other: the rival.
     """
-    from scipy.stats import t as student
-
     poses = sorted({r.pose for r in better.records})
     difference = np.zeros(len(poses))
     for record, a, b in zip(better.records, better.residuals, other.residuals, strict=True):
@@ -75,10 +77,20 @@ def confidence(better: Fit, other: Fit) -> float:
         return 1.0 if difference.sum() > _DECISIVE else 0.5
     # A pose that decides beyond doubt on its own counts as one: how far beyond says nothing.
     difference = np.clip(difference, -_DECISIVE, _DECISIVE)
-    total, spread = difference.mean(), difference.std(ddof=1) / math.sqrt(len(poses))
+    sure = _positive(difference)
+    if len(poses) >= _MANY:
+        sure = max(sure, _positive(np.sort(difference)[1:-1]))
+    return sure
+
+
+def _positive(values: FloatArray) -> float:
+    """How sure it is that the mean of what values are drawn from is above nothing."""
+    from scipy.stats import t as student
+
+    spread = values.std(ddof=1) / math.sqrt(values.size)
     # What chance alone moves a pose's score by: that of log-likelihoods a few units apart.
-    spread = math.hypot(spread, _CHANCE / math.sqrt(len(poses)))
-    return float(student.cdf(total / spread, len(poses) - 1))
+    spread = math.hypot(spread, _CHANCE / math.sqrt(values.size))
+    return float(student.cdf(values.mean() / spread, values.size - 1))
 
 
 def bic_difference(problem: Problem, best: Fit, other: Fit) -> float:
