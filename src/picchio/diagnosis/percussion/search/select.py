@@ -54,6 +54,8 @@ from picchio.model.effects.effect import Effect
 MOST_CAUSES = 3
 # Of the least gain: beyond that no fit without the cause comes near.
 _CLEAR = 10.0
+# How many times what its slopes promised a cause explains where something else made up for it.
+_FORETOLD = 2.0
 # How often every cause is replaced in turn, and up to what share of the baseline's cost that is
 # worth while.
 _SWEEPS = 2
@@ -192,6 +194,9 @@ def _grow(search: Search, stack: ExitStack) -> None:
             here = _settled_again(search)
             search.stood[search.labels] = here, About.of(problem)
             gain = search.pays(here, best.fit, best.about)
+        if best is not None and gain >= search.least and quiet and _made_up_for(search, best):
+            best = _of_all(search, trials, best)
+            gain = search.pays(here, best.fit, best.about)
         if best is not None and gain < search.least:
             best = _of_another_kind(search, best)
             gain = search.pays(here, best.fit, best.about)
@@ -229,6 +234,27 @@ def _grow(search: Search, stack: ExitStack) -> None:
             _settle(search, best.label)
         if len(search.labels) >= MOST_CAUSES:
             break
+
+
+def _made_up_for(search: Search, best: Trial) -> bool:
+    """Whether what is not exact had made up for a cause: it explains far more than it promised."""
+    gain = search.best.cost - best.fit.cost
+    return allowed(search.problem) and gain > _FORETOLD * best.promise
+
+
+def _of_all(search: Search, trials: list[Trial], best: Trial) -> Trial:
+    """The best of all candidates, once one pays that what is not exact had made up for.
+
+    What slopes promise of such a cause says little of which it is: those that promised less are
+    tried as well, and come to `trials`.
+    """
+    here, known = search.best, {trial.label for trial in trials}
+    looked = partial(try_candidates, search, here.hypothesis, whole=True, wide=True)
+    more = [t for t in attempt("all candidates", looked) or () if t.label not in known]
+    more = [t for t in more if t.finished(search.records)]
+    trials += settled_alike(search, more, best.fit, here)
+    trials.sort(key=lambda t: t.score)
+    return _chosen(search, trials, wider=False) or best
 
 
 def _of_another_kind(search: Search, best: Trial) -> Trial:
