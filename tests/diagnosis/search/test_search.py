@@ -17,7 +17,7 @@ from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.search import trials
+from picchio.diagnosis.percussion.search import select, trials
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.search.exchange import (
     exchange,
@@ -501,6 +501,40 @@ def test_as_much_as_settling_gave_the_best_it_may_give_another(faint, two_causes
     best = trials.settled_alike(search, tried)[0]
     assert settled == (["payload:tool", "link_mass:link_2"] if faint else ["payload:tool"])
     assert best.label == settled[-1]
+
+
+def test_where_tolerances_made_up_for_a_cause_those_that_promised_less_are_tried(
+    two_causes, monkeypatch
+):
+    """Slopes promised 160 of a link, 26 of the payload: it did better about its own numbers."""
+    problem, baseline, *_ = two_causes
+    search = search_of(problem, replace(baseline, cost=2000.0))
+    link, payload = (
+        replace(trial_with(problem, baseline, *label.split(":"), **{key: 1.1}), promise=promise)
+        for label, key, promise in (
+            ("link_mass:link_2", "scale", 160.0),
+            ("payload:tool", "mass", 26.0),
+        )
+    )
+    link, payload = (
+        replace(t, fit=replace(t.fit, cost=cost), score=cost)
+        for t, cost in ((link, 1550.0), (payload, 1500.0))
+    )
+    asked = []
+
+    def looked(search, hypothesis, **options):
+        asked.append(options)
+        return [payload, link]
+
+    monkeypatch.setattr(select, "allowed", lambda problem: True)
+    monkeypatch.setattr(select, "try_candidates", looked)
+    monkeypatch.setattr(select, "settled_alike", lambda search, more, best, without: more)
+    assert select._made_up_for(search, link)
+    assert not select._made_up_for(search, replace(link, promise=400.0))
+    tried = [link]
+    assert select._of_all(search, tried, link) is payload
+    assert tried == [payload, link]
+    assert asked == [{"whole": True, "wide": True}]
 
 
 def test_another_kind_of_filter_is_tried_even_where_noise_is_left(arm):
