@@ -122,7 +122,7 @@ def find_period(time: FloatArray, series: FloatArray, programmed: float) -> floa
     for first in range(0, trials.size, 256):
         turn = np.exp(-2j * np.pi * np.outer(1.0 / trials[first : first + 256], t))
         wave = np.ones_like(turn)
-        for _ in harmonics:
+        for _ in harmonics:  # each turns once more than the last
             wave *= turn
             power[first : first + 256] += np.abs(wave @ tapered) ** 2
     best = float(trials[power.argmax()])

@@ -152,19 +152,19 @@ def run_search(search: Search) -> None:
             search.say("checking whether the causes chosen first were the right ones")
             settled = {label for label in search.labels if _tried_before(search, label)}
             other, about = replace_causes(search, settled)
-            if other is not best and search.confirmed(other, about):
-                search.best = other
-                about.restore(search.problem)
+            _accept(search, other, about)
             if search.best is best:
                 break
             if len(search.labels) < MOST_CAUSES:
                 _grow(search, stack)
 
 
-def _accept(search: Search, other: Fit) -> None:
+def _accept(search: Search, other: Fit, about: About | None = None) -> None:
     """Take a fit in place of the best, if the records held out do not speak against it."""
-    if other is not search.best and search.confirmed(other):
+    if other is not search.best and search.confirmed(other, about):
         search.best = other
+        if about is not None:
+            about.restore(search.problem)
 
 
 def _grow(search: Search, stack: ExitStack) -> None:
@@ -345,9 +345,8 @@ def _settle(search: Search, newest: str) -> None:
         search.best = prune(search, again, alone=False)
     quiet = search.leaves_noise(search.best)
     found = exchange_settled(search, simpler=quiet)
-    if found is not None and search.confirmed(*found):
-        search.best, about = found
-        about.restore(search.problem)
+    if found is not None:
+        _accept(search, *found)
         quiet = search.leaves_noise(search.best)
     if quiet:
         return

@@ -29,7 +29,7 @@ _FARTHER = 3.0
 FARTHEST = 3.5
 # Chi-square per sample, up to a blow, above which more is wrong than a record's own numbers.
 _NOT_ITS_OWN = 10.0
-# How many other ways are tried past a kink, of all of a record's.
+# How many other ways past a kink are tried in a record, all in all.
 _OTHERS = 16
 # How often numbers are moved by slopes of their own up to a blow, how much a step is damped, and
 # what fall of chi-square is worth one step more.
