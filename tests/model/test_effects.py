@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
@@ -440,6 +441,27 @@ def test_a_measured_force_rebounds_and_lasts_longer(hits):
     plain = effect_class("pulse_shape")("tool", blend=0.5)
     with pytest.raises(InputError, match=r"pulse_shape: .* no other shape"):
         plain.blows(blows, Conditions())
+
+
+@pytest.mark.parametrize("hits", [5, None])
+@pytest.mark.parametrize("order", list(itertools.permutations(range(3))))
+def test_another_rate_moves_the_programme_and_nothing_else(order, hits):
+    """An echo comes as long after its blow, and a blow out of step as much, in any order."""
+    scale, ratio, delay = 1.05, 0.3, 0.013
+    late = (0.0, 1e-3, -2e-3, 5e-4, 0.0)
+    effects = [
+        effect_class("pulse_rate")("tool", scale=scale),
+        effect_class("rebound")("tool", ratio=ratio, delay=delay),
+        effect_class("pulse_jitter")("tool", std=1e-3).with_hidden({"r": late} if hits else {}),
+    ]
+    blows = Blows.of(BLOWS, hits, DIRECTION)
+    for k in order:
+        blows = effects[k].blows(blows, Conditions(record="r"))
+    due = [h * scale * BLOWS.period + (late[h] if hits else 0.0) for h in range(hits or 1)]
+    expected = [(t, 1.0) for t in due] + [(t + delay, ratio) for t in due]
+    found = zip(blows.start, blows.height / BLOWS.force, strict=True)
+    np.testing.assert_allclose(sorted(found), sorted(expected), rtol=1e-12)
+    assert blows.period == (None if hits else pytest.approx(scale * BLOWS.period))
 
 
 def test_blows_longer_than_their_period_add_up():

@@ -41,6 +41,7 @@ from picchio.diagnosis.percussion.tolerance.linearise import (
     released,
     settled,
     silent,
+    to_the_last,
 )
 from picchio.diagnosis.percussion.tolerance.marginal import Marginal
 from picchio.diagnosis.percussion.tolerance.nudges import Inexact, inexact, nudged, principal
@@ -492,6 +493,32 @@ def test_what_stands_far_off_is_settled_anew_only_where_less_is_in_sight(
         assert not asked and problem.marginal is about.marginal and problem.sizes is about.sizes
         assert released(problem, off, least=-math.inf).cost <= off.cost
         assert asked
+
+
+def test_values_are_told_of_a_fit_that_slopes_foretell(wrong_everywhere, monkeypatch):
+    """From wherever the search left what is not exact, the same values: one step of slopes errs."""
+    robot, campaign = wrong_everywhere
+    problem = Problem(robot, campaign)
+    told = {}
+    with one_thread():
+        start = Hypothesis.baseline(robot, campaign.tolerance)
+        found = settled(problem, fit_growing(problem, start), problem.records)
+        near = About.of(problem)
+        sizes = {name: size.copy() for name, size in problem.sizes.items()}
+        shared = near.marginal.slopes[problem.records[0].name].own
+        for size in sizes.values():
+            size[shared:] = 2.0
+        for way in ("near", "far", "one step"):
+            near.restore(problem)
+            if way != "near":
+                problem.sizes = sizes
+            if way == "one step":
+                monkeypatch.setattr(linearised, "ELSE", 0.0)
+            fitted = to_the_last(problem, found)
+            told[way] = fitted.hypothesis.vector()
+    spread = np.sqrt(fitted.covariance().diagonal())
+    assert np.abs((told["far"] - told["near"]) / spread).max() < 0.1
+    assert np.abs((told["one step"] - told["near"]) / spread).max() > 2.0
 
 
 @pytest.mark.slow

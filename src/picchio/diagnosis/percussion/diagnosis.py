@@ -60,9 +60,9 @@ from picchio.diagnosis.percussion.search.state import LEAST_GAIN, Search, Trial
 from picchio.diagnosis.percussion.tolerance.in_turns import refit_in_turns
 from picchio.diagnosis.percussion.tolerance.linearise import (
     about_another,
-    linearise,
     seek_the_silent,
     settled,
+    to_the_last,
 )
 from picchio.diagnosis.result import Cause, Diagnosis, Estimate
 from picchio.model.effects.effect import Effect
@@ -245,12 +245,8 @@ def _concluded(search: Search, nominal: Fit, before: Evidence) -> PercussionDiag
         rivals = _rivals(search, whole)
         causes = fitted_causes(search, whole, rivals)
     if allowed(problem):
-        linearise(problem, whole.hypothesis, every, both=True)
-        whole = refit(problem, whole.hypothesis, every)
-        # Where it comes to stand, or slopes and Jacobian would differ, and what no record can tell
-        # would pass for known.
-        linearise(problem, whole.hypothesis, every, both=True)
-        whole = fit(problem, whole.hypothesis, every, None, iterations=0, with_jacobian=True)
+        whole = to_the_last(problem, whole)
+        after = fit_evidence(problem, whole)
     off = exceeded(problem, whole)
     left_open, stated = fitted_spread(problem, whole), as_stated(problem, whole)
     beyond = off is not None and off.improbable

@@ -20,9 +20,8 @@ class PulseRate(Effect):
     tried = tuple({"scale": s} for s in (0.96, 0.985, 0.995, 1.005, 1.015, 1.04))
 
     def blows(self, blows: Blows, conditions: Conditions) -> Blows:
-        """Stretch the times of the blows."""
+        """Stretch the programme; what comes after each blow, or shifts it, stays as it is."""
         scale = self.values["scale"]
         period = None if blows.period is None else scale * blows.period
-        return blows.change(
-            start=scale * blows.start, period=period, interval=scale * blows.interval
-        )
+        start = blows.start + (scale - 1.0) * blows.interval * blows.hit
+        return blows.change(start=start, period=period, interval=scale * blows.interval)
