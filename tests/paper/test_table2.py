@@ -28,9 +28,10 @@ def test_peaks_and_ranges_are_the_exact_ones(duty, period):
     world = World(Assumptions(**(WORLD | {"period": period, "duty": duty}), rows=1, columns=3))
     poses = world.rivet_poses
     mass, jacobian = world.robot.mass_and_jacobian(poses)
-    peak, span = steady_extremes(
-        mass, jacobian, world.robot.stiffness, world.given.damping_ratio, world.blows, np.eye(3)
-    )
+    (peak,), (span,) = steady_extremes(
+        mass[None], jacobian[None], world.robot.stiffness,
+        np.array([world.given.damping_ratio]), [world.blows], np.eye(3),
+    )  # fmt: skip
     for k, pose in enumerate(poses):
         response = steady_state(modal_analysis(world.model.linear_system(pose)), world.blows)
         for d in range(3):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -42,23 +43,29 @@ class Place:
         """The arm; its damping and shafts are not used here."""
         return arm(self.base)
 
-    def deflections(self, v: FloatArray, printed: Printed) -> FloatArray | None:
-        """The deflections (3 directions, k rivets, 3 joints) rad; None where one is out of reach.
+    def deflections(self, v: FloatArray, printed: Printed) -> FloatArray:
+        """The deflections (..., 3 directions, k rivets, 3 joints), rad; NaN where out of reach.
 
         Args:
-            v: (unknowns,) of the fit.
+            v: (..., unknowns) of the fit: many worlds at once take little longer than one.
             printed: what the paper prints.
         """
-        given = self.base.but(**decode(v))
-        poses = poses_at(rivet_points(given), given.elbow)
-        if np.isnan(poses).any():
-            return None
-        mass, jacobian = self.robot.mass_and_jacobian(poses)
-        blows = PulseTrain(printed.task.force, given.period, given.width)
-        found = steady_extremes(
-            mass, jacobian, self.robot.stiffness, given.damping_ratio, blows, printed.directions
-        )
-        return found[0] if self.measure == "peak" else found[1]
+        worlds = [self.base.but(**decode(x)) for x in v.reshape(-1, v.shape[-1])]
+        poses = poses_at(np.array([rivet_points(given) for given in worlds]), self.base.elbow)
+        within = ~np.isnan(poses).any(axis=(1, 2))
+        rivets, joints = poses.shape[1:]
+        found = np.full((len(worlds), len(printed.directions), rivets, joints), np.nan)
+        if within.any():
+            mass, jacobian = self.robot.mass_and_jacobian(poses[within].reshape(-1, joints))
+            reached = [worlds[k] for k in np.flatnonzero(within)]
+            extremes = steady_extremes(
+                mass.reshape(-1, rivets, joints, joints), jacobian.reshape(-1, rivets, 3, joints),
+                self.robot.stiffness, np.array([given.damping_ratio for given in reached]),
+                [PulseTrain(printed.task.force, g.period, g.width) for g in reached],
+                printed.directions,
+            )  # fmt: skip
+            found[within] = extremes[0] if self.measure == "peak" else extremes[1]
+        return found.reshape(*v.shape[:-1], *found.shape[1:])
 
 
 def encode(values: dict[str, float]) -> FloatArray:
@@ -83,47 +90,50 @@ def steady_extremes(
     mass: FloatArray,
     jacobian: FloatArray,
     stiffness: FloatArray,
-    damping_ratio: float,
-    blows: PulseTrain,
+    damping_ratio: FloatArray,
+    blows: Sequence[PulseTrain],
     directions: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Peak and range of the steady state by a Fourier sum: to 1 in 1000, for many trials.
 
     Args:
-        mass: (k, n, n).
-        jacobian: (k, 3, n).
+        mass: (w worlds, k, n, n).
+        jacobian: (w, k, 3, n).
         stiffness: (n,).
-        damping_ratio: of every mode.
-        blows: the pulses.
+        damping_ratio: (w,) of every mode.
+        blows: w; the pulses.
         directions: (d, 3).
 
     Returns:
-        largest magnitude, and crest less trough, each (d, k, n) rad.
+        largest magnitude, and crest less trough, each (w, d, k, n) rad.
     """
     root = np.linalg.inv(np.linalg.cholesky(mass))
-    squared, vectors = np.linalg.eigh((root * stiffness) @ root.transpose(0, 2, 1))
-    shapes = root.transpose(0, 2, 1) @ vectors
-    push = directions @ (jacobian @ shapes)  # (k, d, modes)
-    wave = 2.0 * np.pi / blows.period * np.arange(_SAMPLES // 2)
-    force = printed_series(blows, _SAMPLES // 2 - 1)
-    force[1:] /= 2.0  # the other half stands at the negative frequencies
+    squared, vectors = np.linalg.eigh((root * stiffness) @ root.swapaxes(-1, -2))
+    shapes = root.swapaxes(-1, -2) @ vectors
+    push = directions @ (jacobian @ shapes)  # (w, k, d, modes)
+    period = np.array([each.period for each in blows])
+    wave = 2.0 * np.pi / period[:, None] * np.arange(_SAMPLES // 2)
+    force = np.array([printed_series(each, _SAMPLES // 2 - 1) for each in blows])
+    force[:, 1:] /= 2.0  # the other half stands at the negative frequencies
+    wave, force = wave[:, None, None], force[:, None, None]
+    ratio = np.asarray(damping_ratio)[:, None, None, None]
     gap = squared[..., None] - wave**2
-    modal = force / (gap + (2j * damping_ratio) * np.sqrt(squared)[..., None] * wave)
-    history = np.fft.irfft(modal, n=_SAMPLES, axis=-1) * _SAMPLES  # (k, modes, samples)
-    mixed = shapes[:, None] * push[:, :, None, :]  # (k, d, joints, modes)
-    found = np.matmul(mixed.reshape(len(mass), -1, len(stiffness)), history)
+    modal = force / (gap + (2j * ratio) * np.sqrt(squared)[..., None] * wave)
+    history = np.fft.irfft(modal, n=_SAMPLES, axis=-1) * _SAMPLES  # (w, k, modes, samples)
+    mixed = shapes[..., None, :, :] * push[..., None, :]  # (w, k, d, joints, modes)
+    found = np.matmul(mixed.reshape(*mass.shape[:2], -1, len(stiffness)), history)
     high, low = _crest(found), -_crest(-found)
-    shape = (len(mass), len(directions), len(stiffness))
+    shape = (*mass.shape[:2], len(directions), len(stiffness))
     peak = np.maximum(np.abs(high), np.abs(low)).reshape(shape)
-    return np.moveaxis(peak, 1, 0), np.moveaxis((high - low).reshape(shape), 1, 0)
+    return np.moveaxis(peak, 2, 1), np.moveaxis((high - low).reshape(shape), 2, 1)
 
 
 def _crest(history: FloatArray) -> FloatArray:
     """The top of the parabola through the highest sample and its neighbours."""
-    rows, columns = np.indices(history.shape[:2])
-    top = history.argmax(axis=-1)
-    here = history[rows, columns, top]
-    before, after = history[rows, columns, top - 1], history[rows, columns, (top + 1) % _SAMPLES]
+    top = history.argmax(axis=-1)[..., None]
+    before, here, after = (
+        np.take_along_axis(history, (top + step) % _SAMPLES, axis=-1)[..., 0] for step in (-1, 0, 1)
+    )
     bend = 2.0 * here - before - after
     rise = (after - before) ** 2 / 8.0
     return np.asarray(here + np.divide(rise, bend, out=np.zeros_like(here), where=bend > 0.0))
