@@ -60,6 +60,22 @@ def class_of(effect, target=""):
     return next((kind for kind in CLASSES if effect in kind), {effect})
 
 
+def all_but(*names):
+    """Of the catalogue: what to leave out so that these compete, and a test takes half as long."""
+    assert set(names) <= set(catalogue()), names
+    return set(catalogue()) - set(names)
+
+
+# What may stand for one another: by the shape of what is read, and by how heavy the robot is.
+LIKE_A_FILTER = (
+    "pulse_width", "pulse_shape", "rebound", "sensor_lowpass", "sensor_delay", "mount_resonance",
+)  # fmt: skip
+LIKE_A_MASS = (
+    "link_mass", "payload", "joint_inertia", "joint_stiffness", "base_compliance",
+    "transverse_compliance",
+)  # fmt: skip
+
+
 def name_of(case):
     """What a case is called: it is its own seed, too."""
     parts = [case["robot"], case["kind"], case.get("effect") or "", case["snr"], case["draw"]]

@@ -7,20 +7,28 @@ import trial
 @pytest.mark.slow
 @pytest.mark.minutes
 @pytest.mark.parametrize(
-    ("draw", "causes"),
+    ("draw", "causes", "rivals"),
     [
         # The second is a hundredth of the first: it passed for a remainder that is allowed.
-        (8003, {"clock_drift", "force_direction"}),
+        (8003, {"clock_drift", "force_direction"}, (
+            "force_amplitude", "pulse_jitter", "pulse_rate", "sensor_delay", "sensor_misalignment",
+            "tool_offset",
+        )),
         # What is never exact, 87 deviations off, made up for the swapped axes.
-        (8002, {"modal_damping", "sensor_axes"}),
+        (8002, {"modal_damping", "sensor_axes"}, (
+            "force_direction", "joint_damping", "joint_stiffness", "sensor_gain",
+            "sensor_misalignment", "servo_compliance",
+        )),
         # A rise that is shorter than the steps of the sensor's filter was none to it.
-        (20001, {"mount_resonance", "tool_offset"}),
+        (20001, {"mount_resonance", "tool_offset"},
+         (*trial.LIKE_A_FILTER, "force_direction", "sensor_misalignment")),
     ],
-)
-def test_both_are_told(draw, causes):
+    ids=["8003", "8002", "20001"],
+)  # fmt: skip
+def test_both_are_told(draw, causes, rivals):
     """The data are of a simulator of their own, as in the blind trial that found these."""
     case = {"robot": "fanuc_like_3dof", "kind": "pair", "snr": 40, "draw": draw, "mismatch": 1.0}
-    found = trial.run(case, 1)
+    found = trial.run(case, 1, without=trial.all_but(*causes, *rivals))
     assert {effect for effect, _ in found["truth"]} == causes
     assert found["outcome"] == "right", found["claimed"]
     assert found["false"] == []
