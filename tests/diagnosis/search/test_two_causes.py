@@ -22,10 +22,8 @@ import trial
         # A rise that is shorter than the steps of the sensor's filter was none to it.
         (20001, {"mount_resonance", "tool_offset"},
          (*trial.LIKE_A_FILTER, "force_direction", "sensor_misalignment")),
-        # Slopes foretold noise beside the first where there was seven times as much.
-        (90986, {"mains_hum", "modal_damping"}, ("joint_damping", "payload", "sensor_gain")),
     ],
-    ids=["8003", "8002", "20001", "90986"],
+    ids=["8003", "8002", "20001"],
 )  # fmt: skip
 def test_both_are_told(draw, causes, rivals):
     """The data are of a simulator of their own, as in the blind trial that found these."""

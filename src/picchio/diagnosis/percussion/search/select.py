@@ -47,7 +47,6 @@ from picchio.diagnosis.percussion.tolerance.linearise import (
     about_another,
     released,
     settled,
-    to_the_last,
 )
 from picchio.diagnosis.result import BEYOND_DOUBT, Estimate
 from picchio.model.effects.effect import Effect
@@ -178,10 +177,6 @@ def _grow(search: Search, stack: ExitStack) -> None:
         enough = search.explains_enough(here)
         search.say(f"looking for cause {len(search.labels) + 1}")
         quiet = search.leaves_noise(here)
-        if quiet:  # what is left to settle is worth more than a last small cause
-            here = _settled_again(search)
-            search.stood[search.labels] = here, About.of(problem)
-            quiet = search.leaves_noise(here)
         if quiet and not search.pinned:
             stack.enter_context(problem.pinned(here.hypothesis.effects))
             search.pinned = True
@@ -318,17 +313,10 @@ def _settled_again(search: Search) -> Fit:
 
     Else what looks like a small cause may be no more than a round that it had more.
     """
-    here, problem = search.best, search.problem
-    if not allowed(problem) or problem.marginal is None:
-        return here
-    before = About.of(problem)
-    again = attempt("settled to the last", partial(to_the_last, problem, here, both=False))
-    if again is None:
-        before.restore(problem)
-        return here
-    # It may cost more: what slopes foretold of the other was not true.
-    if search.baseline is here:
-        search.baseline, search.about = again, About.of(problem)
+    here = search.best
+    again = _settled_further(search.problem, here, search.records)
+    if search.baseline is here and again is not here:
+        search.baseline, search.about = again, About.of(search.problem)
     search.best = again
     return again
 
