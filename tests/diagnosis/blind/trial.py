@@ -66,13 +66,9 @@ def all_but(*names):
     return set(catalogue()) - set(names)
 
 
-# What may stand for one another: by the shape of what is read, and by how heavy the robot is.
+# What may stand for one another by the shape of what is read.
 LIKE_A_FILTER = (
     "pulse_width", "pulse_shape", "rebound", "sensor_lowpass", "sensor_delay", "mount_resonance",
-)  # fmt: skip
-LIKE_A_MASS = (
-    "link_mass", "payload", "joint_inertia", "joint_stiffness", "base_compliance",
-    "transverse_compliance",
 )  # fmt: skip
 
 

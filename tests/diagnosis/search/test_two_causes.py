@@ -15,10 +15,7 @@ import trial
             "tool_offset",
         )),
         # What is never exact, 87 deviations off, made up for the swapped axes.
-        (8002, {"modal_damping", "sensor_axes"}, (
-            "force_direction", "joint_damping", "joint_stiffness", "sensor_gain",
-            "sensor_misalignment", "servo_compliance",
-        )),
+        (8002, {"modal_damping", "sensor_axes"}, ()),
         # A rise that is shorter than the steps of the sensor's filter was none to it.
         (20001, {"mount_resonance", "tool_offset"},
          (*trial.LIKE_A_FILTER, "force_direction", "sensor_misalignment")),
@@ -26,9 +23,13 @@ import trial
     ids=["8003", "8002", "20001"],
 )  # fmt: skip
 def test_both_are_told(draw, causes, rivals):
-    """The data are of a simulator of their own, as in the blind trial that found these."""
+    """The data are of a simulator of their own, as in the blind trial that found these.
+
+    Where rivals are named, these alone compete, which takes half as long.
+    """
     case = {"robot": "fanuc_like_3dof", "kind": "pair", "snr": 40, "draw": draw, "mismatch": 1.0}
-    found = trial.run(case, 1, without=trial.all_but(*causes, *rivals))
+    without = trial.all_but(*causes, *rivals) if rivals else ()
+    found = trial.run(case, 1, without=without)
     assert {effect for effect, _ in found["truth"]} == causes
     assert found["outcome"] == "right", found["claimed"]
     assert found["false"] == []

@@ -130,16 +130,8 @@ def refine(rule: Rule, place: Place, start: FloatArray, target: Target, steps: i
         here, *others = (residuals(*each) for each in zip(near, there, strict=True))
         return np.transpose([(other - here) / h for other, h in zip(others, step, strict=True)])
 
-    found = least_squares(
-        residuals,
-        v,
-        slopes,
-        bounds=(low, high),
-        max_nfev=steps,
-        xtol=1e-6,
-        ftol=1e-6,
-        x_scale="jac",
-    )  # fmt: skip
+    close = {"xtol": 1e-6, "ftol": 1e-6, "x_scale": "jac"}
+    found = least_squares(residuals, v, slopes, bounds=(low, high), max_nfev=steps, **close)
     best = evaluate(rule, place, found.x, target)
     first = evaluate(rule, place, v, target)
     assert first is not None
