@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import itertools
 import multiprocessing
 import os
 import signal
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
+from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from picchio.core.processes import end_with
 from picchio.diagnosis.attempt import attempt
 
 _MOST = 8
-_shared: dict[int, Mapping[str, Callable[[Any], Any]]] = {}
-_numbers = itertools.count()
+_ASKING = (signal.SIGINT, signal.SIGTERM)  # a process to end
 _within = False  # whether this is a process that was forked here
 
 
@@ -36,6 +34,67 @@ def worker_count(workers: int | None) -> int:
     return min(len(os.sched_getaffinity(0)), _MOST) if workers is None else workers
 
 
+class Worker:
+    """A process forked from this one, which has whatever exists now, and answers what it is sent.
+
+    Each has a pipe of its own: one that is killed in the midst of an answer leaves nothing half
+    read or locked that another would wait for. It ends with this process, at the latest.
+    """
+
+    def __init__(self, answer: Callable[[Any], Any]) -> None:
+        """Start it.
+
+        Args:
+            answer: called in it with what was sent; what it returns comes back, as an error does.
+        """
+        context = multiprocessing.get_context("fork")
+        self.connection, its = context.Pipe()
+        self.process = context.Process(
+            target=_serve, args=(answer, its, self.connection, os.getpid()), daemon=True
+        )
+        # What asks this process to end is heard a moment later: the new one knows by then that
+        # it is not meant.
+        held = signal.pthread_sigmask(signal.SIG_BLOCK, _ASKING)
+        try:
+            self.process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, held)
+            its.close()
+
+    def end(self) -> None:
+        """Whatever it is at is of no use any more."""
+        self.connection.close()
+        self.process.kill()
+        self.process.join()
+
+
+def _serve(
+    answer: Callable[[Any], Any], connection: Connection, other: Connection, parent: int
+) -> None:
+    global _within
+    _within = True
+    end_with(parent)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends this one
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ASKING)
+    other.close()
+    # Whatever shows warnings may have been in the middle of something when this was forked.
+    warnings.simplefilter("ignore")
+    while True:
+        try:
+            asked = connection.recv()
+        except (EOFError, OSError):
+            return
+        try:
+            told = answer(asked)
+        except Exception as error:
+            told = error
+        try:
+            connection.send(told)
+        except OSError:
+            return
+
+
 @contextmanager
 def worker_pool(
     workers: int | None, functions: Mapping[str, Callable[[Any], Any]]
@@ -44,7 +103,8 @@ def worker_pool(
 
     The functions may use whatever exists when the block begins: processes are forked, so nothing
     of that is copied or sent. Items and results are. Where a process can't be forked safely (not
-    on Linux, or within such a process), or one core is all there is, this one does the work itself.
+    on Linux, or within such a process), or one core is all there is, this one does the work itself;
+    so it does with what is left where one is killed.
 
     A function that fails gives None, see `attempt`.
 
@@ -55,51 +115,55 @@ def worker_pool(
     Returns:
         a context manager.
     """
-    number, count = next(_numbers), worker_count(workers)
-    pool: ProcessPoolExecutor | None = None
-    if count > 1:
-        _shared[number] = functions
-        pool = ProcessPoolExecutor(
-            count, multiprocessing.get_context("fork"), begin_worker, (os.getpid(),)
-        )
+    alone = worker_count(workers) < 2
+    pool: list[Worker] = []
+
+    def run(asked: tuple[str, Any]) -> Any:
+        name, item = asked
+        return attempt(name, partial(functions[name], item))
 
     def mapped(name: str, items: Iterable[Any]) -> list[Any]:
-        todo = list(items)
-        if pool is None or len(todo) < 2:
-            return [attempt(name, partial(functions[name], item)) for item in todo]
-        return list(pool.map(_run, [(number, name, item) for item in todo]))
+        nonlocal alone
+        todo = [(name, item) for item in items]
+        if alone or len(todo) < 2:
+            return [run(asked) for asked in todo]
+        while len(pool) < worker_count(workers):
+            pool.append(Worker(run))
+        told = _shared_out(todo, pool)
+        # Who is killed is not replaced: memory may be what was lacking.
+        alone = len(told) < len(todo)
+        return [told[k] if k in told else run(asked) for k, asked in enumerate(todo)]
 
-    others = set(multiprocessing.active_children())
     try:
         yield mapped
-    except BaseException:
-        # Interrupted: what they are at is of no use any more.
-        for process in set(multiprocessing.active_children()) - others:
-            process.kill()
-        raise
     finally:
-        _shared.pop(number, None)
-        if pool is not None:
-            pool.shutdown(cancel_futures=True)
+        for worker in pool:
+            worker.end()
 
 
-def begin_worker(parent: int) -> None:
-    """In a forked process: Ctrl-C is for the parent, which ends this one; so does its death.
+def _shared_out(todo: list[Any], pool: list[Worker]) -> dict[int, Any]:
+    """What is answered to each, by its place; whoever is free is sent the next.
 
-    It does its own work alone.
-
-    Args:
-        parent: its number.
+    Not all are answered where a worker is killed.
     """
-    global _within
-    _within = True
-    end_with(parent)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    told: dict[int, Any] = {}
+    at: dict[Any, int] = {}  # which each connection was sent
+    left = iter(range(len(todo)))
 
+    def send(connection: Connection) -> None:
+        for place in left:
+            at[connection] = place
+            connection.send(todo[place])
+            return
 
-def _run(task: tuple[int, str, Any]) -> Any:
-    number, name, item = task
-    # Whatever shows warnings may have been in the middle of something when this was forked.
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return attempt(name, partial(_shared[number][name], item))
+    for worker in pool:
+        with suppress(OSError):
+            send(worker.connection)
+    while at:
+        ready: list[Any] = wait(list(at))
+        for connection in ready:
+            place = at.pop(connection)
+            with suppress(EOFError, OSError):
+                told[place] = connection.recv()
+                send(connection)
+    return told

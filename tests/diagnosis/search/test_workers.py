@@ -20,7 +20,7 @@ from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.search.state import Search
 from picchio.diagnosis.percussion.search.trials import try_candidates
-from picchio.diagnosis.workers import worker_pool
+from picchio.diagnosis.workers import Worker, worker_pool
 from picchio.model.effects.registry import effect_class
 
 ARM = "fanuc_like_3dof"
@@ -149,12 +149,45 @@ def test_it_goes_on_alone_when_a_helper_is_killed(problem, start):
     alone = problem.own_residuals(start.effects, problem.records, None)
     with parallel_records(problem):
         assert _same(problem, start.effects)
-        helper = problem.helpers._processes[0]
+        helper = problem.helpers._workers[0].process
         os.kill(helper.pid, signal.SIGKILL)
         helper.join()
         for _ in range(2):
             told = problem.residuals(start.effects)
             assert all(np.array_equal(a, b) for a, b in zip(told, alone, strict=True))
+
+
+@linux
+def test_one_that_is_killed_in_the_midst_of_an_answer_holds_nobody_up():
+    """Ctrl-C does that; with one queue for all, what was half written was waited for for ever."""
+    worker, other = Worker(bytes), Worker(len)
+    worker.connection.send(10**7)
+    assert worker.connection.poll(30.0)  # more than a pipe holds, so that it is not all written
+    os.kill(worker.process.pid, signal.SIGKILL)
+    with pytest.raises((EOFError, OSError)):
+        worker.connection.recv()
+    other.connection.send("four")
+    assert other.connection.recv() == 4
+    worker.connection.close()
+    worker.process.join(5.0)
+    other.end()
+    assert not worker.process.is_alive() and not other.process.is_alive()
+
+
+@linux
+def test_what_a_killed_worker_was_at_is_done_here():
+    here = os.getpid()
+
+    def risky(item):
+        if item == 2 and os.getpid() != here:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return item, os.getpid() == here
+
+    with worker_pool(2, {"risky": risky}) as mapped:
+        told = mapped("risky", [1, 2, 3, 4])
+        assert [item for item, _ in told] == [1, 2, 3, 4] and told[1][1]
+        assert not all(alone for _, alone in told)
+        assert all(alone for _, alone in mapped("risky", [3, 4]))
 
 
 LOADED = """

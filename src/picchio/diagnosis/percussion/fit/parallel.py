@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from multiprocessing.connection import Connection
 from typing import Any
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Pin, Problem
-from picchio.diagnosis.workers import begin_worker, worker_count
+from picchio.diagnosis.workers import Worker, worker_count
 from picchio.model.effects.effect import Effect
 
 # Numbers of a residual (channels x samples, all records) below which sending costs what it saves.
@@ -52,32 +49,14 @@ class _Helpers:
     def __init__(self, problem: Problem, count: int) -> None:
         self._problem, self._owner, self._count = problem, os.getpid(), count
         self._places = {record.name: i for i, record in enumerate(problem.records)}
-        self._ends: list[Connection] = []
-        self._processes: list[Any] = []
-        self._leaving: list[Any] = []
+        self._workers: list[Worker] = []
         self._broken = False
 
     def renew(self) -> None:
         """Have the problem as it is from now on: they start anew where they are next asked."""
         if os.getpid() == self._owner:
-            self._dismiss()
+            self.close()
             self._broken = False
-
-    def _start(self) -> None:
-        context = multiprocessing.get_context("fork")
-        problem = self._problem
-        for _ in range(self._count):
-            mine, its = context.Pipe()
-            self._ends.append(mine)
-            # Were our ends open in it, it would not notice that we are gone.
-            process = context.Process(
-                target=_serve,
-                args=(problem, its, list(self._ends), self._owner),
-                daemon=True,
-            )
-            process.start()
-            its.close()
-            self._processes.append(process)
 
     def residuals(
         self, effects: Sequence[Effect], records: Sequence[MeasuredRecord], end: float | None
@@ -110,27 +89,25 @@ class _Helpers:
             return None
         if numbers < _WORTH_SENDING:
             return None
-        if not self._ends:
-            self._start()
+        while len(self._workers) < self._count:
+            self._workers.append(Worker(self._answer))
         bounds = [len(records) * k // parts for k in range(parts + 1)]
         shares = [records[a:b] for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
         pins = tuple(self._problem.pins)
-        asked: list[Connection] = []
-        told: list[Any] = []
         try:
-            for connection, share in zip(self._ends, shares[1:], strict=True):
+            for worker, share in zip(self._workers, shares[1:], strict=True):
                 places = [self._places[r.name] for r in share]
-                connection.send((what, given, places, end, pins))
-                asked.append(connection)
-            try:
-                told.append(getattr(self._problem, what)(*given, shares[0], end))
-            finally:
-                # Whatever happens here, what was asked for is taken, or it would answer the next.
-                told += [connection.recv() for connection in asked]
+                worker.connection.send((what, given, places, end, pins))
+            told = [self._own(what, given, shares[0], end)]
+            # Whatever failed here, what was asked for is taken, or it would answer the next.
+            told += [worker.connection.recv() for worker in self._workers]
         except (EOFError, OSError):  # one of them was killed: go on alone
-            self._dismiss()
+            self.close()
             self._broken = True
             return None
+        except BaseException:  # interrupted
+            self.close()
+            raise
         found: list[Any] = []
         for answer in told:
             if isinstance(answer, Exception):
@@ -138,48 +115,31 @@ class _Helpers:
             found += answer
         return found
 
-    def close(self) -> None:
-        """Let them end."""
-        self._dismiss()
-        for process in self._leaving:
-            process.join(timeout=1.0)
-            if process.is_alive():
-                process.kill()
-        self._leaving = []
-
-    def _dismiss(self) -> None:
-        """Ask no more of them; they end by themselves, for which nobody waits."""
-        for connection in self._ends:
-            connection.close()
-        self._leaving = [p for p in (*self._leaving, *self._processes) if p.is_alive()]
-        self._ends, self._processes = [], []
-
-
-def _serve(
-    problem: Problem, connection: Connection, others: Sequence[Connection], parent: int
-) -> None:
-    """Answer until the other end is closed."""
-    begin_worker(parent)
-    for other in others:
-        other.close()
-    warnings.simplefilter("ignore")
-    problem.helpers = None
-    while True:
+    def _own(
+        self,
+        what: str,
+        given: tuple[Any, ...],
+        records: Sequence[MeasuredRecord],
+        end: float | None,
+    ) -> list[Any] | Exception:
         try:
-            what, given, places, end, pins = connection.recv()
-        except (EOFError, OSError):
-            return
-        answer: list[Any] | Exception
-        try:
-            _pin(problem, pins)
-            records = [problem.records[i] for i in places]
-            answer = getattr(problem, what)(*given, records, end)
+            told: list[Any] = getattr(self._problem, what)(*given, records, end)
         except Exception as error:
-            answer = error
-        try:
-            connection.send(answer)
-        except OSError:
-            return
+            return error
+        return told
+
+    def _answer(self, asked: Any) -> list[Any] | Exception:
+        """In a worker."""
+        what, given, places, end, pins = asked
+        self._problem.helpers = None
+        _pin(self._problem, pins)
+        return self._own(what, given, [self._problem.records[i] for i in places], end)
+
+    def close(self) -> None:
+        """Ask no more of them."""
+        for worker in self._workers:
+            worker.end()
+        self._workers = []
 
 
 def _pin(problem: Problem, pins: Sequence[Pin]) -> None:
