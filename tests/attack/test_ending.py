@@ -4,11 +4,12 @@ import os
 import signal
 import sys
 import time
+from contextlib import suppress
 
 import pytest
 from held import alive, children
 
-from picchio.cli.main import _not_lost
+from picchio.cli.ending import Ending
 from picchio.prediction.plan import Plan
 from picchio.prediction.simulation import simulate
 
@@ -104,16 +105,60 @@ def test_ctrl_c_reaches_the_workers_too(start, campaign):
     assert gone(workers, 1.0)
 
 
-def test_an_interrupt_in_a_destructor_is_not_lost(monkeypatch):
+def _interrupted():
+    signal.raise_signal(signal.SIGINT)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_what_drops_an_interrupt_does_not_lose_it():
     class Last:
         def __del__(self):
-            raise KeyboardInterrupt
+            _interrupted()
 
-    monkeypatch.setattr(sys, "unraisablehook", _not_lost)
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            Last()
-            time.sleep(1.0)
-    finally:
-        signal.signal(signal.SIGINT, before)
+    def library():
+        with suppress(BaseException):
+            _interrupted()
+
+    before = signal.getsignal(signal.SIGINT)
+    for dropped in (Last, library):
+        with pytest.raises(KeyboardInterrupt), Ending().obeyed():
+            dropped()
+            time.sleep(5.0)
+    with Ending().obeyed():
+        pass
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_what_tidies_up_is_not_interrupted_again():
+    tidy = []
+    with pytest.raises(KeyboardInterrupt), Ending().obeyed():
+        try:
+            _interrupted()
+        finally:
+            with suppress(ValueError):
+                raise ValueError("another, met and dealt with while tidying up")
+            time.sleep(0.3)
+            tidy.append(True)
+    assert tidy
+
+
+def test_who_takes_it_for_the_end_goes_on():
+    ending, done = Ending(), []
+    with ending.obeyed():
+        for _ in range(2):
+            try:
+                _interrupted()
+            except KeyboardInterrupt:
+                ending.heard()
+            time.sleep(0.2)
+            done.append(True)
+    assert len(done) == 2
+
+
+def test_what_compiles_is_left_when_it_is_done():
+    scope = {"__name__": "llvmlite.binding.engine", "interrupted": _interrupted, "compiled": []}
+    exec("def compile():\n    interrupted()\n    compiled.append(True)", scope)
+    with pytest.raises(KeyboardInterrupt), Ending().obeyed():
+        scope["compile"]()
+        time.sleep(5.0)
+    assert scope["compiled"]

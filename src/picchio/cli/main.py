@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import _thread
 import multiprocessing
 import os
-import signal
 import sys
-import threading
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
@@ -16,6 +13,7 @@ from typing import Any
 import typer
 
 from picchio.cli.app import app
+from picchio.cli.ending import Terminated, drop, ending
 
 # Importing its file adds a command, in the order of `picchio --help`.
 from picchio.cli.life import (  # noqa: F401
@@ -52,38 +50,12 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line; exit 0 on success, else as `run` says, with one line on stderr."""
     warnings.showwarning = lambda message, *_, **__: say_warning(str(message))
     warnings.simplefilter("default")
-    sys.unraisablehook = _not_lost
-    before = signal.signal(signal.SIGTERM, _terminated)
-    try:
+    sys.unraisablehook = drop
+    with ending.obeyed():
         code = run(arguments)
-    finally:
-        signal.signal(signal.SIGTERM, before)
     if arguments is None and code in (_INTERRUPTED, _TERMINATED):
         _end_at_once(code)
     sys.exit(code)
-
-
-class _Terminated(BaseException):
-    """The process is asked to end: whatever is half-written goes, as after Ctrl-C."""
-
-
-def _terminated(*_: object) -> None:
-    raise _Terminated
-
-
-def _not_lost(met: Any) -> None:
-    """Python drops an exception in a destructor; one that asks this to end is raised again.
-
-    A library's complaint, such as that of a file that never opened, is of no use to anybody.
-    """
-    if met.exc_type in (KeyboardInterrupt, _Terminated):
-        number = signal.SIGTERM if met.exc_type is _Terminated else signal.SIGINT
-        # A moment later: raised in here it would be dropped again.
-        later = threading.Timer(0.05, _thread.interrupt_main, [number])
-        later.daemon = True
-        later.start()
-    elif str(getattr(met.object, "__module__", "picchio")).partition(".")[0] == "picchio":
-        sys.__unraisablehook__(met)
 
 
 def _end_at_once(code: int) -> None:
@@ -116,6 +88,7 @@ def run(arguments: list[str] | None = None) -> int:
         code = _watched(given or ["--help"])
         sys.stdout.flush()
         if code == _INTERRUPTED:  # typer swallows it
+            ending.heard()
             return _fail("interrupted", _INTERRUPTED)
     except OutputError as error:
         return _fail(str(error), 1)
@@ -126,7 +99,7 @@ def run(arguments: list[str] | None = None) -> int:
         return _fail(f"{error.format_message()} See {where} --help")
     except (typer.Abort, KeyboardInterrupt):
         return _fail("interrupted", _INTERRUPTED)
-    except _Terminated:
+    except Terminated:
         return _fail("terminated", _TERMINATED)
     except MemoryError:
         return _fail("there is not enough memory for this: ask for less at a time", 1)

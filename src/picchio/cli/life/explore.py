@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from picchio.cli.app import app
+from picchio.cli.ending import ending
 from picchio.cli.options import (
     FlexOption,
     JsonOption,
@@ -65,7 +66,7 @@ def explore(
         while live.alive:
             time.sleep(0.2)
     except KeyboardInterrupt:
-        pass
+        ending.heard()
     finally:
         live.close()
     deliver(live.to_dict(), json)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from picchio.cli.app import app
+from picchio.cli.ending import ending
 from picchio.cli.options import (
     POSE_HELP,
     FlexOption,
@@ -137,4 +138,5 @@ def _show_live(scene: Scene) -> None:
     try:
         viewer.window.server_proc.wait()
     except KeyboardInterrupt:
+        ending.heard()
         viewer.window.server_proc.kill()
