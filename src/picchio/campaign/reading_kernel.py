@@ -14,14 +14,23 @@ def frame_acceleration(jacobian, gradient, x, v, a, out):
     jacobian is (6, n), gradient (n, 6, n) its change with each coordinate; x, v, a are (k, n).
     """
     n = jacobian.shape[1]
+    bent = np.empty((n, n, 3))
+    for i in range(n):
+        for k in range(n):
+            for r in range(3):
+                bent[i, k, r] = gradient[k, r, i]
     for s in range(x.shape[0]):
-        for r in range(3):
-            total = 0.0
-            for i in range(n):
-                total += jacobian[r, i] * a[s, i]
-                for k in range(n):
-                    total += gradient[k, r, i] * (x[s, k] * a[s, i] + v[s, k] * v[s, i])
-            out[r, s] = total
+        to_x, to_y, to_z = 0.0, 0.0, 0.0
+        for i in range(n):
+            to_x += jacobian[0, i] * a[s, i]
+            to_y += jacobian[1, i] * a[s, i]
+            to_z += jacobian[2, i] * a[s, i]
+            for k in range(n):
+                both = x[s, k] * a[s, i] + v[s, k] * v[s, i]
+                to_x += bent[i, k, 0] * both
+                to_y += bent[i, k, 1] * both
+                to_z += bent[i, k, 2] * both
+        out[0, s], out[1, s], out[2, s] = to_x, to_y, to_z
 
 
 @njit(cache=True, nogil=True)
@@ -32,24 +41,28 @@ def felt(jacobian, gradient, rotation, gravity, x, acceleration, out):
     rest, as a rotation vector in the world. rotation is R0 (3, 3), acceleration (3, k).
     """
     n = jacobian.shape[1]
-    turn, f, once, seen = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    bent = np.zeros((n, n, 3))  # a pair of coordinates once
+    for i in range(n):
+        for k in range(n):
+            for r in range(3):
+                bent[max(i, k), min(i, k), r] += 0.5 * gradient[k, 3 + r, i]
     for s in range(x.shape[0]):
+        t0, t1, t2 = 0.0, 0.0, 0.0  # the turn
+        for i in range(n):
+            t0 += jacobian[3, i] * x[s, i]
+            t1 += jacobian[4, i] * x[s, i]
+            t2 += jacobian[5, i] * x[s, i]
+            for k in range(i + 1):
+                both = x[s, i] * x[s, k]
+                t0 += bent[i, k, 0] * both
+                t1 += bent[i, k, 1] * both
+                t2 += bent[i, k, 2] * both
+        f0 = acceleration[0, s] - gravity[0]
+        f1 = acceleration[1, s] - gravity[1]
+        f2 = acceleration[2, s] - gravity[2]
+        once0, once1, once2 = t1 * f2 - t2 * f1, t2 * f0 - t0 * f2, t0 * f1 - t1 * f0
+        f0 += 0.5 * (t1 * once2 - t2 * once1) - once0 + gravity[0]
+        f1 += 0.5 * (t2 * once0 - t0 * once2) - once1 + gravity[1]
+        f2 += 0.5 * (t0 * once1 - t1 * once0) - once2 + gravity[2]
         for r in range(3):
-            total = 0.0
-            for i in range(n):
-                total += jacobian[3 + r, i] * x[s, i]
-                for k in range(n):
-                    total += 0.5 * gradient[k, 3 + r, i] * x[s, k] * x[s, i]
-            turn[r] = total
-            f[r] = acceleration[r, s] - gravity[r]
-        for r in range(3):
-            p, q = (r + 1) % 3, (r + 2) % 3
-            once[r] = turn[p] * f[q] - turn[q] * f[p]
-        for r in range(3):
-            p, q = (r + 1) % 3, (r + 2) % 3
-            twice = turn[p] * once[q] - turn[q] * once[p]
-            seen[r] = f[r] - once[r] + 0.5 * twice + gravity[r]
-        for r in range(3):
-            out[r, s] = (
-                rotation[0, r] * seen[0] + rotation[1, r] * seen[1] + rotation[2, r] * seen[2]
-            )
+            out[r, s] = rotation[0, r] * f0 + rotation[1, r] * f1 + rotation[2, r] * f2

@@ -45,8 +45,10 @@ from picchio.diagnosis.percussion.tolerance.linearise import (
     ELSE,
     About,
     about_another,
+    left_there,
     released,
     settled,
+    to_the_last,
 )
 from picchio.diagnosis.result import BEYOND_DOUBT, Estimate
 from picchio.model.effects.effect import Effect
@@ -64,6 +66,10 @@ _HALFWAY = 0.3
 _MORE_ROUNDS = 6
 # What share of the cost a turn must take for going on from far off to be worth while.
 _FALLING = 0.3
+# How many times what its slopes foretell a model may leave, and to what share of that settling it
+# must lead.
+_UNFORETOLD = 1.1
+_NEARER = 0.5
 
 
 def begin_search(
@@ -177,6 +183,9 @@ def _grow(search: Search, stack: ExitStack) -> None:
         enough = search.explains_enough(here)
         search.say(f"looking for cause {len(search.labels) + 1}")
         quiet = search.leaves_noise(here)
+        if quiet and search.labels:
+            here = _settled_to_the_last(search)
+            quiet = search.leaves_noise(here)
         if quiet and not search.pinned:
             stack.enter_context(problem.pinned(here.hypothesis.effects))
             search.pinned = True
@@ -318,6 +327,29 @@ def _settled_again(search: Search) -> Fit:
     if search.baseline is here and again is not here:
         search.baseline, search.about = again, About.of(search.problem)
     search.best = again
+    return again
+
+
+def _settled_to_the_last(search: Search) -> Fit:
+    """The fit that stands, settled where slopes foretell noise of a model that leaves much more.
+
+    Beside causes alone: before there is one, what is not exact would make up for it. And where that
+    comes nearer: numbers that are held at the farthest leave as much as before.
+    """
+    here, problem = search.best, search.problem
+    if not allowed(problem):
+        return here
+    left = left_there(problem, here)
+    if left <= _UNFORETOLD * here.cost:
+        return here
+    before = About.of(problem)
+    again = attempt("settled to the last", partial(to_the_last, problem, here, both=False))
+    if again is None or left_there(problem, again) > _NEARER * left:
+        before.restore(problem)
+        return here
+    # It may cost more: what slopes foretold of the other was not true.
+    search.best = again
+    search.stood[search.labels] = again, About.of(problem)
     return again
 
 

@@ -39,6 +39,9 @@ _TRUSTED = 0.5
 _SETTLED = 0.002
 # To how much of the cost slopes must foretell it where values are told: a part of a deviation.
 _TOLD = 1.0
+_LAST_ROUNDS = 8
+# What share of a foretold fall must come: numbers that are held at the farthest explain no more.
+_LITTLE_CAME = 0.02
 # Chi-square per sample above which more is wrong than what is not exact.
 ELSE = 3.0
 # What is not exact explains little where it leaves more than this share of chi-square.
@@ -248,34 +251,47 @@ def released(problem: Problem, found: Fit, least: float) -> Fit:
     return found
 
 
-def to_the_last(problem: Problem, found: Fit) -> Fit:
-    """A fit settled until its slopes foretell its cost to one unit, for its values to be told.
-
-    Models differ by much more, values and how well they are known by less: 4 more of the cost are
-    two standard deviations of one of them.
+def left_there(problem: Problem, found: Fit) -> float:
+    """What a fit's model costs with its inexact numbers where they are; slopes may foretell less.
 
     Args:
-        problem: linearised about the fit; in the end about the other, slopes taken either way.
+        problem: linearised about the fit, or near it.
         found: the fit.
+    """
+    if problem.marginal is None:
+        return found.cost
+    return _cost(problem, found.hypothesis, None, problem.marginal.only(POSE))
+
+
+def to_the_last(problem: Problem, found: Fit, *, both: bool = True) -> Fit:
+    """A fit settled until its slopes foretell its cost to one unit, for its values to be told.
+
+    While more is wrong models differ by much more; values, how well they are known and a last small
+    cause by less: 4 more of the cost are two standard deviations of a value.
+
+    Args:
+        problem: linearised about the fit; in the end about the other.
+        found: the fit.
+        both: as of `linearise`.
 
     Returns:
         the fit, with its Jacobian.
     """
     records = found.records
-    for _ in range(_ROUNDS):
+    for _ in range(_LAST_ROUNDS):
         here = found.hypothesis
-        linearise(problem, here, records, both=True)
+        linearise(problem, here, records, both=both)
         found = refit(problem, here, records)
         if problem.marginal is None or found.chi_square > ELSE * found.samples:
             break
         before = _cost(problem, here, None, problem.marginal.only(POSE))
         there, now, kept = _moved_on(problem, here, found)
         found = replace(found, hypothesis=there)
-        if abs(before - now) * abs(1.0 - kept) <= _TOLD * kept:
+        if kept < _LITTLE_CAME or abs(before - now) * abs(1.0 - kept) <= _TOLD * kept:
             break
     # Where it comes to stand, or slopes and Jacobian would differ, and what no record can tell
     # would pass for known.
-    linearise(problem, found.hypothesis, records, both=True)
+    linearise(problem, found.hypothesis, records, both=both)
     return fit(problem, found.hypothesis, records, None, iterations=0, with_jacobian=True)
 
 
