@@ -44,7 +44,7 @@ SAMPLE = 17
 # Arguments that keep a study small; those with a default that are not here are left alone.
 SMALL = {
     "samples": 8, "poses": 1, "placements": 2, "move": [0.0, 0.0, 0.0, 0.0],
-    "self_collision": False, "hits": HITS, "steady_check": False,
+    "self_collision": False, "hits": HITS, "steady_check": False, "totals": False,
     # A line without an endurance limit, so that every life is a number.
     "sn_curve": SNCurve(name="straight", strength=60e6, cycles=1e6, slopes=(5.0,)),
 }  # fmt: skip
