@@ -96,7 +96,7 @@ OUTPUTS = [
     Output("d.toml", f"diagnose {ARM} --data campaign --model OUT", slow=True),
     Output("d.html", f"diagnose {ARM} --data campaign --report OUT", slow=True),
     Output("i.toml", f"identify {ARM} --data campaign --out OUT", slow=True),
-    Output("rep.html", "reproduce --report OUT", slow=True, threads=True),
+    Output("rep.html", "reproduce --worlds 8 --report OUT", slow=True, threads=True),
 ]  # fmt: skip
 
 
