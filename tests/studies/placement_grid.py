@@ -84,7 +84,9 @@ def cost_there(robot, task, move, sn_curve=None):
                     return None
             branches.append(known[key])
         one = dataclasses.replace(op, poses=np.concatenate(branches), direction=direction)
-        told = picchio.assess(robot, Task((one,)), sn_curve=sn_curve).operations[0]
+        # Neither how sure it is nor the steady state is asked for.
+        options = {"sn_curve": sn_curve, "uncertainty": False, "steady_check": False}
+        told = picchio.assess(robot, Task((one,)), **options).operations[0]
         whole = np.fmax(told.utilisation, told.reducer_utilisation)
         first = 0
         for poses in branches:
