@@ -68,6 +68,18 @@ class Worker:
         self.process.join()
 
 
+def answered(call: Callable[[], Any]) -> Any:
+    """What a call returns, or the error that it raises.
+
+    Args:
+        call: may fail.
+    """
+    try:
+        return call()
+    except Exception as error:
+        return error
+
+
 def _serve(
     answer: Callable[[Any], Any], connection: Connection, other: Connection, parent: int
 ) -> None:
@@ -86,11 +98,7 @@ def _serve(
         except (EOFError, OSError):
             return
         try:
-            told = answer(asked)
-        except Exception as error:
-            told = error
-        try:
-            connection.send(told)
+            connection.send(answered(partial(answer, asked)))
         except OSError:
             return
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 from picchio.core.arrays import FloatArray
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Pin, Problem
-from picchio.diagnosis.workers import Worker, worker_count
+from picchio.diagnosis.workers import Worker, answered, worker_count
 from picchio.model.effects.effect import Effect
 
 # Numbers of a residual (channels x samples, all records) below which sending costs what it saves.
@@ -98,7 +99,8 @@ class _Helpers:
             for worker, share in zip(self._workers, shares[1:], strict=True):
                 places = [self._places[r.name] for r in share]
                 worker.connection.send((what, given, places, end, pins))
-            told = [self._own(what, given, shares[0], end)]
+            own = getattr(self._problem, what)
+            told = [answered(partial(own, *given, shares[0], end))]
             # Whatever failed here, what was asked for is taken, or it would answer the next.
             told += [worker.connection.recv() for worker in self._workers]
         except (EOFError, OSError):  # one of them was killed: go on alone
@@ -115,25 +117,14 @@ class _Helpers:
             found += answer
         return found
 
-    def _own(
-        self,
-        what: str,
-        given: tuple[Any, ...],
-        records: Sequence[MeasuredRecord],
-        end: float | None,
-    ) -> list[Any] | Exception:
-        try:
-            told: list[Any] = getattr(self._problem, what)(*given, records, end)
-        except Exception as error:
-            return error
-        return told
-
-    def _answer(self, asked: Any) -> list[Any] | Exception:
+    def _answer(self, asked: Any) -> list[Any]:
         """In a worker."""
         what, given, places, end, pins = asked
         self._problem.helpers = None
         _pin(self._problem, pins)
-        return self._own(what, given, [self._problem.records[i] for i in places], end)
+        records = [self._problem.records[i] for i in places]
+        told: list[Any] = getattr(self._problem, what)(*given, records, end)
+        return told
 
     def close(self) -> None:
         """Ask no more of them."""
