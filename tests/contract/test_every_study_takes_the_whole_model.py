@@ -44,7 +44,7 @@ SAMPLE = 17
 # Arguments that keep a study small; those with a default that are not here are left alone.
 SMALL = {
     "samples": 8, "poses": 1, "placements": 2, "move": [0.0, 0.0, 0.0, 0.0],
-    "self_collision": False, "hits": HITS, "steady_check": False, "totals": False,
+    "self_collision": False, "hits": HITS, "steady_check": False,
     # A line without an endurance limit, so that every life is a number.
     "sn_curve": SNCurve(name="straight", strength=60e6, cycles=1e6, slopes=(5.0,)),
 }  # fmt: skip
@@ -122,6 +122,8 @@ def ask(study: str, model: Model, excitation: Excitation, folder) -> dict[str, f
         "direction": DIRECTION, "rivets": 2e6,
         "places": Listed("pose", np.array([POSE])), "out": folder / f"{study}.nc", "restart": True,
         "log": a_log(folder), "ledger": folder / "ledger",
+        # Total shares take most of the time: every effect is asked for them under one kind of blow.
+        "totals": isinstance(excitation, picchio.PulseTrain),
     }  # fmt: skip
     parameters = inspect.signature(getattr(picchio, study)).parameters
     if "pose" in parameters and "task" in parameters:  # blows at a pose, instead of a task
