@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import replace
 
 import follow_up
@@ -588,6 +589,33 @@ def test_what_leaves_more_than_foretold_is_settled_where_that_comes_nearer(
     left[100.0] = 105.0  # as foretold
     search.best = replace(one, cost=100.0)
     assert select._settled_to_the_last(search).cost == 100.0
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_what_is_settled_beside_a_cause_and_no_longer_noise_is_looked_at_as_such(
+    known, two_causes, monkeypatch
+):
+    problem, baseline, *_ = two_causes
+    one = trial_with(problem, baseline, "payload", "tool", mass=1.1).fit if known else baseline
+    search = search_of(problem, baseline)
+    search.best = replace(one, cost=100.0)
+    search.leaves_noise = lambda found: found.cost == 100.0
+    asked = []
+
+    def settle(search):
+        search.best = replace(one, cost=140.0)
+        return search.best
+
+    def look(search, hypothesis, whole):
+        asked.append((search.best.cost, whole))
+        return []
+
+    monkeypatch.setattr(select, "_settled_to_the_last", settle)
+    monkeypatch.setattr(select, "try_candidates", look)
+    with ExitStack() as stack:
+        select._grow(search, stack)
+    assert asked == ([(140.0, False)] if known else [(100.0, True)])
+    assert search.pinned != known
 
 
 @pytest.mark.parametrize(("explained", "tries"), [(60.0, 3), (250.0, 1)])
