@@ -9,7 +9,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.excitation.piecewise import PiecewiseForce
-from picchio.model.expansion import Motion
+from picchio.model.swept import Motion
 from picchio.model.system import VibratingSystem
 from picchio.vibration.integration.integrate import CoordinateMotion, Samples
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import mmap
 import multiprocessing
 import os
 import signal
@@ -12,6 +14,8 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing.connection import Connection, wait
 from typing import Any
+
+import numpy as np
 
 from picchio.core.processes import end_with
 from picchio.diagnosis.attempt import attempt
@@ -66,6 +70,18 @@ class Worker:
         self.connection.close()
         self.process.kill()
         self.process.join()
+
+
+def shared_array(shape: tuple[int, ...], dtype: type[np.generic]) -> np.ndarray:
+    """Zeros that processes forked from now on may write for this one to read.
+
+    Args:
+        shape: of the array.
+        dtype: of its numbers.
+    """
+    count = math.prod(shape)
+    memory = mmap.mmap(-1, max(count * np.dtype(dtype).itemsize, 1))
+    return np.frombuffer(memory, dtype, count).reshape(shape)
 
 
 def answered(call: Callable[[], Any]) -> Any:

@@ -18,11 +18,11 @@ from picchio.core.arrays import FloatArray, IndexArray
 from picchio.core.errors import InputError
 from picchio.core.recent import Recent
 from picchio.model.inertia import pseudo_inertia, ten_numbers
+from picchio.model.swept import CROSS, STEP, Inertia, Swept
 from picchio.robot.dynamics.rigid_model import unit_inertia
 from picchio.robot.flexible_robot import FlexibleRobot
 
 BASE_AXES = ("x", "y", "z", "rx", "ry", "rz")
-_STEP = 1e-4  # rad or m, of the central differences
 _KEPT_BENT = 32
 _SHORT = 1e-3  # m, a link that has no length to bend over
 
@@ -182,75 +182,6 @@ def _perpendicular(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
     return first, np.cross(axis, first)
 
 
-@dataclass(frozen=True, eq=False)
-class Inertia:
-    """Mass matrix and gravity about a pose, over c coordinates.
-
-    Attributes:
-        mass: (c, c) kg m^2.
-        mass_gradient: (c, c, c), [k, i, j] = dM_ij/dq_k.
-        gravity: (c,) N m, the torque that holds the arm.
-        gravity_gradient: (c, c) N m/rad.
-        gravity_curvature: (c, c, c), [k, i, j] = d2 g_i/dq_j dq_k.
-    """
-
-    mass: FloatArray
-    mass_gradient: FloatArray
-    gravity: FloatArray
-    gravity_gradient: FloatArray
-    gravity_curvature: FloatArray
-
-
-# [r, s, t]: (a x b)_r is the sum of this times a_s b_t.
-_CROSS = np.zeros((3, 3, 3))
-for _r, _s, _t in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-    _CROSS[_r, _s, _t], _CROSS[_r, _t, _s] = 1.0, -1.0
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """How a frame moves with c coordinates, to second order; world axes.
-
-    Attributes:
-        jacobian: (6, c), linear, then angular.
-        gradient: (c, 6, c), [k, r, i] = dJ_ri/dq_k.
-        rotation: (3, 3), the frame's axes at the pose.
-    """
-
-    jacobian: FloatArray
-    gradient: FloatArray
-    rotation: FloatArray
-
-    def at(self, offset: FloatArray) -> Motion:
-        """The motion of a point (3,) m fixed in the frame.
-
-        Args:
-            offset: (3,) m, from the frame's origin, in its axes.
-        """
-        lever = self.rotation @ offset
-        angular = self.jacobian[3:]
-        across = _CROSS @ lever
-        turned = across @ angular  # (3, c): the lever's change by each coordinate
-        jacobian, gradient = self.jacobian.copy(), self.gradient.copy()
-        jacobian[:3] += turned
-        gradient[:, :3] += (
-            across @ self.gradient[:, 3:] + (_CROSS @ turned).T.swapaxes(1, 2) @ angular
-        )
-        return Motion(jacobian, gradient, self.rotation)
-
-    def take(self, columns: list[int]) -> Motion:
-        """The motion with some of the coordinates.
-
-        Args:
-            columns: indices of the coordinates that are kept.
-        """
-        return Motion(
-            self.jacobian[:, columns],
-            np.ascontiguousarray(self.gradient[np.ix_(columns, range(6), columns)]),
-            self.rotation,
-        )
-
-
 class WideChain:
     """The robot on further coordinates.
 
@@ -307,12 +238,12 @@ class WideChain:
         q[self._own] = rigid._follow @ pose + rigid._offset
         return q
 
-    def _with(self, what: str, point: tuple[float, ...] | None) -> Any:
-        """The wide model with other inertias: the robot's, one link's own, or a point mass."""
+    def _with(self, what: str) -> Any:
+        """The wide model with other inertias: the robot's, or one link's own."""
         if what == "robot":
             return self._model
         joint, placement = self._frame(what)
-        own = unit_inertia(self.robot.tree, what, point)
+        own = unit_inertia(self.robot.tree, what, None)
         model = self._model.copy()
         for i in range(model.njoints):
             model.inertias[i] = pin.Inertia.Zero()
@@ -328,20 +259,17 @@ class WideChain:
             raise InputError("no such link", value=link, choices=self._frames)
         return self._frames[link]
 
-    def inertia(
-        self, pose: FloatArray, what: str = "robot", point: tuple[float, ...] | None = None
-    ) -> Inertia:
+    def inertia(self, pose: FloatArray, what: str = "robot") -> Inertia:
         """Mass matrix and gravity about a pose (nv,), to second order.
 
         Args:
             pose: (nv,) rad or m.
             what: "robot", or a link's name, for what that link alone adds.
-            point: (3,) m in the link, for what 1 kg there adds.
 
         Raises:
             InputError: no such link.
         """
-        model = self._with(what, point)
+        model = self._with(what)
         data, q, columns = model.createData(), self._q(pose), self._columns
 
         def mass(at: FloatArray) -> FloatArray:
@@ -354,9 +282,9 @@ class WideChain:
 
         gravity = columns.T @ np.array(pin.computeGeneralizedGravity(model, data, q))
         slope = gradient(q)
-        steps = [_STEP * column for column in columns.T]
-        d_mass = [(mass(q + s) - mass(q - s)) / (2 * _STEP) for s in steps]
-        d_slope = [(gradient(q + s) - gradient(q - s)) / (2 * _STEP) for s in steps]
+        steps = [STEP * column for column in columns.T]
+        d_mass = [(mass(q + s) - mass(q - s)) / (2 * STEP) for s in steps]
+        d_slope = [(gradient(q + s) - gradient(q - s)) / (2 * STEP) for s in steps]
         here = mass(q)
         if what == "robot":
             gravity, slope = self._balanced(pose, gravity, slope)
@@ -373,6 +301,30 @@ class WideChain:
         own = robot.rigid.gravity_gradient(pose)[np.ix_(robot.flexible_index, robot.flexible_index)]
         slope[:n, :n] += robot.gravity_stiffness(pose) - own
         return gravity, slope
+
+    def swept(self, pose: FloatArray) -> Swept:
+        """How whatever its links carry moves about a pose.
+
+        Args:
+            pose: (nv,) rad or m.
+        """
+        carrying = {joint for joint, _ in self._frames.values()}
+        return Swept.of(self._model, self._columns, self._q(pose), carrying)
+
+    def place(self, link: str) -> tuple[int, FloatArray, FloatArray]:
+        """Where a link's frame is: the number of the joint that carries it, axes and origin there.
+
+        Args:
+            link: its name.
+
+        Returns:
+            the number, (3, 3) and (3,) m, in the joint's axes.
+
+        Raises:
+            InputError: no such link.
+        """
+        joint, placement = self._frame(link)
+        return joint, np.array(placement.rotation), np.array(placement.translation)
 
     @property
     def order(self) -> IndexArray:
@@ -400,31 +352,6 @@ class WideChain:
         full = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
         jacobian = np.array(full).reshape(6, model.nv) @ self._columns
         lever = data.oMi[joint].rotation @ placement.translation
-        jacobian[:3] += _CROSS @ lever @ jacobian[3:]
+        jacobian[:3] += CROSS @ lever @ jacobian[3:]
         at = data.oMi[joint] * placement
         return jacobian, np.array(at.translation), np.array(at.rotation)
-
-    def motion(self, pose: FloatArray, link: str) -> Motion:
-        """How the origin of a link's frame moves, to second order.
-
-        Raises:
-            InputError: no such link.
-        """
-        joint, placement = self._frame(link)
-        model, q, columns = self._model, self._q(pose), self._columns
-        data = model.createData()
-
-        def jacobian(at: FloatArray) -> FloatArray:
-            pin.computeJointJacobians(model, data, at)
-            full = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
-            full = np.array(full).reshape(6, model.nv) @ columns
-            lever = data.oMi[joint].rotation @ placement.translation
-            full[:3] += _CROSS @ lever @ full[3:]
-            return full
-
-        here = jacobian(q)
-        rotation = np.array((data.oMi[joint] * placement).rotation)
-        gradient = [
-            (jacobian(q + _STEP * s) - jacobian(q - _STEP * s)) / (2 * _STEP) for s in columns.T
-        ]
-        return Motion(here, np.array(gradient), rotation)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.recent import Recent
-from picchio.model.expansion import Bent, Inertia, Motion, WideChain
+from picchio.model.expansion import Bent, WideChain
+from picchio.model.swept import Inertia, Motion, Swept
 from picchio.robot.flexible_robot import FlexibleRobot
 
 if TYPE_CHECKING:
@@ -60,16 +62,25 @@ class Geometry:
         return self.chain.robot
 
     def inertia(self, what: str = "robot", point: tuple[float, ...] | None = None) -> Inertia:
-        """As `WideChain.inertia`.
+        """Mass matrix and gravity about the pose, to second order.
 
         Args:
-            what: "robot", or a link.
+            what: "robot", or a link, for what that link alone adds.
             point: (3,) m in the link's axes: of 1 kg there instead of the link.
         """
         key = (what, point)
         if key not in self._inertias:
-            self._inertias[key] = self.chain.inertia(self.pose, what, point)
+            if point is None:
+                found = self.chain.inertia(self.pose, what)
+            else:
+                joint, axes, origin = self.chain.place(what)
+                found = self._swept.inertia(joint, axes @ point + origin)
+            self._inertias[key] = found
         return self._inertias[key]
+
+    @cached_property
+    def _swept(self) -> Swept:
+        return self.chain.swept(self.pose)
 
     def beside(self, pose: FloatArray) -> Geometry:
         """The geometry of the same robot at a pose nearby.
@@ -114,7 +125,7 @@ class Geometry:
         return Inertia(**found)
 
     def motion(self, frame: str, taken: tuple[int, ...] | None = None) -> Motion:
-        """As `WideChain.motion`; a joint's name means the link that it carries.
+        """How the origin of a frame moves; a joint's name means the link that it carries.
 
         Args:
             frame: of the robot.
@@ -126,5 +137,5 @@ class Geometry:
             return self._motions[frame, taken]
         link = frame if self.chain.has_frame(frame) else self.robot.link_of(frame)
         if link not in self._motions:
-            self._motions[link] = self.chain.motion(self.pose, link)
+            self._motions[link] = self._swept.motion(*self.chain.place(link))
         return self._motions[link]

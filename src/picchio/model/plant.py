@@ -11,10 +11,11 @@ import numpy as np
 from picchio.core.arrays import FloatArray
 from picchio.core.errors import InputError
 from picchio.model.conditions import Conditions
-from picchio.model.expansion import Motion, link_end
+from picchio.model.expansion import link_end
 from picchio.model.geometry import Geometry
 from picchio.model.inertia import point_masses
 from picchio.model.linear_system import shared_damping
+from picchio.model.swept import Motion
 from picchio.model.system import Element, ElementKind, VibratingSystem
 from picchio.robot.dynamics.rigid_model import Mass
 from picchio.robot.flexible_robot import FlexibleRobot

@@ -29,19 +29,22 @@ from picchio.vibration.integration.step_kernel import fastest_rate, step_matrice
 # From so many time constants of the fastest mode on, matrices are cheaper than a series.
 _STIFF = 30.0
 _BOUC_WEN = 2
+# Sums may be taken in any order, several terms at once; what is no number stays none.
+_REORDERED = {"reassoc", "contract", "nsz"}
 
 
 @njit(cache=True, nogil=True)
-def packed(inverse, gradient, curvature):
-    """What is summed over pairs of coordinates, a pair once.
+def packed(inverse, gradient, curvature, push):
+    """What is of second order, a pair of coordinates once.
 
     Returns:
-        quadratic (N, N (N + 1)), on the products of rates, then of deflections: inertia's forces
-        and gravity's curvature; tilts (N, N, N), [i, j, k] on deflection k: the mass's change.
+        second (N, N (N + 2)), on the products of rates, of deflections, and of deflections and
+        force: inertia's forces, gravity's curvature, the force's turning; tilts (N, N N), [k] on
+        deflection k: the mass's change, row by row.
     """
     n = gradient.shape[0]
     pairs = n * (n + 1) // 2
-    forces, tilts = np.empty((n, 2 * pairs)), np.zeros((n, n, n))
+    forces, tilts = np.empty((n, n * (n + 2))), np.zeros((n, n * n))
     for i in range(n):
         p = 0
         for j in range(n):
@@ -51,14 +54,16 @@ def packed(inverse, gradient, curvature):
                 if j != k:
                     rates += gradient[k, i, j] - 0.5 * gradient[i, k, j]
                     bent += 0.5 * curvature[k, i, j]
-                forces[i, p] = rates
-                forces[i, pairs + p] = bent
+                forces[i, p] = -rates
+                forces[i, pairs + p] = -bent
                 p += 1
+        for j in range(n):
+            forces[i, 2 * pairs + j] = push[i, j]
     for i in range(n):
         for j in range(n):
             for k in range(n):
                 for m in range(n):
-                    tilts[i, j, k] += inverse[i, m] * gradient[k, m, j]
+                    tilts[k, i * n + j] += inverse[i, m] * gradient[k, m, j]
     return inverse @ forces, tilts
 
 
@@ -73,39 +78,48 @@ def _prepared(
     held[:, :n] = inverse @ stiffness
     held[:, n:] = inverse @ damping
     ik, ic = held[:, :n].copy(), held[:, n:].copy()
-    quadratic, tilts = packed(inverse, gradient, curvature)
-    pushed = inverse @ b, inverse @ b_gradient, rows @ inverse
+    second, tilts = packed(inverse, gradient, curvature, b_gradient)
+    pushed = inverse @ b, rows @ inverse
     fastest = fastest_rate(ik, ic)
     kept = 1
     for k in range(same.size):
         kept = max(kept, same[k] + 2)
     made = np.zeros(kept, dtype=np.bool_)
-    matrices = np.empty((kept, 2 * n, 2 * n))
-    by_start, by_end = np.empty((kept, 2 * n, n)), np.empty((kept, 2 * n, n))
+    matrices = np.empty((kept, 2 * n, 4 * n))  # on y, and on p at the start and the end
     which = np.full(same.size, -1)  # of the matrices each step takes; of a series none
     for k in range(same.size):
         if regular[k] or lengths[k] * fastest > _STIFF:
             u = which[k] = same[k] + 1
             if not made[u]:
                 made[u], length = True, step if regular[k] else lengths[k]
-                matrices[u], by_start[u], by_end[u] = step_matrices(ik, ic, length)
-    room = np.empty(n * (n + 1)), np.empty((n, n)), np.empty(n), np.empty(n)
-    steps = which, matrices, by_start, by_end, fastest
-    return (ik, ic, held, quadratic, tilts), pushed, steps, room
+                parts = step_matrices(ik, ic, length)
+                matrices[u, :, : 2 * n] = parts[0]
+                matrices[u, :, 2 * n : 3 * n], matrices[u, :, 3 * n :] = parts[1], parts[2]
+    room = np.empty(n * (n + 2)), np.empty(n * n), np.empty(n), np.empty(n)
+    return (ik, ic, held, second, tilts), pushed, (which, matrices, fastest), room
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, inline="always", fastmath=_REORDERED)
+def times(matrix, first, vector, out):
+    """A matrix's columns from one on times a vector, into `out`."""
+    for i in range(out.size):
+        total = 0.0
+        for q in range(vector.size):
+            total += matrix[i, first + q] * vector[q]
+        out[i] = total
+
+
+@njit(cache=True, nogil=True, inline="always", fastmath=_REORDERED)
 def lacking(
-    y, force, own, push, held, quadratic, tilts, kinds, parameters, rows, pulls, states, given,
+    y, force, own, held, second, tilts, kinds, parameters, rows, pulls, states, given,
     products, square, rest, out, a,
 ):  # fmt: skip
     """What the linear equations lack, as an acceleration: into `out` (N,); all of it into `a`.
 
-    y is (2N,); own (N,) is the force's own acceleration per newton, push (N, N) its change with y;
-    held (N, 2N) springs beside dampers; quadratic and tilts as `packed` makes them; kinds,
-    parameters, rows and states the elements', pulls (elements, N) M^-1 times their rows, given
-    (elements,) forces that are known already;
-    products (N (N + 1),), square (N, N) and rest (N,) are room to work in.
+    y is (2N,); own (N,) is the force's own acceleration per newton; held (N, 2N) springs beside
+    dampers; second and tilts as `packed` makes them; kinds, parameters, rows and states the
+    elements', pulls (elements, N) M^-1 times their rows, given (elements,) forces that are known
+    already; products (N (N + 2),), square (N N,) and rest (N,) are room to work in.
     """
     n = own.size
     pairs = n * (n + 1) // 2
@@ -115,21 +129,24 @@ def lacking(
             products[p] = y[n + j] * y[n + k]
             products[pairs + p] = y[j] * y[k]
             p += 1
+        products[2 * pairs + j] = y[j] * force
+    # Each sum in a loop of its own: a processor takes several terms of a long one at once.
     for i in range(n):
         total = 0.0
-        for q in range(2 * pairs):
-            total -= quadratic[i, q] * products[q]
-        pushed = 0.0
-        linear = own[i] * force
-        for j in range(n):
-            pushed += push[i, j] * y[j]
-            linear -= held[i, j] * y[j] + held[i, n + j] * y[n + j]
-            tilt = 0.0
-            for k in range(n):
-                tilt += tilts[i, j, k] * y[k]
-            square[i, j] = tilt
-        rest[i] = total + pushed * force
-        a[i] = linear
+        for q in range(products.size):
+            total += second[i, q] * products[q]
+        rest[i] = total
+    for i in range(n):
+        total = 0.0
+        for q in range(y.size):
+            total += held[i, q] * y[q]
+        a[i] = own[i] * force - total
+    for q in range(square.size):
+        square[q] = 0.0
+    for k in range(n):
+        bend = y[k]
+        for q in range(square.size):
+            square[q] += tilts[k, q] * bend
     if kinds is not None:
         for e in range(kinds.size):
             d = 0.0
@@ -147,7 +164,7 @@ def lacking(
         for i in range(n):
             total = rest[i]
             for j in range(n):
-                total -= square[i, j] * out[j]
+                total -= square[i * n + j] * out[j]
             products[i] = total
         if turn == 0:
             for i in range(n):
@@ -157,7 +174,7 @@ def lacking(
         a[i] += products[i]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=_REORDERED)
 def advance(kinds, parameters, rows, before, after, states, new_states):
     """The elements' inner states after the motion from one state (2N,) to another."""
     for e in range(kinds.size):
@@ -169,7 +186,7 @@ def advance(kinds, parameters, rows, before, after, states, new_states):
             new_states[e] = advance_state(parameters[e], change, states[e])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=_REORDERED)
 def add_kink(start, end, length, row, pull, kind, parameters, bend, first, final):
     """Put what an element does between two states (2N,) into its line; whether it meets no kink."""
     n = row.size
@@ -186,7 +203,7 @@ def add_kink(start, end, length, row, pull, kind, parameters, bend, first, final
     return straight
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=_REORDERED)
 def integrate(
     start, mass, gradient, curvature, damping, stiffness, b, b_gradient,
     kinds, parameters, rows, start_states,
@@ -209,21 +226,23 @@ def integrate(
         mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, step, lengths, regular,
         same,
     )  # fmt: skip
-    ik, ic, held, quadratic, tilts = equations
-    own, push, pulls = pushed
-    which, matrices, by_start, by_end, fastest = steps
+    ik, ic, held, second, tilts = equations
+    own, pulls = pushed
+    which, matrices, fastest = steps
     products, square, rest, a = room
     states, new_states = start_states.copy(), start_states.copy()
     given = np.zeros(states.size)
-    y, new, there = start.copy(), np.empty(2 * n), np.empty(2 * n)
-    p0, p1, f0, f1, bend = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(2)
+    whole, new, there = np.empty(4 * n), np.empty(2 * n), np.empty(2 * n)
+    y, f0, f1, moved = whole[: 2 * n], whole[2 * n : 3 * n], whole[3 * n :], np.empty(2 * n)
+    y[:] = start
+    p0, p1, bend = np.empty(n), np.empty(n), np.empty(2)
     at_first, at_last, first, final = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     last = 0.0  # length of the step over which nothing jumped; 0 where something did
     for k in range(lengths.size):
         length = lengths[k]
         if last == 0.0:
             lacking(
-                y, force0[k], own, push, held, quadratic, tilts, kinds, parameters, rows, pulls,
+                y, force0[k], own, held, second, tilts, kinds, parameters, rows, pulls,
                 states, given, products, square, rest, p1, a,
             )  # fmt: skip
             for i in range(n):
@@ -235,25 +254,19 @@ def integrate(
             at_last[i] = p1[i] + share * (p1[i] - p0[i])
             p0[i] = p1[i]
         # Two evaluations after a jump, from which nothing can be extrapolated, and about a kink.
-        u = which[k]
-        matrix, at_start, at_end, by_matrix = matrices[u], by_start[u], by_end[u], u >= 0
+        matrix, by_matrix = matrices[which[k]], which[k] >= 0
         for _look in range(2):
             for i in range(n):
                 f0[i] = own[i] * force0[k] + at_first[i]
                 f1[i] = own[i] * force1[k] + at_last[i]
             if by_matrix:
-                for i in range(2 * n):
-                    total = 0.0
-                    for j in range(n):
-                        total += matrix[i, j] * y[j] + matrix[i, n + j] * y[n + j]
-                        total += at_start[i, j] * f0[j] + at_end[i, j] * f1[j]
-                    new[i] = total
+                times(matrix, 0, whole, new)
             else:
                 taylor(y, f0, f1, length, ik, ic, fastest, new)
             if kinds is not None:
                 advance(kinds, parameters, rows, y, new, states, new_states)
             lacking(
-                new, force1[k], own, push, held, quadratic, tilts, kinds, parameters, rows, pulls,
+                new, force1[k], own, held, second, tilts, kinds, parameters, rows, pulls,
                 new_states, given, products, square, rest, p1, a,
             )  # fmt: skip
             for i in range(n):
@@ -268,12 +281,11 @@ def integrate(
                         )  # fmt: skip
                         crossed = crossed or not straight
             if by_matrix:
+                for i in range(n):
+                    moved[i], moved[n + i] = first[i] - at_first[i], final[i] - at_last[i]
+                times(matrix, 2 * n, moved, there)
                 for i in range(2 * n):
-                    total = new[i]
-                    for j in range(n):
-                        total += at_start[i, j] * (first[j] - at_first[j])
-                        total += at_end[i, j] * (final[j] - at_last[j])
-                    there[i] = total
+                    there[i] += new[i]
             else:
                 for i in range(n):
                     f0[i] = own[i] * force0[k] + first[i]
@@ -297,7 +309,7 @@ def integrate(
         if s >= 0:
             if jumped:
                 lacking(
-                    y, force_after[k], own, push, held, quadratic, tilts, kinds, parameters, rows,
+                    y, force_after[k], own, held, second, tilts, kinds, parameters, rows,
                     pulls, states, given, products, square, rest, p1, a,
                 )  # fmt: skip
             else:
@@ -311,7 +323,7 @@ def integrate(
     end[2 * n :] = states
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, fastmath=_REORDERED)
 def integrate_with_friction(
     start, mass, gradient, curvature, damping, stiffness, b, b_gradient,
     kinds, parameters, rows, start_states,
@@ -324,45 +336,37 @@ def integrate_with_friction(
         mass, gradient, curvature, damping, stiffness, b, b_gradient, rows, step, lengths, regular,
         same,
     )  # fmt: skip
-    ik, ic, held, quadratic, tilts = equations
-    own, push, pulls = pushed
-    which, matrices, by_start, by_end, fastest = steps
+    ik, ic, held, second, tilts = equations
+    own, pulls = pushed
+    which, matrices, fastest = steps
     products, square, rest, a = room
     states, new_states = start_states.copy(), start_states.copy()
     friction, last, given = np.zeros(elements), np.zeros(elements), np.zeros(elements)
-    y, new, zero = start.copy(), np.empty(2 * n), np.zeros(2 * n)
-    p0, p1, f0, f1, bend = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(2)
+    whole, new, zero, even = np.empty(4 * n), np.empty(2 * n), np.zeros(2 * n), np.empty(2 * n)
+    y, f0, f1 = whole[: 2 * n], whole[2 * n : 3 * n], whole[3 * n :]
+    y[:] = start
+    p0, p1, bend = np.empty(n), np.empty(n), np.empty(2)
     kick = np.empty((elements, 2 * n))
     for k in range(lengths.size):
         # Friction is in the step itself, as `stick` finds it: the pseudo-force must not count it.
         given[:] = 0.0
         lacking(
-            y, force0[k], own, push, held, quadratic, tilts, kinds, parameters, rows, pulls,
+            y, force0[k], own, held, second, tilts, kinds, parameters, rows, pulls,
             states, given, products, square, rest, p0, a,
         )  # fmt: skip
         for i in range(n):
             f0[i] = own[i] * force0[k] + p0[i]
             f1[i] = own[i] * force1[k] + p0[i]
-        u = which[k]
-        matrix, at_start, at_end, by_matrix = matrices[u], by_start[u], by_end[u], u >= 0
+        matrix, by_matrix = matrices[which[k]], which[k] >= 0
         for e in range(elements):  # what a unit of friction all through the step does
             if kinds[e] == COULOMB and by_matrix:
-                for i in range(2 * n):
-                    total = 0.0
-                    for j in range(n):
-                        total += (at_start[i, j] + at_end[i, j]) * pulls[e, j]
-                    kick[e, i] = total
+                even[:n], even[n:] = pulls[e], pulls[e]
+                times(matrix, 2 * n, even, kick[e])
             elif kinds[e] == COULOMB:
                 taylor(zero, pulls[e], pulls[e], lengths[k], ik, ic, fastest, kick[e])
         for attempt in range(2):
             if by_matrix:
-                for i in range(2 * n):
-                    total = 0.0
-                    for j in range(2 * n):
-                        total += matrix[i, j] * y[j]
-                    for j in range(n):
-                        total += at_start[i, j] * f0[j] + at_end[i, j] * f1[j]
-                    new[i] = total
+                times(matrix, 0, whole, new)
             else:
                 taylor(y, f0, f1, lengths[k], ik, ic, fastest, new)
             stick(y, new, kinds, parameters, rows, kick, friction, last)
@@ -370,7 +374,7 @@ def integrate_with_friction(
             if attempt == 1:
                 break
             lacking(
-                new, force1[k], own, push, held, quadratic, tilts, kinds, parameters, rows, pulls,
+                new, force1[k], own, held, second, tilts, kinds, parameters, rows, pulls,
                 new_states, given, products, square, rest, p1, a,
             )  # fmt: skip
             for i in range(n):
@@ -388,7 +392,7 @@ def integrate_with_friction(
             for e in range(elements):
                 given[e] = -last[e] if kinds[e] == COULOMB else 0.0
             lacking(
-                y, force_after[k], own, push, held, quadratic, tilts, kinds, parameters, rows,
+                y, force_after[k], own, held, second, tilts, kinds, parameters, rows,
                 pulls, states, given, products, square, rest, p1, a,
             )  # fmt: skip
             x_out[s], v_out[s], a_out[s] = y[:n], y[n:], a

@@ -112,13 +112,12 @@ class Moved:
     Attributes:
         record: with its pose moved.
         effects: what else is moved.
-        shift: (channels, m) what all that does to the residual by the slopes, which is added again;
-            None to have the residual as it is there.
+        size: (columns,) standard deviations by which all is.
     """
 
     record: MeasuredRecord
     effects: tuple[Effect, ...]
-    shift: FloatArray | None
+    size: FloatArray
 
 
 def near_edges(
@@ -183,6 +182,8 @@ class Problem:
         workers: processes for what is independent; as many as cores where None.
 
     Attributes:
+        shifts: (channels, m) by record, what all that is moved does to the residual by the slopes:
+            it is added again; without, the residual is as it is there.
         idle: numbers that are not exact but that no record shows, such as the centre of mass of a
             link that turns about its own axis.
         unsettled: chi-square per sample that what is not exact leaves on the average, where it is
@@ -204,6 +205,7 @@ class Problem:
         self.helpers: _Helpers | None = None
         self.marginal: Marginal | None = None
         self.moved: dict[str, Moved] = {}
+        self.shifts: dict[str, FloatArray] = {}
         self.sizes: dict[str, FloatArray] = {}
         self.idle: frozenset[str] = frozenset()
         self.unsettled = 0.0
@@ -325,13 +327,18 @@ class Problem:
         """
         chosen = self.records if records is None else records
         wanted = tuple(effects)
-        found = self.helpers.residuals(wanted, chosen, end) if self.helpers else None
-        return self.own_residuals(wanted, chosen, end) if found is None else found
+        told = self.helpers.residuals(wanted, chosen, end) if self.helpers else None
+        found = self.own_residuals(wanted, chosen, end) if told is None else told
+        # Here, so that other processes need not know of it.
+        for rows, record in zip(found, chosen, strict=True):
+            if record.name in self.shifts:
+                rows -= self.shifts[record.name][:, : rows.shape[1]]
+        return found
 
     def own_residuals(
         self, effects: Iterable[Effect], records: Sequence[MeasuredRecord], end: float | None
     ) -> list[FloatArray]:
-        """As `residuals`, by this process alone.
+        """As `unmarginalised` without `shifts`, by this process alone.
 
         Args:
             effects: of the model.
@@ -356,8 +363,7 @@ class Problem:
         moved = self.moved.get(record.name)
         if moved is None:
             return residual(record, model, end)
-        found = residual_under(record, model, moved.record, moved.effects, end)
-        return found if moved.shift is None else found - moved.shift[:, : found.shape[1]]
+        return residual_under(record, model, moved.record, moved.effects, end)
 
     def changes(
         self,
@@ -447,17 +453,12 @@ class Problem:
         Returns:
             a context manager.
         """
-        kept = self.marginal, self.moved
-        self.marginal = None
-        if self.moved:
-            self.moved = {name: replace(each, shift=None) for name, each in self.moved.items()}
-            self.renew()
+        kept = self.marginal, self.shifts
+        self.marginal, self.shifts = None, {}
         try:
             yield
         finally:
-            self.marginal, self.moved = kept
-            if self.moved:
-                self.renew()
+            self.marginal, self.shifts = kept
 
     @contextmanager
     def pinned(self, effects: Iterable[Effect]) -> Iterator[None]:

@@ -123,6 +123,7 @@ def fit(
     with_jacobian: bool = False,
     rival: float = np.inf,
     near: Fit | None = None,
+    slopes: list[FloatArray] | None = None,
 ) -> Fit:
     """Fit a hypothesis's unknowns.
 
@@ -139,15 +140,15 @@ def fit(
         rival: cost of another hypothesis: give up on one that stays far above it.
         near: a fit to the same records, at least as long, whose unknowns come first among these:
             its Jacobian is good enough to rank candidates by.
+        slopes: the Jacobian at the start values, where it is known.
     """
     chosen = tuple(problem.records if records is None else records)
-    here = hypothesis
+    here, given = hypothesis, slopes
     residuals = problem.residuals(here.effects, chosen, end)
     cost = _square(residuals) + prior_cost(here)
     damping = 1e-3
-    slopes: list[FloatArray] | None = None
     steps: FloatArray | None = None
-    fresh, refined, turn = False, False, 0
+    fresh, refined, turn = slopes is not None, False, 0
     while turn < iterations and not (turn > 1 and cost > HOPELESS * rival):
         unknowns = here.unknowns()
         if not unknowns:
@@ -201,7 +202,9 @@ def fit(
         fresh = False
         if small or gained < _TRUSTED * expected:
             slopes = None
-    if with_jacobian and problem.marginal is not None and is_nonsmooth(here):
+    if with_jacobian and here is hypothesis and given is not None:
+        slopes = given
+    elif with_jacobian and problem.marginal is not None and is_nonsmooth(here):
         slopes = central_jacobian(problem, here, chosen, end, residuals)
     elif with_jacobian and not (fresh and slopes is not None):
         slopes = jacobian(problem, here, chosen, end, residuals, steps)

@@ -3,6 +3,7 @@
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 
@@ -38,3 +39,43 @@ def taken_out(columns, weights, rows):
             for k in range(weights.size):
                 total += columns[c, j, k] * weights[k]
             rows[c, j] -= total
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def across(columns, jacobian, out):
+    """Sum over channels and samples of a Jacobian's columns times columns.
+
+    Args:
+        columns: (c, m, k).
+        jacobian: (c m, n).
+        out: (n, k), where it goes.
+    """
+    out[:] = 0.0
+    for c in range(columns.shape[0]):
+        for j in range(columns.shape[1]):
+            for n in range(out.shape[0]):
+                value = jacobian[c * columns.shape[1] + j, n]
+                for k in range(out.shape[1]):
+                    out[n, k] += columns[c, j, k] * value
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def less_taken_up(columns, first, jacobian, taken):
+    """Columns less a Jacobian times what each takes up of them, in place.
+
+    Args:
+        columns: (c, m, first + k), of which the last k change.
+        first: how many stay.
+        jacobian: (c m, n).
+        taken: (n, k).
+    """
+    row = np.empty(taken.shape[1])
+    for c in range(columns.shape[0]):
+        for j in range(columns.shape[1]):
+            row[:] = 0.0
+            for n in range(taken.shape[0]):
+                value = jacobian[c * columns.shape[1] + j, n]
+                for k in range(row.size):
+                    row[k] += value * taken[n, k]
+            for k in range(row.size):
+                columns[c, j, first + k] -= row[k]

@@ -40,6 +40,8 @@ _SETTLED = 0.002
 # To how much of the cost slopes must foretell it where values are told: a part of a deviation.
 _TOLD = 1.0
 _LAST_ROUNDS = 8
+# To how much they must foretell it to be the same where it comes to stand.
+_STRAIGHT = 0.1
 # What share of a foretold fall must come: numbers that are held at the farthest explain no more.
 _LITTLE_CAME = 0.02
 # Chi-square per sample above which more is wrong than what is not exact.
@@ -58,7 +60,7 @@ def linearise(
     fitted: Sequence[MeasuredRecord],
     end: float | None = None,
     both: bool = False,
-) -> None:
+) -> list[FloatArray]:
     """Have what is never exact integrated out of all residuals, to first order about a hypothesis.
 
     What its own unknowns can take up of what the campaign shares is left to them: a link that
@@ -73,24 +75,47 @@ def linearise(
         both: take slopes either way. What the unknowns take up must cancel to a thousandth, or the
             little that is left passes for knowledge of what no record can tell, such as the mass of
             all. That matters for how sure values are, not for which model is the better.
+
+    Returns:
+        the hypothesis's Jacobian in every record, in units of the noise alone; none where
+        everything is exact.
     """
     effects = here.effects
     slopes = all_slopes(problem, effects, end, both)
     if len(slopes) < len(problem.records) or not any(s.what for s in slopes.values()):
         problem.marginal = None
-        return
+        return []
     if is_nonsmooth(here):
         signals = {r.name: math.sqrt(signal_power([r])) for r in problem.records}
         slopes = {n: s.silenced(_WHOLE * signals[n]) for n, s in slopes.items()}
-    _move(problem, problem.sizes, shifted=False)
-    problem.marginal = None
+    _place(problem)
+    problem.marginal, problem.shifts = None, {}
     raw = problem.unmarginalised(effects, None, end)
     jacobians = central_jacobian(problem, here, problem.records, end, raw)
     shared, absorbed = _without(problem, slopes, jacobians, {r.name for r in fitted})
     unknowns = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
     problem.marginal = Marginal(shared, dict(zip(unknowns, absorbed, strict=True)))
     problem.unsettled = 0.0
-    _move(problem, problem.sizes)
+    _shift(problem)
+    return jacobians
+
+
+def _whitened(
+    problem: Problem,
+    here: Hypothesis,
+    jacobians: Sequence[FloatArray],
+    records: Sequence[MeasuredRecord],
+) -> list[FloatArray]:
+    """Jacobians of all records, of some of them and with what is never exact integrated out."""
+    assert problem.marginal is not None
+    names, labels = [r.name for r in records], [effect.label for effect in here.effects]
+    known = {r.name: one for r, one in zip(problem.records, jacobians, strict=True)}
+    found = [np.empty_like(known[name]) for name in names]
+    for k in range(found[0].shape[1]):
+        rows = [known[r.name][:, k].reshape(len(r.values), -1) for r in records]
+        for own, column in zip(found, problem.marginal.whitened(rows, names, labels), strict=True):
+            own[:, k] = column.ravel()
+    return found
 
 
 def beside(problem: Problem, record: MeasuredRecord, here: Hypothesis) -> Moved | None:
@@ -122,8 +147,9 @@ def beside(problem: Problem, record: MeasuredRecord, here: Hypothesis) -> Moved 
     # What the campaign shares is where the campaign has it.
     size = next(iter(problem.sizes.values()))[some.own :]
     size = np.concatenate([np.zeros(slopes.own), size])
-    moved = Moved(*nudged(record, slopes.moved(size)), slopes.columns @ size)
+    moved = Moved(*nudged(record, slopes.moved(size)), size)
     problem.moved = {**problem.moved, record.name: moved}
+    problem.shifts = {**problem.shifts, record.name: slopes.by(size)}
     problem.renew()
     return moved
 
@@ -139,34 +165,45 @@ def _without(
     As the fit does it: by the records that are fitted, their own numbers integrated out. Records
     held out then show just what the fit could not know.
     """
+    from picchio.diagnosis.percussion.tolerance.kernel import less_taken_up
+
     names = [r.name for r in problem.records]
-    flat = {n: slopes[n].columns.reshape(-1, slopes[n].columns.shape[2]) for n in names}
+    pairs = dict(zip(names, jacobians, strict=True))
+    crosses = {n: _across(slopes[n].columns, pairs[n]) for n in names}
+    inner = {n: pairs[n].T @ pairs[n] for n in names}
     normal: FloatArray | float = 0.0
     right: FloatArray | float = 0.0
-    for name, jacobian_of in zip(names, jacobians, strict=True):
+    for name in names:
         if name in fitted and not slopes[name].silent:
-            own = slopes[name].own
-            columns = flat[name].astype(float)
-            seen = columns[:, :own].T @ np.column_stack([jacobian_of, columns])
-            n = jacobian_of.shape[1]
-            inner = np.linalg.inv(np.eye(own) + seen[:, n : n + own])
-            normal = normal + jacobian_of.T @ jacobian_of - seen[:, :n].T @ inner @ seen[:, :n]
-            cross = seen[:, n + own :]
-            right = right + jacobian_of.T @ columns[:, own:] - seen[:, :n].T @ inner @ cross
+            own, gram, cross = slopes[name].own, slopes[name].gram, crosses[name]
+            narrowed = cross[:, :own] @ np.linalg.inv(np.eye(own) + gram[:own, :own])
+            normal = normal + inner[name] - narrowed @ cross[:, :own].T
+            right = right + cross[:, own:] - narrowed @ gram[:own, own:]
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     inverse = np.linalg.pinv(normal / np.outer(scale, scale), hermitian=True)
     absorbed = inverse @ (right / scale[:, None]) / scale[:, None]
     found = {}
-    for name, jacobian_of in zip(names, jacobians, strict=True):
+    for name in names:
         if slopes[name].silent:
             found[name] = slopes[name]
             continue
-        own = slopes[name].own
-        columns = slopes[name].columns.copy()
-        left = flat[name][:, own:] - jacobian_of @ absorbed
-        columns[:, :, own:] = left.reshape(*columns.shape[:2], -1)
-        found[name] = replace(slopes[name], columns=columns)
+        own, columns, gram = slopes[name].own, slopes[name].columns.copy(), slopes[name].gram.copy()
+        less_taken_up(columns, own, np.ascontiguousarray(pairs[name]), absorbed)
+        taken = crosses[name].T @ absorbed
+        gram[:, own:] -= taken
+        gram[own:] -= taken.T
+        gram[own:, own:] += absorbed.T @ inner[name] @ absorbed
+        found[name] = replace(slopes[name], columns=columns, gram=gram)
     return found, absorbed
+
+
+def _across(columns: np.ndarray, jacobian_of: FloatArray) -> FloatArray:
+    """(n, k) products of (samples, n) with columns (channels, samples, k)."""
+    from picchio.diagnosis.percussion.tolerance.kernel import across
+
+    found = np.empty((jacobian_of.shape[1], columns.shape[2]))
+    across(columns, np.ascontiguousarray(jacobian_of), found)
+    return found
 
 
 def settled(
@@ -277,22 +314,29 @@ def to_the_last(problem: Problem, found: Fit, *, both: bool = True) -> Fit:
     Returns:
         the fit, with its Jacobian.
     """
-    records = found.records
+    records, off = found.records, math.inf
+    jacobians: list[FloatArray] = []
     for _ in range(_LAST_ROUNDS):
         here = found.hypothesis
-        linearise(problem, here, records, both=both)
+        jacobians = linearise(problem, here, records, both=both)
         found = refit(problem, here, records)
         if problem.marginal is None or found.chi_square > ELSE * found.samples:
             break
         before = _cost(problem, here, None, problem.marginal.only(POSE))
         there, now, kept = _moved_on(problem, here, found)
         found = replace(found, hypothesis=there)
-        if kept < _LITTLE_CAME or abs(before - now) * abs(1.0 - kept) <= _TOLD * kept:
+        off = abs(before - now) * abs(1.0 - kept) / max(kept, 1e-300)
+        if kept < _LITTLE_CAME or off <= _TOLD:
             break
-    # Where it comes to stand, or slopes and Jacobian would differ, and what no record can tell
+    if off > _STRAIGHT:
+        jacobians = linearise(problem, found.hypothesis, records, both=both)
+    # The Jacobian where slopes were taken, or the two would differ, and what no record can tell
     # would pass for known.
-    linearise(problem, found.hypothesis, records, both=both)
-    return fit(problem, found.hypothesis, records, None, iterations=0, with_jacobian=True)
+    slopes = _whitened(problem, found.hypothesis, jacobians, records) if jacobians else None
+    return fit(
+        problem, found.hypothesis, records, None,
+        iterations=0, with_jacobian=True, slopes=slopes,
+    )  # fmt: skip
 
 
 def with_those_left_behind(problem: Problem, found: Fit) -> Fit:
@@ -404,12 +448,13 @@ class About:
     """About what the records are linearised: what `linearise` and `recentre` have found.
 
     Attributes:
-        marginal, sizes, moved, idle, unsettled: the problem's.
+        marginal, sizes, moved, shifts, idle, unsettled: the problem's.
     """
 
     marginal: Marginal | None
     sizes: dict[str, FloatArray]
     moved: dict[str, Moved]
+    shifts: dict[str, FloatArray]
     idle: frozenset[str]
     unsettled: float
 
@@ -420,7 +465,10 @@ class About:
         Args:
             problem: whose slopes, and numbers that are not exact.
         """
-        return cls(problem.marginal, problem.sizes, problem.moved, problem.idle, problem.unsettled)
+        return cls(
+            problem.marginal, problem.sizes, problem.moved, problem.shifts,
+            problem.idle, problem.unsettled,
+        )  # fmt: skip
 
     def restore(self, problem: Problem) -> None:
         """Linearise as it was then.
@@ -430,7 +478,8 @@ class About:
         """
         known = problem.moved is self.moved
         problem.marginal, problem.sizes, problem.moved = self.marginal, self.sizes, self.moved
-        problem.idle, problem.unsettled = self.idle, self.unsettled
+        problem.shifts, problem.idle = self.shifts, self.idle
+        problem.unsettled = self.unsettled
         if not known:
             problem.renew()
 
@@ -518,9 +567,9 @@ def _cost(problem: Problem, hypothesis: Hypothesis, end: float | None, staying: 
     held = 0.0
     quiet = {n for n in names if problem.marginal and problem.marginal.slopes[n].silent}
     for k, name in enumerate(names):
-        moved, sizes = problem.moved.get(name), problem.sizes.get(name)
-        if moved is not None and moved.shift is not None:
-            there[k] = there[k] + moved.shift[:, : there[k].shape[1]]
+        shift, sizes = problem.shifts.get(name), problem.sizes.get(name)
+        if shift is not None:
+            there[k] = there[k] + shift[:, : there[k].shape[1]]
         if sizes is not None and problem.marginal is not None:
             own = problem.marginal.slopes[name].own
             held += float((sizes[:own] ** 2).sum())
@@ -595,16 +644,37 @@ def _in_common(marginal: Marginal, sizes: dict[str, FloatArray], value: tuple[st
     return float(common)
 
 
-def _move(problem: Problem, sizes: dict[str, FloatArray], shifted: bool = True) -> None:
-    if not sizes and not problem.moved:
-        problem.sizes = sizes
-        return
-    problem.sizes, problem.moved = sizes, {}
+def _move(problem: Problem, sizes: dict[str, FloatArray]) -> None:
+    """Have what is not exact so many standard deviations off in every record that is named."""
+    problem.sizes = sizes
+    _place(problem)
+    _shift(problem)
+
+
+def _place(problem: Problem) -> None:
+    """Have every record predicted where its inexact numbers are taken to be."""
+    before, problem.moved = problem.moved, {}
     for record in problem.records:
-        if record.name in sizes:
+        size = problem.sizes.get(record.name)
+        if size is None:
+            continue
+        known = before.get(record.name)
+        if known is None or known.size is not size:
             assert problem.marginal is not None
-            slopes, size = problem.marginal.slopes[record.name], sizes[record.name]
-            there, effects = nudged(record, slopes.moved(size))
-            shift = slopes.columns @ size if shifted else None
-            problem.moved[record.name] = Moved(there, effects, shift)
-    problem.renew()
+            numbers = problem.marginal.slopes[record.name].moved(size)
+            known = Moved(*nudged(record, numbers), size)
+        problem.moved[record.name] = known
+    if problem.moved == before:  # the same, each of them
+        problem.moved = before
+    else:
+        problem.renew()
+
+
+def _shift(problem: Problem) -> None:
+    """Take what is moved out of the residuals again, by the slopes as they are now."""
+    marginal = problem.marginal
+    problem.shifts = (
+        {}
+        if marginal is None
+        else {name: marginal.slopes[name].by(size) for name, size in problem.sizes.items()}
+    )

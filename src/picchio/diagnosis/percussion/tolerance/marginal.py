@@ -17,7 +17,7 @@ import numpy as np
 
 from picchio.core.arrays import FloatArray
 from picchio.core.recent import Recent
-from picchio.diagnosis.percussion.tolerance.slopes import Slopes
+from picchio.diagnosis.percussion.tolerance.slopes import Slopes, products
 
 _KEPT = 24
 # A number of which the records know less than this share is not told from where it is stated.
@@ -198,7 +198,7 @@ class Marginal:
         own = self.slopes[names[0]].own
         numbers = [found[names[0]][own:], *(found[n][: self.slopes[n].own] for n in names)]
         left = [
-            rows + self.slopes[name].columns[:, : rows.shape[1]] @ found[name]
+            rows + self.slopes[name].by(found[name])[:, : rows.shape[1]]
             for name, rows in zip(names, residuals, strict=True)
         ]
         return TakenUp(np.concatenate(numbers), left)
@@ -302,12 +302,11 @@ class Marginal:
         return self._own.get((name, samples, used), make)
 
     def _gram(self, name: str, samples: int) -> FloatArray:
-        key = (name, samples)
+        slopes, key = self.slopes[name], (name, samples)
+        if samples >= slopes.columns.shape[1]:
+            return slopes.gram
         if key not in self._grams:
-            columns = self.slopes[name].columns[:, :samples]
-            channels, count, numbers = columns.shape
-            flat = columns.reshape(channels * count, numbers).astype(float)
-            self._grams[key] = flat.T @ flat
+            self._grams[key] = products(slopes.columns[:, :samples])
         return self._grams[key]
 
     def _root(self, gram: FloatArray, freed: frozenset[str]) -> tuple[FloatArray, FloatArray]:

@@ -20,7 +20,7 @@ from picchio.diagnosis.percussion.data.problem import (
 )
 from picchio.diagnosis.percussion.fit.least_squares import JUMP, between
 from picchio.diagnosis.percussion.tolerance.nudges import POSE, Inexact, Nudge, inexact, nudged
-from picchio.diagnosis.workers import worker_pool
+from picchio.diagnosis.workers import shared_array, worker_pool
 from picchio.model.effects.effect import Effect
 from picchio.model.model import Model
 from picchio.prediction.percussion import BY_MODES
@@ -48,6 +48,7 @@ class Slopes:
         own: how many columns are the record's own; the others the campaign shares.
         columns: (channels, samples, columns) in units of the noise, in single precision.
         norms: (columns,) their norms as they were taken, whatever has been taken out of them since.
+        gram: (columns, columns) their products with each other, over channels and samples.
         silent: whether the columns are set to nothing, as small errors grow beyond what slopes say.
     """
 
@@ -55,21 +56,30 @@ class Slopes:
     own: int
     columns: np.ndarray
     norms: FloatArray
+    gram: FloatArray
     silent: bool = False
 
     @classmethod
-    def of(cls, what: Sequence[Inexact], own: int, columns: np.ndarray) -> Slopes:
+    def of(
+        cls,
+        what: Sequence[Inexact],
+        own: int,
+        columns: np.ndarray,
+        gram: FloatArray | None = None,
+    ) -> Slopes:
         """Slopes as they are taken.
 
         Args:
             what: the numbers, as in the attributes.
             own: as there.
             columns: as there.
+            gram: as there; found here where None.
 
         Returns:
             the slopes.
         """
-        return cls(tuple(what), own, columns, np.sqrt((columns**2).sum(axis=(0, 1), dtype=float)))
+        found = products(columns) if gram is None else gram
+        return cls(tuple(what), own, columns, np.sqrt(np.diag(found)), found)
 
     @cached_property
     def means(self) -> tuple[str, ...]:
@@ -88,7 +98,12 @@ class Slopes:
         what = tuple(one for one, stays in zip(self.what, kept, strict=True) if stays)
         own = int(kept[: self.own].sum())
         return replace(
-            self, what=what, own=own, columns=self.columns[:, :, kept], norms=self.norms[kept]
+            self,
+            what=what,
+            own=own,
+            columns=self.columns[:, :, kept],
+            norms=self.norms[kept],
+            gram=self.gram[np.ix_(kept, kept)],
         )
 
     def silenced(self, most: float) -> Slopes:
@@ -102,7 +117,24 @@ class Slopes:
         """
         if not self.norms.size or self.norms.max() <= most:
             return self
-        return replace(self, columns=np.zeros_like(self.columns), silent=True)
+        return replace(
+            self,
+            columns=np.zeros_like(self.columns),
+            gram=np.zeros_like(self.gram),
+            silent=True,
+        )
+
+    def by(self, sizes: FloatArray) -> FloatArray:
+        """(channels, samples) what they do together.
+
+        Args:
+            sizes: (columns,) standard deviations.
+        """
+        from picchio.diagnosis.percussion.tolerance.kernel import taken_out
+
+        out = np.zeros(self.columns.shape[:2])
+        taken_out(self.columns, -sizes, out)
+        return out
 
     def moved(self, sizes: FloatArray) -> list[tuple[Inexact, FloatArray]]:
         """What is moved by how many standard deviations, (numbers,) each.
@@ -114,6 +146,16 @@ class Slopes:
         for one, size in zip(self.what, sizes, strict=True):
             found.setdefault(one.name, (one, []))[1].append(float(size))
         return [(one, np.array(numbers)) for one, numbers in found.values()]
+
+
+def products(columns: np.ndarray) -> FloatArray:
+    """(k, k) sums over channels and samples of the products of columns (channels, samples, k).
+
+    Args:
+        columns: in single precision; the sums are in double.
+    """
+    flat = columns.reshape(-1, columns.shape[2]).astype(float)
+    return np.asarray(flat.T @ flat)
 
 
 def all_slopes(
@@ -143,17 +185,32 @@ def all_slopes(
     for record in problem.records:
         poses.setdefault(record.pose, []).append(record)
 
-    def at_pose(pose: int) -> list[np.ndarray]:
-        return _of_records(problem, poses[pose], tuple(effects), every, end, both)
+    what = {
+        r.name: [w for w in every[r.name] for _ in range(len(starts(r)) if w.each_blow else 1)]
+        for r in problem.records
+    }
+    # Sending what is found would take as long as finding it.
+    room = {
+        r.name: shared_array(
+            (len(r.values), r.until(end).samples.count, len(what[r.name])), np.float32
+        )
+        for r in problem.records
+    }
+
+    def at_pose(pose: int) -> list[FloatArray]:
+        records = poses[pose]
+        found = _of_records(problem, records, tuple(effects), every, end, both)
+        for record, columns in zip(records, found, strict=True):
+            room[record.name][:] = columns
+        return [products(columns) for columns in found]
 
     with problem.pinned(effects), worker_pool(problem.workers, {"slopes": at_pose}) as mapped:
         found = mapped("slopes", poses)
     slopes = {}
-    for records, columns in zip(poses.values(), found, strict=True):
-        for record, own in zip(records, columns or (), strict=False):
-            blows = len(starts(record))
-            what = tuple(w for w in every[record.name] for _ in range(blows if w.each_blow else 1))
-            slopes[record.name] = Slopes.of(what, sum(not w.once for w in what), own)
+    for records, grams in zip(poses.values(), found, strict=True):
+        for record, gram in zip(records, grams or (), strict=False):
+            own, name = sum(not w.once for w in what[record.name]), record.name
+            slopes[name] = Slopes.of(what[name], own, room[name], gram)
     if not problem.sizes:
         problem.idle |= _idle(slopes.values())
         slopes = {name: each.without(problem.idle) for name, each in slopes.items()}
