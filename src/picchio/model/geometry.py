@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,6 +35,7 @@ class Geometry:
         self.pose = pose
         self._inertias: dict[object, Inertia] = {}
         self._motions: dict[object, Motion] = {}
+        self._sweeps: dict[tuple[int, ...] | None, Swept] = {}
         self._stacks: Recent[FloatArray] = Recent(_KEPT_STACKS)
         # Records of one pose share theirs.
         self.plants: Recent[Plant] = Recent(_KEPT_PLANTS)
@@ -61,26 +61,36 @@ class Geometry:
         """The robot."""
         return self.chain.robot
 
-    def inertia(self, what: str = "robot", point: tuple[float, ...] | None = None) -> Inertia:
+    def inertia(
+        self,
+        what: str = "robot",
+        point: tuple[float, ...] | None = None,
+        taken: tuple[int, ...] | None = None,
+    ) -> Inertia:
         """Mass matrix and gravity about the pose, to second order.
 
         Args:
             what: "robot", or a link, for what that link alone adds.
             point: (3,) m in the link's axes: of 1 kg there instead of the link.
+            taken: only these of the chain's coordinates.
         """
-        key = (what, point)
+        key = (what, point, taken)
         if key not in self._inertias:
-            if point is None:
-                found = self.chain.inertia(self.pose, what)
-            else:
+            if point is not None:
                 joint, axes, origin = self.chain.place(what)
-                found = self._swept.inertia(joint, axes @ point + origin)
+                found = self._swept(taken).inertia(joint, axes @ point + origin)
+            elif taken is not None:
+                found = self.inertia(what).take(taken)
+            else:
+                found = self.chain.inertia(self.pose, what)
             self._inertias[key] = found
         return self._inertias[key]
 
-    @cached_property
-    def _swept(self) -> Swept:
-        return self.chain.swept(self.pose)
+    def _swept(self, taken: tuple[int, ...] | None = None) -> Swept:
+        if taken not in self._sweeps:
+            whole = self.chain.swept(self.pose) if taken is None else self._swept()
+            self._sweeps[taken] = whole if taken is None else whole.take(taken)
+        return self._sweeps[taken]
 
     def beside(self, pose: FloatArray) -> Geometry:
         """The geometry of the same robot at a pose nearby.
@@ -112,14 +122,13 @@ class Geometry:
         every = tuple(masses)
 
         def make() -> FloatArray:
-            parts = [vars(self.inertia(what, point)).values() for what, point in every]
-            rows = [[own[np.ix_(*[taken] * own.ndim)].ravel() for own in part] for part in parts]
-            return np.stack([np.concatenate(row) for row in rows])
+            parts = [vars(self.inertia(what, point, taken)).values() for what, point in every]
+            return np.stack([np.concatenate([own.ravel() for own in part]) for part in parts])
 
         # One product for all that an inertia is made of: it is asked for many thousand times.
         flat = np.array(list(masses.values())) @ self._stacks.get((every, taken), make)
         found, at = {}, 0
-        for name, own in vars(self.inertia(*every[0])).items():
+        for name, own in vars(self.inertia(*every[0], taken)).items():
             shape = (len(taken),) * own.ndim
             found[name] = flat[at : (at := at + len(taken) ** own.ndim)].reshape(shape)
         return Inertia(**found)
@@ -137,5 +146,5 @@ class Geometry:
             return self._motions[frame, taken]
         link = frame if self.chain.has_frame(frame) else self.robot.link_of(frame)
         if link not in self._motions:
-            self._motions[link] = self._swept.motion(*self.chain.place(link))
+            self._motions[link] = self._swept().motion(*self.chain.place(link))
         return self._motions[link]

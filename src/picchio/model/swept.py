@@ -7,7 +7,7 @@ of a serial chain's Jacobian; Lynch and Park, Modern Robotics (2017), section 5.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -36,6 +36,15 @@ class Inertia:
     gravity: FloatArray
     gravity_gradient: FloatArray
     gravity_curvature: FloatArray
+
+    def take(self, columns: tuple[int, ...]) -> Inertia:
+        """The same over some of the coordinates.
+
+        Args:
+            columns: indices of the coordinates that are kept.
+        """
+        kept = {name: own[np.ix_(*[columns] * own.ndim)] for name, own in vars(self).items()}
+        return Inertia(**kept)
 
 
 # [r, s, t]: (a x b)_r is the sum of this times a_s b_t.
@@ -130,6 +139,21 @@ class Swept:
             moving = [model.joints[j].idx_v for j in model.supports[joint] if j > 0]
             carrying[joint][moving] = 1.0
         return cls(jacobians, places, carrying, columns, np.array(model.gravity.linear))
+
+    def take(self, columns: tuple[int, ...]) -> Swept:
+        """The same along some of the coordinates.
+
+        Args:
+            columns: indices of the coordinates that are kept.
+        """
+        kept = np.array([0, *(2 * k + side for k in columns for side in (1, 2))])
+        places = {j: (axes[kept], origin[kept]) for j, (axes, origin) in self.places.items()}
+        return replace(
+            self,
+            jacobians=self.jacobians[kept],
+            places=places,
+            columns=self.columns[:, list(columns)],
+        )
 
     def moving(self, joint: int, point: FloatArray) -> FloatArray:
         """(1 + 2c, 6, nv) how a point that a joint carries moves, world axes.
