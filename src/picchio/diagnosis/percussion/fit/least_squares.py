@@ -20,6 +20,7 @@ from picchio.prediction.percussion import BY_MODES
 # Windows that grow, s: a long one at once lets the fit skip cycles.
 WINDOWS = (0.06, 0.16, 0.4, None)
 _CONVERGED = 1e-5
+_NOTHING = 1e-3  # of a fall of the cost
 _INSIDE = 1e-9
 # Times a rival's cost: what is still above that after two rounds is given up.
 HOPELESS = 1.5
@@ -168,6 +169,9 @@ def fit(
         improved = False
         for _ in range(7 if fresh else 2):
             step = bounded_step(unknowns, vector, normal, gradient, damping)
+            # Where rounding decides, all dampings would be tried for nothing.
+            if fresh and -float(2.0 * gradient @ step + step @ normal @ step) < _NOTHING:
+                break
             trial = here.at(vector + step)
             try:
                 there = problem.residuals(trial.effects, chosen, end)
