@@ -1,6 +1,7 @@
 """Work shared among processes: the same results to the last bit, whatever happens to them."""
 
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -20,7 +21,7 @@ from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.search.state import Search
 from picchio.diagnosis.percussion.search.trials import try_candidates
-from picchio.diagnosis.workers import Worker, worker_pool
+from picchio.diagnosis.workers import Worker, shared_array, worker_pool
 from picchio.model.effects.registry import effect_class
 
 ARM = "fanuc_like_3dof"
@@ -124,6 +125,19 @@ def test_shared_changes_are_those_of_one_process(problem, start):
 
 
 @linux
+def test_what_a_worker_writes_in_shared_memory_is_read_here():
+    room = shared_array((3, 2), np.float32)
+
+    def write(k):
+        room[k] = k + 1.0
+        return multiprocessing.current_process().daemon
+
+    with worker_pool(2, {"write": write}) as mapped:
+        assert mapped("write", range(3)) == [True] * 3  # in others
+    assert room.tolist() == [[1.0, 1.0], [2.0, 2.0], [3.0, 3.0]]
+    assert shared_array((0, 4), np.float32).shape == (0, 4)
+
+
 def test_a_worker_forks_no_others():
     def within(item):
         with worker_pool(2, {"who": lambda _: os.getpid()}) as mapped:
@@ -246,6 +260,7 @@ def test_one_process_loads_when_it_needs():
 
 ANSWER = """
 import json
+import multiprocessing
 import sys
 sys.path[:0] = {folders!r}
 import picchio, trial

@@ -521,6 +521,50 @@ def test_values_are_told_of_a_fit_that_slopes_foretell(wrong_everywhere, monkeyp
     assert np.abs((told["one step"] - told["near"]) / spread).max() > 2.0
 
 
+def test_where_slopes_are_straight_they_tell_as_much_as_those_taken_anew(
+    wrong_everywhere, monkeypatch
+):
+    """The Jacobian is that of where they were taken: another would seem to know damping better."""
+    robot, campaign = wrong_everywhere
+    problem = Problem(robot, campaign)
+    taken, told = [], []
+    plain = linearised.linearise
+    monkeypatch.setattr(linearised, "linearise", lambda *a, **k: taken.append(1) or plain(*a, **k))
+    with one_thread():
+        start = Hypothesis.baseline(robot, campaign.tolerance)
+        found = settled(problem, fit_growing(problem, start), problem.records)
+        near = About.of(problem)
+        for straight in (linearised._STRAIGHT, -1.0):
+            near.restore(problem)
+            monkeypatch.setattr(linearised, "_STRAIGHT", straight)
+            before = len(taken)
+            told.append((to_the_last(problem, found), len(taken) - before))
+    (one, few), (other, more) = told
+    assert more == few + 1
+    spread = np.sqrt(other.covariance().diagonal())
+    assert np.sqrt(one.covariance().diagonal()) == pytest.approx(spread, rel=0.01)
+    assert one.hypothesis.vector() == pytest.approx(
+        other.hypothesis.vector(), abs=0.02 * spread.min()
+    )
+
+
+def test_products_of_slopes_stay_theirs(wrong_everywhere):
+    """Whatever the unknowns take up is taken out of the products as well."""
+    robot, campaign = wrong_everywhere
+    problem = Problem(robot, campaign)
+    with one_thread():
+        linearise(problem, Hypothesis.baseline(robot, campaign.tolerance), problem.records)
+    for slopes in problem.marginal.slopes.values():
+        flat = slopes.columns.reshape(-1, slopes.columns.shape[2]).astype(float)
+        expected = flat.T @ flat
+        sizes = np.maximum(slopes.norms, 1.0)  # as they were before: single precision's own errors
+        off = np.abs(slopes.gram - expected) / np.outer(sizes, sizes)
+        assert off.max() < 1e-6
+        assert np.abs(expected).max() > 100.0
+        fewer = slopes.without({slopes.what[0].name})
+        assert fewer.gram == pytest.approx(slopes.gram[-len(fewer.what) :, -len(fewer.what) :])
+
+
 @pytest.mark.slow
 def test_a_blow_that_rises_slowly_is_one_that_rises_slowly():
     """Fast modes tell a rise from a delay: as a delay, half a millisecond passed for a rebound."""
