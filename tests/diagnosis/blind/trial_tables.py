@@ -16,7 +16,7 @@ BEGIN, END = "<!-- tables: printed, not written -->", "<!-- end of the tables --
 BESIDE = "<!-- {}: printed, not written -->", "<!-- end of {} -->"
 # Worlds that are a little wrong everywhere: the rows, the draws and mismatches that the page tells.
 WRONG = "blind_trial_wrong.jsonl"
-LAST_DRAWS = range(90000, 91000), (1.0, 2.0)
+LAST_DRAWS = range(90000, 92000), (1.0, 2.0)
 IN_WRONG = "<!-- wrong everywhere: printed -->", "<!-- end of wrong everywhere -->"
 SIMPLER = "blind_trial_score_test.jsonl", "blind_trial_plain_bic.jsonl"
 ENOUGH = 30.0  # chi-square from which a measurement is foretold to tell causes apart

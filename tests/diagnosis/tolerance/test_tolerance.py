@@ -103,6 +103,19 @@ def test_where_the_numbers_most_probably_are(dense):
     assert found["b"] == pytest.approx(expected[3:], abs=1e-10)
 
 
+def test_what_the_campaign_shares_belongs_to_no_record(dense):
+    """All together what is left whitened; of each what it shows, and an equal share of the rest."""
+    slopes, whole, residual, parts = dense
+    numbers = -np.linalg.solve(np.eye(9) + whole.T @ whole, whole.T @ residual)
+    left, shared = (residual + whole @ numbers) ** 2, (numbers[5:] ** 2).sum()
+    marginal = Marginal(slopes)
+    found = marginal.taken_up(parts, ["a", "b"]).by_record
+    assert found[0] == pytest.approx(left[:40].sum() + (numbers[:3] ** 2).sum() + shared / 2)
+    assert found[1] == pytest.approx(left[40:].sum() + (numbers[3:5] ** 2).sum() + shared / 2)
+    white = sum(float((each**2).sum()) for each in marginal.whitened(parts, ["a", "b"]))
+    assert found.sum() == pytest.approx(white)
+
+
 def test_beside_more_than_noise_the_numbers_stay_nearer(dense):
     slopes, whole, residual, parts = dense
     expected = -np.linalg.solve(50.0 * np.eye(9) + whole.T @ whole, whole.T @ residual)

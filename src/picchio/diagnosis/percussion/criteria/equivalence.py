@@ -61,7 +61,7 @@ def confidence(better: Fit, other: Fit) -> float:
     From the differences of the poses' scores and their spread (Student's t). A single pose has no
     spread: what it says counts only where it decides beyond doubt on its own. Of five or more no
     single one decides against what all the others but the one that says most agree on. What is
-    known beforehand of fitted numbers, such as a tolerance, belongs to no pose: all have a share.
+    known beforehand of numbers that all poses share, such as a tolerance, belongs to none of them.
 
     Args:
         better: the one with less left.
@@ -69,8 +69,8 @@ def confidence(better: Fit, other: Fit) -> float:
     """
     poses = sorted({r.pose for r in better.records})
     difference = np.zeros(len(poses))
-    for record, a, b in zip(better.records, better.residuals, other.residuals, strict=True):
-        difference[poses.index(record.pose)] += float((b * b).sum() - (a * a).sum())
+    for record, a, b in zip(better.records, _by_record(better), _by_record(other), strict=True):
+        difference[poses.index(record.pose)] += b - a
     known = (other.cost - other.chi_square) - (better.cost - better.chi_square)
     difference += known / len(poses)
     if len(poses) < 2:
@@ -81,6 +81,12 @@ def confidence(better: Fit, other: Fit) -> float:
     if len(poses) >= _MANY:
         sure = max(sure, _positive(np.sort(difference)[1:-1]))
     return sure
+
+
+def _by_record(found: Fit) -> FloatArray:
+    if found.by_record is not None:
+        return found.by_record
+    return np.array([float((rows * rows).sum()) for rows in found.residuals])
 
 
 def _positive(values: FloatArray) -> float:

@@ -447,7 +447,8 @@ def _together(
             continue
         cost = float(sum((r * r).sum() for r in there)) + prior_cost(hypothesis)
         if cost < here.cost:
-            return replace(here, hypothesis=hypothesis, residuals=there, jacobians=None, cost=cost)
+            here = replace(here, jacobians=None, by_record=None)
+            return replace(here, hypothesis=hypothesis, residuals=there, cost=cost)
     return None
 
 

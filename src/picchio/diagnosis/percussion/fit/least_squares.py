@@ -48,6 +48,7 @@ class Fit:
             never exact; None where everything is.
         held: the part of the cost by which what is never exact is not where it is stated; None
             where that is not integrated out, or only the first part was fitted.
+        by_record: (records,) chi-square of each, see `TakenUp`; None as `held`.
     """
 
     hypothesis: Hypothesis
@@ -58,6 +59,7 @@ class Fit:
     end: float | None
     absorbed: FloatArray | None = None
     held: float | None = None
+    by_record: FloatArray | None = None
 
     @property
     def chi_square(self) -> float:
@@ -217,9 +219,16 @@ def fit(
         unknown = [(here.effects[u.effect].label, u.name) for u in here.unknowns()]
         absorbed = problem.marginal.absorbed_covariance(unknown)
     taken = None if end is not None else problem.taken_up(here.effects, chosen)
-    held = None if taken is None else taken.held
     return Fit(
-        here, residuals, slopes if with_jacobian else None, cost, chosen, end, absorbed, held
+        here,
+        residuals,
+        slopes if with_jacobian else None,
+        cost,
+        chosen,
+        end,
+        absorbed,
+        None if taken is None else taken.held,
+        None if taken is None else taken.by_record,
     )
 
 

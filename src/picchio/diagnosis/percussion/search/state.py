@@ -183,6 +183,7 @@ class Search:
             residuals=[*found.residuals, *left],
             jacobians=None,
             held=None if taken is None else taken.held,
+            by_record=None if taken is None else taken.by_record,
             cost=found.cost + float(sum((r * r).sum() for r in left)),
         )
         return whole, absurd

@@ -50,10 +50,13 @@ class TakenUp:
     Attributes:
         numbers: all of it, standard deviations.
         left: what the residuals are then, (channels, m) a record, in units of the noise.
+        by_record: (records,) chi-square of each, its own numbers included; what the campaign shares
+            belongs to no record: all have a share.
     """
 
     numbers: FloatArray
     left: list[FloatArray]
+    by_record: FloatArray
 
     @property
     def held(self) -> float:
@@ -201,7 +204,10 @@ class Marginal:
             rows + self.slopes[name].by(found[name])[:, : rows.shape[1]]
             for name, rows in zip(names, residuals, strict=True)
         ]
-        return TakenUp(np.concatenate(numbers), left)
+        squares = [float((rows**2).sum() + (each**2).sum())
+                   for rows, each in zip(left, numbers[1:], strict=True)]  # fmt: skip
+        shared = float((numbers[0] ** 2).sum()) / len(left)
+        return TakenUp(np.concatenate(numbers), left, np.array(squares) + shared)
 
     def shared_estimate(
         self,
