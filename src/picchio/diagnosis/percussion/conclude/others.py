@@ -45,13 +45,24 @@ def weighed(search: Search, whole: Fit) -> tuple[list[Trial], list[Trial], tuple
     with problem.pinned(whole.hypothesis.effects):
         same, refuted = _on_all_records(problem, whole, same)
         doubted, more = _on_all_records(problem, whole, doubted, BEYOND_DOUBT)
-    refuted += more
+    # What does as well in some records may do worse in all, and yet not be ruled out by them.
+    unsure = [
+        trial
+        for trial in refuted
+        if len(search.labels) > 1 and confidence(whole, trial.fit) < BEYOND_DOUBT
+    ]
+    refuted = [trial for trial in refuted if trial not in unsure] + more
+    doubted += unsure
+    told = False
     if 0 < len(doubted) <= _FEW:
         labels = {trial.fit.hypothesis.labels for trial in doubted}
         rest = [trial for trial in rivals if trial.fit.hypothesis.labels not in labels]
         sure = fitted_causes(search, whole, rest, refuted)
-        if all(cause.confidence >= BEYOND_DOUBT for cause in sure):
-            same += doubted
+        told = all(cause.confidence >= BEYOND_DOUBT for cause in sure)
+    if told:
+        same += doubted
+    else:
+        refuted += unsure
     return same, rivals, fitted_causes(search, whole, rivals, refuted)
 
 
