@@ -78,6 +78,9 @@ def shared_array(shape: tuple[int, ...], dtype: type[np.generic]) -> np.ndarray:
     Args:
         shape: of the array.
         dtype: of its numbers.
+
+    Returns:
+        the array, on memory of its own.
     """
     count = math.prod(shape)
     memory = mmap.mmap(-1, max(count * np.dtype(dtype).itemsize, 1))

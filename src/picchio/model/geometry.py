@@ -73,6 +73,9 @@ class Geometry:
             what: "robot", or a link, for what that link alone adds.
             point: (3,) m in the link's axes: of 1 kg there instead of the link.
             taken: only these of the chain's coordinates.
+
+        Returns:
+            kept: the same object for the same question.
         """
         key = (what, point, taken)
         if key not in self._inertias:

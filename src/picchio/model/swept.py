@@ -124,6 +124,9 @@ class Swept:
             columns: as in the attributes.
             q: (nv,) rad or m.
             joints: numbers of those that carry something.
+
+        Returns:
+            what is asked for later comes from this.
         """
         data, count = model.createData(), 1 + 2 * columns.shape[1]
         jacobians = np.empty((count, 6, model.nv))
@@ -156,11 +159,14 @@ class Swept:
         )
 
     def moving(self, joint: int, point: FloatArray) -> FloatArray:
-        """(1 + 2c, 6, nv) how a point that a joint carries moves, world axes.
+        """How a point that a joint carries moves with the joints, world axes.
 
         Args:
             joint: its number.
             point: (3,) m, in the joint's axes.
+
+        Returns:
+            (1 + 2c, 6, nv), linear, then angular.
         """
         axes, origin = self.places[joint]
         own = self.jacobians * self.carrying[joint]

@@ -101,7 +101,14 @@ def _prepared(
 
 @njit(cache=True, nogil=True, inline="always", fastmath=_REORDERED)
 def times(matrix, first, vector, out):
-    """A matrix's columns from one on times a vector, into `out`."""
+    """A matrix's columns from one on times a vector.
+
+    Args:
+        matrix: (m, first + k) or wider.
+        first: the first of the columns.
+        vector: (k,).
+        out: (m,), where it goes.
+    """
     for i in range(out.size):
         total = 0.0
         for q in range(vector.size):
