@@ -8,7 +8,6 @@ from scipy.stats import binom
 
 from picchio.campaign.record import Record
 from picchio.core.errors import InputError
-from picchio.diagnosis.percussion.data.noise import _likelihood
 from picchio.measurement.noise.autoregression import AutoRegression, fit_autoregression
 from picchio.measurement.noise.estimate import noise_levels
 from picchio.measurement.noise.periodic import find_period, not_periodic
@@ -233,19 +232,3 @@ def test_the_tests_see_what_they_should():
         flatness(np.zeros(5))
     with pytest.raises(InputError, match="no such test"):
         whiteness(hum)["smell"]
-
-
-@pytest.mark.parametrize(("share", "slow"), [(0.3, 0.9), (0.9, -0.5), (1e-5, 0.0), (0.95, 0.99)])
-def test_the_likelihood_of_quiet_pieces_is_that_of_the_dense_covariance(share, slow):
-    rng, n = np.random.default_rng(3), 90
-    rows = rng.normal(size=(n, 4))
-    basis = np.stack([np.ones(n), np.cos(0.4 * np.arange(n))], axis=1)
-    covariance = toeplitz(share * np.array([slow**k for k in range(n)])) + (1 - share) * np.eye(n)
-    inverse = np.linalg.inv(covariance)
-    inner = basis.T @ inverse @ basis
-    free = inverse - inverse @ basis @ np.linalg.solve(inner, basis.T @ inverse)
-    expected = np.linalg.slogdet(covariance)[1] + np.linalg.slogdet(inner)[1]
-    log_det, square, left = _likelihood(rows, basis, share, slow)
-    assert log_det == pytest.approx(expected, rel=1e-8)
-    assert square == pytest.approx(np.sum(rows * (free @ rows)), rel=1e-8)
-    assert left == n - 2

@@ -205,9 +205,9 @@ class Swept:
 
     @cached_property
     def _order(self) -> IndexArray | None:
-        """(c,) the joint of each coordinate, where each moves one."""
-        one = (self.columns != 0.0).sum(axis=0) == 1
-        return self.columns.argmax(axis=0) if one.all() and self.columns.max() == 1.0 else None
+        """(c,) the joint of each coordinate, where each moves one, and by as much as itself."""
+        one = ((self.columns != 0.0).sum(axis=0) == 1) & (self.columns.sum(axis=0) == 1.0)
+        return self.columns.argmax(axis=0) if one.all() else None
 
     def _taken(self, values: FloatArray) -> FloatArray:
         """(..., c) of the coordinates, from (..., nv) of the joints."""
