@@ -13,6 +13,7 @@ import picchio
 from picchio.campaign.campaign import Campaign
 from picchio.campaign.record import Record
 from picchio.campaign.tables import Tolerance
+from picchio.diagnosis.stiffness.fit import climb, score
 from picchio.diagnosis.stiffness.modes import peaks
 from picchio.diagnosis.stiffness.prior import prior_of
 from picchio.diagnosis.stiffness.responses import make_problem
@@ -133,6 +134,20 @@ def test_slopes_are_those_of_differences(frfs):
             found = -(more.residual - less.residual) / 2e-5
             np.testing.assert_allclose(part.slope[..., k], found,
                                        atol=2e-4 * max(1e-3, np.abs(found).max()))  # fmt: skip
+
+
+def test_values_alone_are_the_same(frfs):
+    made = problem(frfs.draw(3, 1))
+    at = 0.3 * np.random.default_rng(0).standard_normal(len(made.precision))
+    alone = made.predict(at, slopes=False)
+    for own, other in zip(made.predict(at), alone, strict=True):
+        np.testing.assert_allclose(other.residual, own.residual, rtol=1e-9, atol=1e-12)
+        assert other.slope.shape == (*own.residual.shape, 0)
+    like = climb(made, np.zeros(len(at)))
+    best = score(made, like.mean, like)
+    assert best < score(made, at, like)
+    for unit in np.eye(len(at))[:6]:  # no small step from the most probable numbers is downhill
+        assert score(made, like.mean + 1e-3 * unit, like) > best - 1e-6
 
 
 def test_stiffness_and_damping_far_off_are_found_exactly(frfs):

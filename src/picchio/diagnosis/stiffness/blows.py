@@ -150,17 +150,20 @@ def _functions(
     if not len(line) or not np.abs(blow).max() > 0.0:
         return []
     kept = np.abs(blow) > _SHAKEN * np.abs(blow).max()
+    told = [one for one in record.channels if one[0].kind.name in POWER]
+    if not told:
+        return []
     window, found = Window(time, line, blow, end), []
-    for channel, values, noise in record.channels:
-        if channel.kind.name not in POWER:
+    every = np.stack([values for _, values, _ in told], axis=1)
+    both = window.over_blow(every, np.array([noise for *_, noise in told]), kept)
+    for (channel, *_), value, size in zip(told, *both, strict=True):
+        if not np.abs(value).max() > 0.0:
             continue
         seen = Seen.by(channel, record.direction, robot, record.pose)
         made = response_to(robot, record.name, seen, record.pose, tolerance, index)
-        value, size = window.over_blow(values, noise, kept)
         gains = made.gains.copy()
         gains[index[_HARD]] = _HARDER
-        if np.abs(value).max() > 0.0:
-            bends = np.zeros((len(index), len(value)))
-            found.append(replace(made, omega=line.imag[kept], measured=value, scale=size,
-                                 shift=line[0].real, gains=gains, bends=bends))  # fmt: skip
+        bends = np.zeros((len(index), len(value)))
+        found.append(replace(made, omega=line.imag[kept], measured=value, scale=size,
+                             shift=line[0].real, gains=gains, bends=bends))  # fmt: skip
     return found

@@ -10,11 +10,12 @@ and the tails are those of the highest evidence (Laplace's approximation; MacKay
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from itertools import groupby
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from scipy.optimize import minimize_scalar, nnls
@@ -22,7 +23,7 @@ from scipy.special import gammaln
 from scipy.stats import chi2
 from scipy.stats import t as student
 
-from picchio.core.arrays import BoolArray, FloatArray
+from picchio.core.arrays import BoolArray, FloatArray, IndexArray
 from picchio.diagnosis.stiffness.presses import Press
 from picchio.diagnosis.stiffness.prior import Prior, Spring, Suspect
 from picchio.diagnosis.stiffness.statics import Table, Yield
@@ -126,13 +127,16 @@ class Problem:
         """Loadings in all."""
         return sum(len(table) for table in self.tables)
 
-    def predict(self, at: FloatArray, known: Sequence[Predicted] | None = None) -> list[Predicted]:
+    def predict(
+        self, at: FloatArray, known: Sequence[Predicted] | None = None, slopes: bool = True
+    ) -> list[Predicted]:
         """What is read, and how it changes with every number.
 
         Args:
             at: (p,) logarithms of the springs over the stated ones; then the other numbers, in
                 standard deviations.
             known: at a place not far off; see `yields`.
+            slopes: not used: values rest on them.
         """
         n, found = self.joints, []
         for k, table in enumerate(self.tables):
@@ -218,12 +222,15 @@ class Fitted(Protocol):
     def precision(self) -> FloatArray:
         """(p, p) of all numbers before the tests."""
 
-    def predict(self, at: FloatArray, known: Sequence[Predicted] | None = None) -> list[Predicted]:
+    def predict(
+        self, at: FloatArray, known: Sequence[Predicted] | None = None, slopes: bool = True
+    ) -> list[Predicted]:
         """Residuals and their slopes.
 
         Args:
             at: (p,) the numbers.
             known: at a place not far off.
+            slopes: False where none is needed: they may be left empty.
 
         Returns:
             one for each table.
@@ -236,7 +243,7 @@ class Predicted:
 
     Attributes:
         residual: (m, r) m or rad, measured less predicted.
-        slope: (m, r, p) of the prediction.
+        slope: (m, r, p) of the prediction; (m, r, 0) where none was asked for.
         own: (m, r, r) covariance of what is drawn for each row anew, or (m, r) variances where
             no two readings share it; None for none.
         yielded: what it rests on.
@@ -358,38 +365,98 @@ def _split(problem: Fitted, rows: BoolArray) -> list[BoolArray]:
     return np.split(np.asarray(rows), ends)
 
 
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """The m rows of tables, one after the other, that have as many readings a row.
+
+    Attributes:
+        rows: which of all.
+        group: (m, r) of each reading, the number of its noise.
+        both: (m, r, p + 1) slopes and, last, the residual.
+        own: as of `Predicted`.
+    """
+
+    rows: slice
+    group: IndexArray
+    both: FloatArray
+    own: FloatArray | None
+
+    @classmethod
+    def all_of(cls, problem: Fitted, parts: Sequence[Predicted]) -> Iterator[_Run]:
+        """In the tables' order."""
+        begin, number = 0, {group: k for k, group in enumerate(problem.groups)}
+
+        def alike(pair: tuple[Rows, Predicted]) -> tuple[int, int]:
+            table, part = pair
+            return len(table.groups), 0 if part.own is None else part.own.ndim
+
+        for (_, kind), pairs in groupby(zip(problem.tables, parts, strict=True), alike):
+            tables, own = zip(*pairs, strict=True)
+            which = np.array([[number[group] for group in table.groups] for table in tables])
+            group = np.repeat(which, [len(table) for table in tables], axis=0)
+            both = np.concatenate([
+                np.concatenate([part.slope, part.residual[..., None]], axis=-1) for part in own
+            ])  # fmt: skip
+            drawn = np.concatenate([part.own for part in own]) if kind else None
+            yield cls(slice(begin, begin + len(group)), group, both, drawn)
+            begin += len(group)
+
+    def white(self, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Slopes and residual in standard deviations; (m,) the covariances' logarithms."""
+        size = noise[self.group]
+        if self.own is None or self.own.ndim == 2:
+            each = np.sqrt(size**2 + (0.0 if self.own is None else self.own))
+            return self.both / each[..., None], 2.0 * np.log(each).sum(axis=-1)
+        lower = np.linalg.cholesky(self.own + size[..., None] ** 2 * np.eye(size.shape[1]))
+        logdet = 2.0 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
+        return np.linalg.solve(lower, self.both), logdet
+
+
+class _Weighed(NamedTuple):
+    """A run's rows under one noise.
+
+    Attributes:
+        slope: (m, r, p) in standard deviations.
+        square: (m,) of the residual.
+        weight: (m,) of a row.
+        curve: (m,) what the second derivative makes of it.
+        kept: (m,) whether it counts.
+    """
+
+    slope: FloatArray
+    square: FloatArray
+    weight: FloatArray
+    curve: FloatArray
+    kept: BoolArray
+
+    def product(self, weight: FloatArray) -> FloatArray:
+        """(p, p) of the slopes, each row so many times."""
+        root = np.sqrt(weight * self.kept)
+        flat = (self.slope * root[:, None, None]).reshape(-1, self.slope.shape[-1])
+        return np.asarray(flat.T @ flat)
+
+
 class _State:
     """The score at one place, for given noise and tails."""
 
-    def __init__(self, problem: Fitted, at: FloatArray, tail: float,
-                 keep: Sequence[BoolArray], near: _State | None = None) -> None:  # fmt: skip
+    def __init__(self, problem: Fitted, at: FloatArray, tail: float, keep: BoolArray,
+                 near: _State | None = None, slopes: bool = True) -> None:  # fmt: skip
         self.problem, self.at, self.tail, self.keep = problem, at, tail, keep
-        self.parts: list[Predicted] = problem.predict(at, None if near is None else near.parts)
+        known = None if near is None else near.parts
+        self.parts: list[Predicted] = problem.predict(at, known, slopes)
+        self.slopes, self.runs = slopes, tuple(_Run.all_of(problem, self.parts))
 
     def weigh(self, noise: FloatArray) -> float:
-        """Fill in weights, gradient and information; the negative log posterior."""
-        problem, p = self.problem, len(self.at)
-        gradient = problem.precision @ self.at
-        self.information = np.zeros((p, p))
-        score = 0.5 * float(self.at @ problem.precision @ self.at)
-        self.chi2, self.weight, self.readings, self.by_row = [], [], [], []
-        curved = np.zeros((p, p))
-        for table, part, keep in zip(problem.tables, self.parts, self.keep, strict=True):
-            size = np.array([noise[problem.groups.index(group)] for group in table.groups])
-            both = np.concatenate([part.slope, part.residual[..., None]], axis=-1)
-            if part.own is None or part.own.ndim == 2:
-                each = np.sqrt(size**2 + (0.0 if part.own is None else part.own))
-                white = both / each[..., None]
-                logdet = 2.0 * np.log(each).sum(axis=-1)
-            else:
-                lower = np.linalg.cholesky(part.own + np.diag(size**2))
-                logdet = 2.0 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
-                white = np.linalg.solve(lower, both)
-            slope, toward = white[..., :-1], white[..., -1]
+        """Fill in weights and, with slopes, the gradient; the negative log posterior."""
+        precise, v = self.problem.precision @ self.at, self.tail
+        score = 0.5 * float(self.at @ precise)
+        self.gradient, self.weighed = precise, list[_Weighed]()
+        for run in self.runs:
+            white, logdet = run.white(noise)
+            toward, kept, r = white[..., -1], self.keep[run.rows], white.shape[1]
             square = (toward**2).sum(axis=1)
-            r, v = table.values.shape[1], self.tail
             if math.isinf(v):
-                weight, curve = np.ones(len(table)), np.ones(len(table))
+                weight, curve = np.ones(len(square)), np.ones(len(square))
                 own = 0.5 * square + 0.5 * r * math.log(2.0 * math.pi)
             else:
                 weight = (v + r) / (v + square)
@@ -398,18 +465,23 @@ class _State:
                 own = 0.5 * (v + r) * np.log1p(square / v) + (
                     gammaln(0.5 * v) - gammaln(0.5 * (v + r)) + 0.5 * r * math.log(v * math.pi)
                 )
-            score += float(((own + 0.5 * logdet) * keep).sum())
-            flat, each = slope.reshape(-1, p), np.repeat([weight * keep, curve * keep], r, axis=1)
-            gradient -= flat.T @ (each[0] * toward.ravel())
-            curved += (flat * each[0][:, None]).T @ flat
-            self.information += (flat * each[1][:, None]).T @ flat
-            self.chi2.append(square)
-            self.weight.append(weight)
-            self.readings.append(np.full(len(table), float(r)))
-            squared = (slope[..., : problem.springs] ** 2).sum(axis=1)
-            self.by_row.append(squared * (curve * keep)[:, None])
-        self.gradient, self.step_matrix = gradient, curved + problem.precision
+            score += float(((own + 0.5 * logdet) * kept).sum())
+            self.weighed.append(_Weighed(white[..., :-1], square, weight, curve, kept))
+            if self.slopes:
+                pull = (weight * kept)[:, None] * toward
+                self.gradient = self.gradient - np.tensordot(pull, white[..., :-1], 2)
         return score
+
+    @property
+    def step_matrix(self) -> FloatArray:
+        """(p, p) what a step divides the gradient by."""
+        return sum((one.product(one.weight) for one in self.weighed), self.problem.precision)
+
+    @property
+    def information(self) -> FloatArray:
+        """(p, p) of the readings."""
+        nothing = np.zeros_like(self.problem.precision)
+        return sum((one.product(one.curve) for one in self.weighed), nothing)
 
 
 def climb(
@@ -426,16 +498,15 @@ def climb(
     Returns:
         the fit.
     """
-    keep = _split(problem, np.ones(problem.rows, bool) if rows is None else rows)
+    keep = np.ones(problem.rows, bool) if rows is None else np.asarray(rows)
     stated = np.log([max(problem.noise[group], _LEAST_NOISE) for group in problem.groups])
     noise = stated.copy()
     state = _State(problem, at.copy(), tail, keep)
     # The first noise is what the residual shows: no row is an outlier of a fit not yet made.
-    for k, group in enumerate(problem.groups):
-        inside = np.concatenate([
-            part.residual[kept][:, [g == group for g in table.groups]].ravel()
-            for table, part, kept in zip(problem.tables, state.parts, keep, strict=True)
-        ])  # fmt: skip
+    for k in range(len(noise)):
+        inside = np.concatenate(
+            [run.both[..., -1][(run.group == k) & keep[run.rows, None]] for run in state.runs]
+        )
         if inside.size:
             noise[k] = max(noise[k], math.log(1.5 * float(np.median(np.abs(inside))) + 1e-300))
 
@@ -460,7 +531,7 @@ def climb(
         if abs(last - now) < 1e-2:
             break
         last = now
-    return _made(problem, state, tail, noise, keep, stated, whole(state, noise))
+    return _made(problem, state, tail, noise, keep, whole(state, noise))
 
 
 def score(problem: Fitted, at: FloatArray, like: Fit) -> float:
@@ -471,14 +542,14 @@ def score(problem: Fitted, at: FloatArray, like: Fit) -> float:
         at: (p,) the numbers.
         like: whose noise and tails count.
     """
-    keep = _split(problem, np.ones(problem.rows, bool))
     noise = np.array([like.noise[group] for group in problem.groups])
-    return _State(problem, at, like.tails, keep).weigh(noise)
+    every = np.ones(problem.rows, bool)
+    return _State(problem, at, like.tails, every, slopes=False).weigh(noise)
 
 
 def _newton(
-    problem: Fitted, state: _State, tail: float, keep: Sequence[BoolArray],
-            noise: FloatArray) -> _State:  # fmt: skip
+    problem: Fitted, state: _State, tail: float, keep: BoolArray, noise: FloatArray
+) -> _State:
     size = np.exp(noise)
     score = state.weigh(size)
     for _ in range(_STEPS):
@@ -503,20 +574,21 @@ def _newton(
 
 
 def _made(
-    problem: Fitted, state: _State, tail: float, noise: FloatArray,
-          keep: Sequence[BoolArray], stated: FloatArray, score: float) -> Fit:  # fmt: skip
-    p = len(state.at)
-    precise = state.information + problem.precision
+    problem: Fitted, state: _State, tail: float, noise: FloatArray, keep: BoolArray, score: float
+) -> Fit:
+    information, weighed = state.information, state.weighed
+    precise = information + problem.precision
     covariance = np.linalg.inv(precise)
     covariance = 0.5 * (covariance + covariance.T)
     prior = 0.5 * np.linalg.slogdet(problem.precision)[1]  # the 2 pi of prior and volume cancel
-    kept = np.concatenate(keep)
-    readings = np.concatenate(state.readings)
-    told = float(np.trace(covariance @ state.information))
+    readings = np.concatenate([np.full(len(one.square), one.slope.shape[1]) for one in weighed])
+    by_row = [(one.slope[..., : problem.springs] ** 2).sum(axis=1)
+              * (one.curve * one.kept)[:, None] for one in weighed]  # fmt: skip
+    told = float(np.trace(covariance @ information))
     return Fit(
         problem, state.at, covariance, prior - score,
         dict(zip(problem.groups, np.exp(noise).tolist(), strict=True)), tail,
-        np.concatenate(state.chi2), np.concatenate(state.weight), readings,
-        float(readings[kept].sum()) - told, np.concatenate(state.by_row),
-        state.information[:p, :p],
+        np.concatenate([one.square for one in weighed]),
+        np.concatenate([one.weight for one in weighed]), readings.astype(float),
+        float(readings[keep].sum()) - told, np.concatenate(by_row), information,
     )  # fmt: skip

@@ -9,9 +9,10 @@ v = Z^-1 J_f^T d and u likewise of the sensor.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from operator import itemgetter
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -139,11 +140,13 @@ class Standing:
     factors: FloatArray
 
     @cached_property
-    def driven(self) -> tuple[int, ...]:
-        """Of each response the first one that is pushed alike at the same lines."""
-        first: dict[tuple[bytes, ...], int] = {}
-        keys = [(r.s.tobytes(), r.push.tobytes(), r.pushes.tobytes()) for r in self.responses]
-        return tuple(first.setdefault(key, i) for i, key in enumerate(keys))
+    def driven(self) -> tuple[_Alike, ...]:
+        """The responses, those together that are pushed alike at the same lines."""
+        alike: dict[tuple[bytes, ...], list[int]] = {}
+        for k, one in enumerate(self.responses):
+            key = one.s.tobytes(), one.push.tobytes(), one.pushes.tobytes()
+            alike.setdefault(key, []).append(k)
+        return tuple(_Alike.of(self.responses, index) for index in alike.values())
 
     def mass_at(self, off: FloatArray) -> FloatArray:
         """The mass matrix (n, n).
@@ -174,7 +177,7 @@ class _Driven:
 
     Attributes:
         motion: (m, n) of the joints, at every line.
-        slopes: (m, p, n) its derivatives by the numbers.
+        slopes: (m, p, n) its derivatives by the numbers; (m, 0, n) where none was asked for.
         at_once: (n,) acceleration where nothing but the masses resists.
     """
 
@@ -188,7 +191,7 @@ class _Driven:
         response: Response,
         off: FloatArray,
         system: tuple[FloatArray, FloatArray, FloatArray],
-        slopes: tuple[FloatArray, FloatArray, FloatArray],
+        slopes: tuple[FloatArray, FloatArray, FloatArray] | None,
     ) -> _Driven:
         """The answer to what a response is the answer to.
 
@@ -197,7 +200,12 @@ class _Driven:
         w = response.s[:, None, None]
         powers = np.ones_like(w), w, w**2
         push = response.push + off @ response.pushes
-        inverse = np.linalg.inv(sum(a * part for a, part in zip(powers, system, strict=True)))
+        at_once = np.linalg.solve(system[2], push)
+        matrix = sum(a * part for a, part in zip(powers, system, strict=True))
+        if slopes is None:
+            motion = np.linalg.solve(matrix, push[:, None])[..., 0]
+            return cls(motion, np.zeros((len(motion), 0, len(push)), complex), at_once)
+        inverse = np.linalg.inv(matrix)
         motion = inverse @ push
         m, n = motion.shape
         both = np.concatenate([motion.real, motion.imag])
@@ -206,7 +214,92 @@ class _Driven:
             real = (both @ part.reshape(-1, n).T).reshape(2, m, -1, n)
             by -= a * (real[0] + 1j * real[1])
         by[:, 2 * n : 2 * n + len(off)] += response.pushes
-        return cls(motion, by @ inverse, np.linalg.solve(system[2], push))
+        return cls(motion, by @ inverse, at_once)
+
+
+@dataclass(frozen=True, eq=False)
+class _Alike:
+    """The r responses of a pose that one force drives at the same lines; see `Response`.
+
+    Attributes:
+        first: the first of them.
+        index: which of the pose's they are.
+        lead: (r, m) by which a motion is multiplied to be what is read.
+        sight, tilt: (r, n).
+        sights, tilts: (r, k, n).
+        gains, delays, widths: (r, 1, k).
+        bends: (r, m, k).
+        bent, measured: (r, m).
+        scale, remainder: (r, m).
+        straight: (r, 1) 1 of those that read what answers at once to a force, else 0.
+    """
+
+    first: Response
+    index: Sequence[int]
+    lead: ComplexArray
+    sight: FloatArray
+    tilt: FloatArray
+    sights: FloatArray
+    tilts: FloatArray
+    gains: FloatArray
+    delays: FloatArray
+    widths: FloatArray
+    bends: ComplexArray
+    bent: ComplexArray
+    measured: ComplexArray
+    scale: FloatArray
+    remainder: FloatArray
+    straight: FloatArray
+
+    @classmethod
+    def of(cls, responses: Sequence[Response], index: Sequence[int]) -> _Alike:
+        """Those of the numbers in `index`."""
+        own = [responses[k] for k in index]
+        s = own[0].s
+
+        def every(name: str) -> FloatArray:
+            return np.array([getattr(one, name) for one in own])
+
+        power = every("power")[:, None]
+        numbers = {name: every(name)[:, None] for name in ("gains", "delays", "widths")}
+        return cls(
+            own[0], index, s**power, every("sight"), every("tilt"), every("sights"),
+            every("tilts"), **numbers, bends=every("bends").swapaxes(1, 2),
+            bent=np.array([one.bent * np.ones(len(s)) for one in own]), measured=every("measured"),
+            scale=every("scale"), remainder=every("remainder"),
+            straight=(power == 2).astype(float),
+        )  # fmt: skip
+
+    def read(self, driven: _Driven, off: FloatArray) -> Iterator[tuple[int, Predicted]]:
+        """Each response's number, and what is left of it."""
+        motion, s = driven.motion, self.first.s
+        sight, tilt = self.sight + off @ self.sights, self.tilt + off @ self.tilts
+        seen = self.lead[..., None] * sight[:, None] + tilt[:, None]
+        delay, width = self.delays @ off, self.widths @ off
+        gain = np.exp(self.gains @ off - s * delay + 0.5 * s**2 * width)
+        bent = self.bent + self.bends @ off
+        plain = (seen * motion).sum(axis=-1)
+        other = self.straight * (sight @ driven.at_once)[:, None] - plain
+        value = gain * (plain + bent * other)
+        left = (self.measured - value) / self.scale
+        follows = gain * (1.0 - bent)
+        slope = (driven.slopes @ seen.transpose(1, 2, 0)).transpose(2, 0, 1) * follows[..., None]
+        if slope.shape[-1] and len(off):
+            own = slice(2 * motion.shape[1], 2 * motion.shape[1] + len(off))
+            line = s[:, None]
+            sights = self.lead[..., None] * (motion @ self.sights.swapaxes(1, 2))
+            direct = sights + motion @ self.tilts.swapaxes(1, 2)
+            slope[..., own] += follows[..., None] * direct
+            slope[..., own] += value[..., None] * (
+                self.gains - line * self.delays + 0.5 * line**2 * self.widths
+            )
+            slope[..., own] += (gain * other)[..., None] * self.bends
+        slope /= self.scale[..., None]
+        both = np.stack([slope.real, slope.imag], axis=2)
+        residual = np.stack([left.real, left.imag], axis=2)
+        remainder = np.stack([self.remainder] * 2, axis=2)
+        for k, number in enumerate(self.index):
+            yield number, Predicted(residual[k], both[k], remainder[k])
 
 
 @dataclass(frozen=True, eq=False)
@@ -366,17 +459,21 @@ class FrfProblem:
         own = shapes[:, mode]
         return float(own @ damp @ own / (2.0 * np.sqrt(squared[mode])))
 
-    def predict(self, at: FloatArray, known: Sequence[Predicted] | None = None) -> list[Predicted]:
+    def predict(
+        self, at: FloatArray, known: Sequence[Predicted] | None = None, slopes: bool = True
+    ) -> list[Predicted]:
         """The real and imaginary parts over the lines' scale, measured less predicted.
 
         Args:
             at: (p,) the numbers.
             known: not used: everything is computed anew.
+            slopes: False where none is needed, which is many times faster.
         """
         n, found = self.joints, []
         scale = np.exp(np.clip(at[: 2 * n], -12.0, 12.0))
         ratio = self.damping_ratio * scale[n:]
         off = at[2 * n : 2 * n + len(self.steps)]
+        pull = self.steps.index("gravity_stiffness") if self.gravity_std > 0.0 else None
         for k, standing in enumerate(self.standings):
             springs = standing.spring * scale[:n]
             first = 2 * n + len(self.steps) + self.modal * k
@@ -385,69 +482,52 @@ class FrfProblem:
                 factors = factors * np.exp(self.by_mode * at[first : first + self.modal])
             mass = standing.mass_at(off)
             stiff = np.diag(springs) + standing.gravity
-            pull = self.steps.index("gravity_stiffness") if self.gravity_std > 0.0 else None
             if pull is not None:
                 stiff = stiff + off[pull] * self.gravity_std * standing.gravity
-            p = len(at)
-            d_stiff, d_damp = np.zeros((p, n, n)), np.zeros((p, n, n))
-            d_stiff[np.arange(n), np.arange(n), np.arange(n)] = springs
-            by_mass = standing.mass_slopes(off)
-            moved = np.flatnonzero(np.abs(by_mass).max(axis=(1, 2), initial=0.0))
-            # The damping's slopes by differences, all at once: springs, ratios, modes, masses.
-            step, once = 1e-5, np.eye(n)
-            ones, still = np.ones((n, n)), np.ones((len(moved), n))
-            modes = np.ones((self.modal, n)) + step * once[: self.modal]
-            same = np.ones_like(modes)
-            change = [(1.0 + step * once, ones, ones), (ones, 1.0 + step * once, ones),
-                      (same, same, modes), (still, still, still)]  # fmt: skip
-            k_of, z_of, f_of = (np.concatenate([np.ones((1, n)), *part])
-                                for part in zip(*change, strict=True))  # fmt: skip
-            masses = np.repeat(mass[None], len(k_of), axis=0)
-            masses[len(k_of) - len(moved) :] += step * by_mass[moved]
-            damps = self.damping(masses, springs * k_of, ratio * z_of, factors * f_of)
-            damp, more = damps[0], (damps[1:] - damps[0]) / step
-            d_damp[: 2 * n] = more[: 2 * n]
-            d_damp[first : first + self.modal] = self.by_mode * more[2 * n : 2 * n + self.modal]
-            d_damp[2 * n + moved] = more[2 * n + self.modal :]
-            if pull is not None:
-                d_stiff[2 * n + pull] = self.gravity_std * standing.gravity
-            d_mass = np.zeros((p, n, n))
-            d_mass[2 * n : 2 * n + len(self.steps)] = by_mass
-            system, slopes = (stiff, damp, mass), (d_stiff, d_damp, d_mass)
-            driven: dict[int, _Driven] = {}  # of channels that read the same motion once
-            for response, first in zip(standing.responses, standing.driven, strict=True):
-                if first not in driven:
-                    driven[first] = _Driven.of(response, off, system, slopes)
-                found.append(self._response(response, off, driven[first]))
+            system, by = (stiff, self.damping(mass, springs, ratio, factors), mass), None
+            if slopes:
+                by = self._slopes(standing, off, (springs, ratio, factors), system, first)
+                if pull is not None:
+                    by[0][2 * n + pull] = self.gravity_std * standing.gravity
+            own: list[tuple[int, Predicted]] = []
+            for alike in standing.driven:
+                own += alike.read(_Driven.of(alike.first, off, system, by), off)
+            found += [part for _, part in sorted(own, key=itemgetter(0))]
         return found
 
-    def _response(self, response: Response, off: FloatArray, driven: _Driven) -> Predicted:
-        line = response.s[:, None]
-        n, p = self.joints, driven.slopes.shape[1]
-        sight, tilt = response.sight + off @ response.sights, response.tilt + off @ response.tilts
-        lead = response.s**response.power
-        v = driven.motion
-        seen = lead[:, None] * sight + tilt
-        gain = response.factor(off)[:, None]
-        bent = (response.bent + off @ response.bends) * np.ones(len(line))
-        plain = np.einsum("mn,mn->m", seen, v)
-        at_once = sight @ driven.at_once if response.power == 2 else 0.0
-        value = gain[:, 0] * (plain + bent * (at_once - plain))
-        follows = gain * (1.0 - bent[:, None])
-        slope = follows * (driven.slopes @ seen[:, :, None])[:, :, 0]
-        own = slice(2 * n, 2 * n + len(self.steps))
-        slope[:, own] += follows * (lead[:, None] * (v @ response.sights.T) + v @ response.tilts.T)
-        slope[:, own] += value[:, None] * (
-            response.gains - line * response.delays + 0.5 * line**2 * response.widths
-        )
-        slope[:, own] += gain * (at_once - plain)[:, None] * response.bends.T
-        left = (response.measured - value) / response.scale
-        slope = slope / response.scale[:, None]
-        return Predicted(
-            np.stack([left.real, left.imag], axis=1),
-            np.stack([slope.real, slope.imag], axis=1).reshape(len(line), 2, p),
-            np.stack([response.remainder] * 2, axis=1),
-        )
+    def _slopes(
+        self,
+        standing: Standing,
+        off: FloatArray,
+        numbers: tuple[FloatArray, FloatArray, FloatArray],
+        system: tuple[FloatArray, FloatArray, FloatArray],
+        first: int,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Derivatives (p, n, n) of a pose's stiffness, damping and mass, gravity's own left out.
+
+        The damping's by differences, all at once: springs, ratios, modes, masses. `numbers` are
+        springs, damping ratios and the modes' factors, `first` where the pose's own begin.
+        """
+        (springs, ratio, factors), (_, damp, mass), n = numbers, system, self.joints
+        by_mass = standing.mass_slopes(off)
+        moved = np.flatnonzero(np.abs(by_mass).max(axis=(1, 2), initial=0.0))
+        step, once = 1e-5, np.eye(n)
+        ones, still = np.ones((n, n)), np.ones((len(moved), n))
+        modes = np.ones((self.modal, n)) + step * once[: self.modal]
+        same = np.ones_like(modes)
+        change = [(1.0 + step * once, ones, ones), (ones, 1.0 + step * once, ones),
+                  (same, same, modes), (still, still, still)]  # fmt: skip
+        k_of, z_of, f_of = (np.concatenate(part) for part in zip(*change, strict=True))
+        masses = np.repeat(mass[None], len(k_of), axis=0)
+        masses[len(k_of) - len(moved) :] += step * by_mass[moved]
+        more = (self.damping(masses, springs * k_of, ratio * z_of, factors * f_of) - damp) / step
+        d_stiff, d_damp, d_mass = np.zeros((3, len(self.precision), n, n))
+        d_stiff[np.arange(n), np.arange(n), np.arange(n)] = springs
+        d_damp[: 2 * n] = more[: 2 * n]
+        d_damp[first : first + self.modal] = self.by_mode * more[2 * n : 2 * n + self.modal]
+        d_damp[2 * n + moved] = more[2 * n + self.modal :]
+        d_mass[2 * n : 2 * n + len(self.steps)] = by_mass
+        return d_stiff, d_damp, d_mass
 
 
 def make_problem(
@@ -753,7 +833,7 @@ def left_over(problem: FrfProblem, at: FloatArray) -> float:
         at: (p,) the numbers.
     """
     shares = []
-    for part, table in zip(problem.predict(at), problem.tables, strict=True):
+    for part, table in zip(problem.predict(at, slopes=False), problem.tables, strict=True):
         left = np.linalg.norm(part.residual * table.scale[:, None])
         shares.append(float(left / np.linalg.norm(table.measured)))
     return float(np.sqrt(np.mean(np.square(shares))))

@@ -162,26 +162,27 @@ class Window:
     end: float = math.inf
 
     def over_blow(
-        self, values: FloatArray, noise: float, kept: BoolArray
+        self, values: FloatArray, noise: FloatArray, kept: BoolArray
     ) -> tuple[ComplexArray, FloatArray]:
-        """The function of a channel and its standard deviation, both SI per newton.
+        """The functions of channels and their standard deviations, both SI per newton.
 
         Args:
-            values: (count,) SI; before the blow their mean is nothing.
-            noise: their standard deviation.
+            values: (count, k) SI; before the blow their means are nothing.
+            noise: (k,) their standard deviations.
             kept: (m,) lines.
 
         Returns:
-            (kept,) each.
+            (k, kept) each.
         """
         within = (self.time >= 0.0) & (self.time <= self.end)
         step, before = float(np.median(np.diff(self.time))), values[self.time < 0.0]
-        rest = float(np.mean(before)) if len(before) >= _QUIET else 0.0
+        rest = before.mean(axis=0) if len(before) >= _QUIET else 0.0
         time, blow = self.time[within], self.blow[kept]
-        value = step * transform(self.line[kept], time, values[within] - rest) / blow
+        value = step * transform(self.line[kept], time, values[within] - rest).T / blow
         weight = np.sqrt(np.sum(np.exp(-2.0 * self.line[0].real * time)))
-        floor = _MODEL * np.hypot(np.abs(value), 0.01 * np.abs(value).max())
-        return value, np.hypot(noise * step * weight / np.abs(blow), floor)
+        size = np.abs(value)
+        floor = _MODEL * np.hypot(size, 0.01 * size.max(axis=1, keepdims=True))
+        return value, np.hypot(noise[:, None] * step * weight / np.abs(blow), floor)
 
 
 def spectra(robot: FlexibleRobot, record: Record, pose: FloatArray) -> list[Spectrum]:
@@ -239,11 +240,11 @@ def spectra(robot: FlexibleRobot, record: Record, pose: FloatArray) -> list[Spec
         bend = _USUAL[1] * _IMPULSE / _USUAL[0] ** 2
     bends = _BENDS * step**2 * bend * np.exp(-np.outer(ends, line)) / blow
     window = Window(time, line, blow)
+    every = np.stack([columns[name] for name in used], axis=1)
+    quiet = every[~after] if (~after).sum() >= _QUIET else every[-max(len(every) // 10, 2) :]
+    both = window.over_blow(every, quiet.std(axis=0), kept)
     found = []
-    for name in used:
-        values = columns[name]
-        quiet = values[~after] if (~after).sum() >= _QUIET else values[-max(len(values) // 10, 2) :]
-        value, size = window.over_blow(values, float(np.std(quiet)), kept)
+    for name, value, size in zip(used, *both, strict=True):
         assert record.direction is not None
         seen = Seen.by(record.channel(name), record.direction, robot, pose)
         found.append(Spectrum(seen, line.imag[kept], line[0].real, value, size,
