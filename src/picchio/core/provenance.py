@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Iterable
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,16 @@ _LIBRARIES = {"pin": "pinocchio", "numpy": "numpy", "scipy": "scipy"}
 
 def package_version() -> str:
     """The installed version of picchio."""
+    return _version("picchio") or "0+unknown"  # run from a source tree that is not installed
+
+
+@cache
+def _version(distribution: str) -> str | None:
+    """Looked up once: a study of a thousand robots is a thousand results."""
     try:
-        return version("picchio")
-    except PackageNotFoundError:  # run from a source tree that is not installed
-        return "0+unknown"
+        return version(distribution)
+    except PackageNotFoundError:
+        return None
 
 
 def provenance(inputs: Iterable[str | Path] = (), *, seed: int | None = None) -> dict[str, Any]:
@@ -31,17 +38,11 @@ def provenance(inputs: Iterable[str | Path] = (), *, seed: int | None = None) ->
     Returns:
         versions (`picchio`, `python`, `libraries`), `seed`, and `inputs` with `file` and `sha256`.
     """
-    libraries: dict[str, str | None] = {}
-    for distribution, name in _LIBRARIES.items():
-        try:
-            libraries[name] = version(distribution)
-        except PackageNotFoundError:
-            libraries[name] = None
     files = sorted({Path(path).resolve() for path in inputs})
     return {
         "picchio": package_version(),
         "python": platform.python_version(),
-        "libraries": libraries,
+        "libraries": {name: _version(own) for own, name in _LIBRARIES.items()},
         "seed": seed,
         "inputs": [{"file": path.name, "sha256": sha256(path)} for path in files],
     }

@@ -211,9 +211,7 @@ def _grow(search: Search, stack: ExitStack) -> None:
             gain = search.pays(here, best.fit, best.about)
         if best is None or gain < search.least:
             break
-        # The slopes of those that were not chosen need not be kept.
-        rest = [replace(t, about=None) for t in trials if t.label != best.label]
-        trials[:] = [best, *rest]
+        trials[:] = [best, *(t.put_by() for t in trials if t.label != best.label)]
         # What the model itself is not exact to may look like a last small cause in some pose.
         known = bool(here.hypothesis.labels)
         if (quiet or enough) and known and confidence(best.fit, here) < BEYOND_DOUBT:

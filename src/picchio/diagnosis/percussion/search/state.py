@@ -41,6 +41,7 @@ class Trial:
         score: BIC; infinite where it was not fitted to the end.
         promise: fall of chi-square that its screening expected.
         about: what the records were linearised about where it was settled by itself; else None.
+        stands: the same without slopes, to go on from once they are not kept.
     """
 
     label: str
@@ -48,6 +49,13 @@ class Trial:
     score: float
     promise: float
     about: About | None = None
+    stands: About | None = None
+
+    def put_by(self) -> Trial:
+        """The trial as one that was not chosen: its slopes need not be kept."""
+        if self.about is None:
+            return self
+        return replace(self, about=None, stands=self.about.without_slopes())
 
     @property
     def draws(self) -> bool:

@@ -355,6 +355,8 @@ def over_the_same_samples(search: Search, trials: Sequence[Trial]) -> list[Trial
 # So many close trials are settled, each by itself; and how much worse one may be to be close.
 _SETTLED = 3
 _CLOSE = 5.0 * SAME
+# What one number gains by chance in one of twenty fits: nothing stands out of the noise so.
+_BY_LUCK = 4.0
 # One that explains nearly as much may well explain more: it lacks at most this share.
 NEARLY = 0.3
 # Of the cost without it, beside which a trial leaves little though more than inexactness explains.
@@ -427,13 +429,16 @@ def settled_alike(
             continue
         if best is not None and trial.fit.hypothesis.labels == best.hypothesis.labels:
             continue
+        if faint and best is None and before.cost - trial.fit.cost < _BY_LUCK:
+            continue
         if decisive_gain(trial.fit, mark) >= _CLOSE and trial.fit.cost - mark.cost >= nearly:
             continue
         left -= 1
         # Beside causes that leave little, numbers are near where one more small cause has them.
         alone = len(trial.fit.hypothesis.labels) < 2
         anew = alone or trial.fit.chi_square > ELSE * trial.fit.samples
-        there, about = settled_by_itself(search, trial.label, trial.fit, anew=anew)
+        settle = partial(settled_by_itself, search, trial.label, trial.fit)
+        there, about = settle(anew=anew) if trial.stands is None else settle(begin=trial.stands)
         if _is_far(there):
             there, about = _gone_on(search, trial, there, about, anew)
         if there is not None and there.cost < trial.fit.cost:
@@ -444,7 +449,13 @@ def settled_alike(
 
 
 def settled_by_itself(
-    search: Search, label: str, start: Fit, *, anew: bool = True, patient: bool = False
+    search: Search,
+    label: str,
+    start: Fit,
+    *,
+    anew: bool = True,
+    patient: bool = False,
+    begin: About | None = None,
 ) -> tuple[Fit | None, About]:
     """A fit about its own inexact numbers, and what the records are linearised about for it.
 
@@ -454,13 +465,15 @@ def settled_by_itself(
         start: the fit.
         anew: as of `settled`.
         patient: as of `settled`.
+        begin: where it stood when it was settled before, to go on from there; else None.
 
     Returns:
         None where that fails.
     """
-    with about_another(search.problem):
+    anew, rounds = anew and begin is None, 2 if begin is None else 1
+    with about_another(search.problem, begin):
         settle = partial(
-            settled, search.problem, start, search.records, rounds=2, anew=anew, patient=patient
+            settled, search.problem, start, search.records, rounds, anew=anew, patient=patient
         )
         return attempt(label, settle), About.of(search.problem)
 

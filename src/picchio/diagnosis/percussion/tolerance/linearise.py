@@ -470,6 +470,13 @@ class About:
             problem.idle, problem.unsettled,
         )  # fmt: skip
 
+    def without_slopes(self) -> About:
+        """The same to go on settling from, where slopes are taken anew: they are large."""
+        if self.marginal is None:
+            return self
+        slopes = {name: one.dropped() for name, one in self.marginal.slopes.items()}
+        return replace(self, marginal=Marginal(slopes))
+
     def restore(self, problem: Problem) -> None:
         """Linearise as it was then.
 

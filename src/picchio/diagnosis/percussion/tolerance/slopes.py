@@ -106,6 +106,10 @@ class Slopes:
             gram=self.gram[np.ix_(kept, kept)],
         )
 
+    def dropped(self) -> Slopes:
+        """The same numbers without their columns, which are large."""
+        return replace(self, columns=np.zeros((0, 0, len(self.what)), self.columns.dtype))
+
     def silenced(self, most: float) -> Slopes:
         """Themselves; with columns of nothing where one standard deviation would do too much.
 
