@@ -433,7 +433,12 @@ def mismatch_summary(rows):
     """Everything about worlds that are a little wrong: the table, bursts, what was said."""
     print_mismatch(rows)
     told = [row for row in rows if not _aside(row)]
-    print_known(told)
+    # Intervals are asked to hold where errors are as large as the diagnosis takes them to be.
+    sizes = sorted({row["mismatch"] for row in told})
+    for size in sizes:
+        if len(sizes) > 1:
+            print(f"everything off by {size:g} times its tolerance:")
+        print_known([row for row in told if row["mismatch"] == size])
     for row in told:
         if row.get("outcome", "undecided") != "right":
             said = [row["verdict"], row["claimed"], row.get("leads", [])]
