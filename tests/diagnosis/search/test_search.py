@@ -533,6 +533,39 @@ def test_what_chance_explains_is_not_settled(faint, two_causes, monkeypatch):
     assert settled == (list(gains)[:1] if faint else list(gains))
 
 
+def test_what_slopes_promise_is_settled_though_its_fit_gained_nothing(two_causes, monkeypatch):
+    """A heavier link 3: its fit lost 5, as tolerances made up for it; settled it gained 63."""
+    problem, baseline, *_ = two_causes
+    search = search_of(problem, replace(baseline, cost=2000.0))
+    search.leaves_noise = lambda found: True
+    told = {  # cost of the fit, promise, and cost once it is settled
+        "payload:tool": (1979.0, 17.0, 1941.0),
+        "joint_stiffness:joint_2": (1983.0, 17.0, 1983.0),
+        "link_mass:link_1": (1984.0, 16.0, 1984.0),
+        "link_mass:link_3": (2005.0, 47.0, 1937.0),
+    }
+    tried = []
+    for label, (cost, promise, _) in told.items():
+        key = "mass" if label == "payload:tool" else "scale"
+        own = trial_with(problem, baseline, *label.split(":"), **{key: 1.1})
+        tried.append(replace(own, fit=replace(own.fit, cost=cost), score=cost, promise=promise))
+    settled = []
+
+    def by_itself(search, label, start, **_):
+        settled.append(label)
+        return replace(start, cost=told[label][2]), None
+
+    monkeypatch.setattr(trials, "allowed", lambda problem: True)
+    monkeypatch.setattr(trials, "bic", lambda found: found.cost)
+    monkeypatch.setattr(trials, "decisive_gain", lambda one, other: one.cost - other.cost)
+    monkeypatch.setattr(trials, "settled_by_itself", by_itself)
+    monkeypatch.setattr(trials, "_is_far", lambda found: False)
+    monkeypatch.setattr(trials, "_stand_for_tolerances", lambda problem: {"link_mass:link_3"})
+    best, other, *_ = trials.settled_alike(search, tried)
+    assert settled == ["link_mass:link_3", "payload:tool", "joint_stiffness:joint_2"]
+    assert (best.label, other.label) == ("link_mass:link_3", "payload:tool")
+
+
 def test_what_was_put_by_goes_on_from_where_it_stood(arm, monkeypatch):
     """Its slopes are dropped, which are large; it is not settled from the stated numbers again."""
     campaign, _ = worlds.make(

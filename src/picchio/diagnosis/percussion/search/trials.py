@@ -424,14 +424,26 @@ def settled_alike(
         nearly = (1.0 - NEARLY) * (before.cost - mark.cost) if faint else near
     again: dict[str, Trial] = {}
     left = _SETTLED
-    for trial in trials:
+    tolerated = _stand_for_tolerances(search.problem) if faint else frozenset()
+
+    def within_reach(trial: Trial) -> float:
+        """What it may cost, settled: its slopes tell more than a fit, for which others made up."""
+        if trial.label not in tolerated or trial.about is not None or trial.stands is not None:
+            return trial.fit.cost
+        return min(trial.fit.cost, before.cost - trial.promise)
+
+    def place(trial: Trial) -> float:
+        lead = trial.fit.cost - within_reach(trial)
+        return bic(trial.fit) - lead if lead > 0.0 else trial.score
+
+    for trial in sorted(trials, key=place):
         if not trial.finished(search.records) or trial.draws or not left:
             continue
         if best is not None and trial.fit.hypothesis.labels == best.hypothesis.labels:
             continue
-        if faint and best is None and before.cost - trial.fit.cost < _BY_LUCK:
+        if faint and best is None and before.cost - within_reach(trial) < _BY_LUCK:
             continue
-        if decisive_gain(trial.fit, mark) >= _CLOSE and trial.fit.cost - mark.cost >= nearly:
+        if decisive_gain(trial.fit, mark) >= _CLOSE and within_reach(trial) - mark.cost >= nearly:
             continue
         left -= 1
         # Beside causes that leave little, numbers are near where one more small cause has them.
@@ -446,6 +458,12 @@ def settled_alike(
             if faint:  # as much may be there for another
                 nearly = max(nearly, trial.fit.cost - there.cost)
     return sorted((again.get(t.label, t) for t in trials), key=lambda t: t.score)
+
+
+def _stand_for_tolerances(problem: Problem) -> frozenset[str]:
+    """Labels of the causes that a number which is never exact may be, where it is farther off."""
+    marginal = problem.marginal
+    return frozenset() if marginal is None else marginal.means
 
 
 def settled_by_itself(

@@ -128,7 +128,7 @@ class Marginal:
             right = mine if right is None else right + mine
             parts.append((own, left))
         assert right is not None
-        key = (tuple(names), tuple(r.shape[1] for r in residuals), freed & self._meant)
+        key = (tuple(names), tuple(r.shape[1] for r in residuals), freed & self.means)
         root = self._roots.get(
             key, lambda: self._root(np.sum([o.shared for o, _ in parts], axis=0), freed)[0]
         )
@@ -286,7 +286,8 @@ class Marginal:
         return found, together
 
     @property
-    def _meant(self) -> frozenset[str]:
+    def means(self) -> frozenset[str]:
+        """Labels of the causes that stand for a number which is never exact."""
         return frozenset(m for s in self.slopes.values() for m in s.means if m)
 
     def _products(self, name: str, samples: int, freed: frozenset[str]) -> _Own:
