@@ -200,8 +200,7 @@ def test_it_can_be_used_by_keyboard(open_page, arm_scene) -> None:
 def test_motion_is_shown_unless_it_is_unwanted(open_page, arm_scene) -> None:
     page = opened(open_page, arm_scene, reduced_motion="no-preference")
     before = page.evaluate("picchio.state.time")
-    page.wait_for_timeout(600)
-    assert page.evaluate("picchio.state.time") != before
+    page.wait_for_function("before => picchio.state.time !== before", arg=before)  # or it fails
 
 
 @pytest.mark.parametrize("name", ["ur10", "panda"])
