@@ -92,8 +92,7 @@ class Response:
         Args:
             off: (k,) of them, in standard deviations.
         """
-        delay, width = off @ self.delays, off @ self.widths
-        return np.asarray(np.exp(off @ self.gains - self.s * delay + 0.5 * self.s**2 * width))
+        return _factor(self, self.s, off)
 
     @property
     def values(self) -> FloatArray:
@@ -275,8 +274,7 @@ class _Alike:
         motion, s = driven.motion, self.first.s
         sight, tilt = self.sight + off @ self.sights, self.tilt + off @ self.tilts
         seen = self.lead[..., None] * sight[:, None] + tilt[:, None]
-        delay, width = self.delays @ off, self.widths @ off
-        gain = np.exp(self.gains @ off - s * delay + 0.5 * s**2 * width)
+        gain = _factor(self, s, off)
         bent = self.bent + self.bends @ off
         plain = (seen * motion).sum(axis=-1)
         other = self.straight * (sight @ driven.at_once)[:, None] - plain
@@ -300,6 +298,12 @@ class _Alike:
         remainder = np.stack([self.remainder] * 2, axis=2)
         for k, number in enumerate(self.index):
             yield number, Predicted(residual[k], both[k], remainder[k])
+
+
+def _factor(of: Response | _Alike, s: ComplexArray, off: FloatArray) -> ComplexArray:
+    """By which numbers that are never exact multiply one function, or several (r, m)."""
+    late, wide = s * (of.delays @ off), s**2 * (of.widths @ off)
+    return np.asarray(np.exp(of.gains @ off - late + 0.5 * wide))
 
 
 @dataclass(frozen=True, eq=False)
