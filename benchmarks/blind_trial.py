@@ -196,6 +196,10 @@ def main():
     if not given.summary and not given.against:
         import trial
 
+        import picchio
+
+        for robot in given.robots:  # or a misspelt one is as many failed cases
+            picchio.load_robot(robot)
         done = {row["case"] for row in rows}
         todo = []
         for case in cases(given.draws) if given.mismatch is None else wrong_cases(
