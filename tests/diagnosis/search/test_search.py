@@ -19,7 +19,8 @@ from picchio.diagnosis.percussion.diagnosis import diagnose_percussion
 from picchio.diagnosis.percussion.fit.drawn import fit_latent
 from picchio.diagnosis.percussion.fit.least_squares import fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
-from picchio.diagnosis.percussion.search import select, trials
+from picchio.diagnosis.percussion.search import alike, select
+from picchio.diagnosis.percussion.search.alike import settled_by_itself
 from picchio.diagnosis.percussion.search.candidates import all_candidates, measure_scales
 from picchio.diagnosis.percussion.search.exchange import (
     exchange,
@@ -45,7 +46,6 @@ from picchio.diagnosis.percussion.search.trials import (
     holdout_choice,
     over_the_same_samples,
     records_of_every_pose,
-    settled_by_itself,
 )
 from picchio.diagnosis.percussion.tolerance import linearise
 from picchio.diagnosis.percussion.tolerance.linearise import About
@@ -498,11 +498,11 @@ def test_as_much_as_settling_gave_the_best_it_may_give_another(faint, two_causes
         settled.append(label)
         return replace(start, cost=start.cost - gains[label]), None
 
-    monkeypatch.setattr(trials, "allowed", lambda problem: True)
-    monkeypatch.setattr(trials, "NEARLY", 0.05)
-    monkeypatch.setattr(trials, "decisive_gain", lambda one, other: one.cost - other.cost)
-    monkeypatch.setattr(trials, "settled_by_itself", by_itself)
-    best = trials.settled_alike(search, tried)[0]
+    monkeypatch.setattr(alike, "allowed", lambda problem: True)
+    monkeypatch.setattr(alike, "NEARLY", 0.05)
+    monkeypatch.setattr(alike, "decisive_gain", lambda one, other: one.cost - other.cost)
+    monkeypatch.setattr(alike, "settled_by_itself", by_itself)
+    best = alike.settled_alike(search, tried)[0]
     assert settled == (["payload:tool", "link_mass:link_2"] if faint else ["payload:tool"])
     assert best.label == settled[-1]
 
@@ -525,11 +525,11 @@ def test_what_chance_explains_is_not_settled(faint, two_causes, monkeypatch):
         settled.append(label)
         return start, None
 
-    monkeypatch.setattr(trials, "allowed", lambda problem: True)
-    monkeypatch.setattr(trials, "decisive_gain", lambda one, other: 0.0)
-    monkeypatch.setattr(trials, "settled_by_itself", by_itself)
-    monkeypatch.setattr(trials, "_is_far", lambda found: False)
-    assert [t.label for t in trials.settled_alike(search, tried)] == list(gains)
+    monkeypatch.setattr(alike, "allowed", lambda problem: True)
+    monkeypatch.setattr(alike, "decisive_gain", lambda one, other: 0.0)
+    monkeypatch.setattr(alike, "settled_by_itself", by_itself)
+    monkeypatch.setattr(alike, "_is_far", lambda found: False)
+    assert [t.label for t in alike.settled_alike(search, tried)] == list(gains)
     assert settled == (list(gains)[:1] if faint else list(gains))
 
 
@@ -555,13 +555,13 @@ def test_what_slopes_promise_is_settled_though_its_fit_gained_nothing(two_causes
         settled.append(label)
         return replace(start, cost=told[label][2]), None
 
-    monkeypatch.setattr(trials, "allowed", lambda problem: True)
-    monkeypatch.setattr(trials, "bic", lambda found: found.cost)
-    monkeypatch.setattr(trials, "decisive_gain", lambda one, other: one.cost - other.cost)
-    monkeypatch.setattr(trials, "settled_by_itself", by_itself)
-    monkeypatch.setattr(trials, "_is_far", lambda found: False)
-    monkeypatch.setattr(trials, "_stand_for_tolerances", lambda problem: {"link_mass:link_3"})
-    best, other, *_ = trials.settled_alike(search, tried)
+    monkeypatch.setattr(alike, "allowed", lambda problem: True)
+    monkeypatch.setattr(alike, "bic", lambda found: found.cost)
+    monkeypatch.setattr(alike, "decisive_gain", lambda one, other: one.cost - other.cost)
+    monkeypatch.setattr(alike, "settled_by_itself", by_itself)
+    monkeypatch.setattr(alike, "_is_far", lambda found: False)
+    monkeypatch.setattr(alike, "_stand_for_tolerances", lambda problem: {"link_mass:link_3"})
+    best, other, *_ = alike.settled_alike(search, tried)
     assert settled == ["link_mass:link_3", "payload:tool", "joint_stiffness:joint_2"]
     assert (best.label, other.label) == ("link_mass:link_3", "payload:tool")
 
@@ -576,7 +576,7 @@ def test_what_was_put_by_goes_on_from_where_it_stood(arm, monkeypatch):
     begun = search.fit(search.baseline.hypothesis.plus(payload), iterations=6)
     tried = Trial(payload.label, begun, bic(begun), 0.0)
     assert tried.put_by() is tried
-    (once,) = trials.settled_alike(search, [tried])
+    (once,) = alike.settled_alike(search, [tried])
     name = problem.records[0].name
     assert once.about.marginal.slopes[name].columns.size
     put_by = once.put_by()
@@ -726,15 +726,15 @@ def test_what_explains_nearly_all_is_settled_from_where_it_has_come(
     near = [each / each.std() for each in begun.fit.residuals]
     asked = []
 
-    def by_itself(search, label, start, *, anew=True, patient=False):
+    def by_itself(search, label, start, *, anew=True, patient=False, **_):
         asked.append((start.cost, anew, patient))
         if start.cost == explained and not anew and patient:
             return replace(start, cost=20.0, residuals=near), None
         return replace(start, cost=explained, residuals=far), None
 
-    monkeypatch.setattr(trials, "allowed", lambda problem: True)
-    monkeypatch.setattr(trials, "settled_by_itself", by_itself)
-    (best,) = trials.settled_alike(search, [begun])
+    monkeypatch.setattr(alike, "allowed", lambda problem: True)
+    monkeypatch.setattr(alike, "settled_by_itself", by_itself)
+    (best,) = alike.settled_alike(search, [begun])
     assert len(asked) == tries
     assert best.fit.cost == (20.0 if tries == 3 else explained)
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -35,6 +36,9 @@ _LONGEST = 3.0  # s of a record that are looked at: what rings longer hardly tel
 _HIGHEST = 150.0  # Hz, of a line
 _SHAKEN = 0.1  # least force over the largest, of a line
 _FINER = 16  # steps of a blow's transform in one of the record's
+# Standard deviations of what is never exact, root mean square: beyond that something else is wrong.
+_STRAINED = 3.0
+_NEAR = 0.1  # to how much of the log probability: it is where a fit in time begins
 # How hard all blows are, and how far that may be off.
 _HARD, _HARDER = "force", 0.1
 
@@ -97,7 +101,8 @@ def rough(
         workers: processes, as `worker_pool` has them.
 
     Returns:
-        None where no channel tells a motion.
+        None where no channel tells a motion, or where masses, poses and places would be absurdly
+        far off.
     """
     exact = tolerance or Tolerance.zero()
     names = [*never_exact(robot, exact, [record.name for record in records]), _HARD]
@@ -122,11 +127,19 @@ def rough(
         at = stated.copy()
         at[:n], at[n : 2 * n] = np.log(begin.stiffness), math.log(begin.damping)
         places = [at]
-    with worker_pool(workers, {"climb": lambda at: climb(problem, at, TAILS)}) as mapped:
+
+    def astray(at: FloatArray) -> bool:
+        off = at[2 * n :]
+        return tolerance is not None and float(off @ off) > _STRAINED**2 * len(off)
+
+    climbs = partial(climb, problem, tail=TAILS, near=_NEAR, astray=astray)
+    with worker_pool(workers, {"climb": climbs}) as mapped:
         climbed = [one for one in mapped("climb", places) if one is not None]
     if not climbed:
         return None
     found = max(climbed, key=lambda one: one.evidence)
+    if astray(found.mean):
+        return None
     if begin is not None:
         found = settled_elsewhere(problem, found, free=False)
     damping, size = found.mean[n : 2 * n], found.std[n : 2 * n]

@@ -10,7 +10,7 @@ and the tails are those of the highest evidence (Laplace's approximation; MacKay
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -485,7 +485,13 @@ class _State:
 
 
 def climb(
-    problem: Fitted, at: FloatArray, tail: float = math.inf, rows: BoolArray | None = None
+    problem: Fitted,
+    at: FloatArray,
+    tail: float = math.inf,
+    rows: BoolArray | None = None,
+    *,
+    near: float = 1e-6,
+    astray: Callable[[FloatArray], bool] = lambda at: False,
 ) -> Fit:
     """The most probable numbers near a place, with the noise of the highest evidence.
 
@@ -494,9 +500,11 @@ def climb(
         at: (p,) where to begin.
         tail: degrees of freedom of the rows' errors; infinite: normal.
         rows: (rows,) which of them count; all if None.
+        near: a step that promises less of the log probability is none.
+        astray: whether numbers are such that going on is in vain.
 
     Returns:
-        the fit.
+        the fit; where it went astray, as far as it came.
     """
     keep = np.ones(problem.rows, bool) if rows is None else np.asarray(rows)
     stated = np.log([max(problem.noise[group], _LEAST_NOISE) for group in problem.groups])
@@ -518,7 +526,9 @@ def climb(
     last = math.inf
     for _ in range(_ROUNDS):
         state = _State(problem, state.at, tail, keep)
-        state = _newton(problem, state, tail, keep, noise)
+        state = _newton(problem, state, tail, keep, noise, near, astray)
+        if astray(state.at):
+            break
         for k in range(len(noise)):
 
             def off(x: float, k: int = k, state: _State = state) -> float:
@@ -548,14 +558,22 @@ def score(problem: Fitted, at: FloatArray, like: Fit) -> float:
 
 
 def _newton(
-    problem: Fitted, state: _State, tail: float, keep: BoolArray, noise: FloatArray
+    problem: Fitted,
+    state: _State,
+    tail: float,
+    keep: BoolArray,
+    noise: FloatArray,
+    near: float,
+    astray: Callable[[FloatArray], bool],
 ) -> _State:
     size = np.exp(noise)
     score = state.weigh(size)
     for _ in range(_STEPS):
+        if astray(state.at):
+            break
         step = -np.linalg.solve(state.step_matrix, state.gradient)
         gain = -float(step @ state.gradient)
-        if gain < 1e-6:
+        if gain < near:
             break
         # No spring changes by more than a factor of e at once.
         share = min(1.0, 1.0 / max(float(np.abs(step[: problem.springs]).max()), 1e-300))

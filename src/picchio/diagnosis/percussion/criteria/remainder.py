@@ -167,7 +167,7 @@ def _evidence_of_poses(found: Fit, costs: FloatArray) -> float:
     """
     by_pose: dict[int, FloatArray] = {}
     for record, residual, left in zip(found.records, found.residuals, costs, strict=True):
-        own = np.array([left, residual.size, signal_power([record])])
+        own = np.array([left, residual.size, signal_power([record], found.end)])
         by_pose[record.pose] = by_pose.get(record.pose, np.zeros(3)) + own
     cost, samples, signal = np.array(list(by_pose.values())).T
     excess = np.maximum(cost - samples, 0.0) / signal

@@ -627,15 +627,19 @@ def residual(
     return out
 
 
-def signal_power(records: Sequence[MeasuredRecord]) -> float:
-    """Sum of squares of all that was measured, in units of the noise."""
-    return float(
-        sum(
-            ((values - values.mean()) ** 2).sum() / record.noise[name].std ** 2
-            for record in records
-            for name, values in record.values.items()
-        )
-    )
+def signal_power(records: Sequence[MeasuredRecord], end: float | None = None) -> float:
+    """Sum of squares of all that was measured, in units of the noise.
+
+    Args:
+        records: which.
+        end: s, up to when; None for all.
+    """
+    total = 0.0
+    for record in records:
+        count = record.until(end).samples.count
+        for name, values in record.values.items():
+            total += float(values[:count].var()) * len(values[:count]) / record.noise[name].std ** 2
+    return total
 
 
 def take_out(

@@ -12,14 +12,12 @@ from picchio.diagnosis.percussion.criteria.remainder import allowed
 from picchio.diagnosis.percussion.fit.drawn import fit_latent, with_hidden
 from picchio.diagnosis.percussion.fit.least_squares import HOPELESS, Fit, fit, fits_without
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.search.alike import NEARLY, settled_alike, settled_by_itself
 from picchio.diagnosis.percussion.search.state import Search, Trial
 from picchio.diagnosis.percussion.search.trials import (
-    NEARLY,
     SCREEN_WINDOW,
     SHORT_LIST,
     records_of_every_pose,
-    settled_alike,
-    settled_by_itself,
     try_candidates,
 )
 from picchio.diagnosis.percussion.tolerance.linearise import About, about_another

@@ -10,8 +10,8 @@ from picchio.diagnosis.attempt import attempt
 from picchio.diagnosis.percussion.criteria.remainder import allowed
 from picchio.diagnosis.percussion.data.problem import Problem
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing, is_nonsmooth
+from picchio.diagnosis.percussion.search.alike import settled_by_itself
 from picchio.diagnosis.percussion.search.state import Search
-from picchio.diagnosis.percussion.search.trials import settled_by_itself
 from picchio.model.effects.effect import Effect
 from picchio.model.effects.scales import Scales
 

@@ -18,6 +18,11 @@ from picchio.diagnosis.percussion.criteria.remainder import allowed, decisive_ga
 from picchio.diagnosis.percussion.data.problem import MeasuredRecord, Problem, Split
 from picchio.diagnosis.percussion.fit.least_squares import Fit, fit_growing
 from picchio.diagnosis.percussion.fit.unknowns import Hypothesis
+from picchio.diagnosis.percussion.search.alike import (
+    exceeding_trials,
+    settled_alike,
+    settled_by_itself,
+)
 from picchio.diagnosis.percussion.search.candidates import measure_scales
 from picchio.diagnosis.percussion.search.exchange import (
     exchange,
@@ -33,11 +38,8 @@ from picchio.diagnosis.percussion.search.restart import restarted
 from picchio.diagnosis.percussion.search.state import LEAST_GAIN, Search, Trial
 from picchio.diagnosis.percussion.search.trials import (
     MOST_RIVALS,
-    exceeding_trials,
     holdout_choice,
     over_the_same_samples,
-    settled_alike,
-    settled_by_itself,
     try_candidates,
 )
 from picchio.diagnosis.percussion.tolerance.in_turns import settled_in_turns
@@ -230,11 +232,12 @@ def _grow(search: Search, stack: ExitStack) -> None:
             if search.best.cost < here.cost and not quiet:
                 continue
             break
-        if best.about is not None and search.best is best.fit:
-            best.about.restore(problem)
+        own = best.about if search.best is best.fit else None
+        if own is not None:
+            own.restore(problem)
         search.best = _without_earlier(search, best.label)
         again = restarted(search, search.best)
-        if best.about is None or again is not best.fit:
+        if own is None or again is not search.best:
             again = _settled_if_better(search, again)
         search.best = released(problem, settled_in_turns(problem, again), search.least)
         if known:
@@ -291,6 +294,9 @@ def _without_earlier(search: Search, newest: str) -> Fit:
         rest = best.hypothesis.minus(label)
         without = attempt(f"without {label}", partial(search.fit, rest, iterations=5))
         if without is None or without.chi_square > ELSE * without.samples:
+            continue
+        if search.pays(without, best) < search.least:
+            best = without
             continue
         start = replace(best, hypothesis=rest)  # as the other's numbers are, which are near
         again, about = settled_by_itself(search, label, start, anew=False)

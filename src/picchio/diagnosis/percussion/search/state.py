@@ -42,6 +42,7 @@ class Trial:
         promise: fall of chi-square that its screening expected.
         about: what the records were linearised about where it was settled by itself; else None.
         stands: the same without slopes, to go on from once they are not kept.
+        in_vain: whether it was settled by itself and came to nothing better.
     """
 
     label: str
@@ -50,6 +51,7 @@ class Trial:
     promise: float
     about: About | None = None
     stands: About | None = None
+    in_vain: bool = False
 
     def put_by(self) -> Trial:
         """The trial as one that was not chosen: its slopes need not be kept."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -214,6 +214,7 @@ def settled(
     *,
     anew: bool = True,
     patient: bool = False,
+    behind: Callable[[Fit, float | None], bool] | None = None,
 ) -> Fit:
     """A hypothesis fitted together with what is not exact, linearised where it comes to stand.
 
@@ -229,6 +230,11 @@ def settled(
         anew: begin where everything is as stated; else where it is taken to be now. Without the
             right cause it was pulled to wherever it made up for that.
         patient: go on however much is left on the way: nothing else is wrong.
+        behind: whether it is given up, told a fit on the way and how much less that left than one
+            by slopes taken before; None where there were none.
+
+    Raises:
+        InputError: it is given up.
     """
     else_wrong = math.inf if patient else ELSE
     if not any(inexact(problem, problem.records[0], problem.campaign.tolerance)):
@@ -238,10 +244,11 @@ def settled(
         problem.idle = frozenset()  # a cause may set free what stood still without it
     here = start.hypothesis
     ends: Sequence[float | None] = _KINKED if is_nonsmooth(here) else (_SHORT, None)
-    if not anew and start.end is None and start.chi_square <= ELSE * start.samples:
+    near = not anew and start.end is None and start.chi_square <= ELSE * start.samples
+    if near:
         ends = (None,)  # no cycle is skipped any more
     for end in ends:
-        here = _settled_up_to(problem, here, records, end, rounds, else_wrong)
+        here = _settled_up_to(problem, here, records, end, rounds, else_wrong, behind, near)
     found = fit(problem, here, records, None, with_jacobian=True)
     if is_nonsmooth(here) and found.chi_square <= ELSE * found.samples:
         found = with_those_left_behind(problem, found)
@@ -289,7 +296,7 @@ def released(problem: Problem, found: Fit, least: float) -> Fit:
 
 
 def left_there(problem: Problem, found: Fit) -> float:
-    """What a fit's model costs with its inexact numbers where they are; slopes may foretell less.
+    """What a fit costs with its inexact numbers where they are; slopes may foretell less.
 
     Args:
         problem: linearised about the fit, or near it.
@@ -297,7 +304,8 @@ def left_there(problem: Problem, found: Fit) -> float:
     """
     if problem.marginal is None:
         return found.cost
-    return _cost(problem, found.hypothesis, None, problem.marginal.only(POSE))
+    staying = problem.marginal.only(POSE)
+    return _cost(problem, found.hypothesis, None, staying, found.records)
 
 
 def to_the_last(problem: Problem, found: Fit, *, both: bool = True) -> Fit:
@@ -399,16 +407,24 @@ def _settled_up_to(
     end: float | None,
     rounds: int,
     else_wrong: float,
+    behind: Callable[[Fit, float | None], bool] | None = None,
+    near: bool = False,
 ) -> Hypothesis:
     """As `settled`, of a first part of the records; slopes serve as long as they lead on."""
-    before = math.inf
+    before, earlier = math.inf, None
     for _ in range(rounds):
         linearise(problem, here, records, end)
         moves = 0
         while moves < _MOVES:
             found = fit(problem, here, records, end, iterations=4)
+            fall = None if earlier is None else earlier - found.cost
+            known = not moves and (near or fall is not None)
+            if behind is not None and known and behind(found, fall):
+                raise InputError("another leaves far less")
             if found.chi_square > else_wrong * max(found.samples, 1):
                 return _at_stated(problem, found, end)
+            if not moves:
+                earlier = found.cost
             here, cost, kept = _moved_on(problem, here, found)
             little = before - cost < _SETTLED * cost
             before, moves = cost, moves + 1
@@ -562,9 +578,15 @@ def _between(
     }
 
 
-def _cost(problem: Problem, hypothesis: Hypothesis, end: float | None, staying: Marginal) -> float:
+def _cost(
+    problem: Problem,
+    hypothesis: Hypothesis,
+    end: float | None,
+    staying: Marginal,
+    records: Sequence[MeasuredRecord] | None = None,
+) -> float:
     """What it costs to have everything just where it is: no slope but of what always stays."""
-    told = _told_of(problem, hypothesis)
+    told = _told_of(problem, hypothesis) if records is None else records
     names = [record.name for record in told]
     labels = [effect.label for effect in hypothesis.effects]
     try:
