@@ -75,6 +75,20 @@ def test_a_robot_as_stated_is_left_alone(worlds):
         assert begin(robot, campaign) is None
 
 
+def test_springs_are_told_apart_from_a_load_that_masses_would_have_to_make_up_for(worlds):
+    """20 kg more were told as springs of 0.73, 0.60 and 0.73, all masses six tolerances off."""
+    robot = load_robot("fanuc_like_3dof")
+    loaded, _ = worlds.make(
+        seed=5, causes=[("payload", "tool", {"mass": 20.0})], records=6, mismatch=1.0
+    )
+    problem = Problem(robot, loaded)
+    assert far_from_stated(problem, problem.records) is None
+    campaign, stiffness, _ = far(worlds, seed=11, records=6, mismatch=1.0)
+    problem = Problem(robot, campaign)
+    found = far_from_stated(problem, problem.records)
+    np.testing.assert_allclose(found.stiffness, stiffness, rtol=0.05)
+
+
 def test_a_transform_by_blocks_is_that_of_all_samples():
     rng = np.random.default_rng(0)
     time, values = np.arange(10_000) * 1e-4, rng.standard_normal(10_000)
