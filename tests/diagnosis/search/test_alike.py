@@ -182,8 +182,9 @@ def test_an_earlier_cause_that_does_nothing_goes_without_being_settled_again(hea
     rest = replace(search.baseline, hypothesis=both.minus("pulse_width:tool"))
     rest = replace(rest, residuals=[r / r.std() for r in rest.residuals])
     monkeypatch.setattr(search, "fit", lambda here, iterations: rest, raising=False)
-    gains = iter([0.5, 500.0])
-    monkeypatch.setattr(search, "pays", lambda *_: next(gains), raising=False)
+    scores = {"as little": 10.0, "more": 500.0}
+    monkeypatch.setattr(select, "bic", lambda found: scores[told] if found is rest else 9.5)
+    monkeypatch.setattr(search, "pays", lambda *_: 500.0, raising=False)
     settled_anew = []
 
     def by_itself(search, label, start, **_):
@@ -191,8 +192,8 @@ def test_an_earlier_cause_that_does_nothing_goes_without_being_settled_again(hea
         return start, About.of(search.problem)
 
     monkeypatch.setattr(select, "settled_by_itself", by_itself)
+    told = "as little"
     assert select._without_earlier(search, "payload:tool") is rest and not settled_anew
-    search.best = replace(search.baseline, hypothesis=both)
-    gains = iter([500.0, 500.0])
+    told = "more"
     assert select._without_earlier(search, "payload:tool") is search.best
     assert settled_anew == ["pulse_width:tool"]

@@ -295,8 +295,8 @@ def _without_earlier(search: Search, newest: str) -> Fit:
         without = attempt(f"without {label}", partial(search.fit, rest, iterations=5))
         if without is None or without.chi_square > ELSE * without.samples:
             continue
-        if search.pays(without, best) < search.least:
-            best = without
+        if bic(without) - bic(best) < search.least:
+            best = without  # as it is: settled it could but leave less
             continue
         start = replace(best, hypothesis=rest)  # as the other's numbers are, which are near
         again, about = settled_by_itself(search, label, start, anew=False)
