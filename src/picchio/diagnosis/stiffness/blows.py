@@ -36,9 +36,11 @@ _LONGEST = 3.0  # s of a record that are looked at: what rings longer hardly tel
 _HIGHEST = 150.0  # Hz, of a line
 _SHAKEN = 0.1  # least force over the largest, of a line
 _FINER = 16  # steps of a blow's transform in one of the record's
-# Standard deviations of what is never exact, root mean square: beyond that something else is wrong.
+# Where masses, poses and places would be so many standard deviations off, root mean square,
+# something else is wrong than springs.
 _STRAINED = 3.0
-_NEAR = 0.1  # to how much of the log probability: it is where a fit in time begins
+# How exactly the most probable place is found, log probability: a fit in time only begins there.
+_NEAR = 0.1
 # How hard all blows are, and how far that may be off.
 _HARD, _HARDER = "force", 0.1
 
@@ -128,20 +130,24 @@ def rough(
         at[:n], at[n : 2 * n] = np.log(begin.stiffness), math.log(begin.damping)
         places = [at]
 
-    def astray(at: FloatArray) -> bool:
-        off = at[2 * n :]
-        return tolerance is not None and float(off @ off) > _STRAINED**2 * len(off)
+    # Those that all records share, but for the force, which no stated tolerance is of.
+    shared = [2 * n + k for k, name in enumerate(names)
+              if name != _HARD and not name.startswith("direction.")]  # fmt: skip
 
-    climbs = partial(climb, problem, tail=TAILS, near=_NEAR, astray=astray)
+    def astray(at: FloatArray) -> bool:
+        off = at[shared]
+        return float(off @ off) > _STRAINED**2 * len(shared)
+
+    climbs = partial(climb, problem, tail=TAILS, least=_NEAR, astray=astray)
     with worker_pool(workers, {"climb": climbs}) as mapped:
-        climbed = [one for one in mapped("climb", places) if one is not None]
+        climbed = [one for one in mapped("climb", places) if one and not astray(one.mean)]
     if not climbed:
         return None
     found = max(climbed, key=lambda one: one.evidence)
-    if astray(found.mean):
-        return None
     if begin is not None:
         found = settled_elsewhere(problem, found, free=False)
+        if astray(found.mean):
+            return None
     damping, size = found.mean[n : 2 * n], found.std[n : 2 * n]
     return Rough(
         np.exp(found.mean[:n]), found.std[:n], float(np.exp(np.average(damping, weights=size**-2))),

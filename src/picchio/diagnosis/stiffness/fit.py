@@ -34,6 +34,7 @@ _NOISE_STD = math.log(10.0) / 1.645  # the instrument's stated noise is right wi
 _LEAST_NOISE = 1e-9  # m or rad, of files that are exact
 _PLAY = 1e-3  # rad or m: what play a joint may have, one standard deviation
 _STEPS, _ROUNDS = 60, 12
+_LOST = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -490,7 +491,7 @@ def climb(
     tail: float = math.inf,
     rows: BoolArray | None = None,
     *,
-    near: float = 1e-6,
+    least: float = 1e-6,
     astray: Callable[[FloatArray], bool] = lambda at: False,
 ) -> Fit:
     """The most probable numbers near a place, with the noise of the highest evidence.
@@ -500,8 +501,8 @@ def climb(
         at: (p,) where to begin.
         tail: degrees of freedom of the rows' errors; infinite: normal.
         rows: (rows,) which of them count; all if None.
-        near: a step that promises less of the log probability is none.
-        astray: whether numbers are such that going on is in vain.
+        least: it ends once a step promises less, twice the log probability.
+        astray: whether numbers are such that going on is in vain: it ends where they stay so.
 
     Returns:
         the fit; where it went astray, as far as it came.
@@ -526,7 +527,7 @@ def climb(
     last = math.inf
     for _ in range(_ROUNDS):
         state = _State(problem, state.at, tail, keep)
-        state = _newton(problem, state, tail, keep, noise, near, astray)
+        state = _newton(problem, state, tail, keep, noise, least, astray)
         if astray(state.at):
             break
         for k in range(len(noise)):
@@ -563,17 +564,19 @@ def _newton(
     tail: float,
     keep: BoolArray,
     noise: FloatArray,
-    near: float,
+    least: float,
     astray: Callable[[FloatArray], bool],
 ) -> _State:
     size = np.exp(noise)
     score = state.weigh(size)
+    lost = 0  # steps in turn: one may lead back
     for _ in range(_STEPS):
-        if astray(state.at):
+        lost = lost + 1 if astray(state.at) else 0
+        if lost > _LOST:
             break
         step = -np.linalg.solve(state.step_matrix, state.gradient)
         gain = -float(step @ state.gradient)
-        if gain < near:
+        if gain < least:
             break
         # No spring changes by more than a factor of e at once.
         share = min(1.0, 1.0 / max(float(np.abs(step[: problem.springs]).max()), 1e-300))

@@ -17,7 +17,8 @@ from picchio.diagnosis.percussion.tolerance.linearise import ELSE, About, about_
 # So many close trials are settled, each by itself; and how much worse one may be to be close.
 _SETTLED = 3
 _CLOSE = 5.0 * SAME
-# What is behind by so much, its slopes taken anew, stays so; and how often it falls as it did.
+# A rival is given up if, its slopes taken anew, it is still behind by this much, and by so many
+# times what it fell since they were taken before.
 _BEHIND = 3.0 * SAME
 _FALLS = 4.0
 # What one number gains by chance in one of twenty fits: nothing stands out of the noise so.
@@ -66,7 +67,9 @@ def settled_alike(
     """Trials, the best first; close ones are compared each about its own inexact numbers.
 
     All were fitted about those of the hypothesis without them, which one may suit better than
-    another. Where everything is exact, nothing changes.
+    another. Where everything is exact, nothing changes. Where the first leaves noise, though what
+    is not exact alone does not, a rival that stays far behind it is given up. Those with kinks take
+    longest and come last.
 
     Args:
         search: data and records.
@@ -116,8 +119,11 @@ def settled_alike(
         # What takes long comes last: it need not go on where another leaves noise.
         some = [trial for trial in waiting if is_close(trial)][:left]
         waiting = sorted(some, key=lambda trial: is_nonsmooth(trial.fit.hypothesis))
-        if best is not None:
-            race.won_by(best, About.of(search.problem))
+        if best is not None and waiting:
+            # What the records are linearised about may be another fit's, of all of them.
+            refit = partial(search.fit, best.hypothesis, iterations=4)
+            if (first := attempt("the first of a race", refit)) is not None:
+                race.won_by(first, About.of(search.problem))
     for trial in waiting:
         if not left or not is_close(trial):
             continue
@@ -131,11 +137,11 @@ def settled_alike(
 
 
 def _settled_trial(search: Search, trial: Trial, race: _Race) -> Trial:
-    """A trial about its own inexact numbers; as it was, and in vain, where that is no better."""
-    settle = partial(settled_by_itself, search, trial.label, behind=race.behind)
+    """A trial about its own inexact numbers; as it was where that is no better."""
+    settle = partial(settled_by_itself, search, trial.label, give_up=race.is_behind)
+    beside = None
     # Beside causes that leave little, numbers are near where one more small cause has them.
-    alone = len(trial.fit.hypothesis.labels) < 2
-    anew = alone or trial.fit.chi_square > ELSE * trial.fit.samples
+    anew = len(trial.fit.hypothesis.labels) < 2 or _is_far(trial.fit)
     if trial.stands is not None:
         there, about = settle(trial.fit, begin=trial.stands, rounds=1)
     elif (beside := race.beside(trial)) is not None:
@@ -145,7 +151,8 @@ def _settled_trial(search: Search, trial: Trial, race: _Race) -> Trial:
     if race.first is None and _is_far(there):
         there, about = _gone_on(search, trial, there, about, anew)
     if there is None or there.cost >= trial.fit.cost:
-        return replace(trial, in_vain=True)
+        # Begun so it would come to the same once more.
+        return replace(trial, in_vain=trial.stands is None and (anew or beside is not None))
     return replace(trial, fit=there, score=bic(there), about=about)
 
 
@@ -159,7 +166,7 @@ class _Race:
     def __init__(self, search: Search) -> None:
         self.search = search
         self.first: tuple[Fit, About] | None = None
-        self.stretches: dict[float | None, Fit] = {}
+        self.stretches: dict[float | None, Fit | None] = {}
 
     def won_by(self, found: Fit, about: About) -> None:
         """A fit, settled, with what the records are linearised about for it."""
@@ -168,8 +175,11 @@ class _Race:
             self.first, self.stretches = (found, about), {}
 
     def beside(self, trial: Trial) -> tuple[Fit, About] | None:
-        """A trial about the first one's inexact numbers, where those leave little of it, too."""
-        if self.first is None:
+        """A trial with kinks about the first one's inexact numbers, where those leave little of it.
+
+        Its own slopes take long, and stretch by stretch it comes to no better place.
+        """
+        if self.first is None or not is_nonsmooth(trial.fit.hypothesis):
             return None
         about, search = self.first[1], self.search
         with about_another(search.problem, about):
@@ -177,20 +187,25 @@ class _Race:
             near = attempt(trial.label, refit)
         return None if near is None or _is_far(near) else (near, about)
 
-    def behind(self, found: Fit, fall: float | None) -> bool:
+    def is_behind(self, found: Fit, fall: float | None) -> bool:
         """Whether a fit on its way stays behind in its stretch, though it falls on as it did."""
-        if self.first is None:
+        first = self._first_of(found)
+        if first is None:
             return False
+        more = bic(found) - bic(first)
+        gap = min(decisive_gain(found, first), more)
+        return gap >= _CLOSE if fall is None else gap >= _BEHIND and more >= _FALLS * fall
+
+    def _first_of(self, found: Fit) -> Fit | None:
+        """The first one's fit in the stretch of another."""
+        if self.first is None:
+            return None
         if found.end not in self.stretches:
             (first, about), problem = self.first, self.search.problem
             with about_another(problem, about):
-                own = fit(problem, first.hypothesis, found.records, found.end, iterations=0)
-            self.stretches[found.end] = own
-        first = self.stretches[found.end]
-        gap = decisive_gain(found, first)
-        if fall is None:
-            return gap >= _CLOSE
-        return gap >= _BEHIND and found.cost - first.cost >= _FALLS * fall
+                again = partial(fit, problem, first.hypothesis, found.records, found.end)
+                self.stretches[found.end] = attempt("first", partial(again, iterations=0))
+        return self.stretches[found.end]
 
 
 def _stand_for_tolerances(problem: Problem) -> frozenset[str]:
@@ -208,7 +223,7 @@ def settled_by_itself(
     patient: bool = False,
     begin: About | None = None,
     rounds: int = 2,
-    behind: Callable[[Fit, float | None], bool] | None = None,
+    give_up: Callable[[Fit, float | None], bool] | None = None,
 ) -> tuple[Fit | None, About]:
     """A fit about its own inexact numbers, and what the records are linearised about for it.
 
@@ -220,7 +235,7 @@ def settled_by_itself(
         patient: as of `settled`.
         begin: where what is not exact may be, to go on from there; else None.
         rounds: as of `settled`.
-        behind: as of `settled`.
+        give_up: as of `settled`.
 
     Returns:
         None where that fails.
@@ -229,7 +244,7 @@ def settled_by_itself(
     with about_another(search.problem, begin):
         settle = partial(
             settled, search.problem, start, search.records, rounds,
-            anew=anew, patient=patient, behind=behind,
+            anew=anew, patient=patient, give_up=give_up,
         )  # fmt: skip
         return attempt(label, settle), About.of(search.problem)
 

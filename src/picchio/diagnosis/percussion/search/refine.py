@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 
 from picchio.diagnosis.attempt import attempt
@@ -79,5 +78,6 @@ def refined(search: Search, trials: Sequence[Trial]) -> list[Trial]:
             continue
         held = search.held_out_gain(best.fit, fitted)
         if held is None or held > 0.0:
-            return [replace(best, label=label, fit=fitted, score=bic(fitted), about=None), *trials]
+            finer = Trial(label, fitted, bic(fitted), best.promise)
+            return [finer, *trials]
     return list(trials)

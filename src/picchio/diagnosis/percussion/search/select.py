@@ -278,7 +278,9 @@ def _of_another_kind(search: Search, best: Trial) -> Trial:
     with about_another(search.problem, best.about):
         again = restarted(search, best.fit)
         about = About.of(search.problem)
-    return best if again is best.fit else replace(best, fit=again, score=bic(again), about=about)
+    if again is best.fit:
+        return best
+    return replace(best, fit=again, score=bic(again), about=about, in_vain=False)
 
 
 def _without_earlier(search: Search, newest: str) -> Fit:
@@ -290,7 +292,7 @@ def _without_earlier(search: Search, newest: str) -> Fit:
     best, problem = search.best, search.problem
     if not allowed(problem) or newest not in search.labels:
         return best
-    for label in search.labels - {newest}:
+    for label in sorted(search.labels - {newest}):
         rest = best.hypothesis.minus(label)
         without = attempt(f"without {label}", partial(search.fit, rest, iterations=5))
         if without is None or without.chi_square > ELSE * without.samples:

@@ -214,7 +214,7 @@ def settled(
     *,
     anew: bool = True,
     patient: bool = False,
-    behind: Callable[[Fit, float | None], bool] | None = None,
+    give_up: Callable[[Fit, float | None], bool] | None = None,
 ) -> Fit:
     """A hypothesis fitted together with what is not exact, linearised where it comes to stand.
 
@@ -230,8 +230,9 @@ def settled(
         anew: begin where everything is as stated; else where it is taken to be now. Without the
             right cause it was pulled to wherever it made up for that.
         patient: go on however much is left on the way: nothing else is wrong.
-        behind: whether it is given up, told a fit on the way and how much less that left than one
-            by slopes taken before; None where there were none.
+        give_up: asked of a fit on the way. Its second argument is by how much the cost fell since
+            slopes were taken before; None where they were not, which is asked only of what begins
+            near.
 
     Raises:
         InputError: it is given up.
@@ -248,7 +249,7 @@ def settled(
     if near:
         ends = (None,)  # no cycle is skipped any more
     for end in ends:
-        here = _settled_up_to(problem, here, records, end, rounds, else_wrong, behind, near)
+        here = _settled_up_to(problem, here, records, end, rounds, else_wrong, give_up, near)
     found = fit(problem, here, records, None, with_jacobian=True)
     if is_nonsmooth(here) and found.chi_square <= ELSE * found.samples:
         found = with_those_left_behind(problem, found)
@@ -407,7 +408,7 @@ def _settled_up_to(
     end: float | None,
     rounds: int,
     else_wrong: float,
-    behind: Callable[[Fit, float | None], bool] | None = None,
+    give_up: Callable[[Fit, float | None], bool] | None = None,
     near: bool = False,
 ) -> Hypothesis:
     """As `settled`, of a first part of the records; slopes serve as long as they lead on."""
@@ -419,7 +420,7 @@ def _settled_up_to(
             found = fit(problem, here, records, end, iterations=4)
             fall = None if earlier is None else earlier - found.cost
             known = not moves and (near or fall is not None)
-            if behind is not None and known and behind(found, fall):
+            if give_up is not None and known and give_up(found, fall):
                 raise InputError("another leaves far less")
             if found.chi_square > else_wrong * max(found.samples, 1):
                 return _at_stated(problem, found, end)
