@@ -39,8 +39,6 @@ _FINER = 16  # steps of a blow's transform in one of the record's
 # Where masses, poses and places would be so many standard deviations off, root mean square,
 # something else is wrong than springs.
 _STRAINED = 3.0
-# How exactly the most probable place is found, log probability: a fit in time only begins there.
-_NEAR = 0.1
 # How hard all blows are, and how far that may be off.
 _HARD, _HARDER = "force", 0.1
 
@@ -138,7 +136,7 @@ def rough(
         off = at[shared]
         return float(off @ off) > _STRAINED**2 * len(shared)
 
-    climbs = partial(climb, problem, tail=TAILS, least=_NEAR, astray=astray)
+    climbs = partial(climb, problem, tail=TAILS, astray=astray)
     with worker_pool(workers, {"climb": climbs}) as mapped:
         climbed = [one for one in mapped("climb", places) if one and not astray(one.mean)]
     if not climbed:

@@ -491,7 +491,6 @@ def climb(
     tail: float = math.inf,
     rows: BoolArray | None = None,
     *,
-    least: float = 1e-6,
     astray: Callable[[FloatArray], bool] = lambda at: False,
 ) -> Fit:
     """The most probable numbers near a place, with the noise of the highest evidence.
@@ -501,7 +500,6 @@ def climb(
         at: (p,) where to begin.
         tail: degrees of freedom of the rows' errors; infinite: normal.
         rows: (rows,) which of them count; all if None.
-        least: it ends once a step promises less, twice the log probability.
         astray: whether numbers are such that going on is in vain: it ends where they stay so.
 
     Returns:
@@ -527,7 +525,7 @@ def climb(
     last = math.inf
     for _ in range(_ROUNDS):
         state = _State(problem, state.at, tail, keep)
-        state = _newton(problem, state, tail, keep, noise, least, astray)
+        state = _newton(problem, state, tail, keep, noise, astray)
         if astray(state.at):
             break
         for k in range(len(noise)):
@@ -564,7 +562,6 @@ def _newton(
     tail: float,
     keep: BoolArray,
     noise: FloatArray,
-    least: float,
     astray: Callable[[FloatArray], bool],
 ) -> _State:
     size = np.exp(noise)
@@ -576,7 +573,7 @@ def _newton(
             break
         step = -np.linalg.solve(state.step_matrix, state.gradient)
         gain = -float(step @ state.gradient)
-        if gain < least:
+        if gain < 1e-6:
             break
         # No spring changes by more than a factor of e at once.
         share = min(1.0, 1.0 / max(float(np.abs(step[: problem.springs]).max()), 1e-300))
