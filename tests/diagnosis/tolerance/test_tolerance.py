@@ -21,7 +21,12 @@ from picchio.diagnosis.percussion.criteria.remainder import (
     decisive_gain,
     tempered_evidence,
 )
-from picchio.diagnosis.percussion.data.problem import Problem, held_out, residual_under
+from picchio.diagnosis.percussion.data.problem import (
+    Problem,
+    held_out,
+    residual_under,
+    signal_power,
+)
 from picchio.diagnosis.percussion.diagnosis import _told_by_slopes, diagnose_percussion
 from picchio.diagnosis.percussion.fit.drawn import refit
 from picchio.diagnosis.percussion.fit.least_squares import (
@@ -690,6 +695,18 @@ def test_a_better_fit_is_decisive_only_if_little_is_left_of_it():
     # What is known beforehand counts in full, whatever the remainder.
     assert decisive_gain(left(0.0, 90.0), left(0.0, 40.0)) == pytest.approx(50.0, abs=3.0)
     assert decisive_gain(left(0.0, 90.0), left(0.0)) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_a_stretch_leaves_is_compared_with_the_signal_in_it():
+    """A signal that begins late: in the first half there is a tenth of it."""
+    signal = np.concatenate([10.0 * np.sin(np.arange(500.0)), 100.0 * np.sin(np.arange(500.0))])
+    half = SimpleNamespace(samples=SimpleNamespace(count=500))
+    record = SimpleNamespace(
+        values={"x": signal}, noise={"x": SimpleNamespace(std=2.0)}, until=lambda end: half
+    )
+    first = 0.25 * 500 * signal[:500].var()
+    assert signal_power([record, record], 0.1) == pytest.approx(2.0 * first)
+    assert signal_power([record]) == pytest.approx(0.25 * 1000 * signal.var())
 
 
 def test_numbers_that_are_absurdly_far_off_speak_for_no_model():

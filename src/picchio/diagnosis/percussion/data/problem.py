@@ -636,7 +636,7 @@ def signal_power(records: Sequence[MeasuredRecord], end: float | None = None) ->
     """
     total = 0.0
     for record in records:
-        count = record.until(end).samples.count
+        count = None if end is None else record.until(end).samples.count
         for name, values in record.values.items():
             total += float(values[:count].var()) * len(values[:count]) / record.noise[name].std ** 2
     return total
