@@ -76,7 +76,7 @@ def test_a_robot_as_stated_is_left_alone(worlds):
 
 
 def test_springs_are_told_apart_from_a_load_that_masses_would_have_to_make_up_for(worlds):
-    """20 kg more were told as springs of 0.73, 0.60 and 0.73, all masses six tolerances off."""
+    """20 kg more were told as springs of 0.73, 0.60 and 0.73."""
     robot = load_robot("fanuc_like_3dof")
     loaded, _ = worlds.make(
         seed=5, causes=[("payload", "tool", {"mass": 20.0})], records=6, mismatch=1.0

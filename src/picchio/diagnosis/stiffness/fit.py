@@ -34,7 +34,7 @@ _NOISE_STD = math.log(10.0) / 1.645  # the instrument's stated noise is right wi
 _LEAST_NOISE = 1e-9  # m or rad, of files that are exact
 _PLAY = 1e-3  # rad or m: what play a joint may have, one standard deviation
 _STEPS, _ROUNDS = 60, 12
-_LOST = 3
+_LOST = 3  # steps in turn that may be astray: a long one may lead back
 
 
 @dataclass(frozen=True, eq=False)
@@ -566,7 +566,7 @@ def _newton(
 ) -> _State:
     size = np.exp(noise)
     score = state.weigh(size)
-    lost = 0  # steps in turn: one may lead back
+    lost = 0
     for _ in range(_STEPS):
         lost = lost + 1 if astray(state.at) else 0
         if lost > _LOST:
