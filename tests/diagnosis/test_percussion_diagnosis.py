@@ -99,6 +99,19 @@ def test_explained_is_what_the_contract_says():
     assert Gain(("a",), ("b",), 0.03, 0.0195, 0.020).explained == 1.0
 
 
+def test_a_gain_is_told_as_it_went():
+    def told(before: float, after: float) -> str:
+        return Gain(("a",), ("b",), before, after, 0.020).told
+
+    assert told(0.31, 0.1) == (
+        "the error falls from 31 % to 10 % of the signal (noise alone: 2 %): "
+        "90.0 % of what is wrong is explained"
+    )
+    assert told(0.02, 0.02) == "the error stays at 2 % of the signal (noise alone: 2 %)"
+    worse = told(0.20, 0.30)
+    assert worse == "the error rises from 20 % to 30 % of the signal (noise alone: 2 %)"
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

@@ -44,8 +44,8 @@ _SCATTER = 0.01
 Verdict = Literal["nothing-wrong", "named", "ambiguous", "partial", "unexplained"]
 VERDICTS: dict[str, str] = {
     "nothing-wrong": "the residual is noise and what the tolerances allow",
-    "named": "the causes leave noise, and no more than a small remainder",
-    "ambiguous": "two or more sets of causes do so, and these data cannot tell them apart",
+    "named": "the causes explain the records; what is left is noise, or little more",
+    "ambiguous": "several sets of causes explain the records; these data cannot tell them apart",
     "partial": "the causes, or what acts much like them, explain most; more than noise is left",
     "unexplained": "more than noise is left and no cause may be claimed",
 }
@@ -224,6 +224,19 @@ class Gain:
         if to_explain <= _SCATTER * self.noise_floor_nrmse**2:
             return None
         return min((self.baseline_nrmse**2 - self.extended_nrmse**2) / to_explain, 1.0)
+
+    @property
+    def told(self) -> str:
+        """The end of a sentence that begins with the records, without its stop."""
+        was, now, noise = (
+            f"{100.0 * x:.3g} %"
+            for x in (self.baseline_nrmse, self.extended_nrmse, self.noise_floor_nrmse)
+        )
+        way = "falls" if self.extended_nrmse < self.baseline_nrmse else "rises"
+        change = f"stays at {was}" if was == now else f"{way} from {was} to {now}"
+        share = 100.0 * (self.explained or 0.0)
+        explained = f": {share:.1f} % of what is wrong is explained" if share > 0.0 else ""
+        return f"the error {change} of the signal (noise alone: {noise}){explained}"
 
     def to_dict(self) -> dict[str, Any]:
         """As in JSON."""

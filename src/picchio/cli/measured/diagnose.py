@@ -168,15 +168,10 @@ def show_diagnosis(found: Diagnosis, plan: Path | None = None) -> None:
         out.print(f"  not looked for: {names} ({why})")
     gain = found.gain
     if gain is not None:
-        share = "" if gain.explained is None else f"; {100 * gain.explained:.1f} % explained"
         where = f"On {count_of(len(gain.held_out_records), 'record')} held out"
         if not gain.held_out_records:
             where = "Nothing was held out; on what was fitted"
-        out.print(
-            f"{where} the residual falls from "
-            f"{100 * gain.baseline_nrmse:.3g} % to {100 * gain.extended_nrmse:.3g} % of the "
-            f"signal; noise alone is {100 * gain.noise_floor_nrmse:.3g} %{share}."
-        )
+        out.print(f"{where} {gain.told}.")
     if found.remainder is not None:
         out.print(f"  {found.remainder.told}")
     if found.told_without:
@@ -237,9 +232,9 @@ def _show_life(life: Mapping[str, Any]) -> None:
     out.print(table(columns, rows, ruled=False, head_style="dim", title="Life"))
     if "interval_level" in life:
         out.print(
-            f"  {100 * life['interval_level']:g} % intervals: before, of all that has a tolerance; "
-            "after, of what the records leave open of it, and of what differs from burst to burst. "
-            "The material's scatter is not in them (picchio assess --uncertainty)",
+            f"  {100 * life['interval_level']:g} % intervals. Before: all that has a tolerance "
+            "may be off. After: as far as the records leave that open, and bursts differ. The "
+            "material's scatter is not in them: picchio assess --uncertainty has it",
             style="dim",
         )
 

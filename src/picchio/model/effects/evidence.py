@@ -26,7 +26,7 @@ LACKING = {
     "reshaped": "blows of a force that was measured have no other shape to turn into",
     "days": "the records are not of several known dates",
     "kelvin": "the records are not of several known temperatures",
-    "motion": "blows alone tell it in fewer numbers: a simpler effect is looked for in its place",
+    "motion": "in blows it looks like a simpler effect, which is looked for; motions show it",
 }
 """What an effect may take of the records (`Effect.takes`), and what is wrong without it."""
 

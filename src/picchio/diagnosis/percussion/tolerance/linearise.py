@@ -237,7 +237,6 @@ def settled(
     Raises:
         InputError: it is given up.
     """
-    else_wrong = math.inf if patient else ELSE
     if not any(inexact(problem, problem.records[0], problem.campaign.tolerance)):
         return start
     if anew:
@@ -248,14 +247,43 @@ def settled(
     near = not anew and start.end is None and start.chi_square <= ELSE * start.samples
     if near:
         ends = (None,)  # no cycle is skipped any more
+    terms = _Terms(rounds, math.inf if patient else ELSE, give_up, near)
     for end in ends:
-        here = _settled_up_to(problem, here, records, end, rounds, else_wrong, give_up, near)
+        here = _settled_up_to(problem, here, records, end, terms)
     found = fit(problem, here, records, None, with_jacobian=True)
     if is_nonsmooth(here) and found.chi_square <= ELSE * found.samples:
         found = with_those_left_behind(problem, found)
-    if found.chi_square > else_wrong * found.samples:
+    if found.chi_square > terms.else_wrong * found.samples:
         return _unless_little(problem, found)
     return found
+
+
+@dataclass(frozen=True)
+class _Terms:
+    """How long what is not exact is settled.
+
+    Attributes:
+        rounds: how often slopes are taken at most.
+        else_wrong: chi-square per sample above which something else is wrong.
+        give_up: as of `settled`.
+        near: whether it begins where little is left.
+    """
+
+    rounds: int
+    else_wrong: float = math.inf
+    give_up: Callable[[Fit, float | None], bool] | None = None
+    near: bool = False
+
+    def in_vain(self, found: Fit, fall: float | None, moves: int) -> bool:
+        """Whether a fit is given up, after so many moves by the same slopes.
+
+        Args:
+            found: the fit.
+            fall: of its cost since slopes were taken before; None where they were not.
+            moves: how many; only one with new slopes tells anything new.
+        """
+        known = not moves and (self.near or fall is not None)
+        return self.give_up is not None and known and self.give_up(found, fall)
 
 
 def released(problem: Problem, found: Fit, least: float) -> Fit:
@@ -288,7 +316,7 @@ def released(problem: Problem, found: Fit, least: float) -> Fit:
     begun = fit(problem, found.hypothesis, records, None, iterations=6)
     # Slopes foretell more than comes of it, if anything.
     if begun.cost < found.cost - least:
-        here = _settled_up_to(problem, begun.hypothesis, records, None, 1, math.inf)
+        here = _settled_up_to(problem, begun.hypothesis, records, None, _Terms(1))
         again = fit(problem, here, records, None, with_jacobian=True)
         if again.cost < found.cost:
             return again
@@ -406,23 +434,19 @@ def _settled_up_to(
     here: Hypothesis,
     records: Sequence[MeasuredRecord],
     end: float | None,
-    rounds: int,
-    else_wrong: float,
-    give_up: Callable[[Fit, float | None], bool] | None = None,
-    near: bool = False,
+    terms: _Terms,
 ) -> Hypothesis:
     """As `settled`, of a first part of the records; slopes serve as long as they lead on."""
     before, earlier = math.inf, None
-    for _ in range(rounds):
+    for _ in range(terms.rounds):
         linearise(problem, here, records, end)
         moves = 0
         while moves < _MOVES:
             found = fit(problem, here, records, end, iterations=4)
             fall = None if earlier is None else earlier - found.cost
-            known = not moves and (near or fall is not None)
-            if give_up is not None and known and give_up(found, fall):
+            if terms.in_vain(found, fall, moves):
                 raise InputError("another leaves far less")
-            if found.chi_square > else_wrong * max(found.samples, 1):
+            if found.chi_square > terms.else_wrong * max(found.samples, 1):
                 return _at_stated(problem, found, end)
             if not moves:
                 earlier = found.cost
