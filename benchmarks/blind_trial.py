@@ -173,7 +173,10 @@ def main():
     wrong.add_argument("--robots", type=words, default=[ARM], help="by commas")
     wrong.add_argument("--kinds", type=words, default=["null", "single"], help="by commas")
     wrong.add_argument("--seeds", type=span, help="draws a:b, without b; 0:10")
-    wrong.add_argument("--sensors", type=words, help="such as accelerometer; else with deflections")
+    wrong.add_argument(
+        "--sensors", type=words,
+        help="such as accelerometer; with force among them it is read, not programmed; else all",
+    )  # fmt: skip
     wrong.add_argument("--errors", type=words, help="keys of [tolerance] that are off; else all")
     wrong.add_argument("--effects", type=words, help="hidden first, in turn; else drawn")
     wrong.add_argument("--snr", type=int, default=40, help="dB")

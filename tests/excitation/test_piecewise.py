@@ -136,6 +136,19 @@ def test_reading_a_measured_force(tmp_path):
     assert alone.period == pytest.approx(0.004)
 
 
+@pytest.mark.parametrize("first", [-0.0005, 0.0, 0.00025])
+def test_a_recorded_force_keeps_its_time(first):
+    """t = 0 need not be at a sample; where there is none before it, the first one holds."""
+    time = first + 0.0005 * np.arange(9)
+    samples = 1000.0 + 4e5 * time
+    force = MeasuredForce.from_start(time, samples)
+    assert force.time[0] == 0.0 and force.period == pytest.approx(time[-1])
+    later = np.linspace(max(first, 0.0), time[-2], 7)
+    blow = force.blow()
+    assert [float(blow(np.array([t]))[0]) for t in later] == pytest.approx(1000.0 + 4e5 * later)
+    assert force.samples[0] == pytest.approx(1000.0 + 4e5 * max(first, 0.0))
+
+
 @pytest.mark.parametrize(
     ("text", "part"),
     [

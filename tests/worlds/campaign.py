@@ -75,6 +75,7 @@ NOT_OF_THE_PLAN = (
     "nuisances",
     "engine",
     "modal",
+    "programmed",
     "strength",
     "causes",
     "mismatch",
@@ -112,6 +113,7 @@ def make(
     modal="joints",
     mismatch=0.0,
     only=None,
+    programmed=True,
     **options,
 ):
     """A campaign, and the truth about it.
@@ -134,6 +136,7 @@ def make(
             deviations, and the campaign says so; else all is normal, and it says nothing: the
             format's tolerances hold.
         only: keys of `[tolerance]` that are off, with a mismatch; all where None.
+        programmed: whether the campaign states the blows; else the force is read, as "force".
         **options: `strength`, and of `plan.make`: hits, period, width, sampling, force, offset, ...
 
     Returns:
@@ -173,7 +176,7 @@ def make(
                 {name: np.ascontiguousarray(values) for name, values in arrays.items()},
                 pose=dict(zip(nominal.joints, map(float, shot.pose), strict=True)),
                 direction=[float(v) for v in shot.direction],
-                force=shot.force,
+                force=shot.force if programmed else None,
                 time=_START + timedelta(days=shot.when),
                 temperature=shot.temperature,
             )
@@ -185,7 +188,7 @@ def make(
         taken,
         robot=robot,
         tool=nominal.tool,
-        excitation=table,
+        excitation=table if programmed else None,
         tolerance=None if mismatch else _EXACT,
     )
     truth = {

@@ -32,6 +32,7 @@ class Plan:
         sampling: Hz.
         quiet, ring: s before the first blow, and after the burst.
         offset: of the samples from t = 0, in steps.
+        blend: what a blow is like that nothing is wrong with: 0 a rectangle, 1 a half-sine.
     """
 
     robot: str
@@ -44,6 +45,7 @@ class Plan:
     ring: float = 0.75
     offset: float = 0.5
     force: float = field(default=300.0)
+    blend: float = 0.0
 
     def times(self):
         """(m,) s of the samples."""

@@ -94,7 +94,9 @@ class World:
             robot=robot,
             pose=pose,
             direction=np.asarray(shot.direction, float) / np.linalg.norm(shot.direction),
-            blows=Blows(shot.force * self.nuisances.force, plan.period, plan.width, hits),
+            blows=Blows(
+                shot.force * self.nuisances.force, plan.period, plan.width, hits, blend=plan.blend
+            ),
             chain=chain,
             springs=robot.springs(torque) * self.nuisances.stiffness,
             damping_ratio=robot.damping_ratio * self.nuisances.damping_ratio,

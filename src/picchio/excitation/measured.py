@@ -96,6 +96,20 @@ class MeasuredForce(Excitation):
         table = np.reshape(read_columns(path, ("time [s]", "force [N]")), (-1, 2))
         return cls(table[:, 0], table[:, 1], period or 0.0, preload, str(path))
 
+    @classmethod
+    def from_start(cls, time: FloatArray, samples: FloatArray) -> Self:
+        """The force of a record from t = 0 on, which may lie between two of its samples.
+
+        Args:
+            time: (m,) s, ascending; before 0 it is quiet.
+            samples: (m,) N.
+        """
+        after = time > 1e-12
+        return cls(
+            np.concatenate([[0.0], time[after]]),
+            np.concatenate([[np.interp(0.0, time, samples)], samples[after]]),
+        )
+
     @property
     def peak_force(self) -> float:
         """The largest absolute force of the record, N."""

@@ -549,16 +549,17 @@ def _blows(record: Record) -> Blows:
         from picchio.excitation.measured import MeasuredForce
 
         data = record.read(["force"])
-        after = data["time"] >= -1e-12
-        excitation = MeasuredForce(data["time"][after], data["force"][after])
+        excitation = MeasuredForce.from_start(data["time"], data["force"])
         return Blows.of(excitation, 1, direction).change(recorded=True)
     return Blows.of(excitation, record.hits, direction)
 
 
 def _channels(record: Record, robot: FlexibleRobot) -> tuple[Channel, ...]:
-    found = []
+    found, drives = [], record.blows() is None
     for name in record.channels:
         channel = record.channel(name)
+        if channel.kind.of_force and drives:
+            continue  # what the prediction is driven by says nothing of it
         if channel.kind.reader is None:
             if not channel.kind.unused:
                 warn_user(

@@ -51,6 +51,11 @@ SETS = {
     "thermal_stiffness": (None, 2),
 }
 
+# Where the force is read, by a load cell: half-sines of 4 ms, 12 records of 1 s at 2 kHz.
+READ = {
+    "programmed": False, "blend": 1.0, "sampling": 2000.0, "hits": 5, "ring": 0.65, "records": 12,
+}  # fmt: skip
+
 
 def class_of(effect, target=""):
     """An effect and what cannot be told from it: its class."""
@@ -114,6 +119,8 @@ def make(case, salt=0):
     kind = kind.get(case["kind"], case["kind"])
     options = {"sensors": tuple(sensors), "records": case.get("records", 3 if few else 18)}
     options |= wrong
+    if "force" in sensors:
+        options |= READ
     if case["kind"] == "mixed":  # a catalogued cause, and a little of what no catalogue has
         rest = {"robot": case["robot"], **options}
         causes = cases.causes("single", seed, effect=case.get("effect"), **rest)
@@ -158,14 +165,14 @@ def run(case, salt=0, without=(), method="diagnose", workers=1):
     # What is outside of the catalogue stays outside where the catalogue has learnt it.
     hidden = {name for cause in truth["causes"] for name in outside(cause["effect"])}
     without = {*without, *(hidden if case["kind"] == "outside" else ())}
-    robot = picchio.load_robot(case["robot"])
+    robot, read = picchio.load_robot(case["robot"]), "force" in case.get("sensors", ())
     began, spent = time.monotonic(), time.process_time()
     if method == "diagnose":
         found = diagnose_percussion(robot, campaign, without=without, workers=workers)
         result = judge(case, truth, found)
         if case["kind"] in ("few", "sets") and found.diagnosis.verdict == "ambiguous":
             result["follow_up"] = follow(robot, case, campaign, truth, found, seed_of(case, salt))
-        if truth["causes"] and result["right"]:
+        if truth["causes"] and result["right"] and not read:
             result["burst"] = burst.errors(found, truth, seed_of(case, salt))
             if not case.get("mismatch"):  # else what the true causes remove is not all
                 result["removed"] = removed.share(found, truth)
@@ -178,7 +185,7 @@ def run(case, salt=0, without=(), method="diagnose", workers=1):
         result |= outcomes.judge(case, truth, result)
         if method == "diagnose" and result["outcome"] == "right":
             result["known"] = outcomes.known(found.diagnosis, robot, truth)
-            result["lives"] = burst.lives(found, truth, seed_of(case, salt))
+            result["lives"] = {} if read else burst.lives(found, truth, seed_of(case, salt))
     result["seconds"] = round(time.monotonic() - began, 1)
     result["cpu_seconds"] = round(time.process_time() - spent, 1)
     return result
@@ -266,6 +273,7 @@ def _head(case):
         "snr": case["snr"],
     }
     if "mismatch" in case:
-        sensors = "accelerometer" if case.get("sensors") else "all"
+        given = case.get("sensors") or ()
+        sensors = "force read" if "force" in given else "accelerometer" if given else "all"
         head |= {"mismatch": case["mismatch"], "sensors": sensors}
     return head

@@ -132,8 +132,7 @@ def diagnosis_scene(found: PercussionDiagnosis, **options: Any) -> Scene:
     if blows is None:
         # Only measured: what the tool did from the first blow on.
         data = record.read(["force"])
-        after = data["time"] >= -1e-12
-        blows, hits = MeasuredForce(data["time"][after], data["force"][after]), 1
+        blows, hits = MeasuredForce.from_start(data["time"], data["force"]), 1
     return build_scene(
         found.problem.robot,
         setup.geometry.pose,
