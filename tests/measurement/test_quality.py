@@ -37,6 +37,18 @@ def test_nothing_wrong_and_the_noise_known(worlds, robot, seed):
         assert noise.std == pytest.approx(np.ravel(truth["noise"][group])[0], rel=0.1)
 
 
+def test_records_of_a_recorded_force_are_bursts_from_rest(worlds, robot):
+    """Their quiet time tells the noise, as that of programmed blows does."""
+    sensors = ("accelerometer", "deflection", "force")
+    report, truth, _ = check(worlds, robot, [], records=3, sensors=sensors, programmed=False,
+                             blend=1.0, sampling=2000.0)  # fmt: skip
+    assert {record.blows for record in report.records} == {"the force was recorded"}
+    assert not any(record.steady for record in report.campaign)
+    for name, noise in report.noise.items():
+        group = name.rpartition(".")[0] if name.startswith("acc") else name.partition(".")[0]
+        assert noise.std == pytest.approx(np.ravel(truth["noise"][group])[0], rel=0.2)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur10", "kinova_gen3", "kuka_iiwa14"])
 def test_nothing_wrong_with_other_robots(worlds, name):

@@ -199,6 +199,12 @@ class Record:
         """Blows of the burst, one of a tap; None in a steady record."""
         return self.excitation.hits or (1 if self.test == "tap" else None)
 
+    @property
+    def steady(self) -> bool:
+        """Whether the blows never end. A force that is only recorded begins from rest."""
+        stated = self.excitation.blows.model_dump(exclude_none=True)
+        return self.kind == "percussion" and self.hits is None and bool(stated)
+
     def blows(self) -> Excitation | None:
         """The programmed blow train; None where none is stated.
 

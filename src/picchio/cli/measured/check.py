@@ -150,15 +150,16 @@ def _show_contents(report: QualityReport) -> None:
         poses = {tuple(r.pose.items() if isinstance(r.pose, dict) else r.pose or ()) for r in hits}
         directions = {tuple(np.round(r.direction or [], 6)) for r in hits}
         levels = sorted({r.excitation["force"] for r in hits if "force" in r.excitation})
-        level = (
-            f"{levels[0]:g}" + (f" to {levels[-1]:g}" if len(levels) > 1 else "") if levels else "?"
-        )
-        steady = sum("hits" not in r.excitation for r in hits)
+        level = "the force recorded"
+        if levels:
+            level = f"{levels[0]:g}" + (f" to {levels[-1]:g}" if len(levels) > 1 else "")
+            level = f"{count_of(len(levels), 'level')} ({level} N)"
+        steady = sum(record.steady for record in campaign)
         bursts = f"{count_of(len(hits) - steady, 'burst')}, {steady} steady"
         out.print(
             f"  percussion: {count_of(len(hits), 'record')} ({bursts}), "
             f"{count_of(len(poses), 'pose')}, {count_of(len(directions), 'direction')}, "
-            f"{count_of(len(levels), 'level')} ({level} N)"
+            f"{level}"
         )
     if motions:
         seconds = sum(r.end - r.start for r in motions)

@@ -64,7 +64,7 @@ class Window:
     @property
     def steady(self) -> bool:
         """A percussion record whose blows never end."""
-        return self.record.kind == "percussion" and self.record.hits is None
+        return self.record.steady
 
     @property
     def burst_end(self) -> float | None:

@@ -74,8 +74,11 @@ def summarise(scan: RecordScan) -> RecordSummary:
     blows = scan.window.blows
     words = None
     if not motion:
-        words = blows.describe() if blows is not None else "not stated"
-        words += f", {record.hits} blows" if record.hits is not None else ", steady"
+        if blows is None and not record.steady:
+            words = "the force was recorded"
+        else:
+            words = blows.describe() if blows is not None else "not stated"
+            words += ", steady" if record.steady else f", {record.hits} blows"
     direction = record.direction
     return RecordSummary(
         record.file,
