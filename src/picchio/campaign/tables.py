@@ -125,7 +125,7 @@ class Tolerance(StrictModel):
         stiffness: 1, of each joint; drawn once a campaign, as all where nothing else is said.
         damping_ratio: 1, of all modes together.
         damping_by_mode: 1, of each mode by itself; once a pose.
-        force: 1, of the blows; as `sensor_gain`, where every record reads them and it is not stated.
+        force: 1, of the blows; as `sensor_gain` if not stated where all records read them.
         link_mass: 1, of each link.
         link_com: m, of each link's centre of mass along each axis.
         link_inertia: 1, of each link's moments of inertia.
