@@ -149,6 +149,23 @@ def test_a_recorded_force_keeps_its_time(first):
     assert force.samples[0] == pytest.approx(1000.0 + 4e5 * max(first, 0.0))
 
 
+def test_the_noise_of_a_force_sensor_is_no_force():
+    """It would shake the model on and on: what does not rise out of the quiet time's noise is 0."""
+    rng, time = np.random.default_rng(3), 5e-4 * np.arange(-200, 1000)
+    pulse = np.where(
+        (time >= 0.1) & (time < 0.104), 300.0 * np.sin(np.pi * (time - 0.1) / 4e-3), 0.0
+    )
+    read = 2.0 + pulse + 0.3 * rng.standard_normal(time.size)  # its zero is off, too
+    force = MeasuredForce.from_start(time, read)
+    acts = (force.time >= 0.0995) & (force.time <= 0.1045)
+    assert not force.samples[~acts].any()
+    there = np.interp(force.time, time, pulse)
+    assert np.abs(force.samples - there)[acts].max() < 1.5
+    # Without a quiet time nothing is known of its noise.
+    alone = MeasuredForce.from_start(time[time >= 0.0], read[time >= 0.0])
+    np.testing.assert_array_equal(alone.samples, read[time >= 0.0])
+
+
 @pytest.mark.parametrize(
     ("text", "part"),
     [

@@ -14,6 +14,10 @@ from picchio.core.files import read_columns
 from picchio.excitation.excitation import Excitation
 from picchio.excitation.piecewise import PiecewiseForce
 
+# Samples of the quiet time from which a force sensor's noise is known, and how many of its standard
+# deviations a force is above.
+_QUIET, _NOISE = 20, 5.0
+
 
 @dataclass(frozen=True, eq=False)
 class MeasuredForce(Excitation):
@@ -100,10 +104,19 @@ class MeasuredForce(Excitation):
     def from_start(cls, time: FloatArray, samples: FloatArray) -> Self:
         """The force of a record from t = 0 on, which may lie between two of its samples.
 
+        Where it does not rise out of the noise that the quiet time before shows, there is none: the
+        sensor's noise would shake the model for as long as the record lasts.
+
         Args:
             time: (m,) s, ascending; before 0 it is quiet.
             samples: (m,) N.
         """
+        quiet = samples[time < -1e-12]
+        if quiet.size >= _QUIET:
+            rest = float(quiet.mean())
+            acts = np.abs(samples - rest) > _NOISE * float(quiet.std())
+            beside = np.convolve(acts, np.ones(3), "same") > 0.0  # where a blow begins and ends
+            samples = np.where(beside, samples - rest, 0.0)
         after = time > 1e-12
         return cls(
             np.concatenate([[0.0], time[after]]),
